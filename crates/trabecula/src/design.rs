@@ -1,0 +1,1 @@
+//! The design: the data, and its one road to a solid.

@@ -1,0 +1,74 @@
+//! The one trait the extractor sees: value, gradient and bound. Negative is solid.
+
+use crate::math::{Aabb, Interval, Vec3};
+
+/// The nodes of a structured block: every combination of the three coordinate lists (mm), x running fastest.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<'a> {
+    /// Coordinates of the node planes along each axis, ascending.
+    pub axes: [&'a [f64]; 3],
+}
+
+impl Block<'_> {
+    /// Number of nodes along each axis.
+    pub fn shape(&self) -> [usize; 3] {
+        self.axes.map(<[f64]>::len)
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.shape().iter().product()
+    }
+
+    /// Whether the block has no node.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The box spanned by the nodes.
+    pub fn bounds(&self) -> Aabb {
+        let end = |a: &[f64]| a[a.len() - 1];
+        Aabb { min: self.axes.map(|a| a[0]), max: self.axes.map(end) }
+    }
+}
+
+/// A function of space. Evaluating cannot fail: whatever can be wrong is found when the field is built.
+pub trait Field: Send + Sync {
+    /// Fills `out[i]` with the value at `points[i]` (mm). The slices have equal length.
+    fn values(&self, points: &[Vec3], out: &mut [f64]);
+
+    /// Fills values and gradients (per mm). Where the function has a crease, one of the one-sided gradients.
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]);
+
+    /// An interval that contains every value in the box. Proven, so a block may be skipped by it.
+    fn bound(&self, b: &Aabb) -> Interval;
+
+    /// Fills `out` (x fastest) with the values at the block's nodes, rounded to f32.
+    ///
+    /// The default goes through points; structured fields override it, and there most of the speed is won.
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        let [xs, ys, zs] = block.axes;
+        let mut points = Vec::with_capacity(xs.len());
+        let mut values = vec![0.0; xs.len()];
+        let mut rows = out.chunks_exact_mut(xs.len());
+        for &z in zs {
+            for &y in ys {
+                points.clear();
+                points.extend(xs.iter().map(|&x| [x, y, z]));
+                self.values(&points, &mut values);
+                if let Some(row) = rows.next() {
+                    for (o, v) in row.iter_mut().zip(&values) {
+                        *o = *v as f32;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The value at one point (mm).
+    fn value(&self, p: Vec3) -> f64 {
+        let mut v = [0.0];
+        self.values(&[p], &mut v);
+        v[0]
+    }
+}

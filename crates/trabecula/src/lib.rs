@@ -1,0 +1,21 @@
+//! Trabecula: lattice design. A solid is a region and a field; a lattice is a cell (a function on the torus)
+//! seen through a map (position to phase), cut by a part at a level.
+//!
+//! Lengths are mm, angles degrees at the door, phases turns; negative is solid; triangles are counter-clockwise
+//! seen from outside.
+
+pub mod cell;
+pub mod design;
+pub mod extract;
+pub mod fault;
+pub mod field;
+pub mod grade;
+pub mod io;
+pub mod lattice;
+pub mod map;
+pub mod math;
+pub mod measure;
+pub mod mesh;
+pub mod region;
+pub mod render;
+pub mod solid;

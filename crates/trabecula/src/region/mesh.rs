@@ -1,0 +1,2 @@
+/// A closed triangle mesh.
+pub struct MeshRegion;
