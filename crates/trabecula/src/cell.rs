@@ -34,11 +34,7 @@ pub struct Cell {
 impl Cell {
     /// A cell from its series.
     pub fn new(series: Series) -> Cell {
-        Cell {
-            series,
-            table: OnceLock::new(),
-            connect: Default::default(),
-        }
+        Cell { series, table: OnceLock::new(), connect: Default::default() }
     }
 
     /// The series.

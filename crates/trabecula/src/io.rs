@@ -30,12 +30,7 @@ pub struct Metadata {
 }
 
 /// Writes a mesh in the format of `extension`: stl (binary), ply (binary), obj, 3mf.
-pub fn write_mesh<W: io::Write>(
-    mesh: &Mesh,
-    extension: &str,
-    meta: &Metadata,
-    out: &mut W,
-) -> io::Result<()> {
+pub fn write_mesh<W: io::Write>(mesh: &Mesh, extension: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
     let _ = (mesh, extension, meta, out);
     todo!()
 }

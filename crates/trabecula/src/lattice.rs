@@ -34,12 +34,7 @@ pub struct Lattice {
 impl Lattice {
     /// Checks and joins the pieces.
     pub fn new(cell: Arc<Cell>, map: Map, part: Part, level: Level) -> Result<Lattice, Fault> {
-        Ok(Lattice {
-            cell,
-            map,
-            part,
-            level,
-        })
+        Ok(Lattice { cell, map, part, level })
     }
 
     /// Fills the level t at points (mm).

@@ -17,12 +17,7 @@ pub type Skew = (usize, usize, f64);
 
 impl Affine {
     /// u = D Rᵀ (x − offset), after the shears are undone.
-    pub fn rigid(
-        wavelength: Vec3,
-        rotate: Vec3,
-        offset: Vec3,
-        skew: &[Skew],
-    ) -> Result<Affine, Fault> {
+    pub fn rigid(wavelength: Vec3, rotate: Vec3, offset: Vec3, skew: &[Skew]) -> Result<Affine, Fault> {
         let _ = (wavelength, rotate, offset, skew);
         todo!()
     }

@@ -147,8 +147,7 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
                 + w * (1.0 / 120.0
                     + w * (-1.0 / 5040.0
                         + w * (1.0 / 362880.0
-                            + w * (-1.0 / 39916800.0
-                                + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
+                            + w * (-1.0 / 39916800.0 + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
     let c = 1.0
         + w * (-0.5
             + w * (1.0 / 24.0
@@ -175,15 +174,9 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing; growing it by points gives their bounds.
-    pub const EMPTY: Aabb = Aabb {
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
+    pub const EMPTY: Aabb = Aabb { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     /// The box that contains everything.
-    pub const ALL: Aabb = Aabb {
-        min: [f64::NEG_INFINITY; 3],
-        max: [f64::INFINITY; 3],
-    };
+    pub const ALL: Aabb = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
 
     /// The smallest box that holds this one and `p`.
     pub fn with(mut self, p: Vec3) -> Aabb {
@@ -210,10 +203,7 @@ impl Aabb {
 
     /// The box grown by `by` on every side.
     pub fn grown(self, by: f64) -> Aabb {
-        Aabb {
-            min: self.min.map(|v| v - by),
-            max: self.max.map(|v| v + by),
-        }
+        Aabb { min: self.min.map(|v| v - by), max: self.max.map(|v| v + by) }
     }
 
     /// Its middle.
@@ -319,10 +309,7 @@ mod tests {
             let u = (f64::from(i) - 10_000.0) * 0.000_731;
             let (s, c) = sin_cos_turns(u);
             let (ls, lc) = (core::f64::consts::TAU * (u - u.floor())).sin_cos();
-            assert!(
-                (s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15,
-                "{u}: {s} {ls} {c} {lc}"
-            );
+            assert!((s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15, "{u}: {s} {ls} {c} {lc}");
         }
     }
 
