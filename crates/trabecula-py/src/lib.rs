@@ -57,7 +57,7 @@ mod _core {
         let known = trabecula::cell::named(name).ok_or_else(|| {
             pyo3::exceptions::PyKeyError::new_err(format!("no cell is named {name}"))
         })?;
-        let series = Series::new((known.terms)())
+        let series = Series::new(known.terms())
             .map_err(|f| pyo3::exceptions::PyRuntimeError::new_err(format!("cell {name}: {f}")))?;
         crate::run::run(py, None, None, |_| {
             let cell = Cell::new(series);

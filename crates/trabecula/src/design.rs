@@ -14,6 +14,8 @@ mod region;
 mod report;
 mod sample;
 mod schema;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 

@@ -7,7 +7,6 @@ use super::error::DesignError;
 use super::report::Varied;
 use super::{Built, Design, Loader, Warning, level, region, sample};
 use crate::cell::{Cell, Part, Series, Term, named};
-use crate::fault::Fault;
 use crate::field::Field;
 use crate::lattice::Lattice;
 use crate::map::{Affine, Map};
@@ -114,7 +113,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
                 let names: Vec<&str> = crate::cell::catalogue().iter().map(|n| n.name).collect();
                 DesignError::unknown(&below("cell"), "cell", name, &names)
             })?;
-            (Some(name.as_str()), (known.terms)(), below("cell"))
+            (Some(name.as_str()), known.terms(), below("cell"))
         }
         CellSpec::Kind(CellKind::Series(s)) => {
             let at = below("cell.series");
@@ -139,8 +138,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
         points: place.points,
     };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
-    Lattice::new(cell, map, spec.part.into(), level)
-        .map_err(|f: Fault| DesignError::fault(&place.path, f))
+    Ok(Lattice::new(cell, map, spec.part.into(), level))
 }
 
 fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {

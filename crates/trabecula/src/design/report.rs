@@ -5,7 +5,6 @@ use serde_json::{Value as Json, json};
 use super::{Built, build::LOOKS, sample};
 use crate::cell::Part;
 use crate::lattice::{Lattice, Level};
-use crate::map::Map;
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,8 +119,8 @@ pub(super) fn report(built: &Built) -> Json {
 
 /// The thinnest wall or narrowest neck (mm) at the ends of the level's range; null where there is none.
 fn thickness(lattice: &Lattice, iso: Varied) -> Json {
-    let Map::Affine(a) = &lattice.map;
-    let at = |t| lattice.cell.thickness(lattice.part, t, &a.matrix);
+    let to_phase = lattice.map.jacobian([0.0; 3]);
+    let at = |t| lattice.cell.thickness(lattice.part, t, &to_phase);
     match (
         at(iso.min),
         if iso.min == iso.max {

@@ -3,9 +3,9 @@
 use crate::math::{Aabb, Vec3};
 use crate::region::Region;
 
-/// About `count` points inside the region, spread evenly: the additive recurrence of the plastic number's
-/// three-dimensional kin (Roberts 2018), which keeps step with no lattice, unlike a grid. Fewer come where the region
-/// is a tiny share of its bounds. Also the share of the bounds that is inside.
+/// About `count` points inside the region, spread evenly: Halton's sequence in bases 2, 3 and 5 over the bounds, which
+/// keeps step with no lattice, unlike a grid. Fewer come where the region is a tiny share of its bounds. Also the
+/// share of the bounds that is inside.
 pub(super) fn inside(region: &Region, count: usize) -> (Vec<Vec3>, f64) {
     let bounds = region.bounds();
     let trial = (count / 8).clamp(2_000, 50_000);
@@ -47,11 +47,19 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
 
 /// Point `i` of the sequence in the box.
 fn place(b: &Aabb, i: usize) -> Vec3 {
-    /// Real root of g⁴ = g + 1.
-    const G: f64 = 1.220_744_084_605_759_5;
     let size = b.size();
-    let step = [1.0 / G, 1.0 / (G * G), 1.0 / (G * G * G)];
-    core::array::from_fn(|a| b.min[a] + size[a] * (0.5 + i as f64 * step[a]).fract())
+    core::array::from_fn(|a| b.min[a] + size[a] * mirrored(i + 1, [2, 3, 5][a]))
+}
+
+/// The digits of `i` in `base`, mirrored at the point: van der Corput's sequence, in (0, 1).
+fn mirrored(mut i: usize, base: usize) -> f64 {
+    let (mut v, mut digit) = (0.0, 1.0);
+    while i > 0 {
+        digit /= base as f64;
+        v += digit * (i % base) as f64;
+        i /= base;
+    }
+    v
 }
 
 #[cfg(test)]
