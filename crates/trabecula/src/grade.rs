@@ -193,6 +193,7 @@ fn range(stops: &[[f64; 2]], s: Interval) -> Interval {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::math::norm;

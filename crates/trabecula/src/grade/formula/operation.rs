@@ -321,14 +321,15 @@ fn power_range(a: Interval, b: Interval) -> Interval {
 /// The range of cos(v − 2π·shift).
 fn wave(v: Interval, shift: f64) -> Interval {
     let (lo, hi) = (v.lo / TAU - shift, v.hi / TAU - shift);
-    if !(lo.abs().max(hi.abs()) < 1e8) {
+    let far = lo.abs().max(hi.abs());
+    if far.is_nan() || far >= 1e8 {
         return Interval::new(-1.0, 1.0);
     }
     // A crest lies within when a whole number of turns does, a trough half a turn on; with slack for rounding.
     let holds = |at: f64| (hi + 1e-7 - at).floor() >= (lo - 1e-7 - at).ceil();
     let ends = [lo, hi].map(|t| ((t - t.floor()) * TAU).cos());
     // The slack of 1e-7 turns aside, the reduction above is good to 1e-8·2π at the largest argument.
-    let slack = 1e-14 + 1e-15 * lo.abs().max(hi.abs());
+    let slack = 1e-14 + 1e-15 * far;
     Interval::new(
         if holds(0.5) {
             -1.0
