@@ -18,7 +18,7 @@ pub struct Design {
 }
 
 /// Files below a folder.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
@@ -97,7 +97,7 @@ fn named(py: Python<'_>, e: design::DesignError, file: &Option<String>) -> PyErr
 }
 
 /// Python data as the core's tree. Anything with `tolist` (numpy's arrays and scalars) goes through it.
-fn node(data: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
+pub fn node(data: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
     if depth > 64 {
         return Err(pyo3::exceptions::PyValueError::new_err(
             "a design is at most 64 levels deep; does it hold itself?",

@@ -9,10 +9,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use trabecula::design::Built;
+use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
 
+use crate::design::Folder;
 use crate::error;
 use crate::mesh::Mesh;
 use crate::run::run;
@@ -197,6 +198,24 @@ pub struct Region {
 
 #[pymethods]
 impl Region {
+    /// The region of a design, or of a file with the key `region` alone, as text; `folder` is where paths start.
+    #[staticmethod]
+    fn from_text(py: Python<'_>, text: &str, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
+        let region = run(py, None, None, |_| {
+            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
+            design::region(&node, &Folder(folder))
+        })?;
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e.in_file(&file)))
+    }
+
+    /// The region under the key `region` of a dictionary.
+    #[staticmethod]
+    fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>, folder: PathBuf) -> PyResult<Region> {
+        let node = crate::design::node(data, 0)?;
+        let region = run(py, None, None, |_| design::region(&node, &Folder(folder)))?;
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e))
+    }
+
     /// Signed distance at points (n, 3), mm, negative inside.
     fn distance<'py>(
         &self,

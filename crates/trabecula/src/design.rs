@@ -23,7 +23,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
+use crate::cell::Cell;
 use crate::lattice::Lattice;
+use crate::region::Region;
 use crate::solid::Solid;
 
 pub use data::*;
@@ -137,6 +139,20 @@ impl Design {
             e
         })
     }
+}
+
+/// The region of a design, or of a tree with the key `region` alone.
+pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
+    let lines = node.lines();
+    region::region(&read::region_in(node)?, "region", loader).map_err(|mut e| {
+        e.line = e.line.or_else(|| lines.line(&e.path));
+        e
+    })
+}
+
+/// The cell that a tree describes, as under the key `cell` of a lattice.
+pub fn cell(node: &Node) -> Result<Cell, DesignError> {
+    Ok(build::cell(&read::cell_in(node)?, "cell")?.1)
 }
 
 impl Built {

@@ -107,30 +107,8 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
-    let (name, terms, at) = match &spec.cell {
-        CellSpec::Name(name) => {
-            let known = named(name).ok_or_else(|| {
-                let names: Vec<&str> = crate::cell::catalogue().iter().map(|n| n.name).collect();
-                DesignError::unknown(&below("cell"), "cell", name, &names)
-            })?;
-            (Some(name.as_str()), known.terms(), below("cell"))
-        }
-        CellSpec::Kind(CellKind::Series(s)) => {
-            let at = below("cell.series");
-            for (i, t) in s.terms.iter().enumerate() {
-                finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
-                finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
-            }
-            let term = |t: &TermSpec| Term {
-                hkl: t.hkl,
-                amplitude: t.amplitude,
-                phase: t.phase,
-            };
-            (None, s.terms.iter().map(term).collect(), at)
-        }
-    };
-    let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
-    let cell = Arc::new(Cell::new(series));
+    let (name, cell) = cell(&spec.cell, &below("cell"))?;
+    let cell = Arc::new(cell);
     let map = map(&spec.map, &below("map"))?;
     let here = Place {
         path: below("level"),
@@ -139,6 +117,30 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
+}
+
+/// The cell, and its name if it has one.
+pub(super) fn cell<'a>(spec: &'a CellSpec, path: &str) -> Result<(Option<&'a str>, Cell), DesignError> {
+    let (name, terms, at) = match spec {
+        CellSpec::Name(name) => {
+            let known = named(name).ok_or_else(|| {
+                let names: Vec<&str> = crate::cell::catalogue().iter().map(|n| n.name).collect();
+                DesignError::unknown(path, "cell", name, &names)
+            })?;
+            (Some(name.as_str()), known.terms(), path.to_string())
+        }
+        CellSpec::Kind(CellKind::Series(s)) => {
+            let at = format!("{path}.series");
+            for (i, t) in s.terms.iter().enumerate() {
+                finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
+                finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
+            }
+            let term = |t: &TermSpec| Term { hkl: t.hkl, amplitude: t.amplitude, phase: t.phase };
+            (None, s.terms.iter().map(term).collect(), at)
+        }
+    };
+    let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
+    Ok((name, Cell::new(series)))
 }
 
 fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {

@@ -101,6 +101,16 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     })
 }
 
+/// The region in a design, or in a tree that says nothing else.
+pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
+    let at = At::root(node);
+    if at.entries("a design or a region")?.iter().any(|(key, _)| *key == "lattice") {
+        return Ok(design(node)?.region);
+    }
+    let f = at.fields("a region file", &["schema", "units", "region"], &[])?;
+    region(f.need("region", "say where the part may be, such as [region.box] with size = [20, 20, 20]")?)
+}
+
 fn three(at: &At) -> Read<[f64; 3]> {
     at.numbers(THREE)
 }
@@ -210,6 +220,13 @@ fn lattice(at: &At) -> Read<LatticeSpec> {
         map: map(f.need("map", "such as map.affine with wavelength = 4")?)?,
         level: level(f.need("level", "exactly one of iso, fraction, porosity")?)?,
     })
+}
+
+/// The cell in a tree of its own.
+pub(super) fn cell_in(node: &Node) -> Read<CellSpec> {
+    let mut at = At::root(node);
+    at.path = "cell".into();
+    cell(&at)
 }
 
 fn cell(at: &At) -> Read<CellSpec> {
