@@ -16,9 +16,9 @@ EDGE   ?= 0.25
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 
-SOURCES := Cargo.toml Cargo.lock pyproject.toml README.md \
-    $(shell find crates python -type f -name '*.rs' -o -name Cargo.toml -path 'crates/*' -o -path 'python/*' \
-      \( -name '*.py' -o -name '*.pyi' -o -name py.typed -o -name '*.json' \) -type f)
+SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
+    $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
+      \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
 
 .PHONY: all demo test core-test python-test docs-test bench smoke tidy docs clean
 .DELETE_ON_ERROR:
