@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import os
@@ -26,6 +27,14 @@ DESIGNS = ("toml", "json")
 MESH_OUT = ("stl", "3mf", "ply", "obj")
 MESH_IN = (*MESH_OUT, "off")
 VOXELS_OUT = ("npy", "vti")
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, saying what is wrong in one line."""
+
+    def error(self, message: str):
+        """Leaves with status 2."""
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
 class Refused(Exception):
@@ -107,7 +116,7 @@ def kind_of(path: str) -> str:
 
 def parser() -> argparse.ArgumentParser:
     """Everything that the command understands."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="trabecula",
         description="Lattice design: a design file in, a closed and measured solid out.",
         epilog=EPILOG,
@@ -585,10 +594,8 @@ def main(argv: list[str] | None = None) -> int:
     if args.command is None:
         top.print_help(sys.stderr)
         return 2
-    try:
+    with contextlib.suppress(ValueError):  # not the main thread
         signal.signal(signal.SIGTERM, _terminated)
-    except ValueError:  # not the main thread
-        pass
     try:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):

@@ -16,6 +16,19 @@ if TYPE_CHECKING:
 __all__ = ["READS", "WRITES", "Mesh"]
 
 WRITES = ("stl", "3mf", "ply", "obj")
+FIGURES = (
+    "volume",
+    "area",
+    "area_lattice",
+    "area_cut",
+    "solid_fraction",
+    "porosity",
+    "euler",
+    "pieces",
+    "cavities",
+    "closed",
+    "bounds",
+)
 READS = ("stl", "3mf", "ply", "obj", "off")
 
 
@@ -97,9 +110,8 @@ class Mesh(Picture):
         """
         figures = dict(self._figures)
         share = self.solid_fraction
-        keys = "volume area area_lattice area_cut solid_fraction porosity euler pieces cavities closed bounds".split()
         figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share}
-        return {k: figures[k] for k in keys}
+        return {k: figures[k] for k in FIGURES}
 
     @cached_property
     def solid_fraction(self) -> float | None:

@@ -16,8 +16,8 @@ def box(
     size: Point | None = None,
     center: Point | None = None,
     *,
-    min: Point | None = None,  # noqa: A002
-    max: Point | None = None,  # noqa: A002
+    min: Point | None = None,
+    max: Point | None = None,
 ) -> dict:
     """An axis-aligned box, by ``size`` and ``center`` (the origin unless given) or by the corners ``min`` and ``max``."""
     return {"box": _given(size=size, center=center, min=min, max=max)}

@@ -194,7 +194,7 @@ def spartan(
     fit of ours in the same form for the gyroid, for which the note gives none. ``region`` is a box of 4 × 4 × 4
     wavelengths about the origin unless given.
     """
-    from . import level, map  # noqa: A004
+    from . import level, map
 
     cells = {"diamond": "diamond", "gyroid": "gyroid_mirrored", "gyroid_mirrored": "gyroid_mirrored"}
     if name not in cells:

@@ -1,5 +1,7 @@
 //! What went wrong, as Python's exceptions.
 
+use std::sync::Mutex;
+
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use trabecula::design::DesignError;
@@ -37,12 +39,25 @@ pub fn stopped(s: Stopped) -> PyErr {
     }
 }
 
+/// Where the core last failed by a mistake of ours.
+static LAST: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps the place of such a failure for the exception, instead of printing it; TRABECULA_DEBUG prints it too.
+pub fn watch() {
+    let debug = std::env::var_os("TRABECULA_DEBUG").is_some();
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if let Ok(mut last) = LAST.lock() {
+            *last = info.to_string().replace('\n', " ");
+        }
+        if debug {
+            usual(info);
+        }
+    }));
+}
+
 /// A mistake of ours, caught before it takes the interpreter along.
-pub fn internal(what: Box<dyn std::any::Any + Send>) -> PyErr {
-    let text = what
-        .downcast_ref::<&str>()
-        .map(|s| s.to_string())
-        .or_else(|| what.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no message".into());
-    PyRuntimeError::new_err(format!("internal error in the core: {text}"))
+pub fn internal(_: Box<dyn std::any::Any + Send>) -> PyErr {
+    let what = LAST.lock().map(|l| l.clone()).unwrap_or_default();
+    PyRuntimeError::new_err(format!("internal error in the core: {what}"))
 }

@@ -20,6 +20,12 @@ mod _core {
     #[pymodule_export]
     use crate::solid::{Region, Solid, Voxels};
 
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::error::watch();
+        Ok(())
+    }
+
     /// Version of the core.
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
