@@ -11,7 +11,7 @@ MAP = "lattice.core.map.affine"
 CASES = [
     # misspelt words
     ("[region.box]", "[regoin.box]", "regoin", ["unknown key", 'did you mean "region"']),
-    ("[region.box]", "[region.bocks]", "region.bocks", ["unknown region", 'did you mean "box"']),
+    ("[region.box]", "[region.boxx]", "region.boxx", ["unknown region", 'did you mean "box"']),
     (
         "size = [8, 8, 8]",
         "sise = [8, 8, 8]",

@@ -14,7 +14,6 @@ import warnings
 from pathlib import Path
 
 import pytest
-
 import trabecula
 
 if sys.version_info >= (3, 11):
