@@ -1,0 +1,110 @@
+# Everything sets itself up in .venv; a second run rebuilds only what changed.
+#
+#   make demo    a part with a lattice, measured and drawn, in demo/
+#   make test    the core's tests and the Python tests
+#   make bench   our command beside other tools (those that are installed)
+#   make tidy    formatters and linters
+#   make docs    remakes the generated pages and figures under docs/
+#
+# PYTHON names the interpreter that .venv is made from (3.10 or newer).
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
+EDGE   ?= 0.25
+
+export PYO3_PYTHON := $(abspath $(BIN)/python)
+
+SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
+    $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
+      \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
+
+.PHONY: all demo test core-test python-test docs-test bench smoke tidy docs clean
+.DELETE_ON_ERROR:
+
+all: $(VENV)/.installed
+
+# --- set-up -----------------------------------------------------------------------------------------------------------
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { \
+	  echo "Trabecula needs Python 3.10 or newer; '$(PYTHON)' is missing or older."; \
+	  echo "Name another one: make PYTHON=/path/to/python3.12"; exit 1; }
+	@command -v cargo >/dev/null || { \
+	  echo "Trabecula's core is written in Rust and 'cargo' was not found."; \
+	  echo "Install Rust 1.88 or newer (https://rustup.rs) and run this again."; exit 1; }
+	@$(PYTHON) -m venv --clear $(VENV) || { \
+	  echo "Could not make $(VENV). On Debian and Ubuntu the package python3-venv is needed."; exit 1; }
+	@echo "setting up $(VENV)"
+	@$(PIP) install 'maturin>=1.9,<2' 'numpy>=1.24'
+	@touch $@
+
+build/.wheel: $(VENV)/.made $(SOURCES)
+	@echo "building the package"
+	@rm -rf build/wheels && mkdir -p build
+	@$(BIN)/maturin build --quiet --release --interpreter $(BIN)/python --out build/wheels
+	@touch $@
+
+$(VENV)/.installed: build/.wheel
+	@$(PIP) install --force-reinstall --no-deps build/wheels/trabecula-*.whl
+	@$(PIP) install build/wheels/trabecula-*.whl
+	@touch $@
+
+$(VENV)/.test-tools: $(VENV)/.installed pyproject.toml
+	@$(PIP) install "$$(echo build/wheels/trabecula-*.whl)[test]" 'ruff>=0.8'
+	@touch $@
+
+# --- the demo ---------------------------------------------------------------------------------------------------------
+
+DEMO := examples/hip_stem.toml
+PART := examples/parts/hip_stem.stl
+
+demo: demo/hip_stem.png
+	@cat demo/summary.txt
+
+demo/hip_stem.png: $(VENV)/.installed $(DEMO) $(PART) scripts/demo_summary.py
+	@mkdir -p demo
+	$(BIN)/trabecula check $(DEMO)
+	$(BIN)/trabecula mesh $(DEMO) -o demo/hip_stem.3mf --edge $(EDGE)
+	$(BIN)/trabecula mesh $(DEMO) -o demo/hip_stem.stl --edge $(EDGE)
+	$(BIN)/trabecula measure demo/hip_stem.stl --region $(PART) --json > demo/report.json
+	$(BIN)/trabecula render demo/hip_stem.stl -o demo/hip_stem.part.png
+	@$(BIN)/python scripts/demo_summary.py demo > demo/summary.txt
+	@mv demo/hip_stem.part.png $@
+
+# --- checks -----------------------------------------------------------------------------------------------------------
+
+test: core-test python-test docs-test
+
+core-test: $(VENV)/.made
+	cargo test --release --locked -p trabecula
+
+python-test: $(VENV)/.test-tools
+	$(BIN)/python -m pytest -q tests --ignore tests/test_docs.py
+
+docs-test: $(VENV)/.test-tools
+	$(BIN)/python -m pytest -q tests/test_docs.py
+
+tidy: $(VENV)/.test-tools
+	@if cargo fmt --version >/dev/null 2>&1; then echo "cargo fmt"; cargo fmt --all --check; \
+	  else echo "NOT CHECKED: rustfmt is not installed (rustup component add rustfmt)"; fi
+	@if cargo clippy --version >/dev/null 2>&1; then echo "cargo clippy"; \
+	  cargo clippy --quiet --locked --workspace --all-targets -- -D warnings; \
+	  else echo "NOT CHECKED: clippy is not installed (rustup component add clippy)"; fi
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+smoke: $(VENV)/.installed
+	$(BIN)/python bench/smoke.py --trabecula $(BIN)/trabecula
+
+bench: $(VENV)/.installed
+	$(BIN)/python bench/peers.py --trabecula $(BIN)/trabecula --record
+
+docs: $(VENV)/.installed
+	$(BIN)/python scripts/figure_porosity.py
+	$(BIN)/python scripts/cell_tables.py
+	$(BIN)/python scripts/design_reference.py
+
+clean:
+	rm -rf build demo $(VENV)

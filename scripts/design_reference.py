@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""Writes the generated reference: docs/generated/{design,command,python}.md, from the schema, the help and the docstrings."""
+
+import inspect
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import trabecula
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "docs" / "generated"
+STAMP = "<!-- Made by scripts/design_reference.py; do not edit. -->"
+COMMANDS = "new check mesh voxels measure cells render".split()
+
+
+def kind(schema):
+    """A property's type in words."""
+    if "$ref" in schema:
+        name = schema["$ref"].rsplit("/", 1)[-1]
+        return f"[{name}](#{name.lower()})"
+    for join in ("anyOf", "oneOf", "allOf"):
+        if join in schema:
+            return " or ".join(dict.fromkeys(kind(s) for s in schema[join] if s.get("type") != "null"))
+    if "const" in schema or "enum" in schema:
+        return ", ".join(f"`{v}`" for v in schema.get("enum", [schema.get("const")]))
+    if schema.get("type") == "array":
+        return f"list of {kind(schema['items'])}" if "items" in schema else "list"
+    words = schema.get("type", "anything")
+    return words if isinstance(words, str) else " or ".join(w for w in words if w != "null")
+
+
+def one_line(text):
+    """Text as a table cell."""
+    return " ".join(str(text).split()).replace("|", "\\|")
+
+
+def properties(schema):
+    """Rows for the keys of an object, those of its alternatives included."""
+    rows = []
+    for key, value in schema.get("properties", {}).items():
+        needed = "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
+        rows.append(f"| `{key}` | {kind(value)} | {needed} | {one_line(value.get('description', ''))} |")
+    for join in ("anyOf", "oneOf"):
+        for part in schema.get(join, []):
+            rows += properties(part)
+    return rows
+
+
+def design(schema):
+    """The schema as tables."""
+    lines = [STAMP, "# Design file: every key", "", "Needed: `yes`, or the default.", ""]
+    for name, part in {"design": schema, **schema.get("$defs", schema.get("definitions", {}))}.items():
+        lines += [f"## {name}", "", part.get("description", ""), ""]
+        rows = properties(part)
+        lines += ["| key | is | needed | |", "|---|---|---|---|", *rows, ""] if rows else [kind(part), ""]
+    return "\n".join(lines)
+
+
+def command():
+    """The help pages."""
+    lines = [STAMP, "# The command: its help", ""]
+    for name in ["", *COMMANDS]:
+        words = [sys.executable, "-m", "trabecula", *name.split(), "--help"]
+        text = subprocess.run(words, check=True, capture_output=True, text=True).stdout.rstrip()
+        lines += [f"## trabecula {name}".rstrip(), "", "```text", text, "```", ""]
+    return "\n".join(lines)
+
+
+def python():
+    """Names, signatures and docstrings."""
+    lines = [STAMP, "# Python: every name", ""]
+    for name in sorted(trabecula.__all__):
+        thing = getattr(trabecula, name)
+        members = [(name, thing)]
+        if inspect.ismodule(thing) or inspect.isclass(thing):
+            public = sorted(k for k in getattr(thing, "__all__", vars(thing)) if not k.startswith("_"))
+            owned = ((k, getattr(thing, k)) for k in public)
+            keep = inspect.isclass(thing)
+            members += [(f"{name}.{k}", m) for k, m in owned if keep or getattr(m, "__module__", "") == thing.__name__]
+        for label, member in members:
+            try:
+                label += str(inspect.signature(member)) if callable(member) else ""
+            except (TypeError, ValueError):
+                pass
+            lines += [f"### `{label}`", "", inspect.getdoc(member) or "", ""]
+    return "\n".join(lines)
+
+
+def main():
+    """Write the pages."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    schema = json.loads((ROOT / "schema" / "design.json").read_text(encoding="utf-8"))
+    for name, text in (("design", design(schema)), ("command", command()), ("python", python())):
+        (OUT / f"{name}.md").write_text(text.rstrip() + "\n", encoding="utf-8")
+        print(OUT / f"{name}.md")
+
+
+if __name__ == "__main__":
+    main()
