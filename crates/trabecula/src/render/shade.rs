@@ -8,8 +8,8 @@ use crate::extract::Surface;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Colours in linear light.
-const LATTICE: [f32; 3] = [0.80, 0.70, 0.55];
-const CUT: [f32; 3] = [0.30, 0.42, 0.56];
+const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];
+const CUT: [f32; 3] = [0.27, 0.38, 0.52];
 /// Samples of the sky about each point.
 const SKY: usize = 20;
 
@@ -80,16 +80,16 @@ fn lit(n: Vec3, eye: Vec3, camera: &Camera, colour: [f32; 3], open: f32, cut: bo
     let half = unit(add(key, eye));
     let gloss = dot(n, half).max(0.0).powi(if cut { 24 } else { 48 }) as f32;
     let edge = (1.0 - dot(n, eye).clamp(0.0, 1.0)).powi(3) as f32;
-    let shadow = 0.35 + 0.65 * open;
+    let shadow = 0.22 + 0.78 * open;
     let tint_key = [1.00, 0.965, 0.91];
     let tint_sky = [0.86, 0.93, 1.00];
     let tint_ground = [0.82, 0.76, 0.70];
     core::array::from_fn(|k| {
         let ambient =
-            open * open.sqrt() * 0.42 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
-        let direct = shadow * (0.66 * key_light * tint_key[k] + 0.20 * diffuse(fill) * tint_sky[k]);
+            open * open.sqrt() * 0.40 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
+        let direct = shadow * (0.88 * key_light * tint_key[k] + 0.12 * diffuse(fill) * tint_sky[k]);
         let shine =
-            open * (0.10 * gloss * tint_key[k] + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
+            open * (0.13 * gloss * tint_key[k] + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
         let v = colour[k] * (ambient + direct) + shine;
         // Highlights roll off instead of clipping.
         if v > 0.75 {
@@ -170,7 +170,7 @@ fn occlusion(camera: &Camera, raster: &Raster) -> Vec<f32> {
                 }
                 dark += weight * sum / SKY as f64;
             }
-            *out = (1.0 - 2.3 * dark).clamp(0.0, 1.0) as f32;
+            *out = (1.0 - 3.3 * dark).clamp(0.0, 1.0) as f32;
         }
     });
     let smooth = smoothed(&raw, [cw, ch], |x, y| raster.near[at(x, y)]);
