@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Camera;
 use super::raster::{NONE, Raster, weights};
+use super::{Camera, View};
 use crate::extract::Surface;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -25,6 +25,8 @@ pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<
     let normals = normals(surface);
     let [w, h] = raster.size;
     let open = occlusion(camera, raster);
+    let key = towards(camera, -0.55, 0.75, 0.60);
+    let shadows = Shadows::cast(surface, key);
     let mut picture = vec![[0.0f32; 4]; w * h];
     picture.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
         for (x, out) in row.iter_mut().enumerate() {
@@ -51,9 +53,10 @@ pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<
             if dot(flat, eye) < 0.0 {
                 n = scale(n, -1.0);
             }
+            let sun = shadows.light(p, flat);
             let light = lit(
-                n,
-                eye,
+                [n, eye, key],
+                sun,
                 camera,
                 if cut { CUT } else { LATTICE },
                 open[at],
@@ -65,14 +68,84 @@ pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<
     picture
 }
 
-/// The light that leaves a surface towards the eye.
-fn lit(n: Vec3, eye: Vec3, camera: &Camera, colour: [f32; 3], open: f32, cut: bool) -> [f32; 3] {
-    let [right, up, out] = camera.axes;
-    let towards =
-        |r: f64, u: f64, o: f64| unit(add(scale(right, r), add(scale(up, u), scale(out, o))));
-    let key = towards(-0.55, 0.75, 0.60);
-    let fill = towards(0.85, 0.10, 0.55);
-    let rim = towards(0.35, 0.45, -0.85);
+/// A direction by its parts to the right, up and towards the eye.
+fn towards(camera: &Camera, right: f64, up: f64, out: f64) -> Vec3 {
+    let [r, u, o] = camera.axes;
+    unit(add(scale(r, right), add(scale(u, up), scale(o, out))))
+}
+
+/// What the key light sees.
+struct Shadows {
+    eye: Camera,
+    raster: Raster,
+    /// Length of one of its samples, mm.
+    texel: f64,
+}
+
+impl Shadows {
+    /// Samples across and down.
+    const SIZE: usize = 2048;
+
+    /// Draws the surface as seen along the light.
+    fn cast(surface: &Surface, key: Vec3) -> Shadows {
+        let size = [Self::SIZE; 2];
+        let azimuth = key[1].atan2(key[0]).to_degrees();
+        let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
+        let eye = Camera::new(
+            &surface.mesh.bounds(),
+            &View {
+                size,
+                azimuth,
+                elevation,
+            },
+            size,
+        );
+        let raster = Raster::draw(surface, &eye, size);
+        let texel = eye.distance / eye.focal;
+        Shadows { eye, raster, texel }
+    }
+
+    /// The share of the light that reaches a point of a face with this normal, softened over 5×5 samples.
+    fn light(&self, p: Vec3, flat: Vec3) -> f32 {
+        let side = if dot(flat, self.eye.axes[2]) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        // A step off the face and towards the light keeps the face from shading itself.
+        let lift = add(
+            scale(flat, side * 2.0 * self.texel),
+            scale(self.eye.axes[2], 2.5 * self.texel),
+        );
+        let [x, y, near] = self.eye.project(add(p, lift));
+        let (mut seen, mut all) = (0.0, 0.0);
+        for j in -2i64..=2 {
+            for i in -2i64..=2 {
+                let (x, y) = (x.floor() as i64 + 2 * i, y.floor() as i64 + 2 * j);
+                let inside =
+                    (0..Self::SIZE as i64).contains(&x) && (0..Self::SIZE as i64).contains(&y);
+                let hidden = inside
+                    && f64::from(self.raster.near[y as usize * Self::SIZE + x as usize]) > near;
+                let weight = 1.0 / (1.0 + (i * i + j * j) as f32);
+                seen += if hidden { 0.0 } else { weight };
+                all += weight;
+            }
+        }
+        seen / all
+    }
+}
+
+/// The light that leaves a surface towards the eye; `sun` is the share of the key light that reaches it.
+fn lit(
+    [n, eye, key]: [Vec3; 3],
+    sun: f32,
+    camera: &Camera,
+    colour: [f32; 3],
+    open: f32,
+    cut: bool,
+) -> [f32; 3] {
+    let fill = towards(camera, 0.85, 0.10, 0.55);
+    let rim = towards(camera, 0.35, 0.45, -0.85);
     let diffuse = |l: Vec3| dot(n, l).max(0.0) as f32;
     // A little wrap keeps the key's shadow line soft.
     let key_light = ((dot(n, key) as f32 + 0.15) / 1.15).max(0.0);
@@ -80,16 +153,18 @@ fn lit(n: Vec3, eye: Vec3, camera: &Camera, colour: [f32; 3], open: f32, cut: bo
     let half = unit(add(key, eye));
     let gloss = dot(n, half).max(0.0).powi(if cut { 24 } else { 48 }) as f32;
     let edge = (1.0 - dot(n, eye).clamp(0.0, 1.0)).powi(3) as f32;
-    let shadow = 0.22 + 0.78 * open;
+    let shadow = 0.35 + 0.65 * open;
     let tint_key = [1.00, 0.965, 0.91];
     let tint_sky = [0.86, 0.93, 1.00];
     let tint_ground = [0.82, 0.76, 0.70];
     core::array::from_fn(|k| {
         let ambient =
-            open * open.sqrt() * 0.40 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
-        let direct = shadow * (0.88 * key_light * tint_key[k] + 0.12 * diffuse(fill) * tint_sky[k]);
-        let shine =
-            open * (0.13 * gloss * tint_key[k] + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
+            open * open.sqrt() * 0.46 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
+        let direct =
+            shadow * (0.86 * sun * key_light * tint_key[k] + 0.16 * diffuse(fill) * tint_sky[k]);
+        let shine = open
+            * (0.13 * sun * gloss * tint_key[k]
+                + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
         let v = colour[k] * (ambient + direct) + shine;
         // Highlights roll off instead of clipping.
         if v > 0.75 {

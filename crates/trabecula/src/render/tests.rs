@@ -225,6 +225,6 @@ fn gallery() {
             t.elapsed() - drawn,
             file.len()
         );
-        assert!(std::fs::write(dir.join(format!("meas-{name}.png")), file).is_ok());
+        assert!(std::fs::write(dir.join(format!("trabecula-{name}.png")), file).is_ok());
     }
 }
