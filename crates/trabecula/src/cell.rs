@@ -4,6 +4,7 @@ mod connect;
 mod named;
 mod quantile;
 mod series;
+mod thickness;
 
 pub use connect::{Connectivity, connectivity};
 pub use named::{Named, catalogue, named};

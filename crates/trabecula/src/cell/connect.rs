@@ -1,22 +1,449 @@
 //! Where the periodic solid is one piece in R³.
+//!
+//! The function is sampled on a grid of the torus cut into tetrahedra along the diagonals (Freudenthal), on which
+//! the linear interpolant's solid has the pieces and loops of the graph of its nodes. As solid grows node by node, a
+//! forest keeps the pieces and, for each, the lattice translations that its closed paths realise: the solid is one
+//! piece in R³ when there is one piece on the torus and its translations are all of Z³. Pieces appear and join at
+//! critical values of the function, so each such event is moved to the critical point beside it, and the few events
+//! that matter are played again at their exact levels.
+
 use super::Part;
-use crate::math::Vec3;
+use rayon::prelude::*;
+
+use crate::math::{Vec3, add, scale, sub, unit};
+
+mod critical;
+mod forest;
+mod grid;
+mod sublattice;
+
+pub(super) use critical::{Critical, Function, critical, sample};
+use forest::{Forest, Joined};
+use grid::{DIRECTIONS, Grid};
+use sublattice::{Int3, Sublattice};
+
+/// The steps along the axes.
+const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 /// How a part's connectivity changes with its level.
 #[derive(Clone, Debug, Default)]
 pub struct Connectivity {
     /// Intervals of the level, as amounts of solid grow, in which the periodic solid is one piece in R³:
-    /// [from, to] in iso (for `Upper` from ≥ to).
+    /// [from, to] in iso (for `Upper` from ≥ to). The last one runs to the level at which all is solid.
     pub intervals: Vec<[f64; 2]>,
-    /// Saddles by which separate pieces, or a piece and its lattice translate, join: (phase in turns, level).
+    /// Saddles by which pieces that were separate in R³ join, a piece and its own lattice translate included: (phase
+    /// in turns, level of f). A line on which f is extreme (a strut that shrinks to a line) is given by points along
+    /// it. Empty for sheets.
     pub necks: Vec<(Vec3, f64)>,
 }
 
-/// Analyses the part of the cell function `f` (values and gradients per turn at phases).
-pub fn connectivity(
-    f: &(dyn Fn(&[Vec3], &mut [f64], &mut [Vec3]) + Sync),
-    part: Part,
-) -> Connectivity {
-    let _ = (f, part);
-    todo!()
+/// A piece as it appears.
+struct Birth {
+    node: u32,
+    level: f64,
+    /// Whether the level is that of a critical point, not of a sample.
+    exact: bool,
+    /// Loops that the piece had from the first.
+    loops: Sublattice,
 }
+
+/// Two pieces that join, or one that meets its translate.
+struct Event {
+    pieces: [u32; 2],
+    shift: Int3,
+    level: f64,
+    exact: bool,
+}
+
+/// Analyses the part of the cell function `f` (values and gradients per turn at phases).
+///
+/// Levels are exact (to about 1e-9) where the critical points are found by Newton's method, else good to the sampling.
+pub fn connectivity(f: Function, part: Part) -> Connectivity {
+    let grid = Grid::sample(f);
+    let mut amounts: Vec<f64> = grid.values.iter().map(|v| amount(part, *v)).collect();
+    if amounts.iter().any(|v| !v.is_finite()) {
+        return Connectivity::default();
+    }
+    amounts.iter_mut().for_each(|v| *v += 0.0); // −0.0 and 0.0 are one level
+    let mut order: Vec<u32> = (0..amounts.len() as u32).collect();
+    order.sort_unstable_by(|a, b| {
+        amounts[*a as usize]
+            .total_cmp(&amounts[*b as usize])
+            .then(a.cmp(b))
+    });
+    let sweep = Sweep {
+        f,
+        part,
+        grid: &grid,
+        amounts: &amounts,
+        order: &order,
+    };
+    let (births, events) = sweep.events();
+    let last = order.last().map_or(0, |i| *i);
+    let full = sweep.refine(last, &[], 3).unwrap_or(amounts[last as usize]);
+    let mut intervals = replay(births, events, full, grid.error, grid.range());
+    if part == Part::Upper {
+        intervals.iter_mut().flatten().for_each(|v| *v = -*v + 0.0);
+    }
+    let necks = if part == Part::Sheet {
+        Vec::new()
+    } else {
+        sweep.necks()
+    };
+    Connectivity { intervals, necks }
+}
+
+/// How late a value becomes solid: the level at which it does (negated for the upper part).
+fn amount(part: Part, v: f64) -> f64 {
+    match part {
+        Part::Sheet => v.abs(),
+        Part::Lower => v,
+        Part::Upper => -v,
+    }
+}
+
+/// The nodes in the order in which they become solid.
+struct Sweep<'a> {
+    f: Function<'a>,
+    part: Part,
+    grid: &'a Grid,
+    amounts: &'a [f64],
+    order: &'a [u32],
+}
+
+impl Sweep<'_> {
+    /// The amount at the critical point near a node from which at most `falling` directions lead to more solid;
+    /// sought from the node and from the middles towards `others`.
+    fn refine(&self, node: u32, others: &[u32], falling: usize) -> Option<f64> {
+        let here = self.grid.position(node);
+        let middle = |o: &u32| {
+            let d = sub(self.grid.position(*o), here).map(|v| v - v.round());
+            [0, 1, 2].map(|a| here[a] + d[a] / 2.0)
+        };
+        core::iter::once(here)
+            .chain(others.iter().map(middle))
+            .find_map(|start| {
+                let c = self.critical(node, start)?;
+                let level = amount(self.part, c.level);
+                let near = (level - self.amounts[node as usize]).abs() <= 3.0 * self.grid.error;
+                (c.falling <= falling && near).then_some(level)
+            })
+    }
+
+    /// The critical point near `start`, seen as one of the amount about `node`.
+    fn critical(&self, node: u32, start: Vec3) -> Option<Critical> {
+        let c = critical(self.f, start, 1.5 * 3f64.sqrt() / self.grid.n as f64)?;
+        let negative = match self.part {
+            Part::Sheet => self.grid.values[node as usize] < 0.0,
+            Part::Lower => false,
+            Part::Upper => true,
+        };
+        if !negative {
+            return Some(c);
+        }
+        let [a, b, d] = c.axes;
+        Some(Critical {
+            falling: 3 - c.falling - c.flat,
+            values: [-c.values[2], -c.values[1], -c.values[0]],
+            axes: [d, b, a],
+            ..c
+        })
+    }
+
+    /// Grows the solid and notes what happens to its pieces.
+    fn events(&self) -> (Vec<Birth>, Vec<Event>) {
+        let (n, sheet) = (self.amounts.len(), self.part == Part::Sheet);
+        // Elements: nodes, then for a sheet the edges that the surface f = 0 crosses.
+        let mut forest = Forest::new(if sheet { n * 8 } else { n });
+        let mut births = Vec::new();
+        let mut events = Vec::new();
+        if sheet {
+            self.surface(&mut forest, &mut births);
+        }
+        let mut nears = Vec::with_capacity(28);
+        for &node in self.order {
+            nears.clear();
+            for (k, d) in DIRECTIONS.iter().enumerate() {
+                let (ahead, wrap) = self.grid.step(node, *d);
+                let (behind, back) = self.grid.step(node, d.map(|c| -c));
+                nears.push((ahead, ahead, wrap));
+                nears.push((behind, behind, back));
+                if sheet {
+                    // An edge stands in the period of its first node.
+                    nears.push((self.grid.edge(node, k), ahead, [0; 3]));
+                    nears.push((self.grid.edge(behind, k), behind, back));
+                }
+            }
+            nears.retain(|(element, _, _)| forest.has(*element));
+            forest.insert(node);
+            if nears.is_empty() {
+                let level = self.refine(node, &[], 0);
+                births.push(Birth {
+                    node,
+                    level: level.unwrap_or(self.amounts[node as usize]),
+                    exact: level.is_some(),
+                    loops: Sublattice::default(),
+                });
+            }
+            for &(element, towards, wrap) in &nears {
+                let (pieces, shift) = match forest.join(node, element, wrap) {
+                    Joined::Same => continue,
+                    Joined::Merged {
+                        pieces: [_, young], ..
+                    } if young == node => continue,
+                    Joined::Merged { pieces, shift } => (pieces, shift),
+                    Joined::Loop { piece, shift } => ([piece; 2], shift),
+                };
+                let level = self.refine(node, &[towards], 1);
+                let (level, exact) = (
+                    level.unwrap_or(self.amounts[node as usize]),
+                    level.is_some(),
+                );
+                events.push(Event {
+                    pieces,
+                    shift,
+                    level,
+                    exact,
+                });
+            }
+        }
+        (births, events)
+    }
+
+    /// Puts in the surface f = 0: crossed edges, joined through the triangles they share.
+    fn surface(&self, forest: &mut Forest, births: &mut Vec<Birth>) {
+        let n = self.amounts.len() as u32;
+        let negative = |i: u32| self.grid.values[i as usize] < 0.0;
+        let mut crossed = Vec::new();
+        for node in 0..n {
+            for (k, d) in DIRECTIONS.iter().enumerate() {
+                if negative(node) != negative(self.grid.step(node, *d).0) {
+                    forest.insert(self.grid.edge(node, k));
+                    crossed.push(self.grid.edge(node, k));
+                }
+            }
+        }
+        for node in 0..n {
+            // A triangle is node, node + d, node + d + e with d and e along different axes.
+            for k in 0..7 {
+                for l in (0..7).filter(|l| (k + 1) & (l + 1) == 0) {
+                    let (mid, wrap) = self.grid.step(node, DIRECTIONS[k]);
+                    let sides = [
+                        (self.grid.edge(node, k), [0; 3]),
+                        (self.grid.edge(mid, l), wrap),
+                        (self.grid.edge(node, (k + 1 | (l + 1)) - 1), [0; 3]),
+                    ];
+                    let mut crossed = sides.iter().filter(|(e, _)| forest.has(*e));
+                    if let (Some((a, wa)), Some((b, wb))) =
+                        (crossed.next().copied(), crossed.next().copied())
+                    {
+                        forest.join(a, b, [0, 1, 2].map(|c| wb[c] - wa[c]));
+                    }
+                }
+            }
+        }
+        for edge in crossed {
+            if forest.leads(edge) {
+                births.push(Birth {
+                    node: edge,
+                    level: 0.0,
+                    exact: true,
+                    loops: forest.loops(edge),
+                });
+            }
+        }
+    }
+
+    /// The saddles that join what was separate in R³ just before, and points of the lines that are extreme.
+    fn necks(&self) -> Vec<(Vec3, f64)> {
+        let back = 1.5 * self.grid.error + 1e-6 * self.grid.range();
+        let n = self.order.len() as u32;
+        // The node nearest to a critical point is at most h√3/2 away, which bounds its slope; and slopes fall towards it.
+        let steepest = 0.866 * self.grid.bend / self.grid.n as f64;
+        let still = |i: &u32| {
+            let here = self.grid.slopes[*i as usize];
+            let near = |d: Int3| self.grid.slopes[self.grid.step(*i, d).0 as usize];
+            here <= steepest
+                && STEPS
+                    .iter()
+                    .all(|d| here <= near(*d) && here <= near(d.map(|c| -c)))
+        };
+        let points: Vec<Critical> = (0..n)
+            .into_par_iter()
+            .filter(still)
+            .filter_map(|i| self.critical(i, self.grid.position(i)))
+            .filter(|c| (c.falling == 1 && c.flat == 0) || (c.falling == 0 && c.flat > 0))
+            .collect();
+        let (saddles, lines): (Vec<_>, Vec<_>) = points.into_iter().partition(|c| c.flat == 0);
+        let least = self
+            .order
+            .first()
+            .map_or(0.0, |i| self.amounts[*i as usize]);
+        let extreme = |c: &Critical| amount(self.part, c.level) - least <= self.grid.error;
+        let h = 1.0 / self.grid.n as f64;
+        let mut found = distinct(lines.into_iter().filter(extreme).collect(), 1.8 * h);
+        let mut asked: Vec<_> = distinct(saddles, 0.2 * h)
+            .into_iter()
+            .filter_map(|c| {
+                let level = amount(self.part, c.level);
+                let ends = [1.0, -1.0].map(|side| self.descend(&c, side * h, level - back));
+                // A side may end in a hollow less deep than that.
+                let hollow = ends.iter().fold(level - back, |m, (node, _)| {
+                    m.max(self.amounts[*node as usize])
+                });
+                let limit = hollow + 1e-9 * back;
+                (limit < level).then_some((limit, ends, c))
+            })
+            .collect();
+        asked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut forest = Forest::new(self.order.len());
+        let mut grown = 0;
+        for (limit, [(a, v), (b, w)], saddle) in asked {
+            while let Some(&node) = self
+                .order
+                .get(grown)
+                .filter(|i| self.amounts[**i as usize] < limit)
+            {
+                grown += 1;
+                forest.insert(node);
+                for d in DIRECTIONS.iter().flat_map(|d| [*d, d.map(|c| -c)]) {
+                    let (near, wrap) = self.grid.step(node, d);
+                    if forest.has(near) {
+                        forest.join(node, near, wrap);
+                    }
+                }
+            }
+            if !forest.together(a, b, [0, 1, 2].map(|c| w[c] - v[c])) {
+                found.push(saddle);
+            }
+        }
+        found
+            .into_iter()
+            .map(|c| (c.at.map(|v| v - v.floor()), c.level))
+            .collect()
+    }
+
+    /// Walks from a saddle, `first` turns along its falling direction and then straight down, to a node near the first
+    /// point solid at `limit`, or near the bottom of a hollow above it.
+    fn descend(&self, saddle: &Critical, first: f64, limit: f64) -> (u32, Int3) {
+        let sign = if self.part == Part::Upper { -1.0 } else { 1.0 };
+        let mut at = add(saddle.at, scale(saddle.axes[0], first));
+        let (mut v, mut g) = sample(self.f, at);
+        let mut step = 0.4 * first.abs();
+        loop {
+            let corners = self
+                .grid
+                .corners(at)
+                .map(|c| (self.amounts[c.0 as usize], c));
+            let lowest = corners
+                .into_iter()
+                .fold(corners[0], |a, b| if b.0 < a.0 { b } else { a });
+            if (sign * v < limit && lowest.0 < limit) || step < 0.01 * first.abs() {
+                return lowest.1;
+            }
+            let next = add(at, scale(unit(g), -sign * step));
+            let (w, k) = sample(self.f, next);
+            if sign * w < sign * v {
+                (at, v, g) = (next, w, k);
+            } else {
+                step *= 0.5;
+            }
+        }
+    }
+}
+
+/// Points of one period, those nearer than `apart` along every axis given once.
+fn distinct(points: Vec<Critical>, apart: f64) -> Vec<Critical> {
+    let mut kept: Vec<Critical> = Vec::new();
+    for p in points {
+        let same = |k: &Critical| {
+            sub(p.at, k.at)
+                .iter()
+                .all(|d| (d - d.round()).abs() < apart)
+        };
+        if !kept.iter().any(same) {
+            kept.push(p);
+        }
+    }
+    kept
+}
+
+/// Plays the events at their refined levels; the intervals in which one piece winds round the torus every way.
+///
+/// Pieces that join others again within the error of sampling, or exactly where they appear, are noise.
+fn replay(
+    births: Vec<Birth>,
+    mut events: Vec<Event>,
+    full: f64,
+    error: f64,
+    range: f64,
+) -> Vec<[f64; 2]> {
+    let index = |node: u32| births.iter().position(|b| b.node == node);
+    let mut order: Vec<usize> = (0..births.len()).collect();
+    order.sort_by(|a, b| births[*a].level.total_cmp(&births[*b].level));
+    let mut forest = Forest::new(births.len());
+    for &i in &order {
+        forest.insert(i as u32);
+        forest.wind(i as u32, &births[i].loops);
+    }
+    let Some(&eldest) = order.first() else {
+        return Vec::new();
+    };
+    for e in events.iter_mut().filter(|e| !e.exact) {
+        // On a line of extreme values a piece meets its neighbours where it appears, whatever the samples say.
+        let born = e
+            .pieces
+            .map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
+        let born = born[0].max(born[1]);
+        if e.level - born <= error {
+            (e.level, e.exact) = (born, true);
+        }
+    }
+    events.sort_by(|a, b| a.level.total_cmp(&b.level));
+    // Spans in which a second piece lives.
+    let mut spans = Vec::new();
+    let mut whole = forest
+        .loops(eldest as u32)
+        .is_full()
+        .then_some(births[eldest].level);
+    for e in &events {
+        let (Some(a), Some(b)) = (index(e.pieces[0]), index(e.pieces[1])) else {
+            continue;
+        };
+        if let Joined::Merged {
+            pieces: [_, young], ..
+        } = forest.join(a as u32, b as u32, e.shift)
+        {
+            let born = &births[young as usize];
+            let noise = if born.exact && e.exact {
+                1e-6 * range
+            } else {
+                error
+            };
+            if e.level - born.level > noise {
+                spans.push([born.level, e.level]);
+            }
+        }
+        if whole.is_none() && forest.loops(eldest as u32).is_full() {
+            whole = Some(e.level);
+        }
+    }
+    let Some(mut from) = whole else {
+        return Vec::new();
+    };
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut intervals = Vec::new();
+    for [birth, death] in spans {
+        if birth - from > 1e-6 * range {
+            intervals.push([from, birth]);
+        }
+        from = from.max(death);
+    }
+    if full - from > 1e-6 * range {
+        intervals.push([from, full]);
+    }
+    intervals
+}
+
+#[cfg(test)]
+mod tests;
