@@ -16,6 +16,7 @@ use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 use crate::solid::Solid;
 
+mod crease;
 mod grid;
 mod table;
 mod tile;
@@ -287,11 +288,17 @@ pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxel
 }
 
 /// One triangle of a binary STL: normal, corners, no attributes.
+#[inline]
 fn push_record(out: &mut Vec<u8>, t: [[f32; 3]; 3]) {
-    let wide = t.map(|p| p.map(f64::from));
-    let n = crate::math::unit(cross(sub(wide[1], wide[0]), sub(wide[2], wide[0])));
+    let [a, b, c] = t;
+    let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let long = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    let s = if long > 0.0 { 1.0 / long } else { 0.0 };
+    let floats = [
+        n[0] * s, n[1] * s, n[2] * s, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
+    ];
     let mut record = [0u8; 50];
-    let floats = n.iter().map(|v| *v as f32).chain(t.into_iter().flatten());
     for (slot, v) in record.chunks_exact_mut(4).zip(floats) {
         slot.copy_from_slice(&v.to_le_bytes());
     }

@@ -1,7 +1,7 @@
 //! The rectilinear grid: even steps between the planes of the region, and one step of padding around it.
 
 use crate::fault::Fault;
-use crate::field::{Block, Field};
+use crate::field::Block;
 use crate::math::Aabb;
 use crate::solid::Solid;
 

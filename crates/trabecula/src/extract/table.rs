@@ -15,9 +15,23 @@ use std::sync::LazyLock;
 pub(super) const EDGES: [(usize, usize); 12] =
     [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 0), (2, 2), (3, 2), (4, 0), (4, 1), (5, 1), (6, 0)];
 
-/// For each pattern of solid corners, triangles as indices into `EDGES`, counter-clockwise seen from the void.
-pub(super) static TRIANGLES: LazyLock<[Vec<[u8; 3]>; 256]> =
-    LazyLock::new(|| core::array::from_fn(|case| loops(case).iter().flat_map(|l| fan(l)).collect()));
+/// What a pattern of solid corners makes.
+pub(super) struct Case {
+    /// Triangles as indices into `EDGES`, counter-clockwise seen from the void.
+    pub triangles: Vec<[u8; 3]>,
+    /// The loop around the patch, where there is only one: counter-clockwise seen from the void.
+    pub ring: Option<Vec<u8>>,
+}
+
+/// For each pattern of solid corners, what it makes.
+pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
+    core::array::from_fn(|case| {
+        let loops = loops(case);
+        let triangles = loops.iter().flat_map(|l| fan(l)).collect();
+        let ring = (loops.len() == 1).then(|| loops[0].iter().map(|&e| e as u8).collect());
+        Case { triangles, ring }
+    })
+});
 
 /// The edge between two corners.
 fn edge(a: usize, b: usize) -> usize {
@@ -107,7 +121,7 @@ mod tests {
     fn every_pattern_is_closed_against_its_faces_and_faces_outwards() {
         for case in 1..255usize {
             let mut count = std::collections::HashMap::new();
-            for t in &TRIANGLES[case] {
+            for t in &CASES[case].triangles {
                 for k in 0..3 {
                     *count.entry((t[k], t[(k + 1) % 3])).or_insert(0) += 1;
                 }
@@ -119,7 +133,7 @@ mod tests {
             assert_eq!(single, crossed, "case {case}");
         }
         // One solid corner at the origin: the normal points away from it.
-        let [a, b, c] = TRIANGLES[1][0].map(|e| point(e as usize, 0.5));
+        let [a, b, c] = CASES[1].triangles[0].map(|e| point(e as usize, 0.5));
         assert!(side(a, b, c, [0.0; 3]) < 0.0);
     }
 
@@ -138,8 +152,8 @@ mod tests {
                     _ => if random() < 0.5 { random() } else { [1e-3, 1.0 - 1e-3][usize::from(random() < 0.5)] },
                 });
                 let p = |e: u8| point(e as usize, at[e as usize]);
-                for s in &TRIANGLES[case] {
-                    for t in &TRIANGLES[case] {
+                for s in &CASES[case].triangles {
+                    for t in &CASES[case].triangles {
                         for k in 0..3 {
                             let (a, b) = (s[k], s[(k + 1) % 3]);
                             if !t.contains(&a) && !t.contains(&b) {
