@@ -128,8 +128,11 @@ impl Cell {
     /// Minimum wall thickness (sheet) or narrowest neck diameter (lower, upper) at level `iso`, in mm, where
     /// phases relate to millimetres by u = `to_phase` · x. `None` where the part is empty or full.
     pub fn thickness(&self, part: Part, iso: f64, to_phase: &Mat3) -> Option<f64> {
-        let _ = (part, iso, to_phase);
-        todo!()
+        let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.gradients(u, v, g);
+        match part {
+            Part::Sheet => thickness::wall(&f, iso, to_phase),
+            _ => thickness::neck(&f, part, iso, &self.connectivity(part).necks, to_phase),
+        }
     }
 
     /// Values and gradients (per turn) at phases `u`.

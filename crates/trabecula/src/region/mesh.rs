@@ -148,6 +148,7 @@ impl MeshRegion {
         lo: [usize; 3],
         hi: [usize; 3],
         hint: Option<u32>,
+        level: f64,
         out: &mut [f32],
     ) {
         let first: Vec3 = std::array::from_fn(|a| block.axes[a][lo[a]]);
@@ -160,7 +161,7 @@ impl MeshRegion {
             }
         });
         let here = self.sample(center, hint);
-        let d = here.distance;
+        let d = here.distance - level;
         let shape = block.shape();
         let index = |x: usize, y: usize, z: usize| (z * shape[1] + y) * shape[0] + x;
         if (0..3).all(|a| hi[a] - lo[a] == 1) {
@@ -196,8 +197,8 @@ impl MeshRegion {
         let (mut before, mut after) = (hi, lo);
         before[a] = middle;
         after[a] = middle;
-        self.carve(block, lo, before, here.triangle, out);
-        self.carve(block, after, hi, here.triangle, out);
+        self.carve(block, lo, before, here.triangle, level, out);
+        self.carve(block, after, hi, here.triangle, level, out);
     }
 }
 
@@ -264,9 +265,7 @@ impl Field for MeshRegion {
     }
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
-        if !block.is_empty() {
-            self.carve(block, [0; 3], block.shape(), None, out);
-        }
+        self.fill_level(block, 0.0, out);
     }
 }
 
@@ -276,7 +275,13 @@ impl Shape for MeshRegion {
     }
 
     /// None: a flat part of a mesh is many triangles, any of which may be out of plane by rounding.
-    fn planes(&self, _axis: usize, _out: &mut Vec<f64>) {}
+    fn level_planes(&self, _axis: usize, _level: f64, _out: &mut Vec<f64>) {}
+
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        if !block.is_empty() {
+            self.carve(block, [0; 3], block.shape(), None, level, out);
+        }
+    }
 
     fn volume(&self) -> Option<f64> {
         Some(self.volume)
