@@ -131,7 +131,7 @@ pub fn rotation(degrees: Vec3) -> Mat3 {
     product(&rx, &product(&ry, &rz))
 }
 
-/// (sin 2πu, cos 2πu) for a phase u in turns; error below 2e-16, exact at quarter turns.
+/// (sin 2πu, cos 2πu) for a phase u in turns; error below 4e-16, exact at quarter turns.
 ///
 /// Plain polynomials on an eighth of a turn: every system gives the same bits and the loops vectorise.
 #[inline(always)]
@@ -153,7 +153,8 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
             + w * (1.0 / 24.0
                 + w * (-1.0 / 720.0
                     + w * (1.0 / 40320.0
-                        + w * (-1.0 / 3628800.0 + w * (1.0 / 479001600.0 - w / 87178291200.0))))));
+                        + w * (-1.0 / 3628800.0
+                            + w * (1.0 / 479001600.0 + w * (-1.0 / 87178291200.0 + w / 20922789888000.0)))))));
     // The quadrant modulo 4, as a float, so that no integer conversion breaks the vector loop.
     let k = q - 4.0 * ((q * 0.25 - 0.375 + ROUND) - ROUND);
     let odd = k == 1.0 || k == 3.0;
@@ -309,6 +310,7 @@ mod tests {
             let u = (f64::from(i) - 10_000.0) * 0.000_731;
             let (s, c) = sin_cos_turns(u);
             let (ls, lc) = (core::f64::consts::TAU * (u - u.floor())).sin_cos();
+            // The library's own argument 2πu is rounded by up to 4e-16.
             assert!((s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15, "{u}: {s} {ls} {c} {lc}");
         }
     }

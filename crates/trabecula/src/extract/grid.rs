@@ -74,7 +74,7 @@ impl Grid {
                 ),
             ));
         }
-        Ok(Grid { axes, margin: needed.max(1.0 / 1024.0) })
+        Ok(Grid { axes, margin: needed.max(1.0 / 4096.0) })
     }
 
     /// Number of cells along each axis.
