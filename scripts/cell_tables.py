@@ -44,7 +44,12 @@ def main():
         for v in FRACTIONS:
             lines.append(f"| {v} | " + " | ".join(f"{trabecula.iso(c, v, part=part):.6f}" for c in CELLS) + " |")
         lines.append("")
-    lines += ["## Fractions in which the periodic solid is one piece", "", "| cell | sheet | lower | upper |", "|---|---|---|---|"]
+    lines += [
+        "## Fractions in which the periodic solid is one piece",
+        "",
+        "| cell | sheet | lower | upper |",
+        "|---|---|---|---|",
+    ]
     for cell in CELLS:
         cells = [", ".join(f"{a:.4f} to {b:.4f}" for a, b in limits(cell, part)) or "none" for part in PARTS]
         lines.append(f"| {cell} | " + " | ".join(cells) + " |")

@@ -40,7 +40,13 @@ def properties(schema):
     """Rows for the keys of an object, those of its alternatives included."""
     rows = []
     for key, value in schema.get("properties", {}).items():
-        needed = "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
+        needed = (
+            "yes"
+            if key in schema.get("required", [])
+            else one_line(json.dumps(value["default"]))
+            if "default" in value
+            else ""
+        )
         rows.append(f"| `{key}` | {kind(value)} | {needed} | {one_line(value.get('description', ''))} |")
     for join in ("anyOf", "oneOf"):
         for part in schema.get(join, []):

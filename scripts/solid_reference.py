@@ -63,22 +63,31 @@ def iso(n):
 
 
 SHEAR = np.array([[1, 0, -np.tan(np.radians(20))], [0, 1, 0], [0, 0, 1]])
+MOVED = (0.3, 0.7, 1.1)
 T30 = 0.463951958  # gyroid, sheet, fraction 0.30: corpus/cells.toml
 D35 = 0.365449953  # diamond, f >= t, fraction 0.35: the sheet of fraction 0.3 has this half-level, and V(-t) = 0.35
 
 # name: (bounds, region, lattice), negative inside
 SOLIDS = {
-    "lamellae": (((-5,) * 3, (5,) * 3), lambda p: box(p, (-5,) * 3, (5,) * 3), lambda p: np.cos(TAU * p[0] / 5) + 0 * p[1] * p[2]),
-    "gyroid_half": (((-5,) * 3, (5,) * 3), lambda p: box(p, (-5,) * 3, (5,) * 3), lambda p: seen("gyroid", p, iso(5))),
+    "lamellae": (
+        ((-5,) * 3, (5,) * 3),
+        lambda p: box(p, (-5,) * 3, (5,) * 3),
+        lambda p: np.cos(TAU * p[0] / 5) + 0 * p[1] * p[2],
+    ),
+    "gyroid_half": (
+        ((-5,) * 3, (5,) * 3),
+        lambda p: box(p, (-5,) * 3, (5,) * 3),
+        lambda p: seen("gyroid", p, iso(5), MOVED),
+    ),
     "gyroid_sheet_30": (
         ((0,) * 3, (10,) * 3),
         lambda p: box(p, (0,) * 3, (10,) * 3),
-        lambda p: np.abs(seen("gyroid", p, iso(5))) - T30,
+        lambda p: np.abs(seen("gyroid", p, iso(5), MOVED)) - T30,
     ),
     "diamond_upper_porous": (
         ((0,) * 3, (12, 10, 8)),
         lambda p: box(p, (0,) * 3, (12, 10, 8)),
-        lambda p: D35 - seen("diamond", p, np.diag([1 / 6, 1 / 5, 1 / 4])),
+        lambda p: D35 - seen("diamond", p, np.diag([1 / 6, 1 / 5, 1 / 4]), MOVED),
     ),
     "primitive_cavities": (
         ((-2.5,) * 3, (7.5,) * 3),
@@ -103,7 +112,7 @@ SOLIDS = {
     "linear_slab": (
         ((0,) * 3, (20, 8, 8)),
         lambda p: box(p, (0,) * 3, (20, 8, 8)),
-        lambda p: np.abs(seen("gyroid", p, iso(4))) - ramp(p[0], 2, 0.2, 18, 0.9),
+        lambda p: np.abs(seen("gyroid", p, iso(4), MOVED)) - ramp(p[0], 2, 0.2, 18, 0.9),
     ),
     "depth_ball": (
         ((-7,) * 3, (7,) * 3),
@@ -178,7 +187,9 @@ def topology(bounds, region, lattice, n):
         block = inside
         for axis in range(3):
             if mask >> axis & 1:
-                block = np.logical_and(*(np.take(block, np.arange(block.shape[axis])[s], axis) for s in (slice(1, None), slice(None, -1))))
+                block = np.logical_and(
+                    *(np.take(block, np.arange(block.shape[axis])[s], axis) for s in (slice(1, None), slice(None, -1)))
+                )
         euler += (-1) ** bin(mask).count("1") * int(block.sum())
     pieces = ndimage.label(inside)[1]
     voids = ndimage.label(~inside, np.ones((3, 3, 3)))[1] - 1
