@@ -3,9 +3,9 @@
 
     python bench/peers.py --trabecula .venv/bin/trabecula [--n 128,256] [--repeat 5] [--peers-python PYTHON] [--record]
 
-Runs are interleaved (every program once, then again), so that what else the machine does falls on all alike. Printed are
-medians with the least and the greatest, the peak of resident memory, triangles and the relative error of the volume. Peers
-that are not installed in PYTHON are left out. --record writes bench/record/DATE-MACHINE.csv too.
+Runs are interleaved (every program once, then again), so that what else the machine does falls on all alike. Printed
+are medians with the least and the greatest, the peak of resident memory, triangles and the relative error of the
+volume. Peers that are not installed in PYTHON are left out. --record writes bench/record/DATE-MACHINE.csv too.
 """
 
 import argparse
@@ -38,7 +38,12 @@ def processor():
 
 def versions(python):
     """{peer: version} of the peers that PYTHON has."""
-    probe = "import importlib.metadata as m, sys\nfor p in sys.argv[1:]:\n try: print(p, m.version(p))\n except m.PackageNotFoundError: pass"
+    probe = (
+        "import importlib.metadata as m, sys\n"
+        "for p in sys.argv[1:]:\n"
+        "    try: print(p, m.version(p))\n"
+        "    except m.PackageNotFoundError: pass"
+    )
     done = subprocess.run([python, "-c", probe, *PEERS.values()], capture_output=True, text=True, check=True)
     found = dict(line.split() for line in done.stdout.splitlines())
     return {peer: found[package] for peer, package in PEERS.items() if package in found}
@@ -92,7 +97,8 @@ def main():
                         facts.setdefault(peer, w.read_volume(out))
                         os.remove(out)
                 print(
-                    f"\n{work}, n = {n}\n  {'':12} {'median s':>9} {'least':>8} {'greatest':>8} {'MB':>7} {'triangles':>10} {'volume error':>13}"
+                    f"\n{work}, n = {n}\n  {'':12} {'median s':>9} {'least':>8} {'greatest':>8} {'MB':>7}"
+                    f" {'triangles':>10} {'volume error':>13}"
                 )
                 for peer, pairs in taken.items():
                     seconds, peak = [s for s, _ in pairs], max(m for _, m in pairs)
@@ -107,7 +113,20 @@ def main():
         with path.open("w", newline="") as file:
             file.write(f"# {machine}; {a.repeat} interleaved runs\n")
             writer = csv.writer(file)
-            writer.writerow("work n program version median_s min_s max_s peak_mb triangles volume_error".split())
+            writer.writerow(
+                [
+                    "work",
+                    "n",
+                    "program",
+                    "version",
+                    "median_s",
+                    "min_s",
+                    "max_s",
+                    "peak_mb",
+                    "triangles",
+                    "volume_error",
+                ]
+            )
             writer.writerows(rows)
         print(f"\n{path}")
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every workload once, small, by the command alone: does it run, and is the volume right? Times are printed, never judged.
+"""Every workload once, small, by the command alone: is the volume right? Times are printed, never judged.
 
 python bench/smoke.py --trabecula .venv/bin/trabecula
 """

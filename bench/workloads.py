@@ -38,7 +38,7 @@ def spacing(n):
 
 
 def field(name, n):
-    """f as a float32 array (z, y, x) with one outer layer that closes the cube: the fastest plain-numpy way, by tables."""
+    """f as a float32 array (z, y, x), one outer layer closing the cube: the fastest plain-numpy way, by tables."""
     import numpy as np
 
     u = 2 * np.pi * np.linspace(0, CELLS, n)

@@ -46,7 +46,18 @@ def formula(name, x, y, z):
     }[name]()
 
 
-CELLS = "gyroid gyroid_mirrored diamond primitive iwp neovius frd fischer_koch_s lidinoid split_p".split()
+CELLS = [
+    "gyroid",
+    "gyroid_mirrored",
+    "diamond",
+    "primitive",
+    "iwp",
+    "neovius",
+    "frd",
+    "fischer_koch_s",
+    "lidinoid",
+    "split_p",
+]
 # Levels (of f <= t) at which the fraction is wanted; rounded values near 0.05, 0.1, 0.2, 0.3, 0.5, 0.7 and 0.9.
 LEVELS = {
     "gyroid": [-1.33, -1.2, -0.91, -0.62, 0.0, 0.62, 1.2],
@@ -135,7 +146,10 @@ def main():
         print(f"range = [{least:.5f}, {greatest:.5f}]")
         print(f"euler = {euler(name)}")
         print(f"area = {area(name, a.lines // 2, a.samples // 2):.5f}")
-        print("lower = [" + ", ".join(f"[{t}, {v:.6f}]" for t, v in zip(LEVELS[name], fractions)) + "]\n", flush=True)
+        print(
+            "lower = [" + ", ".join(f"[{t}, {v:.6f}]" for t, v in zip(LEVELS[name], fractions, strict=True)) + "]\n",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from pathlib import Path
 import trabecula
 
 ROOT = Path(__file__).resolve().parent.parent
-CELLS = "gyroid diamond primitive iwp neovius frd fischer_koch_s lidinoid split_p".split()
+CELLS = ["gyroid", "diamond", "primitive", "iwp", "neovius", "frd", "fischer_koch_s", "lidinoid", "split_p"]
 FRACTIONS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 PARTS = ("sheet", "lower", "upper")
 DESIGN = """schema = 1
@@ -38,7 +38,7 @@ def main():
     """Write the page."""
     lines = ["<!-- Made by scripts/cell_tables.py; do not edit. -->", "# The named cells in numbers", ""]
     lines += ["The two gyroids differ by a mirror and share their numbers.", ""]
-    for part, meaning in zip(PARTS, ("|f| ≤ t", "f ≤ t", "f ≥ t")):
+    for part, meaning in zip(PARTS, ("|f| ≤ t", "f ≤ t", "f ≥ t"), strict=True):
         lines += [f"## Level t for a fraction, `{part}`: {meaning}", ""]
         lines += ["| fraction | " + " | ".join(CELLS) + " |", "|---" * (len(CELLS) + 1) + "|"]
         for v in FRACTIONS:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Writes the generated reference: docs/generated/{design,command,python}.md, from the schema, the help and the docstrings."""
+"""Writes docs/generated/{design,command,python}.md from the schema, the help pages and the docstrings."""
 
+import contextlib
 import inspect
 import json
 import subprocess
@@ -12,7 +13,7 @@ import trabecula
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated"
 STAMP = "<!-- Made by scripts/design_reference.py; do not edit. -->"
-COMMANDS = "new check mesh voxels measure cells render".split()
+COMMANDS = ["new", "check", "mesh", "voxels", "measure", "cells", "render"]
 
 
 def kind(schema):
@@ -86,10 +87,8 @@ def python():
             keep = inspect.isclass(thing)
             members += [(f"{name}.{k}", m) for k, m in owned if keep or getattr(m, "__module__", "") == thing.__name__]
         for label, member in members:
-            try:
+            with contextlib.suppress(TypeError, ValueError):
                 label += str(inspect.signature(member)) if callable(member) else ""
-            except (TypeError, ValueError):
-                pass
             lines += [f"### `{label}`", "", inspect.getdoc(member) or "", ""]
     return "\n".join(lines)
 

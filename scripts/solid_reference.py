@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reference numbers for corpus/designs, independent of the core: numpy and the formulas, written out once more here.
 
-Volume and areas come from dense parallel lines, as in cell_reference.py; Euler number, pieces and cavities from the cubes
-of a fine grid (scipy labels them). Where a number is known in closed form, corpus/solids.toml says so and uses that.
+Volume and areas come from dense parallel lines, as in cell_reference.py; Euler number, pieces and cavities from the
+cubes of a fine grid (scipy labels them). Where a number is known in closed form, corpus/solids.toml uses that.
 
     python scripts/solid_reference.py [--lines 300] [NAME ...]
 """
@@ -125,7 +125,7 @@ SOLIDS = {
         lambda p: np.abs(seen("diamond", p, iso(5))) - (0.4 + 0.1 * np.sin(p[0] / 3)),
     ),
     "skewed_lens": (
-        ((-9, -9, -1.5), (9, 9, 5.5)),
+        ((-9.5, -9.5, -1.5), (9.5, 9.5, 5.5)),
         lens,
         lambda p: -seen("neovius", p, iso(6) @ SHEAR),
     ),
@@ -133,7 +133,7 @@ SOLIDS = {
 
 
 def sweep(bounds, region, lattice, axis, n, samples):
-    """(part of the line that is solid, lattice crossings, cut crossings), summed over lines along `axis`, as measures."""
+    """(volume, this axis' share of the lattice and cut areas), from lines along `axis`."""
     low, high = (np.array(b, float) for b in bounds)
     size = high - low
     one, two = (k for k in range(3) if k != axis)
@@ -179,7 +179,7 @@ def topology(bounds, region, lattice, n):
     """(Euler number of the surface, pieces, cavities) from the cubes of a grid whose corners are all inside."""
     low, high = (np.array(b, float) for b in bounds)
     step = (high - low).max() / n
-    axes = [np.arange(a - 1.63 * step, b + 2 * step, step) for a, b in zip(low, high)]
+    axes = [np.arange(a - 1.63 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     p = np.meshgrid(*axes, indexing="ij", sparse=True)
     inside = np.maximum(region(p), lattice(p)) <= 0
     euler = 0
