@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/generated/cells.md: what the core knows of each named cell, by `trabecula cells --json` and trabecula.iso."""
+"""Writes docs/generated/cells.md: what the core knows of each named cell, by `trabecula cells` and `trabecula.iso`."""
 
 import json
 import subprocess

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import trabecula
 
 if sys.version_info >= (3, 11):
