@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import trabecula
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,8 +29,9 @@ def main():
     for part, meaning in PARTS.items():
         lines += [f"## Level t for a fraction, `{part}`: {meaning.replace('|', chr(92) + '|')}", ""]
         lines += ["| fraction | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
-        for v in FRACTIONS:
-            lines.append(f"| {v} | " + " | ".join(f"{trabecula.iso(c, v, part=part):.6f}" for c in names) + " |")
+        columns = [trabecula.iso(name, np.array(FRACTIONS), part=part) for name in names]
+        for v, levels in zip(FRACTIONS, zip(*columns, strict=True), strict=True):
+            lines.append(f"| {v} | " + " | ".join(f"{t:.6f}" for t in levels) + " |")
         lines.append("")
     lines += ["## Fractions in which the periodic solid is one piece", "", "| cell | sheet | lower | upper |"]
     lines.append("|---|---|---|---|")

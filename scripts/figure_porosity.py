@@ -31,12 +31,12 @@ BLUE, RED, GREEN, GREY = "#1f5fa8", "#c0392b", "#2a7f4f", "#8a8a8a"
 
 def exact(cell, porosity):
     """t at which f <= t leaves this porosity."""
-    return np.array([trabecula.iso(cell, 1 - p, part="lower") for p in porosity])
+    return trabecula.iso(cell, 1 - porosity, part="lower")
 
 
 def realised(cell, levels):
     """The porosity of f <= t."""
-    return np.array([1 - trabecula.fraction(cell, t, part="lower") for t in levels])
+    return 1 - trabecula.fraction(cell, levels, part="lower")
 
 
 def odd_fit(cell):
