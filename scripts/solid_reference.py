@@ -137,8 +137,8 @@ def sweep(bounds, region, lattice, axis, n, samples):
     low, high = (np.array(b, float) for b in bounds)
     size = high - low
     one, two = (k for k in range(3) if k != axis)
-    first = low[one] + size[one] * (np.arange(n) + 0.371) / n
-    second = low[two] + size[two] * (np.arange(n) + 0.138) / n
+    first = low[one] + size[one] * (np.arange(n) + 0.5) / n
+    second = low[two] + size[two] * (np.arange(n) + 0.5) / n
     # A margin, so that surfaces on the bounds are crossed.
     start, stop = low[axis] - 0.01 * size[axis], high[axis] + 0.01 * size[axis]
     along = np.linspace(start, stop, samples + 1)
