@@ -1,1 +1,165 @@
 //! The design: the data, and its one road to a solid.
+//!
+//! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
+//! wrong is one [`DesignError`] with the path, the line and the nearest right word.
+
+mod build;
+mod data;
+mod error;
+mod grade;
+mod level;
+mod node;
+mod read;
+mod region;
+mod report;
+mod sample;
+mod schema;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value as Json;
+
+use crate::cell::Cell;
+use crate::lattice::Lattice;
+use crate::region::Region;
+use crate::solid::Solid;
+
+pub use data::*;
+pub use error::{DesignError, nearest};
+pub use node::{Lines, Node, Value};
+pub use schema::schema;
+
+/// A lattice part, as data.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Design {
+    /// Version of this format; 1.
+    #[schemars(range(min = 1, max = 1))]
+    pub schema: u32,
+    /// Unit of length.
+    #[serde(default)]
+    pub units: Units,
+    /// Where the part may be.
+    pub region: RegionSpec,
+    /// What fills the region: one lattice, under a name of your own.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    pub lattice: Lattices,
+    /// Where each key stands in the file it was read from.
+    #[serde(skip)]
+    pub lines: Lines,
+}
+
+/// The unit of length of a design.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Units {
+    /// Millimetre.
+    #[default]
+    Mm,
+}
+
+/// Hands over the files that a design refers to.
+pub trait Loader {
+    /// The bytes of the file at `path`, or one sentence why not.
+    fn load(&self, path: &str) -> Result<Vec<u8>, String>;
+}
+
+/// Something in a design that is allowed but may not be meant.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// Path of the key in the design.
+    pub path: String,
+    /// What may not be meant, with the numbers.
+    pub message: String,
+}
+
+/// A built design.
+pub struct Built {
+    /// The solid.
+    pub solid: Solid,
+    /// The lattices in it, by name.
+    pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// What may not be meant.
+    pub warnings: Vec<Warning>,
+}
+
+impl Design {
+    /// A design of one lattice in a region.
+    pub fn new(region: RegionSpec, name: &str, lattice: LatticeSpec) -> Design {
+        let lattice = Lattices::from([(name.to_string(), lattice)]);
+        Design {
+            schema: 1,
+            units: Units::Mm,
+            region,
+            lattice,
+            lines: Lines::default(),
+        }
+    }
+
+    /// Reads a design from TOML.
+    ///
+    /// ```
+    /// # use trabecula::design::Design;
+    /// let e = Design::from_toml("schema = 1\n[regoin.box]\nsize = [8, 8, 8]").unwrap_err();
+    /// assert_eq!((e.line, e.path.as_str(), e.nearest.as_deref()), (Some(2), "regoin", Some("region")));
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Design, DesignError> {
+        read::design(&Node::from_toml(text)?)
+    }
+
+    /// Reads a design from JSON.
+    pub fn from_json(text: &str) -> Result<Design, DesignError> {
+        read::design(&Node::from_json(text)?)
+    }
+
+    /// Reads a design from a tree.
+    pub fn from_node(node: &Node) -> Result<Design, DesignError> {
+        read::design(node)
+    }
+
+    /// The design as TOML.
+    pub fn to_toml(&self) -> Result<String, DesignError> {
+        toml::to_string(self)
+            .map_err(|e| DesignError::new("", format!("cannot be written as TOML: {e}")))
+    }
+
+    /// The design as JSON.
+    pub fn to_json(&self) -> Json {
+        serde_json::to_value(self).unwrap_or(Json::Null)
+    }
+
+    /// Builds the solid. Numbers are checked here: finite, in range, possible in the region.
+    pub fn build(&self, loader: &dyn Loader) -> Result<Built, DesignError> {
+        build::design(self, loader).map_err(|mut e| {
+            e.line = e.line.or_else(|| self.lines.line(&e.path));
+            e
+        })
+    }
+}
+
+/// The region of a design, or of a tree with the key `region` alone.
+pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
+    let lines = node.lines();
+    region::region(&read::region_in(node)?, "region", loader).map_err(|mut e| {
+        e.line = e.line.or_else(|| lines.line(&e.path));
+        e
+    })
+}
+
+/// The cell that a tree describes, as under the key `cell` of a lattice.
+pub fn cell(node: &Node) -> Result<Cell, DesignError> {
+    Ok(build::cell(&read::cell_in(node)?, "cell")?.1)
+}
+
+impl Built {
+    /// The numbers of the design without meshing it: for each lattice iso, fraction, porosity, thickness and
+    /// connected_fraction (a number, or [min, max] over the region where it varies), the region's bounds and
+    /// volume, and the warnings.
+    pub fn report(&self) -> Json {
+        report::report(self)
+    }
+}

@@ -1,10 +1,28 @@
-//! Extraction of surfaces and voxels from a solid.
+//! Extraction of surfaces and voxels from a solid, tile by tile.
+//!
+//! A tile depends on nothing but the solid, the grid and its index. Tiles are extracted in parallel, a few at a time,
+//! and taken in order, so the result does not depend on the number of threads and memory is bounded by the tiles in
+//! flight plus the output.
 
+use std::collections::HashMap;
 use std::io;
+use std::sync::Mutex;
+
+use rayon::prelude::*;
 
 use crate::fault::Fault;
+use crate::field::{Block, Field};
+use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 use crate::solid::Solid;
+
+mod crease;
+mod grid;
+mod table;
+mod tile;
+
+use grid::Grid;
+use tile::{Patch, Scratch};
 
 /// Told how far the work is; answers whether to go on.
 pub trait Progress: Sync {
@@ -67,35 +85,160 @@ pub struct Estimate {
     pub stl: f64,
 }
 
-/// Estimates the work for a grid spacing `edge` (mm).
+/// Estimates the work for a grid spacing `edge` (mm) from a few tiles spread over the grid.
+///
+/// # Errors
+/// A spacing or region for which no grid can be made.
 pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
-    let _ = (solid, edge);
-    todo!()
+    const SAMPLES: usize = 24;
+    let grid = Grid::new(solid, edge)?;
+    let total: usize = grid.tiles().iter().product();
+    let sampled = total.min(SAMPLES);
+    let found: usize = (0..sampled)
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, i| {
+            // Odd multiples of a share of the whole: the middles of equal runs of tiles.
+            let index = (2 * i + 1) * total / (2 * sampled);
+            tile::extract(solid, &grid, grid.tile(index), scratch).map_or(0, |p| p.triangles.len())
+        })
+        .sum();
+    let triangles = found as f64 * total as f64 / sampled as f64;
+    Ok(Estimate {
+        cells: grid.cells().map(|n| n as u64),
+        triangles,
+        // Half as many vertices of 24 bytes, 12 bytes of indices and a flag, twice over while vectors grow.
+        memory: triangles * 2.0 * (12.0 + 12.0 + 1.0),
+        stl: 84.0 + 50.0 * triangles,
+    })
+}
+
+/// Extracts all tiles, a few at a time, and hands what `cook` makes of them to `take` in order.
+fn each_tile<T: Send>(
+    solid: &Solid,
+    grid: &Grid,
+    progress: &dyn Progress,
+    cook: impl Fn(Patch) -> T + Sync,
+    mut take: impl FnMut(T) -> Result<(), Stopped> + Send,
+) -> Result<(), Stopped> {
+    let total: usize = grid.tiles().iter().product();
+    let scratch = Mutex::new(Vec::<Scratch>::new());
+    let work = |tiles: std::ops::Range<usize>| -> Vec<Option<T>> {
+        tiles
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|i| {
+                let mut mine = scratch.lock().ok().and_then(|mut s| s.pop()).unwrap_or_default();
+                let patch = tile::extract(solid, grid, grid.tile(i), &mut mine);
+                if let Ok(mut s) = scratch.lock() {
+                    s.push(mine);
+                }
+                patch.map(&cook)
+            })
+            .collect()
+    };
+    let batch = 4 * rayon::current_num_threads();
+    let mut ready: Vec<Option<T>> = Vec::new();
+    let mut next = 0;
+    loop {
+        let tiles = next..(next + batch).min(total);
+        next = tiles.end;
+        // While one batch is taken the following one is extracted.
+        let (done, found) = rayon::join(
+            || ready.drain(..).flatten().try_for_each(&mut take),
+            || work(tiles.clone()),
+        );
+        done?;
+        if !progress.step(next as u64, total as u64) {
+            return Err(Stopped::Interrupted);
+        }
+        ready = found;
+        if tiles.is_empty() {
+            return Ok(());
+        }
+    }
 }
 
 /// The surface at grid spacing `edge` (mm), held in memory. Same bytes for any number of threads.
+///
+/// # Errors
+/// A spacing or region for which no grid can be made; an interruption; more than 2³² vertices.
 pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surface, Stopped> {
-    let _ = (solid, edge, progress);
-    todo!()
+    let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
+    let mut out = Surface::default();
+    // Vertices on the borders of tiles, by grid edge.
+    let mut border: HashMap<u64, u32> = HashMap::new();
+    each_tile(solid, &grid, progress, |p| p, |patch| {
+        let mut names = Vec::with_capacity(patch.vertices.len());
+        for ((v, key), shared) in patch.vertices.iter().zip(&patch.keys).zip(&patch.shared) {
+            let vertices = &mut out.mesh.vertices;
+            let new = u32::try_from(vertices.len())
+                .map_err(|_| Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL")))?;
+            let name = if *shared { *border.entry(*key).or_insert(new) } else { new };
+            if name == new {
+                vertices.push(*v);
+            }
+            names.push(name);
+        }
+        out.mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+        out.cut.extend_from_slice(&patch.cut);
+        Ok(())
+    })?;
+    Ok(out)
 }
 
 /// The surface at grid spacing `edge` (mm), streamed as binary STL; memory is bounded by the tiles in flight.
 /// The 84-byte header is rewritten at the end, so `out` must be at its start and seekable.
+///
+/// # Errors
+/// As `surface`; failures of `out`; more triangles than the format can count (2³²).
 pub fn stream_stl<W: io::Write + io::Seek + Send>(
     solid: &Solid,
     edge: f64,
     out: &mut W,
     progress: &dyn Progress,
 ) -> Result<Summary, Stopped> {
-    let _ = (solid, edge, out, progress);
-    todo!()
+    let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
+    let middle = solid.region.bounds().center();
+    let mut summary = Summary::default();
+    out.write_all(&[0; 84]).map_err(Stopped::Io)?;
+    let cook = |patch: Patch| {
+        let corners = |t: &[u32; 3]| t.map(|v| patch.vertices[v as usize]);
+        let mut part = Summary { triangles: patch.triangles.len() as u64, ..Summary::default() };
+        let mut records = Vec::with_capacity(50 * patch.triangles.len());
+        for (t, cut) in patch.triangles.iter().zip(&patch.cut) {
+            let t = corners(t);
+            let [a, b, c] = t.map(|p| sub(p, middle));
+            part.volume += dot(a, cross(b, c)) / 6.0;
+            let area = norm(cross(sub(b, a), sub(c, a))) / 2.0;
+            *(if *cut { &mut part.area_cut } else { &mut part.area_lattice }) += area;
+            push_record(&mut records, t.map(|p| p.map(|x| x as f32)));
+        }
+        (part, records)
+    };
+    each_tile(solid, &grid, progress, cook, |(part, records)| {
+        summary.triangles += part.triangles;
+        summary.volume += part.volume;
+        summary.area_lattice += part.area_lattice;
+        summary.area_cut += part.area_cut;
+        if summary.triangles > u64::from(u32::MAX) {
+            let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
+            return Err(Stopped::Refused(Fault::new("edge", message)));
+        }
+        out.write_all(&records).map_err(Stopped::Io)
+    })?;
+    let mut header = [b' '; 84];
+    let title = concat!("binary STL, mm, by trabecula ", env!("CARGO_PKG_VERSION"));
+    header[..title.len()].copy_from_slice(title.as_bytes());
+    header[80..].copy_from_slice(&(summary.triangles as u32).to_le_bytes());
+    out.seek(io::SeekFrom::Start(0)).and_then(|_| out.write_all(&header)).and_then(|()| out.flush()).map_err(Stopped::Io)?;
+    Ok(summary)
 }
 
 /// Occupancy on a grid of cubic voxels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Voxels {
     /// Lower corner of the first voxel, mm.
-    pub origin: [f64; 3],
+    pub origin: Vec3,
     /// Edge of a voxel, mm.
     pub step: f64,
     /// Number of voxels along x, y, z.
@@ -104,8 +247,165 @@ pub struct Voxels {
     pub solid: Vec<u8>,
 }
 
-/// Voxels of edge `step` (mm) over the region's bounds.
+/// Voxels of edge `step` (mm) that cover the region's bounds, centred on them.
+///
+/// # Errors
+/// A step or region for which no grid can be made; more than 2³³ voxels; an interruption.
 pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxels, Stopped> {
-    let _ = (solid, step, progress);
-    todo!()
+    Grid::new(solid, step).map_err(|f| Stopped::Refused(Fault::new("step", f.message)))?;
+    let bounds = solid.region.bounds();
+    let shape = bounds.size().map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
+    let count = shape.iter().map(|&n| n as f64).product::<f64>();
+    if count > (1u64 << 33) as f64 {
+        let message = format!("{step} mm makes {count:.2e} voxels; at most 8.6e9 are possible: use a step above {:.3} mm", step * (count / 8e9).cbrt());
+        return Err(Stopped::Refused(Fault::new("step", message)));
+    }
+    let extent = shape.map(|n| n as f64 * step);
+    let origin = [0, 1, 2].map(|a| bounds.center()[a] - extent[a] / 2.0);
+    let axes = [0, 1, 2].map(|a| (0..shape[a]).map(|i| origin[a] + (i as f64 + 0.5) * step).collect::<Vec<f64>>());
+    let mut out = Voxels { origin, step, shape, solid: vec![0; shape.iter().product()] };
+    let layer = shape[0] * shape[1];
+    let slab = (layer * rayon::current_num_threads()).max(1);
+    for (n, layers) in out.solid.chunks_mut(slab).enumerate() {
+        layers.par_chunks_mut(layer).enumerate().for_each(|(i, layer)| {
+            let z = n * rayon::current_num_threads() + i;
+            let block = Block { axes: [&axes[0], &axes[1], &axes[2][z..=z]] };
+            let mut samples = vec![0f32; layer.len()];
+            layer.fill(1);
+            let fields = [Some(&*solid.region as &dyn Field), solid.field.as_deref()];
+            for f in fields.into_iter().flatten() {
+                f.fill(&block, &mut samples);
+                for (o, v) in layer.iter_mut().zip(&samples) {
+                    *o &= u8::from(*v <= 0.0);
+                }
+            }
+        });
+        if !progress.step((n + 1) as u64, shape[2].div_ceil(slab / layer) as u64) {
+            return Err(Stopped::Interrupted);
+        }
+    }
+    Ok(out)
+}
+
+/// One triangle of a binary STL: normal, corners, no attributes.
+#[inline]
+fn push_record(out: &mut Vec<u8>, t: [[f32; 3]; 3]) {
+    let [a, b, c] = t;
+    let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let long = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    let s = if long > 0.0 { 1.0 / long } else { 0.0 };
+    let floats = [
+        n[0] * s, n[1] * s, n[2] * s, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
+    ];
+    let mut record = [0u8; 50];
+    for (slot, v) in record.chunks_exact_mut(4).zip(floats) {
+        slot.copy_from_slice(&v.to_le_bytes());
+    }
+    out.extend_from_slice(&record);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::{Cell, Part, Series, named};
+    use crate::grade::Grade;
+    use crate::lattice::{Lattice, Level};
+    use crate::map::{Affine, Map};
+    use crate::math::{Aabb, Interval, scale};
+    use crate::region::Shape;
+    use std::sync::Arc;
+
+    struct Ball(f64);
+    impl Field for Ball {
+        fn values(&self, points: &[Vec3], out: &mut [f64]) {
+            points.iter().zip(out).for_each(|(p, o)| *o = norm(*p) - self.0);
+        }
+        fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+            self.values(points, values);
+            points.iter().zip(gradients).for_each(|(p, g)| *g = scale(*p, 1.0 / norm(*p).max(1e-300)));
+        }
+        fn bound(&self, b: &Aabb) -> Interval {
+            let (c, r) = (norm(b.center()) - self.0, norm(b.size()) / 2.0);
+            Interval::new(c - r, c + r)
+        }
+    }
+    impl Shape for Ball {
+        fn bounds(&self) -> Aabb {
+            Aabb { min: [-self.0; 3], max: [self.0; 3] }
+        }
+        fn planes(&self, _: usize, _: &mut Vec<f64>) {}
+        fn volume(&self) -> Option<f64> {
+            None
+        }
+    }
+    struct Cube(f64);
+    impl Field for Cube {
+        fn values(&self, points: &[Vec3], out: &mut [f64]) {
+            points.iter().zip(out).for_each(|(p, o)| *o = p.iter().map(|x| (x - self.0).max(-x)).fold(f64::NEG_INFINITY, f64::max));
+        }
+        fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+            self.values(points, values);
+            gradients.fill([1.0, 0.0, 0.0]);
+        }
+        fn bound(&self, b: &Aabb) -> Interval {
+            let (c, r) = (self.value(b.center()), norm(b.size()) / 2.0);
+            Interval::new(c - r, c + r)
+        }
+    }
+    impl Shape for Cube {
+        fn bounds(&self) -> Aabb {
+            Aabb { min: [0.0; 3], max: [self.0; 3] }
+        }
+        fn planes(&self, _: usize, out: &mut Vec<f64>) {
+            out.extend([0.0, self.0]);
+        }
+        fn volume(&self) -> Option<f64> {
+            None
+        }
+    }
+
+    fn defects(m: &Mesh) -> (usize, usize) {
+        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+        for t in &m.triangles {
+            for k in 0..3 {
+                *edges.entry((t[k], t[(k + 1) % 3])).or_insert(0) += 1;
+            }
+        }
+        let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a))).count();
+        (open, edges.values().filter(|&&n| n != 1).count())
+    }
+
+    fn gyroid(part: Part, level: Level) -> Arc<dyn Field> {
+        let cell = Cell::new(Series::new(named("gyroid").expect("named").terms()).expect("series"));
+        Arc::new(Lattice::new(Arc::new(cell), Map::Affine(Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[]).expect("map")), part, level))
+    }
+
+    #[test]
+    fn try_it() {
+        for n in [16, 32, 64, 128] {
+            let solid = Solid { region: Arc::new(Cube(2.0)), field: Some(gyroid(Part::Sheet, Level::Iso(Grade::Constant(0.463951958)))), wavelength: 1.0 };
+            let t = std::time::Instant::now();
+            let s = surface(&solid, 1.0 / n as f64, &Silent).expect("surface");
+            println!("sheet {n}: {:?} {} tris, vol rel err {:.3e} area {} open {:?}", t.elapsed(), s.mesh.triangles.len(), s.mesh.volume() / 2.4 - 1.0, s.mesh.area(), defects(&s.mesh));
+        }
+        for n in [8, 16, 32, 64] {
+            let solid = Solid { region: Arc::new(Ball(1.0)), field: None, wavelength: 1.0 };
+            let s = surface(&solid, 1.0 / n as f64, &Silent).expect("surface");
+            let v = 4.0 / 3.0 * core::f64::consts::PI;
+            println!("ball {n}: {} tris, vol rel err {:.3e} area err {:.3e} open {:?}", s.mesh.triangles.len(), s.mesh.volume() / v - 1.0, s.mesh.area() / (3.0 * v) - 1.0, defects(&s.mesh));
+        }
+        for n in [8, 16, 32, 64] {
+            let solid = Solid { region: Arc::new(Ball(1.0)), field: Some(gyroid(Part::Sheet, Level::Iso(Grade::Constant(0.463951958)))), wavelength: 1.0 };
+            let s = surface(&solid, 1.0 / n as f64, &Silent).expect("surface");
+            println!("gyroid ball {n}: {} tris, vol {:.6e} open {:?}", s.mesh.triangles.len(), s.mesh.volume(), defects(&s.mesh));
+        }
+        let solid = Solid { region: Arc::new(Cube(4.0)), field: Some(gyroid(Part::Lower, Level::Iso(Grade::Constant(0.0)))), wavelength: 1.0 };
+        for n in [128, 256, 512] {
+            let t = std::time::Instant::now();
+            let mut f = std::io::BufWriter::new(std::fs::File::create("/tmp/x.stl").expect("file"));
+            let s = stream_stl(&solid, 4.0 / (n as f64 - 1.0), &mut f, &Silent).expect("stl");
+            println!("{n}: {:?} {s:?}", t.elapsed());
+        }
+    }
 }

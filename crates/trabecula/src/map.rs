@@ -1,36 +1,91 @@
 //! Maps from position (mm) to phase (turns).
 
 use crate::fault::Fault;
-use crate::math::{Mat3, Vec3};
+use crate::math::{IDENTITY, Mat3, Vec3, apply, determinant, inverse, product, rotation, scale, transpose};
 
-/// u = M x + b.
+/// An affine map u = M x + b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
-    /// M, per mm.
+    /// M, turns per mm.
     pub matrix: Mat3,
     /// b, turns.
     pub shift: Vec3,
+    /// The wavelengths it was made from, mm.
+    pub wavelength: Vec3,
 }
 
-/// A named shear: `(of, by, degrees)` moves axis `of` by tan(degrees) times coordinate `by`.
+/// A named shear `(of, by, degrees)`: coordinate `of` grows by tan(degrees) times coordinate `by`.
 pub type Skew = (usize, usize, f64);
 
 impl Affine {
-    /// u = D Rᵀ (x − offset), after the shears are undone.
+    /// u = D Rᵀ S⁻¹ (x − offset), D = diag(1/λ), R = Rx Ry Rz: the lattice of wavelengths λ (mm) is turned rigidly by
+    /// the angles (degrees), then sheared, then moved by +offset (mm).
+    ///
+    /// # Errors
+    /// Wavelengths that are not positive and finite, angles that are not finite, shears that flatten space.
     pub fn rigid(wavelength: Vec3, rotate: Vec3, offset: Vec3, skew: &[Skew]) -> Result<Affine, Fault> {
-        let _ = (wavelength, rotate, offset, skew);
-        todo!()
+        let d = per_wavelength(wavelength)?;
+        finite("rotate", &rotate)?;
+        let mut shear = IDENTITY;
+        for &(of, by, degrees) in skew {
+            let name: String = [of, by].map(|a| ['x', 'y', 'z'][a]).iter().collect();
+            if !(degrees.abs() < 90.0) {
+                return Err(Fault::new(
+                    format!("skew.{name}"),
+                    format!("{degrees} degrees; a shear angle lies between -90 and 90, exclusive"),
+                ));
+            }
+            shear[of][by] += degrees.to_radians().tan();
+        }
+        if !(determinant(&shear) > 1e-6) {
+            return Err(Fault::new(
+                "skew",
+                format!("these shears together flatten or invert space (determinant {:.3}); use smaller angles", determinant(&shear)),
+            ));
+        }
+        let matrix = product(&d, &product(&transpose(&rotation(rotate)), &inverse(&shear)));
+        Self::about(matrix, offset, wavelength)
     }
 
-    /// u = Rᵀ D (x − offset): seed form of the SPARTAN note.
+    /// u = Rᵀ D (x − offset): scaled to phase first and rotated there, as the SPARTAN note writes it (equations 1.2
+    /// and 1.6). With unequal wavelengths the lattice is sheared by the rotation, not turned rigidly.
+    ///
+    /// # Errors
+    /// Wavelengths that are not positive and finite, angles that are not finite.
     pub fn spartan(wavelength: Vec3, rotate: Vec3, offset: Vec3) -> Result<Affine, Fault> {
-        let _ = (wavelength, rotate, offset);
-        todo!()
+        let d = per_wavelength(wavelength)?;
+        finite("rotate", &rotate)?;
+        Self::about(product(&transpose(&rotation(rotate)), &d), offset, wavelength)
+    }
+
+    fn about(matrix: Mat3, offset: Vec3, wavelength: Vec3) -> Result<Affine, Fault> {
+        finite("offset", &offset)?;
+        Ok(Affine { matrix, shift: scale(apply(&matrix, offset), -1.0), wavelength })
     }
 }
 
-/// A map.
-#[derive(Clone, Debug)]
+fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
+    match v.iter().find(|c| !c.is_finite()) {
+        Some(c) => Err(Fault::new(key, format!("{c} is not a finite number"))),
+        None => Ok(()),
+    }
+}
+
+fn per_wavelength(wavelength: Vec3) -> Result<Mat3, Fault> {
+    for w in wavelength {
+        if !(w > 0.0 && w.is_finite()) || !(1.0 / w).is_finite() {
+            return Err(Fault::new("wavelength", format!("{w} mm; a wavelength is a positive, finite length")));
+        }
+    }
+    let mut d = IDENTITY;
+    for a in 0..3 {
+        d[a][a] = 1.0 / wavelength[a];
+    }
+    Ok(d)
+}
+
+/// A map from position to phase.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Map {
     /// u = M x + b.
     Affine(Affine),
@@ -39,6 +94,67 @@ pub enum Map {
 impl Map {
     /// The smallest wavelength (mm): what `--per-cell` divides.
     pub fn wavelength(&self) -> f64 {
-        todo!()
+        match self {
+            Map::Affine(a) => a.wavelength.iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// Fills phases (turns) of points (mm).
+    pub fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
+        let Map::Affine(a) = self;
+        for (o, &p) in out.iter_mut().zip(points) {
+            let u = apply(&a.matrix, p);
+            *o = [u[0] + a.shift[0], u[1] + a.shift[1], u[2] + a.shift[2]];
+        }
+    }
+
+    /// du/dx at a point, turns per mm.
+    pub fn jacobian(&self, _at: Vec3) -> Mat3 {
+        let Map::Affine(a) = self;
+        a.matrix
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{norm, sub};
+
+    #[test]
+    fn lattice_vectors_are_those_of_the_conventions() {
+        let (w, r) = ([1.0, 1.0, 2.0], [20.0, 35.0, 50.0]);
+        let rigid = Affine::rigid(w, r, [0.0; 3], &[]).expect("valid");
+        let v = transpose(&inverse(&rigid.matrix)).map(norm);
+        for (got, want) in v.iter().zip([1.0, 1.0, 2.0]) {
+            assert!((got - want).abs() < 1e-14);
+        }
+        // Figures for the phase-space reading: columns of diag(λ) R.
+        let spartan = Affine::spartan(w, r, [0.0; 3]).expect("valid");
+        let v = transpose(&inverse(&spartan.matrix)).map(norm);
+        for (got, want) in v.iter().zip([1.011, 1.484, 1.667]) {
+            assert!((got - want).abs() < 5e-4, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn offset_moves_the_lattice_and_skew_shears_it() {
+        let plain = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("valid"));
+        let moved = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.3, -0.2, 5.0], &[]).expect("valid"));
+        let (mut u, mut v) = ([[0.0; 3]], [[0.0; 3]]);
+        plain.phases(&[[1.0, 2.0, 3.0]], &mut u);
+        moved.phases(&[[1.3, 1.8, 8.0]], &mut v);
+        assert!(norm(sub(u[0], v[0])) < 1e-14);
+        let skewed = Map::Affine(Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 2, 45.0)]).expect("valid"));
+        skewed.phases(&[[3.0, 0.0, 3.0]], &mut u);
+        assert!(norm(sub(u[0], [0.0, 0.0, 3.0])) < 1e-14);
+    }
+
+    #[test]
+    fn refuses_what_is_no_length() {
+        for w in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let fault = Affine::rigid([1.0, w, 1.0], [0.0; 3], [0.0; 3], &[]).expect_err("refused");
+            assert_eq!(fault.at, "wavelength");
+        }
+        assert!(Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 1, 90.0)]).is_err());
     }
 }

@@ -1,6 +1,20 @@
 //! Measures of a mesh.
-use crate::math::Aabb;
+
+use rayon::prelude::*;
+
+use crate::math::{Aabb, cross, norm, sub};
 use crate::mesh::Mesh;
+
+mod adjacency;
+mod exact;
+mod intersect;
+
+pub use adjacency::non_manifold_vertices;
+use adjacency::{Bodies, Edges};
+pub use intersect::self_intersections;
+
+/// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
+const CHUNK: usize = 1 << 16;
 
 /// What a closed mesh is.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,22 +23,51 @@ pub struct Size {
     pub volume: f64,
     /// Area, mm².
     pub area: f64,
-    /// V − E + F.
+    /// V − E + F, over the vertices that triangles use.
     pub euler: i64,
-    /// Solids.
+    /// Solids: bodies (joined by shared vertices) of positive signed volume.
     pub pieces: usize,
-    /// Closed voids inside solids.
+    /// Closed voids inside solids: bodies of negative signed volume.
     pub cavities: usize,
     /// Whether every edge has exactly two triangles of opposite direction.
     pub closed: bool,
-    /// Bounds.
+    /// Bounds of the vertices that triangles use.
     pub bounds: Aabb,
 }
 
 /// Measures a mesh (vertices already joined by index).
+///
+/// Time and memory are linear in the mesh.
 pub fn size(mesh: &Mesh) -> Size {
-    let _ = mesh;
-    todo!()
+    let edges = Edges::count(mesh);
+    let bodies = Bodies::of(mesh);
+    let signed = bodies.volumes(mesh);
+    Size {
+        volume: signed.iter().sum(),
+        area: area(mesh),
+        euler: bodies.vertices as i64 - edges.all as i64 + mesh.triangles.len() as i64,
+        pieces: signed.iter().filter(|v| **v > 0.0).count(),
+        cavities: signed.iter().filter(|v| **v < 0.0).count(),
+        closed: edges.all == edges.sound && edges.loops == 0,
+        bounds: mesh.bounds(),
+    }
+}
+
+/// Area by parts of equal size, so that the sum is the same for any number of threads.
+fn area(mesh: &Mesh) -> f64 {
+    let parts: Vec<f64> = mesh
+        .triangles
+        .par_chunks(CHUNK)
+        .map(|part| {
+            part.iter()
+                .map(|t| {
+                    let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+                    norm(cross(sub(b, a), sub(c, a))) / 2.0
+                })
+                .sum()
+        })
+        .collect();
+    parts.iter().sum()
 }
 
 /// What is wrong with a mesh as the boundary of one solid.
@@ -36,16 +79,254 @@ pub struct Defects {
     pub crowded_edges: usize,
     /// Edges with two triangles that run the same way (a flipped neighbour).
     pub flipped_edges: usize,
-    /// Triangles that repeat another one's vertices.
+    /// Triangles that repeat another one's vertices, in whatever order.
     pub duplicate_triangles: usize,
-    /// Triangles with two equal vertices or zero area.
+    /// Triangles with two equal vertices or zero area (decided exactly).
     pub degenerate_triangles: usize,
-    /// Connected bodies.
+    /// Connected bodies, joined by shared vertices.
     pub bodies: usize,
 }
 
 /// Counts the defects of a mesh.
 pub fn defects(mesh: &Mesh) -> Defects {
-    let _ = mesh;
-    todo!()
+    let edges = Edges::count(mesh);
+    let mut keys = mesh.triangles.clone();
+    keys.par_iter_mut().for_each(|t| t.sort_unstable());
+    keys.par_sort_unstable();
+    Defects {
+        open_edges: edges.open,
+        crowded_edges: edges.crowded,
+        flipped_edges: edges.flipped,
+        duplicate_triangles: keys.windows(2).filter(|w| w[0] == w[1]).count(),
+        degenerate_triangles: (0..mesh.triangles.len())
+            .into_par_iter()
+            .filter(|&i| degenerate(mesh, i))
+            .count(),
+        bodies: Bodies::of(mesh).count,
+    }
+}
+
+/// Whether triangle `i` has two equal vertices or exactly no area.
+fn degenerate(mesh: &Mesh, i: usize) -> bool {
+    let [a, b, c] = mesh.corners(i);
+    exact::plane_axis(a, b, c).is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Vec3, add};
+
+    pub(super) fn tetrahedron() -> Mesh {
+        Mesh {
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        }
+    }
+
+    pub(super) fn cube(min: Vec3, edge: f64) -> Mesh {
+        let vertices = (0..8)
+            .map(|i| {
+                add(
+                    min,
+                    [i & 1, i >> 1 & 1, i >> 2 & 1].map(|b| f64::from(b) * edge),
+                )
+            })
+            .collect();
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        Mesh {
+            vertices,
+            triangles: quads
+                .iter()
+                .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+                .collect(),
+        }
+    }
+
+    pub(super) fn torus(n: u32, m: u32) -> Mesh {
+        let mut mesh = Mesh::default();
+        for i in 0..n {
+            for j in 0..m {
+                let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)]
+                    .map(|t| t * core::f64::consts::TAU);
+                let r = 2.0 + v.cos();
+                mesh.vertices.push([r * u.cos(), r * u.sin(), v.sin()]);
+                let at = |i: u32, j: u32| (i % n) * m + j % m;
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        mesh
+    }
+
+    /// One mesh of several.
+    pub(super) fn join(parts: &[Mesh]) -> Mesh {
+        let mut all = Mesh::default();
+        for p in parts {
+            let shift = all.vertices.len() as u32;
+            all.vertices.extend(&p.vertices);
+            all.triangles
+                .extend(p.triangles.iter().map(|t| t.map(|v| v + shift)));
+        }
+        all
+    }
+
+    pub(super) fn flipped(mut mesh: Mesh) -> Mesh {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh
+    }
+
+    #[test]
+    fn simple_solids() {
+        let s = size(&tetrahedron());
+        assert!((s.volume - 1.0 / 6.0).abs() < 1e-15);
+        assert!((s.area - (1.5 + 0.75f64.sqrt())).abs() < 1e-15);
+        assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (2, 1, 0, true));
+        let s = size(&cube([1.0, 2.0, 3.0], 2.0));
+        assert_eq!(
+            (s.volume, s.area, s.euler, s.pieces, s.closed),
+            (8.0, 24.0, 2, 1, true)
+        );
+        assert_eq!(
+            s.bounds,
+            Aabb {
+                min: [1.0, 2.0, 3.0],
+                max: [3.0, 4.0, 5.0]
+            }
+        );
+        let s = size(&torus(40, 30));
+        assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (0, 1, 0, true));
+        // An inscribed torus: below 2π²Rr², within the error of its polygons.
+        let ideal = 4.0 * core::f64::consts::PI.powi(2);
+        assert!(s.volume < ideal && s.volume > ideal * 0.98);
+    }
+
+    #[test]
+    fn nothing_measures_as_nothing() {
+        let s = size(&Mesh::default());
+        assert_eq!(
+            (s.volume, s.area, s.euler, s.pieces, s.cavities, s.closed),
+            (0.0, 0.0, 0, 0, 0, true)
+        );
+        assert!(s.bounds.is_empty());
+        assert_eq!(defects(&Mesh::default()), Defects::default());
+    }
+
+    #[test]
+    fn cavities_pieces_and_unused_vertices() {
+        let nested = join(&[
+            cube([0.0; 3], 4.0),
+            flipped(cube([1.0; 3], 2.0)),
+            cube([1.5; 3], 1.0),
+            tetrahedron(),
+        ]);
+        let s = size(&nested);
+        assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (8, 3, 1, true));
+        assert!((s.volume - (64.0 - 8.0 + 1.0 + 1.0 / 6.0)).abs() < 1e-12);
+        let mut stray = cube([0.0; 3], 1.0);
+        stray.vertices.push([99.0; 3]);
+        let s = size(&stray);
+        assert_eq!((s.euler, s.bounds.max), (2, [1.0; 3]));
+        assert_eq!(
+            defects(&nested),
+            Defects {
+                bodies: 4,
+                ..Defects::default()
+            }
+        );
+    }
+
+    #[test]
+    fn touching_bodies_are_told_by_index_not_position() {
+        let (a, b) = (cube([0.0; 3], 1.0), cube([1.0; 3], 1.0));
+        let apart = join(&[a, b]);
+        assert_eq!(size(&apart).pieces, 2);
+        assert_eq!(non_manifold_vertices(&apart), 0);
+        // The corner (1, 1, 1) made common: vertex 7 of the first, 8 of both.
+        let mut joined = apart;
+        joined
+            .triangles
+            .iter_mut()
+            .flatten()
+            .filter(|v| **v == 8)
+            .for_each(|v| *v = 7);
+        let s = size(&joined);
+        assert_eq!((s.pieces, s.closed, s.euler), (1, true, 3));
+        assert_eq!(non_manifold_vertices(&joined), 1);
+    }
+
+    #[test]
+    fn two_cubes_with_a_common_edge_have_a_crowded_edge() {
+        let mut m = join(&[cube([0.0; 3], 1.0), cube([1.0, 1.0, 0.0], 1.0)]);
+        m.triangles.iter_mut().flatten().for_each(|v| {
+            *v = match *v {
+                8 => 3,
+                12 => 7,
+                v => v,
+            }
+        });
+        let d = defects(&m);
+        assert_eq!(
+            (d.crowded_edges, d.open_edges, d.flipped_edges, d.bodies),
+            (1, 0, 0, 1)
+        );
+        assert!(!size(&m).closed);
+    }
+
+    #[test]
+    fn defects_are_counted() {
+        let mut open = cube([0.0; 3], 1.0);
+        open.triangles.pop();
+        let d = defects(&open);
+        assert_eq!(
+            (d.open_edges, d.flipped_edges, size(&open).closed),
+            (3, 0, false)
+        );
+        let mut turned = cube([0.0; 3], 1.0);
+        turned.triangles[0].swap(0, 1);
+        let d = defects(&turned);
+        assert_eq!(
+            (d.open_edges, d.flipped_edges, size(&turned).closed),
+            (0, 3, false)
+        );
+        let mut twice = cube([0.0; 3], 1.0);
+        twice.triangles.push([3, 0, 2]);
+        let d = defects(&twice);
+        assert_eq!((d.duplicate_triangles, d.crowded_edges), (1, 3));
+        let mut thin = cube([0.0; 3], 1.0);
+        thin.vertices.push([0.5, 0.5, 0.0]);
+        thin.triangles.extend([[0, 8, 3], [1, 1, 2]]);
+        assert_eq!(defects(&thin).degenerate_triangles, 2);
+    }
+
+    #[test]
+    fn a_moebius_band_is_neither_closed_nor_oriented() {
+        let n = 12u32;
+        let mut m = Mesh::default();
+        for i in 0..n {
+            let t = f64::from(i) / f64::from(n) * core::f64::consts::TAU;
+            for side in [-0.3, 0.3] {
+                let r = 1.0 + side * (t / 2.0).cos();
+                m.vertices
+                    .push([r * t.cos(), r * t.sin(), side * (t / 2.0).sin()]);
+            }
+            let (a, b) = (2 * i, 2 * i + 1);
+            let (c, d) = if i + 1 < n { (a + 2, b + 2) } else { (1, 0) };
+            m.triangles.extend([[a, c, d], [a, d, b]]);
+        }
+        let d = defects(&m);
+        assert_eq!(
+            (d.open_edges, d.flipped_edges, d.bodies),
+            (2 * n as usize, 1, 1)
+        );
+        assert_eq!((size(&m).euler, size(&m).closed), (0, false));
+        assert_eq!(non_manifold_vertices(&m), 0);
+    }
 }

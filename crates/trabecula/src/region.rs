@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::field::Field;
+use crate::field::{Block, Field};
 use crate::math::Aabb;
 
 mod csg;
@@ -23,7 +23,33 @@ pub trait Shape: Field {
     ///
     /// On such a plane, within the face, the signed distance computes to exactly 0.0 for a point whose
     /// coordinate equals the number given here, so that a grid plane laid on it reproduces the face exactly.
-    fn planes(&self, axis: usize, out: &mut Vec<f64>);
+    fn planes(&self, axis: usize, out: &mut Vec<f64>) {
+        self.level_planes(axis, 0.0, out);
+    }
+
+    /// Adds the coordinates of planes normal to `axis` on which the distance is `level` (mm) over a part of the
+    /// plane: what `planes` is to the surface, for the surface moved outwards by `level`. At level zero the
+    /// distance there is exactly 0.0; at other levels it is `level` to within rounding of the coordinate.
+    fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>);
+
+    /// Fills `out` (x fastest) with the distance less `level` (mm) at the block's nodes.
+    ///
+    /// Signs are right at every node. Values are right within one grid cell of the level; farther away a
+    /// shape may give a smaller magnitude, but never one below a cell's diagonal.
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        let [xs, ys, zs] = block.axes;
+        let mut points = Vec::with_capacity(xs.len());
+        let mut values = vec![0.0; xs.len()];
+        let nodes = zs.iter().flat_map(|&z| ys.iter().map(move |&y| (y, z)));
+        for ((y, z), row) in nodes.zip(out.chunks_exact_mut(xs.len().max(1))) {
+            points.clear();
+            points.extend(xs.iter().map(|&x| [x, y, z]));
+            self.values(&points, &mut values);
+            for (o, v) in row.iter_mut().zip(&values) {
+                *o = (v - level) as f32;
+            }
+        }
+    }
 
     /// Exact volume (mm³) where it is known in closed form.
     fn volume(&self) -> Option<f64>;
@@ -31,3 +57,91 @@ pub trait Shape: Field {
 
 /// A shared region.
 pub type Region = Arc<dyn Shape>;
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::math::{Vec3, add, norm, scale, sub};
+
+    /// A number in [-1, 1) from a linear congruential generator.
+    pub fn random(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn point(seed: &mut u64, reach: f64) -> Vec3 {
+        [0; 3].map(|_| random(seed) * reach)
+    }
+
+    /// The laws of a shape near the origin: 1-Lipschitz, gradient against differences, bounds that hold, solid
+    /// within its bounds, volume by sampling, and a fill with the right signs. `exact`: |gradient| there is 1.
+    pub fn check_shape(name: &str, s: &dyn Shape, reach: f64, exact: f64) {
+        let mut seed = 42;
+        let mut smooth = 0;
+        for _ in 0..4000 {
+            let (p, q) = (point(&mut seed, reach), point(&mut seed, reach));
+            let (vp, vq) = (s.value(p), s.value(q));
+            assert!((vp - vq).abs() <= norm(sub(p, q)) * (1.0 + 1e-12) + 1e-12, "{name}: Lipschitz");
+            assert!(vp > 0.0 || s.bounds().distance(p) == 0.0, "{name}: solid outside its bounds at {p:?}");
+            let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+            s.gradients(&[p], &mut v, &mut g);
+            assert_eq!(v[0], vp);
+            assert!((norm(g[0]) - 1.0).abs() < 1e-9 || exact == 0.0, "{name}: |gradient| {g:?} at {p:?}");
+            // Central differences agree away from creases, which are rare.
+            let h = 1e-5;
+            let diff = [0, 1, 2].map(|a| {
+                let mut e = [0.0; 3];
+                e[a] = h;
+                (s.value(add(p, e)) - s.value(sub(p, e))) / (2.0 * h)
+            });
+            smooth += usize::from(norm(sub(diff, g[0])) < 1e-3);
+
+            let half = scale([random(&mut seed), random(&mut seed), random(&mut seed)].map(f64::abs), 0.4);
+            let b = Aabb { min: sub(p, half), max: add(p, half) };
+            let range = s.bound(&b);
+            for _ in 0..8 {
+                let w = add(p, [0, 1, 2].map(|a| random(&mut seed) * half[a]));
+                let v = s.value(w);
+                assert!(range.lo <= v && v <= range.hi, "{name}: {v} outside {range:?}");
+            }
+            assert!(range.hi - range.lo <= 2.0 * norm(b.size()) * (1.0 + 1e-9), "{name}: loose bound");
+        }
+        assert!(smooth > 3900, "{name}: the gradient agrees with differences at {smooth} of 4000 points");
+
+        for level in [0.0, 0.17, -0.23] {
+            let axis: Vec<f64> = (0..23).map(|i| -reach + 2.0 * reach * f64::from(i) / 22.0).collect();
+            let block = Block { axes: [&axis, &axis[2..20], &axis[..17]] };
+            let mut out = vec![f32::NAN; block.len()];
+            s.fill_level(&block, level, &mut out);
+            let cell = 3f64.sqrt() * 2.0 * reach / 22.0;
+            let mut i = 0;
+            for z in block.axes[2] {
+                for y in block.axes[1] {
+                    for x in block.axes[0] {
+                        let (v, o) = (s.value([*x, *y, *z]) - level, f64::from(out[i]));
+                        let near = (v - o).abs() < 1e-6 * (1.0 + v.abs());
+                        let far = v.abs() > cell && o.abs() >= cell * 0.999 && o.abs() <= v.abs() + 1e-6;
+                        assert!(near || (far && (v < 0.0) == (o < 0.0)), "{name}: filled {o} for {v}");
+                        i += 1;
+                    }
+                }
+            }
+        }
+
+        if let Some(volume) = s.volume() {
+            let b = s.bounds();
+            let n = 60_000;
+            let inside = (0..n)
+                .filter(|_| {
+                    let p = point(&mut seed, 0.5);
+                    s.value([0, 1, 2].map(|a| b.center()[a] + p[a] * b.size()[a])) < 0.0
+                })
+                .count();
+            let [x, y, z] = b.size();
+            let sampled = x * y * z * inside as f64 / n as f64;
+            // Five standard deviations of a binomial at its widest.
+            let tolerance = 5.0 * x * y * z * 0.5 / f64::from(n).sqrt();
+            assert!((sampled - volume).abs() < tolerance, "{name}: volume {volume}, sampled {sampled}");
+        }
+    }
+}

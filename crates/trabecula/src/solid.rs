@@ -17,17 +17,35 @@ pub struct Solid {
     pub wavelength: f64,
 }
 
+/// As a field, the greater of the lattice's value and the region's signed distance: negative in the finished part,
+/// positive outside, continuous, and not a distance. Extraction keeps the two apart.
 impl Field for Solid {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let _ = (points, out);
-        todo!()
+        self.region.values(points, out);
+        if let Some(field) = &self.field {
+            let mut f = vec![0.0; points.len()];
+            field.values(points, &mut f);
+            for (o, f) in out.iter_mut().zip(f) {
+                *o = o.max(f);
+            }
+        }
     }
+
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let _ = (points, values, gradients);
-        todo!()
+        self.region.gradients(points, values, gradients);
+        if let Some(field) = &self.field {
+            let (mut f, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+            field.gradients(points, &mut f, &mut g);
+            for i in 0..points.len() {
+                if f[i] > values[i] {
+                    (values[i], gradients[i]) = (f[i], g[i]);
+                }
+            }
+        }
     }
+
     fn bound(&self, b: &Aabb) -> Interval {
-        let _ = b;
-        todo!()
+        let r = self.region.bound(b);
+        self.field.as_ref().map_or(r, |f| r.max(f.bound(b)))
     }
 }

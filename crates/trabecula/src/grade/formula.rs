@@ -1,25 +1,560 @@
-//! Formulas.
+//! Formulas: parsed to a short stack program, never evaluated as code.
+//!
+//! ```text
+//! sum     = product { ("+" | "-") product }
+//! product = signed { ("*" | "/") signed }
+//! signed  = ("-" | "+") signed | power
+//! power   = atom [ "^" signed ]                       (so −x² is −(x²), and 2^3^2 is 2^9)
+//! atom    = number | x | y | z | pi | e | name "(" sum { "," sum } ")" | "(" sum ")"
+//! ```
+
 use crate::fault::Fault;
 use crate::math::{Aabb, Interval, Vec3};
 
-/// A parsed formula in x, y, z (mm).
+mod operation;
+use operation::{FUNCTIONS, Operation};
+
+/// The longest formula, in bytes.
+const LONGEST: usize = 4096;
+/// The deepest nesting of brackets, signs and powers.
+const DEEPEST: usize = 64;
+
+/// A parsed formula in x, y, z (mm). Angles of its functions are in radians.
+///
+/// Operators `+ - * / ^`; constants `pi`, `e`; functions `sin cos tan asin acos atan atan2(y, x) sinh cosh tanh exp
+/// log` (natural) `log10 sqrt abs min max clamp(v, low, high) floor ceil mod(a, b)` (with the sign of b) `hypot
+/// sign step(edge, v) smoothstep(a, b, v)`.
 #[derive(Clone, Debug)]
-pub struct Formula;
+pub struct Formula {
+    program: Vec<Instruction>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Instruction {
+    Number(f64),
+    Variable(usize),
+    Apply(Operation),
+}
+
+/// What a program can be run on: numbers, numbers with gradients, intervals.
+trait Quantity: Copy {
+    fn constant(v: f64) -> Self;
+    fn apply(op: Operation, args: [Self; 3]) -> Self;
+}
+
+impl Quantity for f64 {
+    fn constant(v: f64) -> f64 {
+        v
+    }
+    fn apply(op: Operation, args: [f64; 3]) -> f64 {
+        op.value(args)
+    }
+}
+
+impl Quantity for Interval {
+    fn constant(v: f64) -> Interval {
+        Interval::new(v, v)
+    }
+    fn apply(op: Operation, args: [Interval; 3]) -> Interval {
+        op.range(args)
+    }
+}
+
+/// A value and its gradient (forward differentiation).
+#[derive(Clone, Copy)]
+struct Dual(f64, Vec3);
+
+impl Quantity for Dual {
+    fn constant(v: f64) -> Dual {
+        Dual(v, [0.0; 3])
+    }
+    fn apply(op: Operation, args: [Dual; 3]) -> Dual {
+        let at = args.map(|d| d.0);
+        let partials = op.partials(at);
+        let mut gradient = [0.0; 3];
+        for (d, partial) in args.iter().zip(partials) {
+            for a in 0..3 {
+                // An argument that stands still adds nothing, even where the partial is infinite or undefined.
+                if d.1[a] != 0.0 {
+                    gradient[a] += partial * d.1[a];
+                }
+            }
+        }
+        Dual(op.value(at), gradient)
+    }
+}
 
 impl Formula {
-    /// Parses; never evaluates anything but mathematics.
+    /// Parses a formula.
+    ///
+    /// **Errors** name the column, what was found there and what may stand there; an unknown word gets the nearest
+    /// known one.
     pub fn parse(text: &str) -> Result<Formula, Fault> {
-        let _ = text;
-        todo!()
+        if text.len() > LONGEST {
+            let n = text.len();
+            return Err(Fault::new(
+                "",
+                format!("the formula has {n} characters; at most {LONGEST} are read"),
+            ));
+        }
+        let mut p = Parser {
+            text,
+            at: 0,
+            depth: 0,
+            program: Vec::new(),
+        };
+        p.sum()?;
+        match p.peek() {
+            None => Ok(Formula { program: p.program }),
+            Some('*') => Err(p.fault("write a power as ^, not **")),
+            Some(')') => Err(p.fault("this bracket was never opened")),
+            Some(_) => Err(p.fault("expected an operator (+ - * / ^) or the end")),
+        }
     }
+
+    /// Fills `out[i]` with the value at `points[i]` (mm).
+    pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let mut stack = Vec::new();
+        for (o, p) in out.iter_mut().zip(points) {
+            *o = self.run(*p, &mut stack);
+        }
+    }
+
+    /// Fills values and gradients (per mm).
+    pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let mut stack = Vec::new();
+        for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
+            let [x, y, z] = *p;
+            let at = [
+                Dual(x, [1.0, 0.0, 0.0]),
+                Dual(y, [0.0, 1.0, 0.0]),
+                Dual(z, [0.0, 0.0, 1.0]),
+            ];
+            Dual(*v, *g) = self.run(at, &mut stack);
+        }
+    }
+
     /// Value and gradient at a point.
     pub fn gradient(&self, p: Vec3) -> (f64, Vec3) {
-        let _ = p;
-        todo!()
+        let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+        self.gradients(&[p], &mut v, &mut g);
+        (v[0], g[0])
     }
-    /// Contains every value in the box.
+
+    /// Contains every value in the box, by interval arithmetic; everything where the formula may be undefined.
     pub fn bound(&self, b: &Aabb) -> Interval {
-        let _ = b;
-        todo!()
+        let at = [0, 1, 2].map(|a| Interval::new(b.min[a], b.max[a]));
+        self.run(at, &mut Vec::new())
+    }
+
+    fn run<T: Quantity>(&self, variables: [T; 3], stack: &mut Vec<T>) -> T {
+        stack.clear();
+        for instruction in &self.program {
+            match *instruction {
+                Instruction::Number(v) => stack.push(T::constant(v)),
+                Instruction::Variable(a) => stack.push(variables[a]),
+                Instruction::Apply(op) => {
+                    let mut args = [T::constant(0.0); 3];
+                    let first = stack.len() - op.arity();
+                    args[..op.arity()].copy_from_slice(&stack[first..]);
+                    stack.truncate(first);
+                    stack.push(T::apply(op, args));
+                }
+            }
+        }
+        // The parser leaves exactly one number.
+        stack.pop().unwrap_or(T::constant(f64::NAN))
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    depth: usize,
+    program: Vec<Instruction>,
+}
+
+impl<'a> Parser<'a> {
+    fn sum(&mut self) -> Result<(), Fault> {
+        self.product()?;
+        while let Some(sign @ ('+' | '-')) = self.peek() {
+            self.at += 1;
+            self.product()?;
+            self.apply(if sign == '+' {
+                Operation::Add
+            } else {
+                Operation::Subtract
+            });
+        }
+        Ok(())
+    }
+
+    fn product(&mut self) -> Result<(), Fault> {
+        self.signed()?;
+        while let Some(sign @ ('*' | '/')) = self.peek() {
+            if self.text[self.at..].starts_with("**") {
+                break;
+            }
+            self.at += 1;
+            self.signed()?;
+            self.apply(if sign == '*' {
+                Operation::Multiply
+            } else {
+                Operation::Divide
+            });
+        }
+        Ok(())
+    }
+
+    /// The only rule by which nesting grows; it keeps the recursion, and so the call stack, bounded.
+    fn signed(&mut self) -> Result<(), Fault> {
+        if self.depth == DEEPEST {
+            return Err(self.fault(&format!("nested more than {DEEPEST} deep")));
+        }
+        self.depth += 1;
+        match self.peek() {
+            Some('-') => {
+                self.at += 1;
+                self.signed()?;
+                self.apply(Operation::Negate);
+            }
+            Some('+') => {
+                self.at += 1;
+                self.signed()?;
+            }
+            _ => {
+                self.atom()?;
+                if self.peek() == Some('^') {
+                    self.at += 1;
+                    self.signed()?;
+                    self.apply(Operation::Power);
+                }
+            }
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn atom(&mut self) -> Result<(), Fault> {
+        match self.peek() {
+            Some('(') => {
+                self.at += 1;
+                self.sum()?;
+                self.expect(')')
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.word(),
+            _ => Err(self.fault("expected a number, x, y, z, pi, e, a function or a bracket")),
+        }
+    }
+
+    fn number(&mut self) -> Result<(), Fault> {
+        let bytes = self.text.as_bytes();
+        let digits = |mut i: usize| {
+            while bytes.get(i).is_some_and(u8::is_ascii_digit) {
+                i += 1;
+            }
+            i
+        };
+        let mut end = digits(self.at);
+        if bytes.get(end) == Some(&b'.') {
+            end = digits(end + 1);
+        }
+        if let Some(b'e' | b'E') = bytes.get(end) {
+            let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+            let last = digits(end + 1 + sign);
+            if last > end + 1 + sign {
+                end = last;
+            }
+        }
+        match self.text[self.at..end].parse::<f64>() {
+            Ok(v) if v.is_finite() => {
+                self.program.push(Instruction::Number(v));
+                self.at = end;
+                Ok(())
+            }
+            _ => Err(self.fault("expected a finite number")),
+        }
+    }
+
+    fn word(&mut self) -> Result<(), Fault> {
+        let rest = &self.text[self.at..];
+        let end = rest
+            .find(|c: char| !c.is_alphanumeric() && c != '_')
+            .unwrap_or(rest.len());
+        let word = &rest[..end];
+        let instruction = match word {
+            "x" => Instruction::Variable(0),
+            "y" => Instruction::Variable(1),
+            "z" => Instruction::Variable(2),
+            "pi" => Instruction::Number(core::f64::consts::PI),
+            "e" => Instruction::Number(core::f64::consts::E),
+            _ => return self.call(word),
+        };
+        self.program.push(instruction);
+        self.at += end;
+        if self.peek() == Some('(') {
+            return Err(self.fault(&format!("{word} is not a function; write * to multiply")));
+        }
+        Ok(())
+    }
+
+    fn call(&mut self, word: &str) -> Result<(), Fault> {
+        let Some(&(_, op)) = FUNCTIONS.iter().find(|f| f.0 == word) else {
+            let names = ["x", "y", "z", "pi", "e"]
+                .into_iter()
+                .chain(FUNCTIONS.iter().map(|f| f.0));
+            let nearest = names
+                .clone()
+                .min_by_key(|n| distance(word, n))
+                .unwrap_or("x");
+            let list = names.collect::<Vec<_>>().join(", ");
+            return Err(self.fault(&format!(
+                "nearest known word: {nearest}. Known words: {list}"
+            )));
+        };
+        self.at += word.len();
+        if self.peek() != Some('(') {
+            return Err(self.fault(&format!(
+                "{word} takes its argument in brackets: expected ("
+            )));
+        }
+        self.at += 1;
+        self.sum()?;
+        for k in 1..op.arity() {
+            if self.peek() != Some(',') {
+                return Err(self.fault(&format!(
+                    "{word} takes {} arguments, not {k}: expected a comma",
+                    op.arity()
+                )));
+            }
+            self.at += 1;
+            self.sum()?;
+        }
+        if self.peek() == Some(',') {
+            return Err(self.fault(&format!("{word} takes no more than {}", plural(op.arity()))));
+        }
+        self.expect(')')?;
+        self.apply(op);
+        Ok(())
+    }
+
+    fn apply(&mut self, op: Operation) {
+        self.program.push(Instruction::Apply(op));
+    }
+
+    fn expect(&mut self, c: char) -> Result<(), Fault> {
+        if self.peek() == Some(c) {
+            self.at += 1;
+            return Ok(());
+        }
+        Err(self.fault(&format!("expected an operator or {c}")))
+    }
+
+    /// The next character that is not white space.
+    fn peek(&mut self) -> Option<char> {
+        let rest = &self.text[self.at..];
+        let c = rest.chars().find(|c| !c.is_whitespace());
+        self.at += rest.len() - rest.trim_start().len();
+        c
+    }
+
+    /// A fault at the next character: column, what stands there, what to do.
+    fn fault(&mut self, message: &str) -> Fault {
+        let next = self.peek();
+        let column = self.text[..self.at].chars().count() + 1;
+        let rest = &self.text[self.at..];
+        let found = match next {
+            None => "the formula ends".to_string(),
+            Some(c) if c.is_alphabetic() || c == '_' => {
+                let word = rest
+                    .chars()
+                    .take_while(|c| c.is_alphanumeric() || *c == '_')
+                    .take(32);
+                format!("found '{}'", word.collect::<String>())
+            }
+            Some(c) => format!("found '{}'", c.escape_debug()),
+        };
+        Fault::new("", format!("column {column}: {found}; {message}"))
+    }
+}
+
+fn plural(n: usize) -> String {
+    if n == 1 {
+        "one argument".into()
+    } else {
+        format!("{n} arguments")
+    }
+}
+
+/// The number of single-letter changes between two words (Levenshtein), letter case aside.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, c) in a.chars().flat_map(char::to_lowercase).enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for j in 0..b.len() {
+            let change = diagonal + usize::from(b[j] != c);
+            diagonal = row[j + 1];
+            row[j + 1] = change.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(text: &str, p: Vec3) -> f64 {
+        Formula::parse(text).map_or(f64::NAN, |f| f.gradient(p).0)
+    }
+
+    #[test]
+    fn operators_bind_as_in_mathematics() {
+        let p = [3.0, 2.0, 0.5];
+        for (text, want) in [
+            ("-x^2", -9.0),
+            ("2^3^2", 512.0),
+            ("2^-1", 0.5),
+            ("-2^-2", -0.25),
+            ("1 - 2 - 3", -4.0),
+            ("8 / 4 / 2", 1.0),
+            ("2 + 3 * 4", 14.0),
+            ("(2 + 3) * 4", 20.0),
+            ("--x", 3.0),
+            ("2*-x", -6.0),
+            ("+1.5e1 - .5", 14.5),
+            ("1e0 + 2e+1 + 1.", 22.0),
+            ("x*y + z", 6.5),
+            ("min(x, y) + max(x, y)", 5.0),
+            ("clamp(x, 0, 1)", 1.0),
+            ("mod(-1, 3)", 2.0),
+            ("mod(7, -3)", -2.0),
+            ("atan2(1, 1) * 4 - pi", 0.0),
+            ("hypot(x, 4)", 5.0),
+            ("log(e) + log10(100)", 3.0),
+            ("smoothstep(0, 1, z)", 0.5),
+            ("step(1, x) + sign(-x) + floor(z) + ceil(z)", 1.0),
+        ] {
+            assert!(
+                (at(text, p) - want).abs() < 1e-15,
+                "{text} = {} not {want}",
+                at(text, p)
+            );
+        }
+    }
+
+    #[test]
+    fn gradients_follow_the_chain_rule() {
+        let f = Formula::parse("x^2*sin(y) + exp(z)/x").unwrap_or(Formula { program: vec![] });
+        let [x, y, z] = [1.3, 0.7, 0.2f64];
+        let (_, g) = f.gradient([x, y, z]);
+        let want = [
+            2.0 * x * y.sin() - z.exp() / (x * x),
+            x * x * y.cos(),
+            z.exp() / x,
+        ];
+        for a in 0..3 {
+            assert!((g[a] - want[a]).abs() < 1e-14);
+        }
+        // A constant exponent gives no logarithm of a negative number, a standing argument no 0 · ∞.
+        let (v, g) = Formula::parse("x^3 + sqrt(0*y)")
+            .map_or((0.0, [0.0; 3]), |f| f.gradient([-2.0, 1.0, 0.0]));
+        assert_eq!((v, g[0]), (-8.0, 12.0));
+    }
+
+    #[test]
+    fn bounds_hold_over_random_boxes() {
+        let mut s = 3u64;
+        let mut next = || {
+            s = s
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (s >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for text in [
+            "sin(x*y)/(2+cos(z))",
+            "x^2 - y^3 + abs(z)^1.5",
+            "mod(x, 0.7)*smoothstep(-1, 1, y)",
+            "log(2+hypot(x,y))^2",
+        ] {
+            let f = Formula::parse(text).unwrap_or_else(|e| panic!("{e}"));
+            for _ in 0..500 {
+                let min = [0; 3].map(|_| next() * 4.0 - 2.0);
+                let max = min.map(|v| v + next() * next());
+                let bound = f.bound(&Aabb { min, max });
+                for _ in 0..8 {
+                    let p = [0, 1, 2].map(|a| min[a] + (max[a] - min[a]) * next());
+                    let v = f.gradient(p).0;
+                    assert!(
+                        bound.lo <= v && v <= bound.hi,
+                        "{text} at {p:?}: {v} not in {bound:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn faults_say_where_and_what() {
+        for (text, words) in [
+            ("", "column 1: the formula ends; expected a number"),
+            ("1 +", "column 4: the formula ends"),
+            (
+                "sinn(x)",
+                "column 1: found 'sinn'; nearest known word: sin. Known words: x, y, z, pi",
+            ),
+            (
+                "0.3 + COS(x)",
+                "column 7: found 'COS'; nearest known word: cos",
+            ),
+            ("2 x", "column 3: found 'x'; expected an operator"),
+            ("x(2)", "column 2: found '('; x is not a function"),
+            (
+                "(x",
+                "column 3: the formula ends; expected an operator or )",
+            ),
+            ("x)", "column 2: found ')'; this bracket was never opened"),
+            ("x**2", "column 2: found '*'; write a power as ^, not **"),
+            (
+                "atan2(x)",
+                "column 8: found ')'; atan2 takes 2 arguments, not 1",
+            ),
+            (
+                "sin(x, y)",
+                "column 6: found ','; sin takes no more than one argument",
+            ),
+            (
+                "sin x",
+                "column 5: found 'x'; sin takes its argument in brackets",
+            ),
+            ("1e999", "column 1: found '1'; expected a finite number"),
+            ("x ; y", "column 3: found ';'"),
+            ("ü + 1", "column 1: found 'ü'; nearest"),
+            (".", "column 1: found '.'; expected a finite number"),
+            ("__import__('os')", "column 1: found '__import__'"),
+        ] {
+            let message = Formula::parse(text)
+                .err()
+                .map_or(String::new(), |f| f.message);
+            assert!(message.contains(words), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn hostile_nesting_is_refused_not_followed() {
+        for text in [
+            "(".repeat(4000),
+            "-".repeat(4000),
+            "x^".repeat(2000),
+            "sin(".repeat(1000),
+            "x".repeat(5000),
+        ] {
+            assert!(Formula::parse(&text).is_err());
+        }
+        assert!(Formula::parse(&format!("{}x{}", "(".repeat(60), ")".repeat(60))).is_ok());
+        assert!(Formula::parse(&vec!["x"; 2000].join("+")).is_ok());
     }
 }

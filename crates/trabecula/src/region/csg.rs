@@ -1,14 +1,335 @@
-use super::Region;
-/// Union.
-pub struct Union(pub Vec<Region>);
-/// Intersection.
-pub struct Intersection(pub Vec<Region>);
-/// The first without the others.
-pub struct Difference(pub Vec<Region>);
-/// A region grown (positive) or shrunk.
+//! Combinations of regions.
+
+use super::{Region, Shape};
+use crate::fault::Fault;
+use crate::field::{Block, Field};
+use crate::math::{Aabb, Interval, Vec3};
+
+/// What lies in any of the regions: the least of their distances.
+pub struct Union(Vec<Region>);
+
+/// What lies in all of the regions: the greatest of their distances.
+pub struct Intersection(Vec<Region>);
+
+/// What lies in the first region and in none of the others: max(d₀, −d₁, −d₂ …).
+pub struct Difference(Vec<Region>);
+
+/// A region grown (positive) or shrunk (negative): d − by.
 pub struct Offset {
-    /// The region.
-    pub of: Region,
-    /// mm.
-    pub by: f64,
+    of: Region,
+    by: f64,
+    /// Values closer to zero than this are zero, so that a flat face moved to a rounded coordinate stays exact.
+    snap: f64,
+}
+
+fn some(verb: &str, of: Vec<Region>) -> Result<Vec<Region>, Fault> {
+    if of.is_empty() {
+        return Err(Fault::new("", format!("{verb} of no regions: list at least one")));
+    }
+    Ok(of)
+}
+
+impl Union {
+    /// The union. Errors if the list is empty.
+    pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
+        some("a union", of).map(Union)
+    }
+}
+
+impl Intersection {
+    /// The intersection. Errors if the list is empty.
+    pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
+        some("an intersection", of).map(Intersection)
+    }
+}
+
+impl Difference {
+    /// The first region without the others. Errors if the list is empty.
+    pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
+        some("a difference", of).map(Difference)
+    }
+}
+
+impl Offset {
+    /// The region moved outwards by `by` mm. Errors if `by` is not finite.
+    pub fn new(of: Region, by: f64) -> Result<Self, Fault> {
+        if !by.is_finite() {
+            return Err(Fault::new("by", format!("{by} mm is not a distance: give a finite number")));
+        }
+        let mut planes = Vec::new();
+        (0..3).for_each(|axis| of.planes(axis, &mut planes));
+        // The moved coordinate, the distance and the difference each round once.
+        let snap = planes.iter().fold(0.0f64, |s, c| s.max(4.0 * f64::EPSILON * (c.abs() + by.abs())));
+        Ok(Offset { of, by, snap })
+    }
+
+    fn snapped(&self, v: f64) -> f64 {
+        if v.abs() <= self.snap { 0.0 } else { v }
+    }
+}
+
+/// How the regions of a list join: the signs they enter with and whether the greatest or the least counts.
+trait Join: Send + Sync {
+    fn regions(&self) -> &[Region];
+    /// Whether region `i` enters by its complement.
+    fn negated(&self, i: usize) -> bool;
+    /// Whether a later value takes the place of the one held.
+    fn takes(new: f64, held: f64) -> bool;
+    fn range(a: Interval, b: Interval) -> Interval;
+    fn extent(&self) -> Aabb;
+}
+
+impl Join for Union {
+    fn regions(&self) -> &[Region] {
+        &self.0
+    }
+    fn negated(&self, _: usize) -> bool {
+        false
+    }
+    fn takes(new: f64, held: f64) -> bool {
+        new < held
+    }
+    fn range(a: Interval, b: Interval) -> Interval {
+        a.min(b)
+    }
+    fn extent(&self) -> Aabb {
+        let full = self.0.iter().map(|r| r.bounds()).filter(|b| !b.is_empty());
+        full.reduce(Aabb::union).unwrap_or(Aabb::EMPTY)
+    }
+}
+
+impl Join for Intersection {
+    fn regions(&self) -> &[Region] {
+        &self.0
+    }
+    fn negated(&self, _: usize) -> bool {
+        false
+    }
+    fn takes(new: f64, held: f64) -> bool {
+        new > held
+    }
+    fn range(a: Interval, b: Interval) -> Interval {
+        a.max(b)
+    }
+    fn extent(&self) -> Aabb {
+        self.0.iter().map(|r| r.bounds()).fold(Aabb::ALL, Aabb::intersection)
+    }
+}
+
+impl Join for Difference {
+    fn regions(&self) -> &[Region] {
+        &self.0
+    }
+    fn negated(&self, i: usize) -> bool {
+        i > 0
+    }
+    fn takes(new: f64, held: f64) -> bool {
+        new > held
+    }
+    fn range(a: Interval, b: Interval) -> Interval {
+        a.max(b)
+    }
+    fn extent(&self) -> Aabb {
+        self.0[0].bounds()
+    }
+}
+
+macro_rules! joined {
+    ($($shape:ty),*) => {$(
+        impl Field for $shape {
+            fn values(&self, points: &[Vec3], out: &mut [f64]) {
+                self.regions()[0].values(points, out);
+                let mut other = vec![0.0; points.len()];
+                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                    r.values(points, &mut other);
+                    for (o, v) in out.iter_mut().zip(&other) {
+                        let v = if self.negated(i) { -v } else { *v };
+                        if Self::takes(v, *o) {
+                            *o = v;
+                        }
+                    }
+                }
+            }
+
+            fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+                self.regions()[0].gradients(points, values, gradients);
+                let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                    r.gradients(points, &mut v, &mut g);
+                    let sign = if self.negated(i) { -1.0 } else { 1.0 };
+                    for k in 0..points.len() {
+                        if Self::takes(sign * v[k], values[k]) {
+                            values[k] = sign * v[k];
+                            gradients[k] = g[k].map(|x| sign * x);
+                        }
+                    }
+                }
+            }
+
+            fn bound(&self, b: &Aabb) -> Interval {
+                let mut range = self.regions()[0].bound(b);
+                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                    let other = r.bound(b);
+                    range = Self::range(range, if self.negated(i) { -other } else { other });
+                }
+                range
+            }
+
+            fn fill(&self, block: &Block, out: &mut [f32]) {
+                self.fill_level(block, 0.0, out);
+            }
+        }
+
+        impl Shape for $shape {
+            fn bounds(&self) -> Aabb {
+                self.extent()
+            }
+
+            fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
+                for (i, r) in self.regions().iter().enumerate() {
+                    r.level_planes(axis, if self.negated(i) { -level } else { level }, out);
+                }
+            }
+
+            // Rounding keeps order, so joining rounded values gives the rounded join.
+            fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+                self.regions()[0].fill_level(block, level, out);
+                let mut other = vec![0.0f32; out.len()];
+                for (i, r) in self.regions().iter().enumerate().skip(1) {
+                    let sign = if self.negated(i) { -1.0f32 } else { 1.0 };
+                    r.fill_level(block, level * f64::from(sign), &mut other);
+                    for (o, v) in out.iter_mut().zip(&other) {
+                        if Self::takes(f64::from(sign * v), f64::from(*o)) {
+                            *o = sign * v;
+                        }
+                    }
+                }
+            }
+
+            fn volume(&self) -> Option<f64> {
+                match self.regions() {
+                    [only] => only.volume(),
+                    _ => None,
+                }
+            }
+        }
+    )*};
+}
+joined!(Union, Intersection, Difference);
+
+impl Field for Offset {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.of.values(points, out);
+        out.iter_mut().for_each(|v| *v = self.snapped(*v - self.by));
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.of.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v = self.snapped(*v - self.by));
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let r = self.of.bound(b);
+        Interval::new(self.snapped(r.lo - self.by), self.snapped(r.hi - self.by))
+    }
+
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.fill_level(block, 0.0, out);
+    }
+}
+
+impl Shape for Offset {
+    fn bounds(&self) -> Aabb {
+        self.of.bounds().grown(self.by)
+    }
+
+    fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
+        self.of.level_planes(axis, self.by + level, out);
+    }
+
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        self.of.fill_level(block, self.by + level, out);
+        let snap = self.snap as f32;
+        out.iter_mut().filter(|v| v.abs() <= snap).for_each(|v| *v = 0.0);
+    }
+
+    fn volume(&self) -> Option<f64> {
+        if self.by == 0.0 { self.of.volume() } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::region::tests::check_shape;
+    use crate::region::{Cuboid, Cylinder, HalfSpace, Sphere};
+    use std::sync::Arc;
+
+    fn parts() -> [Region; 3] {
+        [
+            Arc::new(Cuboid::new([-1.1, -0.9, -1.3], [1.2, 0.8, 1.0]).unwrap()),
+            Arc::new(Sphere::new([1.0, 0.2, 0.3], 0.9).unwrap()),
+            Arc::new(Cylinder::new([0.0, 0.0, -2.0], [0.0, 0.0, 1.0], 0.4, 4.0).unwrap()),
+        ]
+    }
+
+    #[test]
+    fn combinations_keep_the_laws_of_a_shape() {
+        let list = || parts().to_vec();
+        check_shape("union", &Union::new(list()).unwrap(), 2.5, 0.0);
+        check_shape("intersection", &Intersection::new(list()).unwrap(), 2.5, 0.0);
+        let difference: Region = Arc::new(Difference::new(list()).unwrap());
+        check_shape("difference", difference.as_ref(), 2.5, 0.0);
+        for by in [0.3, -0.3] {
+            check_shape("offset", &Offset::new(difference.clone(), by).unwrap(), 2.5, 0.0);
+        }
+    }
+
+    #[test]
+    fn values_at_known_points() {
+        let [b, s, c] = parts();
+        let p = [1.0, 0.2, 0.3];
+        assert_eq!(Union::new(vec![b.clone(), s.clone()]).unwrap().value(p), -0.9);
+        assert!((Difference::new(vec![b.clone(), s.clone()]).unwrap().value(p) - 0.9).abs() < 1e-15);
+        assert!((Intersection::new(vec![b.clone(), c]).unwrap().value([1.0, 0.0, 0.0]) - 0.6).abs() < 1e-15);
+        assert!((Offset::new(s, 0.5).unwrap().value(p) + 1.4).abs() < 1e-15);
+        assert_eq!(Union::new(vec![b.clone()]).unwrap().volume(), b.volume());
+    }
+
+    #[test]
+    fn faces_stay_exactly_zero_through_combinations_and_offsets() {
+        let b = Arc::new(Cuboid::new([0.1, 0.2, 0.3], [10.0, 12.3, 7.7]).unwrap());
+        let hole = Arc::new(Cuboid::new([3.0, 3.0, 5.0], [5.0, 5.0, 9.0]).unwrap());
+        let cut: Region = Arc::new(Difference::new(vec![b, hole]).unwrap());
+        for by in [0.0, -0.8, -0.1, 0.7, 1.0 / 3.0] {
+            let grown = Offset::new(cut.clone(), by).unwrap();
+            let (mut z, mut x) = (Vec::new(), Vec::new());
+            grown.planes(2, &mut z);
+            grown.planes(0, &mut x);
+            assert!((z[1] - 7.7 - by).abs() < 1e-14 && (z[2] - 5.0 - by).abs() < 1e-14, "{z:?}");
+            assert_eq!(grown.value([8.0, 8.0, z[1]]), 0.0, "top moved by {by}");
+            assert_eq!(grown.value([8.0, 8.0, z[0]]), 0.0, "bottom moved by {by}");
+            assert_eq!(grown.value([4.0, 4.0, z[2]]), 0.0, "floor of the hole moved by {by}");
+            assert_eq!(grown.value([x[1], 8.0, 2.0]), 0.0, "side moved by {by}");
+        }
+    }
+
+    #[test]
+    fn bounds_follow_the_parts() {
+        let [b, s, _] = parts();
+        let open: Region = Arc::new(HalfSpace::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap());
+        let i = Intersection::new(vec![b.clone(), open.clone()]).unwrap();
+        assert_eq!(i.bounds().max, [1.2, 0.8, 0.0]);
+        assert!(!Union::new(vec![b.clone(), open]).unwrap().bounds().is_finite());
+        assert_eq!(Difference::new(vec![b.clone(), s]).unwrap().bounds(), b.bounds());
+        assert_eq!(Offset::new(b.clone(), 0.5).unwrap().bounds(), b.bounds().grown(0.5));
+    }
+
+    #[test]
+    fn empty_lists_and_wild_offsets_are_refused() {
+        assert!(Union::new(vec![]).is_err());
+        assert!(Intersection::new(vec![]).is_err());
+        assert!(Difference::new(vec![]).is_err());
+        assert_eq!(Offset::new(parts()[0].clone(), f64::NAN).err().unwrap().at, "by");
+    }
 }

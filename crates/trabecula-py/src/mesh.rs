@@ -1,0 +1,180 @@
+//! Meshes: arrays, figures, files, pictures.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use trabecula::extract::Surface;
+use trabecula::math::{cross, norm, sub};
+use trabecula::render::{View, png, render};
+use trabecula::{io, measure};
+
+use crate::run::run;
+use crate::solid::Region;
+
+/// A triangle mesh.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct Mesh {
+    surface: Surface,
+    /// Whether it is known which triangles are cuts.
+    split: bool,
+    design: String,
+}
+
+impl Mesh {
+    pub fn new(surface: Surface, design: String) -> Self {
+        Mesh {
+            surface,
+            split: true,
+            design,
+        }
+    }
+}
+
+#[pymethods]
+impl Mesh {
+    /// Reads the bytes of a mesh file; `extension` names the format.
+    #[staticmethod]
+    fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
+        let loaded = run(py, None, None, |_| io::read_mesh(bytes, extension))?;
+        let mesh = loaded
+            .map_err(|f| PyValueError::new_err(f.to_string()))?
+            .mesh;
+        let cut = vec![false; mesh.triangles.len()];
+        Ok(Mesh {
+            surface: Surface { mesh, cut },
+            split: false,
+            design: String::new(),
+        })
+    }
+
+    /// The same mesh, its triangles that lie on the region's boundary (within `tolerance`, mm) marked as cuts.
+    fn split_by(&self, py: Python<'_>, region: &Region, tolerance: f64) -> PyResult<Mesh> {
+        let (surface, region) = (&self.surface, &region.region);
+        let surface = run(py, None, None, |_| {
+            let mut distance = vec![0.0; surface.mesh.vertices.len()];
+            region.values(&surface.mesh.vertices, &mut distance);
+            let on = |v: &u32| distance[*v as usize].abs() <= tolerance;
+            let cut = surface
+                .mesh
+                .triangles
+                .iter()
+                .map(|t| t.iter().all(on))
+                .collect();
+            Surface {
+                mesh: surface.mesh.clone(),
+                cut,
+            }
+        })?;
+        Ok(Mesh {
+            surface,
+            split: true,
+            design: self.design.clone(),
+        })
+    }
+
+    /// Vertex positions (n, 3), mm.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let v = self.surface.mesh.vertices.clone();
+        let n = v.len();
+        v.into_flattened().into_pyarray(py).reshape([n, 3])
+    }
+
+    /// Vertex indices (m, 3), counter-clockwise seen from outside.
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let t = self.surface.mesh.triangles.clone();
+        let m = t.len();
+        t.into_flattened().into_pyarray(py).reshape([m, 3])
+    }
+
+    /// For each triangle, whether it lies on the region's boundary.
+    #[getter]
+    fn cut<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        self.surface.cut.clone().into_pyarray(py)
+    }
+
+    /// The design it came from, as TOML text.
+    #[getter]
+    fn design(&self) -> &str {
+        &self.design
+    }
+
+    /// Numbers of vertices and triangles.
+    #[getter]
+    fn counts(&self) -> (usize, usize) {
+        (
+            self.surface.mesh.vertices.len(),
+            self.surface.mesh.triangles.len(),
+        )
+    }
+
+    /// Volume, areas, Euler number, pieces, cavities, closedness, bounds.
+    fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let surface = &self.surface;
+        let (size, cut) = run(py, None, None, |_| {
+            let area = |i: usize| {
+                let [a, b, c] = surface.mesh.corners(i);
+                norm(cross(sub(b, a), sub(c, a))) / 2.0
+            };
+            let cut: f64 = (0..surface.cut.len())
+                .filter(|i| surface.cut[*i])
+                .map(area)
+                .sum();
+            (measure::size(&surface.mesh), cut)
+        })?;
+        let d = PyDict::new(py);
+        d.set_item("volume", size.volume)?;
+        d.set_item("area", size.area)?;
+        d.set_item("area_lattice", self.split.then_some(size.area - cut))?;
+        d.set_item("area_cut", self.split.then_some(cut))?;
+        d.set_item("euler", size.euler)?;
+        d.set_item("pieces", size.pieces)?;
+        d.set_item("cavities", size.cavities)?;
+        d.set_item("closed", size.closed)?;
+        d.set_item("bounds", [size.bounds.min, size.bounds.max])?;
+        Ok(d)
+    }
+
+    /// Writes the mesh to `path` in the format `extension`.
+    fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
+        let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
+        let meta = io::Metadata {
+            title,
+            design: self.design.clone(),
+            application,
+        };
+        let written = run(py, None, None, |_| {
+            let mut out = BufWriter::with_capacity(1 << 20, File::create(path)?);
+            io::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;
+            out.flush()
+        })?;
+        Ok(written?)
+    }
+
+    /// A picture as PNG bytes.
+    fn png<'py>(
+        &self,
+        py: Python<'py>,
+        width: usize,
+        height: usize,
+        azimuth: f64,
+        elevation: f64,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let size = [width, height];
+        let bytes = run(py, None, None, |_| {
+            let view = View {
+                size,
+                azimuth,
+                elevation,
+            };
+            png(&render(&self.surface, &view), size)
+        })?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+}

@@ -1,0 +1,95 @@
+//! Long work off the interpreter: other Python threads run, Ctrl-C stops it, progress is told on the calling thread.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use trabecula::extract::Progress;
+
+use crate::error;
+
+/// How often signals are looked at and progress is told.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Progress that the working threads write and the calling thread reads.
+#[derive(Default)]
+struct Shared {
+    done: AtomicU64,
+    total: AtomicU64,
+    stop: AtomicBool,
+}
+
+impl Progress for Shared {
+    fn step(&self, done: u64, total: u64) -> bool {
+        self.done.fetch_max(done, Relaxed);
+        self.total.store(total, Relaxed);
+        !self.stop.load(Relaxed)
+    }
+}
+
+/// Runs `work` on `threads` threads (all processors if `None`), calling `tell(done, total)` now and then.
+pub fn run<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    tell: Option<Py<PyAny>>,
+    work: impl FnOnce(&dyn Progress) -> T + Send,
+) -> PyResult<T> {
+    let pool = match threads {
+        None => None,
+        Some(n @ 1..=4096) => {
+            let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+            Some(built.map_err(|e| {
+                PyValueError::new_err(format!("threads: {n} cannot be started: {e}"))
+            })?)
+        }
+        Some(n) => {
+            return Err(PyValueError::new_err(format!(
+                "threads is {n}; it must be from 1 to 4096"
+            )));
+        }
+    };
+    let shared = Shared::default();
+    let shared = &shared;
+    py.detach(|| {
+        std::thread::scope(|scope| {
+            let (finished, waiting) = channel::<()>();
+            let worker = scope.spawn(move || {
+                let _finished = finished; // dropped, and so told, even if the work panics
+                match pool {
+                    Some(pool) => pool.install(|| work(shared)),
+                    None => work(shared),
+                }
+            });
+            let mut raised = None;
+            let mut told = 0;
+            while let Err(RecvTimeoutError::Timeout) = waiting.recv_timeout(TICK) {
+                if raised.is_some() {
+                    continue;
+                }
+                let news = Python::attach(|py| {
+                    py.check_signals()?;
+                    let (done, total) = (shared.done.load(Relaxed), shared.total.load(Relaxed));
+                    if let Some(tell) = &tell
+                        && total > 0
+                        && done != told
+                    {
+                        told = done;
+                        tell.call1(py, (done, total))?;
+                    }
+                    Ok(())
+                });
+                if let Err(e) = news {
+                    shared.stop.store(true, Relaxed);
+                    raised = Some(e);
+                }
+            }
+            let result = worker.join().map_err(error::internal);
+            match raised {
+                Some(e) => Err(e),
+                None => result,
+            }
+        })
+    })
+}

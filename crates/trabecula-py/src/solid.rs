@@ -1,0 +1,287 @@
+//! Solids: field, surface, voxels, figures.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use trabecula::design::{self, Built, Node};
+use trabecula::extract::{self, Stopped};
+use trabecula::field::Field;
+
+use crate::design::Folder;
+use crate::error;
+use crate::mesh::Mesh;
+use crate::run::run;
+
+/// A region and the lattice in it.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct Solid {
+    built: Built,
+    warnings: Vec<(String, String)>,
+    design: String,
+}
+
+impl Solid {
+    pub fn built(built: Built, warnings: Vec<(String, String)>, design: String) -> Self {
+        Solid {
+            built,
+            warnings,
+            design,
+        }
+    }
+}
+
+/// Points of Python (n, 3) as the core's.
+fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+    let a = p.as_array();
+    if a.ncols() != 3 {
+        return Err(PyValueError::new_err(format!(
+            "points must have shape (n, 3), found {:?}",
+            a.shape()
+        )));
+    }
+    Ok(a.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect())
+}
+
+fn values<'py>(
+    py: Python<'py>,
+    field: &dyn Field,
+    points: Vec<[f64; 3]>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    const BATCH: usize = 4096;
+    let out = run(py, None, None, |_| {
+        let mut out = vec![0.0; points.len()];
+        out.par_chunks_mut(BATCH)
+            .zip(points.par_chunks(BATCH))
+            .for_each(|(o, p)| field.values(p, o));
+        out
+    })?;
+    Ok(out.into_pyarray(py))
+}
+
+#[pymethods]
+impl Solid {
+    /// (path, message) of what may not be meant.
+    #[getter]
+    fn warnings(&self) -> Vec<(String, String)> {
+        self.warnings.clone()
+    }
+
+    /// The design as TOML text.
+    #[getter]
+    fn design(&self) -> &str {
+        &self.design
+    }
+
+    /// The smallest wavelength, mm.
+    #[getter]
+    fn wavelength(&self) -> f64 {
+        self.built.solid.wavelength
+    }
+
+    /// Lower and upper corner of the region's bounds, mm.
+    #[getter]
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let b = self.built.solid.region.bounds();
+        (b.min, b.max)
+    }
+
+    /// The region.
+    #[getter]
+    fn region(&self) -> Region {
+        Region {
+            region: self.built.solid.region.clone(),
+        }
+    }
+
+    /// The figures of the design without meshing it, as JSON text.
+    fn report(&self, py: Python<'_>) -> PyResult<String> {
+        run(py, None, None, |_| self.built.report().to_string())
+    }
+
+    /// Values at points (n, 3): negative in the solid.
+    fn field<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        values(py, &self.built.solid, self::points(&points)?)
+    }
+
+    /// What a spacing will take: cells along each axis, triangles, bytes in memory, bytes of a binary STL.
+    fn estimate<'py>(&self, py: Python<'py>, edge: f64) -> PyResult<Bound<'py, PyDict>> {
+        let e = run(py, None, None, |_| {
+            extract::estimate(&self.built.solid, edge)
+        })?
+        .map_err(error::fault)?;
+        let d = PyDict::new(py);
+        d.set_item("cells", e.cells)?;
+        d.set_item("triangles", e.triangles)?;
+        d.set_item("memory", e.memory)?;
+        d.set_item("stl", e.stl)?;
+        Ok(d)
+    }
+
+    /// The surface at grid spacing `edge` (mm).
+    #[pyo3(signature = (edge, threads=None, progress=None))]
+    fn mesh(
+        &self,
+        py: Python<'_>,
+        edge: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Mesh> {
+        let surface = run(py, threads, progress, |p| {
+            extract::surface(&self.built.solid, edge, p)
+        })?;
+        Ok(Mesh::new(
+            surface.map_err(error::stopped)?,
+            self.design.clone(),
+        ))
+    }
+
+    /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume and areas.
+    #[pyo3(signature = (path, edge, threads=None, progress=None))]
+    fn stream_stl<'py>(
+        &self,
+        py: Python<'py>,
+        path: PathBuf,
+        edge: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let summary = run(py, threads, progress, |p| {
+            let mut out =
+                BufWriter::with_capacity(1 << 20, File::create(path).map_err(Stopped::Io)?);
+            let summary = extract::stream_stl(&self.built.solid, edge, &mut out, p)?;
+            out.flush().map_err(Stopped::Io)?;
+            Ok(summary)
+        })?;
+        let s = summary.map_err(error::stopped)?;
+        let d = PyDict::new(py);
+        d.set_item("triangles", s.triangles)?;
+        d.set_item("volume", s.volume)?;
+        d.set_item("area", s.area_lattice + s.area_cut)?;
+        d.set_item("area_lattice", s.area_lattice)?;
+        d.set_item("area_cut", s.area_cut)?;
+        Ok(d)
+    }
+
+    /// Occupancy on cubic voxels of edge `step` (mm).
+    #[pyo3(signature = (step, threads=None, progress=None))]
+    fn voxels(
+        &self,
+        py: Python<'_>,
+        step: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Voxels> {
+        let voxels = run(py, threads, progress, |p| {
+            extract::voxels(&self.built.solid, step, p)
+        })?;
+        Ok(Voxels {
+            voxels: voxels.map_err(error::stopped)?,
+        })
+    }
+}
+
+/// Where a part may be: a signed distance.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct Region {
+    pub region: trabecula::region::Region,
+}
+
+#[pymethods]
+impl Region {
+    /// The region of a design, or of a file with the key `region` alone, as text; `folder` is where paths start.
+    #[staticmethod]
+    fn from_text(py: Python<'_>, text: &str, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
+        let region = run(py, None, None, |_| {
+            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
+            design::region(&node, &Folder(folder))
+        })?;
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e.in_file(&file)))
+    }
+
+    /// The region under the key `region` of a dictionary.
+    #[staticmethod]
+    fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>, folder: PathBuf) -> PyResult<Region> {
+        let node = crate::design::node(data, 0)?;
+        let region = run(py, None, None, |_| design::region(&node, &Folder(folder)))?;
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e))
+    }
+
+    /// Signed distance at points (n, 3), mm, negative inside.
+    fn distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let region: &dyn Field = &*self.region;
+        values(py, region, self::points(&points)?)
+    }
+
+    /// Lower and upper corner of the bounds, mm.
+    #[getter]
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let b = self.region.bounds();
+        (b.min, b.max)
+    }
+
+    /// Volume, mm³: exact where it is known in closed form, otherwise of its surface at grid spacing `edge` (mm).
+    fn volume(&self, py: Python<'_>, edge: f64) -> PyResult<f64> {
+        if let Some(v) = self.region.volume() {
+            return Ok(v);
+        }
+        let full = trabecula::solid::Solid {
+            region: self.region.clone(),
+            field: None,
+            wavelength: edge,
+        };
+        let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
+        Ok(surface.map_err(error::stopped)?.mesh.volume())
+    }
+}
+
+/// Occupancy on a grid of cubic voxels.
+#[pyclass(frozen, module = "trabecula._core")]
+pub struct Voxels {
+    voxels: extract::Voxels,
+}
+
+#[pymethods]
+impl Voxels {
+    /// Lower corner of the first voxel, mm.
+    #[getter]
+    fn origin(&self) -> [f64; 3] {
+        self.voxels.origin
+    }
+
+    /// Edge of a voxel, mm.
+    #[getter]
+    fn step(&self) -> f64 {
+        self.voxels.step
+    }
+
+    /// Voxels along x, y, z.
+    #[getter]
+    fn shape(&self) -> [usize; 3] {
+        self.voxels.shape
+    }
+
+    /// 1 where solid, indexed [z, y, x].
+    #[getter]
+    fn solid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let [nx, ny, nz] = self.voxels.shape;
+        self.voxels
+            .solid
+            .clone()
+            .into_pyarray(py)
+            .reshape([nz, ny, nx])
+    }
+}

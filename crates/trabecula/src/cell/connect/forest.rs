@@ -1,0 +1,184 @@
+//! Union-find on the torus that also knows how the pieces wind around it.
+
+use super::sublattice::{Int3, Sublattice};
+
+/// A vector sum.
+fn plus(a: Int3, b: Int3) -> Int3 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// A vector difference.
+fn minus(a: Int3, b: Int3) -> Int3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// What joining two elements changed.
+pub(super) enum Joined {
+    /// They were one piece in R³ already.
+    Same,
+    /// A piece met a translate of itself, which none of its loops had reached.
+    Loop {
+        /// The element by which the piece is known.
+        piece: u32,
+        /// The translation (periods).
+        shift: Int3,
+    },
+    /// Two pieces became one.
+    Merged {
+        /// The elements by which the pieces were known, the elder first; it names the union.
+        pieces: [u32; 2],
+        /// The period in which the second stands, seen from the first.
+        shift: Int3,
+    },
+}
+
+/// A forest over elements of the torus. Each piece carries the translations realised by its closed loops.
+pub(super) struct Forest {
+    parent: Vec<u32>,
+    /// The period in which the element stands, seen from its parent.
+    shift: Vec<Int3>,
+    /// When an element joined; an element counts as present from then on.
+    rank: Vec<u32>,
+    /// For roots: the elder element of the piece, and the loops.
+    elder: Vec<u32>,
+    loops: Vec<Sublattice>,
+    clock: u32,
+}
+
+const ABSENT: u32 = u32::MAX;
+
+impl Forest {
+    /// No element present, of `n`.
+    pub(super) fn new(n: usize) -> Forest {
+        Forest {
+            parent: (0..n as u32).collect(),
+            shift: vec![[0; 3]; n],
+            rank: vec![ABSENT; n],
+            elder: (0..n as u32).collect(),
+            loops: vec![Sublattice::default(); n],
+            clock: 0,
+        }
+    }
+
+    /// Makes an element present, as a piece of its own.
+    pub(super) fn insert(&mut self, i: u32) {
+        self.rank[i as usize] = self.clock;
+        self.clock += 1;
+    }
+
+    /// Whether an element is present.
+    pub(super) fn has(&self, i: u32) -> bool {
+        self.rank[i as usize] != ABSENT
+    }
+
+    /// Whether the element is the elder of its piece.
+    pub(super) fn leads(&mut self, i: u32) -> bool {
+        let root = self.find(i).0;
+        self.elder[root as usize] == i
+    }
+
+    /// The loops of the piece of an element.
+    pub(super) fn loops(&mut self, i: u32) -> Sublattice {
+        let root = self.find(i).0;
+        self.loops[root as usize]
+    }
+
+    /// Adds loops to the piece of an element.
+    pub(super) fn wind(&mut self, i: u32, loops: &Sublattice) {
+        let root = self.find(i).0;
+        self.loops[root as usize].absorb(loops);
+    }
+
+    /// The root of an element and the period in which the element stands, seen from the root; halves the path.
+    fn find(&mut self, mut i: u32) -> (u32, Int3) {
+        let mut total = [0; 3];
+        loop {
+            let p = self.parent[i as usize];
+            if p == i {
+                return (i, total);
+            }
+            let q = self.parent[p as usize];
+            self.shift[i as usize] = plus(self.shift[i as usize], self.shift[p as usize]);
+            self.parent[i as usize] = q;
+            total = plus(total, self.shift[i as usize]);
+            i = q;
+        }
+    }
+
+    /// Whether `a`, and `b` moved by `wrap` periods, are one piece in R³.
+    pub(super) fn together(&mut self, a: u32, b: u32, wrap: Int3) -> bool {
+        let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
+        ra == rb && self.loops[ra as usize].contains(minus(plus(ga, wrap), gb))
+    }
+
+    /// Joins `a` with `b` moved by `wrap` periods.
+    pub(super) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> Joined {
+        let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
+        // Where the root of b stands, seen from the root of a.
+        let gap = minus(plus(ga, wrap), gb);
+        if ra == rb {
+            let grew = self.loops[ra as usize].insert(gap);
+            let piece = self.elder[ra as usize];
+            return if grew {
+                Joined::Loop { piece, shift: gap }
+            } else {
+                Joined::Same
+            };
+        }
+        let (ea, eb) = (self.elder[ra as usize], self.elder[rb as usize]);
+        let shift = minus(plus(gap, self.find(eb).1), self.find(ea).1);
+        let back = |v| minus([0; 3], v);
+        let (keep, lose, gap, pieces, shift) = if self.rank[ea as usize] < self.rank[eb as usize] {
+            (ra, rb, gap, [ea, eb], shift)
+        } else {
+            (rb, ra, back(gap), [eb, ea], back(shift))
+        };
+        let loops = self.loops[lose as usize];
+        self.loops[keep as usize].absorb(&loops);
+        self.parent[lose as usize] = keep;
+        self.shift[lose as usize] = gap;
+        Joined::Merged { pieces, shift }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_closes_on_its_translate() {
+        // Four elements round the torus along x; the last step wraps.
+        let mut f = Forest::new(4);
+        (0..4).for_each(|i| f.insert(i));
+        for i in 0..3 {
+            assert!(matches!(
+                f.join(i, i + 1, [0; 3]),
+                Joined::Merged { pieces: [0, _], .. }
+            ));
+        }
+        assert!(f.together(0, 3, [0; 3]) && !f.together(0, 3, [1, 0, 0]));
+        assert!(matches!(
+            f.join(3, 0, [1, 0, 0]),
+            Joined::Loop {
+                piece: 0,
+                shift: [1, 0, 0]
+            }
+        ));
+        assert!(f.together(0, 3, [-5, 0, 0]) && !f.together(0, 3, [0, 1, 0]));
+        assert!(matches!(f.join(2, 1, [2, 0, 0]), Joined::Same));
+    }
+
+    #[test]
+    fn shifts_are_between_elders_whatever_the_roots() {
+        let mut f = Forest::new(4);
+        [2, 0, 1, 3].into_iter().for_each(|i| f.insert(i));
+        f.join(0, 1, [1, 0, 0]);
+        f.join(3, 2, [0, 1, 0]);
+        // 1 meets 3 across z: 0 at the origin, 1 at x, 3 at x + z, 2 at x + y + z.
+        match f.join(1, 3, [0, 0, 1]) {
+            Joined::Merged { pieces, shift } => assert_eq!((pieces, shift), ([2, 0], [-1, -1, -1])),
+            _ => panic!("two pieces become one"),
+        }
+        assert!(f.together(0, 2, [1, 1, 1]) && f.together(2, 0, [-1, -1, -1]));
+    }
+}

@@ -1,0 +1,443 @@
+//! The data of a design, as it stands in a file. A kind is the name of a table, or a bare word without settings.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::schema;
+
+/// A number, or three of them along x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrThree {
+    /// The same along all three axes.
+    One(f64),
+    /// Along x, y, z.
+    Three([f64; 3]),
+}
+
+impl OneOrThree {
+    /// The three numbers.
+    pub fn three(self) -> [f64; 3] {
+        match self {
+            OneOrThree::One(v) => [v; 3],
+            OneOrThree::Three(v) => v,
+        }
+    }
+}
+
+/// Where the part may be. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RegionSpec {
+    /// An axis-aligned box.
+    Box(BoxSpec),
+    /// A straight round cylinder.
+    Cylinder(CylinderSpec),
+    /// A ball.
+    Sphere(SphereSpec),
+    /// One side of a plane; it bounds nothing alone, so combine it.
+    HalfSpace(HalfSpaceSpec),
+    /// A closed triangle mesh from a file (stl, obj, ply, off, 3mf).
+    Mesh(MeshSpec),
+    /// Points in any of the regions.
+    Union(Vec<RegionSpec>),
+    /// Points in all of the regions.
+    Intersection(Vec<RegionSpec>),
+    /// Points in the first region and in none of the others.
+    Difference(Vec<RegionSpec>),
+    /// A region grown or shrunk by a distance.
+    Offset(OffsetSpec),
+}
+
+/// A box by its size and centre, or by two corners.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum BoxSpec {
+    /// By size and centre.
+    Size(BoxSize),
+    /// By two corners.
+    Corners(BoxCorners),
+}
+
+/// A box by its size and centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxSize {
+    /// Edge lengths (mm).
+    pub size: [f64; 3],
+    /// Its middle (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+}
+
+/// A box by two corners.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxCorners {
+    /// Lower corner (mm).
+    pub min: [f64; 3],
+    /// Upper corner (mm).
+    pub max: [f64; 3],
+}
+
+/// A straight round cylinder.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderSpec {
+    /// Middle of the lower face (mm).
+    pub base: [f64; 3],
+    /// Direction from the lower to the upper face; its length does not matter.
+    #[serde(default = "build_axis", skip_serializing_if = "is_build_axis")]
+    pub axis: [f64; 3],
+    /// Radius (mm).
+    pub radius: f64,
+    /// Height along the axis (mm).
+    pub height: f64,
+}
+
+/// A ball.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereSpec {
+    /// Centre (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Radius (mm).
+    pub radius: f64,
+}
+
+/// One side of a plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HalfSpaceSpec {
+    /// A point on the plane (mm).
+    pub point: [f64; 3],
+    /// Normal of the plane; it points out of the solid.
+    pub normal: [f64; 3],
+}
+
+/// A closed triangle mesh from a file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    /// Path of the file, relative to the design file.
+    pub path: String,
+    /// Unit of the file's coordinates (mm unless given); a 3MF file names its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Factor on all coordinates, after the unit.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+}
+
+/// A unit of length in a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// 0.001 mm.
+    Micron,
+    /// Millimetre.
+    Mm,
+    /// 10 mm.
+    Cm,
+    /// 1000 mm.
+    M,
+    /// 25.4 mm.
+    Inch,
+    /// 304.8 mm.
+    Foot,
+}
+
+impl Unit {
+    /// The words and what they mean.
+    pub const ALL: [(&'static str, Unit); 6] = [
+        ("mm", Unit::Mm),
+        ("micron", Unit::Micron),
+        ("cm", Unit::Cm),
+        ("m", Unit::M),
+        ("inch", Unit::Inch),
+        ("foot", Unit::Foot),
+    ];
+
+    /// Its length in mm.
+    pub fn in_mm(self) -> f64 {
+        match self {
+            Unit::Micron => 0.001,
+            Unit::Mm => 1.0,
+            Unit::Cm => 10.0,
+            Unit::M => 1000.0,
+            Unit::Inch => 25.4,
+            Unit::Foot => 304.8,
+        }
+    }
+}
+
+/// A region grown or shrunk.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OffsetSpec {
+    /// The region.
+    pub of: Box<RegionSpec>,
+    /// Distance (mm); positive grows.
+    pub by: f64,
+}
+
+/// A lattice: a cell seen through a map, cut by a part at a level.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LatticeSpec {
+    /// The function on the torus.
+    pub cell: CellSpec,
+    /// Which side of the level is solid.
+    pub part: PartSpec,
+    /// Position (mm) to phase (turns).
+    pub map: MapSpec,
+    /// How much is solid.
+    pub level: LevelSpec,
+}
+
+/// A cell: the name of a ready one, or a series.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum CellSpec {
+    /// A named surface.
+    Name(#[schemars(schema_with = "schema::cell_name")] String),
+    /// Your own function.
+    Kind(CellKind),
+}
+
+/// A cell with settings.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CellKind {
+    /// A Fourier series.
+    Series(SeriesSpec),
+}
+
+/// A Fourier series: the sum of its terms.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesSpec {
+    /// The terms.
+    pub terms: Vec<TermSpec>,
+}
+
+/// amplitude · cos 2π(h·u + phase), u in turns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TermSpec {
+    /// Whole numbers (h, k, l).
+    pub hkl: [i32; 3],
+    /// Amplitude.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub amplitude: f64,
+    /// Phase in turns; −0.25 makes a sine.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub phase: f64,
+}
+
+/// Which side of the level is solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PartSpec {
+    /// |f| ≤ t.
+    Sheet,
+    /// f ≤ t.
+    Lower,
+    /// f ≥ t.
+    Upper,
+}
+
+/// Position (mm) to phase (turns).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum MapSpec {
+    /// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
+    Affine(AffineSpec),
+    /// The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
+    Spartan(SpartanSpec),
+}
+
+/// A rigid rotation of the scaled lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AffineSpec {
+    /// Cell edge (mm), one or three.
+    pub wavelength: OneOrThree,
+    /// Angles about x, y, z (degrees): z is turned first, then y, then x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotate: [f64; 3],
+    /// Moves the lattice (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset: [f64; 3],
+    /// Shears.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub skew: SkewSpec,
+}
+
+/// Shears in degrees: `xz = 20` moves x by tan(20°) · z.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkewSpec {
+    /// x by tan · y.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub xy: f64,
+    /// x by tan · z.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub xz: f64,
+    /// y by tan · x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub yx: f64,
+    /// y by tan · z.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub yz: f64,
+    /// z by tan · x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub zx: f64,
+    /// z by tan · y.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub zy: f64,
+}
+
+impl SkewSpec {
+    /// The six shears by name.
+    pub fn named(&self) -> [(&'static str, f64); 6] {
+        let s = self;
+        [
+            ("xy", s.xy),
+            ("xz", s.xz),
+            ("yx", s.yx),
+            ("yz", s.yz),
+            ("zx", s.zx),
+            ("zy", s.zy),
+        ]
+    }
+}
+
+/// The SPARTAN reading: scaled first, rotated in phase.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpartanSpec {
+    /// Wavelength (mm), one or three.
+    pub wavelength: OneOrThree,
+    /// Angles about x, y, z (degrees).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotate: [f64; 3],
+    /// Moves the lattice (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset: [f64; 3],
+}
+
+/// How much is solid: exactly one amount.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LevelSpec {
+    /// The amount.
+    #[serde(flatten)]
+    pub amount: AmountSpec,
+    /// What a fraction or porosity is of.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub of: Of,
+    /// How a fraction or porosity becomes a level.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub fit: Fit,
+}
+
+/// An amount of solid.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum AmountSpec {
+    /// The field value t; for a sheet the half-level.
+    Iso(GradeSpec),
+    /// Solid volume fraction, between 0 and 1.
+    Fraction(GradeSpec),
+    /// One minus the solid volume fraction, between 0 and 1.
+    Porosity(GradeSpec),
+}
+
+/// What a fraction is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Of {
+    /// Of the periodic cell.
+    #[default]
+    Cell,
+    /// Of the finished part, cut cells included (solved for).
+    Part,
+}
+
+/// How a fraction becomes a level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Fit {
+    /// By the cell's own exact distribution.
+    #[default]
+    Table,
+    /// By the SPARTAN polynomial (diamond as published; gyroid fitted in the same form). Part `lower` only.
+    Spartan,
+}
+
+/// A number that may vary in space.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum GradeSpec {
+    /// The same everywhere.
+    Constant(f64),
+    /// Varying.
+    Kind(GradeKind),
+}
+
+/// How a number varies.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum GradeKind {
+    /// Along a direction.
+    Linear(LinearSpec),
+    /// By depth (mm) below the region's surface.
+    Depth(DepthSpec),
+    /// A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)".
+    Formula(String),
+}
+
+/// Piecewise linear in s = along · x, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinearSpec {
+    /// Direction; s is measured in multiples of its length.
+    pub along: [f64; 3],
+    /// (s, value), s rising.
+    pub stops: Vec<[f64; 2]>,
+}
+
+/// Piecewise linear in depth, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DepthSpec {
+    /// (depth in mm, value), depth rising.
+    pub stops: Vec<[f64; 2]>,
+}
+
+/// Named lattices.
+pub type Lattices = BTreeMap<String, LatticeSpec>;
+
+fn is_default<T: Default + PartialEq>(v: &T) -> bool {
+    *v == T::default()
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(v: &f64) -> bool {
+    *v == 1.0
+}
+
+fn build_axis() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}
+
+fn is_build_axis(v: &[f64; 3]) -> bool {
+    *v == build_axis()
+}

@@ -1,0 +1,116 @@
+//! Numbers that may vary: data to [`Grade`], values checked.
+
+use super::build::finite;
+use super::data::{GradeKind, GradeSpec};
+use super::error::DesignError;
+use crate::grade::{Formula, Grade};
+use crate::region::Region;
+
+/// What values an amount may take.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Allowed {
+    /// Any finite number.
+    Finite,
+    /// Greater than 0 and less than 1.
+    Share(&'static str),
+}
+
+impl Allowed {
+    pub fn check(self, path: &str, v: f64, place: &str) -> Result<f64, DesignError> {
+        match self {
+            Allowed::Finite => finite(path, v),
+            Allowed::Share(name) if !(v > 0.0 && v < 1.0) => {
+                let message = format!(
+                    "{name} is {v}{place}; it must be greater than 0 and less than 1{}",
+                    hint(name, v)
+                );
+                Err(DesignError::new(path, message).found(v.to_string()))
+            }
+            Allowed::Share(_) => Ok(v),
+        }
+    }
+}
+
+fn hint(name: &str, v: f64) -> String {
+    match (name, v) {
+        ("fraction", 0.0) | ("porosity", 1.0) => " (nothing would be solid)".into(),
+        ("fraction", 1.0) | ("porosity", 0.0) => " (all would be solid)".into(),
+        (_, v) if v > 1.0 && v <= 100.0 => format!(" (for {v} per cent write {})", v / 100.0),
+        _ => String::new(),
+    }
+}
+
+/// The grade, with `1 − value` instead of the value if `complement`. Stops are checked here; a formula is checked
+/// where it is sampled.
+pub(super) fn grade(
+    spec: &GradeSpec,
+    path: &str,
+    region: &Region,
+    allowed: Allowed,
+    complement: bool,
+) -> Result<Grade, DesignError> {
+    let turn = |v: f64| if complement { 1.0 - v } else { v };
+    let kind = match spec {
+        GradeSpec::Constant(v) => return Ok(Grade::Constant(turn(allowed.check(path, *v, "")?))),
+        GradeSpec::Kind(kind) => kind,
+    };
+    let stops = |path: &str, stops: &[[f64; 2]]| {
+        if stops.is_empty() {
+            return Err(DesignError::new(
+                path,
+                "no stops given; give at least one [position, value]",
+            ));
+        }
+        let mut out = Vec::with_capacity(stops.len());
+        let mut last = f64::NEG_INFINITY;
+        for (i, &[at, value]) in stops.iter().enumerate() {
+            let path = format!("{path}[{i}]");
+            finite(&path, at)?;
+            if at <= last {
+                let message =
+                    format!("positions must rise from stop to stop, found {at} after {last}");
+                return Err(DesignError::new(path, message).found(at.to_string()));
+            }
+            last = at;
+            out.push([
+                at,
+                turn(allowed.check(&path, value, &format!(" at position {at}"))?),
+            ]);
+        }
+        Ok(out)
+    };
+    match kind {
+        GradeKind::Linear(l) => {
+            let below = format!("{path}.linear.along");
+            for v in l.along {
+                finite(&below, v)?;
+            }
+            if l.along == [0.0; 3] {
+                return Err(DesignError::new(
+                    below,
+                    "the direction is zero; give one such as [0, 0, 1]",
+                ));
+            }
+            Ok(Grade::Linear {
+                along: l.along,
+                stops: stops(&format!("{path}.linear.stops"), &l.stops)?,
+            })
+        }
+        GradeKind::Depth(d) => Ok(Grade::Depth {
+            region: region.clone(),
+            stops: stops(&format!("{path}.depth.stops"), &d.stops)?,
+        }),
+        GradeKind::Formula(text) => {
+            let place = format!("{path}.formula");
+            let own =
+                Formula::parse(text).map_err(|f| DesignError::fault(&place, f).found(text))?;
+            if !complement {
+                return Ok(Grade::Formula(own));
+            }
+            let turned = format!("1 - ({text})");
+            Formula::parse(&turned)
+                .map(Grade::Formula)
+                .map_err(|f| DesignError::fault(&place, f).found(text))
+        }
+    }
+}

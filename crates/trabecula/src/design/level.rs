@@ -1,0 +1,204 @@
+//! How much is solid: data to [`Level`].
+
+use super::build::Place;
+use super::data::{AmountSpec, Fit, LevelSpec, Of, PartSpec};
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::sample;
+use crate::cell::{Cell, Part};
+use crate::field::Field;
+use crate::grade::Grade;
+use crate::lattice::{Lattice, Level};
+use crate::map::Map;
+use std::sync::Arc;
+
+/// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
+/// text says eighth order; the ten numbers are those of a ninth-order polynomial). Porosity within 0.0031.
+const DIAMOND: [f64; 10] = [
+    -1.40181203e03,
+    6.31442849e03,
+    -1.20734024e04,
+    1.27714436e04,
+    -8.16588099e03,
+    3.23757850e03,
+    -7.84778926e02,
+    1.09747587e02,
+    -1.01136257e01,
+    1.39501223,
+];
+/// The same for the gyroid, fitted by us on [0.02, 0.98], where it is within 0.0001 of the porosity.
+const GYROID: [f64; 10] = [
+    6.74056878,
+    -30.3325595,
+    59.2693991,
+    -65.8909524,
+    46.3314037,
+    -21.8771005,
+    7.86858261,
+    -2.64954320,
+    -2.36866364,
+    1.45443255,
+];
+
+/// The level of the SPARTAN polynomial for this cell at porosity `p`, if there is one.
+pub fn spartan(cell: &str, p: f64) -> Option<f64> {
+    let c = match cell {
+        "diamond" => &DIAMOND,
+        "gyroid" | "gyroid_mirrored" => &GYROID,
+        _ => return None,
+    };
+    Some(c.iter().fold(0.0, |t, a| t * p + a))
+}
+
+/// Builds the level of a lattice. `name` is the cell's, if it has one.
+pub(super) fn level(
+    spec: &LevelSpec,
+    part: PartSpec,
+    name: Option<&str>,
+    cell: &Arc<Cell>,
+    map: &Map,
+    place: &Place,
+) -> Result<Level, DesignError> {
+    let path = |key: &str| format!("{}.{key}", place.path);
+    let (key, value, allowed) = match &spec.amount {
+        AmountSpec::Iso(v) => ("iso", v, Allowed::Finite),
+        AmountSpec::Fraction(v) => ("fraction", v, Allowed::Share("fraction")),
+        AmountSpec::Porosity(v) => ("porosity", v, Allowed::Share("porosity")),
+    };
+    let amount = grade(value, &path(key), place.region, allowed, key == "porosity")?;
+    if key == "iso" {
+        for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
+            if set {
+                let message =
+                    format!("\"{option}\" goes with fraction or porosity, found iso; leave it out");
+                return Err(DesignError::new(path(option), message));
+            }
+        }
+        return Ok(Level::Iso(amount));
+    }
+    if let Grade::Formula(_) = &amount {
+        check_formula(&amount, &path(&format!("{key}.formula")), key, place)?;
+    }
+    match (spec.of, spec.fit) {
+        (Of::Cell, Fit::Table) => Ok(Level::Fraction(amount)),
+        (Of::Part, Fit::Table) => {
+            let Some(target) = amount.constant() else {
+                let message = format!(
+                    "of = \"part\" solves for one level and takes a constant {key}; found one that varies"
+                );
+                return Err(DesignError::new(path("of"), message));
+            };
+            let iso = solve(target, part.into(), cell, map, place);
+            Ok(Level::Iso(Grade::Constant(iso)))
+        }
+        (Of::Cell, Fit::Spartan) => {
+            let fits = "diamond, gyroid, gyroid_mirrored";
+            if part != PartSpec::Lower {
+                let message = "fit = \"spartan\" is for part lower (f ≤ t); use fit = \"table\" for sheet and upper";
+                return Err(DesignError::new(path("fit"), message));
+            }
+            let Some(fraction) = amount.constant() else {
+                let message =
+                    format!("fit = \"spartan\" takes a constant {key}; found one that varies");
+                return Err(DesignError::new(path("fit"), message));
+            };
+            match name.and_then(|n| spartan(n, 1.0 - fraction)) {
+                Some(iso) => Ok(Level::Iso(Grade::Constant(iso))),
+                None => {
+                    let found = name.unwrap_or("a series");
+                    let message = format!(
+                        "fit = \"spartan\" is known for {fits}; found {found}, so use fit = \"table\""
+                    );
+                    Err(DesignError::new(path("fit"), message))
+                }
+            }
+        }
+        (Of::Part, Fit::Spartan) => {
+            let message = "fit = \"spartan\" speaks of the cell, of = \"part\" of the part; give one of the two";
+            Err(DesignError::new(path("fit"), message))
+        }
+    }
+}
+
+/// Refuses a formula that leaves (0, 1) at any of some thousands of points in the region.
+fn check_formula(
+    fraction: &Grade,
+    path: &str,
+    key: &'static str,
+    place: &Place,
+) -> Result<(), DesignError> {
+    let bounds = place.region.bounds();
+    let corner = |i: usize| {
+        core::array::from_fn(|a| {
+            if i >> a & 1 == 0 {
+                bounds.min[a]
+            } else {
+                bounds.max[a]
+            }
+        })
+    };
+    let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+    let mut distance = [0.0; 8];
+    place.region.values(&corners, &mut distance);
+    let in_corners = corners
+        .iter()
+        .zip(distance)
+        .filter(|(_, d)| *d <= 1e-9)
+        .map(|(c, _)| *c);
+    let points: Vec<[f64; 3]> = place.points.iter().copied().chain(in_corners).collect();
+    let mut values = vec![0.0; points.len()];
+    fraction.values(&points, &mut values);
+    let far = |v: f64| {
+        if v.is_nan() {
+            f64::INFINITY
+        } else {
+            (v - 0.5).abs()
+        }
+    };
+    let worst = values
+        .iter()
+        .enumerate()
+        .max_by(|a, b| far(*a.1).total_cmp(&far(*b.1)));
+    if let Some((i, v)) = worst {
+        let own = if key == "porosity" { 1.0 - v } else { *v };
+        let [x, y, z] = points[i];
+        Allowed::Share(key).check(path, own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
+    }
+    Ok(())
+}
+
+/// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's
+/// values at a million points inside. Error about 1e-4 in the fraction.
+fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) -> f64 {
+    let (points, _) = sample::inside(place.region, 1_000_000);
+    // At level zero the field is |f|, f or −f; the part at level t is where that is at most t, t or −t.
+    let at_zero = Lattice::new(cell.clone(), map.clone(), part, Level::Iso(Grade::Constant(0.0)));
+    let mut values = vec![0.0; points.len()];
+    at_zero.values(&points, &mut values);
+    let k = ((target * values.len() as f64) as usize).min(values.len() - 1);
+    let (_, v, _) = values.select_nth_unstable_by(k, f64::total_cmp);
+    if part == Part::Upper { -*v } else { *v }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spartan;
+
+    #[test]
+    fn the_published_polynomial_is_of_ninth_order_and_nearly_odd() {
+        for i in 1..20 {
+            let p = f64::from(i) / 20.0;
+            for (cell, odd) in [("diamond", 2e-3), ("gyroid", 1e-3)] {
+                let (a, b) = (
+                    spartan(cell, p).unwrap_or(9.0),
+                    spartan(cell, 1.0 - p).unwrap_or(9.0),
+                );
+                assert!((a + b).abs() < odd, "{cell} {p}: {a} {b}");
+            }
+        }
+        // Exact levels: diamond 0.486154728 and gyroid 0.616271908 at porosity 0.3.
+        assert!((spartan("diamond", 0.3).unwrap_or(9.0) - 0.486_154_728).abs() < 2e-3);
+        assert!((spartan("gyroid_mirrored", 0.3).unwrap_or(9.0) - 0.616_271_908).abs() < 1e-4);
+        assert_eq!(spartan("primitive", 0.3), None);
+    }
+}

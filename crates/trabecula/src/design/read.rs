@@ -1,0 +1,401 @@
+//! Tree to data: every key, kind and word is checked here; values are checked when the design is built.
+
+use super::Design;
+use super::data::*;
+use super::error::DesignError;
+use super::node::{At, Fields, GRADES, Later, Node};
+use crate::cell::catalogue;
+
+type Read<T> = Result<T, DesignError>;
+
+const THREE: &str = "three numbers [x, y, z]";
+const REGIONS: [&str; 9] = [
+    "box",
+    "cylinder",
+    "sphere",
+    "halfspace",
+    "mesh",
+    "union",
+    "intersection",
+    "difference",
+    "offset",
+];
+const LATER_TOP: [Later; 4] = [
+    (
+        "blend",
+        "one lattice fills the whole region; leave the blend out and keep one lattice",
+    ),
+    ("skin", "leave it out"),
+    ("keep", "leave it out"),
+    ("beams", "use a lattice"),
+];
+const LATER_CELL: [Later; 3] = [
+    ("tet", "use a named cell or a series"),
+    ("beams", "use a named cell or a series"),
+    ("waves", "use a named cell or a series"),
+];
+const LATER_MAP: [Later; 4] = [
+    ("phase", "use affine, with constant wavelength and rotation"),
+    ("cylinder", "use affine"),
+    ("sphere", "use affine"),
+    ("tets", "use affine"),
+];
+const LATER_GRADE: [Later; 4] = [
+    (
+        "radial",
+        "use a formula, such as \"0.3 + 0.01*sqrt(x^2 + y^2)\"",
+    ),
+    ("grid", "use linear, depth or formula"),
+    ("points", "use linear, depth or formula"),
+    ("field", "use linear, depth or formula"),
+];
+
+/// The design in a tree.
+pub(super) fn design(node: &Node) -> Read<Design> {
+    let f = At::root(node).fields(
+        "a design",
+        &["schema", "units", "region", "lattice"],
+        &LATER_TOP,
+    )?;
+    let schema = f.need("schema", "write schema = 1 at the top")?;
+    let number = schema.number()?;
+    if number != 1.0 {
+        return Err(schema.error(format!("this version reads schema 1, found {number}")));
+    }
+    if let Some(units) = f.get("units") {
+        let word = units.text("\"mm\"")?;
+        if word != "mm" {
+            let message = format!(
+                "lengths in a design are mm, found \"{word}\"; a mesh file may have its own unit"
+            );
+            return Err(units.error(message));
+        }
+    }
+    let spec = region(f.need(
+        "region",
+        "say where the part may be, such as [region.box] with size = [20, 20, 20]",
+    )?)?;
+    let missing = "say what fills the region, such as [lattice.core] with cell = \"gyroid\"";
+    let entries = f
+        .need("lattice", missing)?
+        .entries("lattices by name, such as [lattice.core]")?;
+    if entries.is_empty() {
+        return Err(DesignError::new("lattice", missing));
+    }
+    if let [(a, _), (b, at), ..] = entries.as_slice() {
+        let message = format!(
+            "several lattices ({a}, {b}) need a blend to say where each is; blends come in a later version, so keep one"
+        );
+        return Err(at.error(message));
+    }
+    let mut lattices = Lattices::new();
+    for (name, at) in &entries {
+        lattices.insert(name.to_string(), lattice(at)?);
+    }
+    Ok(Design {
+        schema: 1,
+        units: super::Units::Mm,
+        region: spec,
+        lattice: lattices,
+        lines: node.lines(),
+    })
+}
+
+/// The region in a design, or in a tree that says nothing else.
+pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
+    let at = At::root(node);
+    if at.entries("a design or a region")?.iter().any(|(key, _)| *key == "lattice") {
+        return Ok(design(node)?.region);
+    }
+    let f = at.fields("a region file", &["schema", "units", "region"], &[])?;
+    region(f.need("region", "say where the part may be, such as [region.box] with size = [20, 20, 20]")?)
+}
+
+fn three(at: &At) -> Read<[f64; 3]> {
+    at.numbers(THREE)
+}
+
+fn region(at: &At) -> Read<RegionSpec> {
+    let (kind, at) = at.kind("region", &REGIONS, &[])?;
+    let at = &at;
+    Ok(match kind {
+        "box" => RegionSpec::Box(cuboid(at)?),
+        "cylinder" => {
+            let f = at.fields("a cylinder", &["base", "axis", "radius", "height"], &[])?;
+            RegionSpec::Cylinder(CylinderSpec {
+                base: three(f.need("base", "the middle of the lower face, [x, y, z] in mm")?)?,
+                axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
+                radius: f.need("radius", "mm")?.number()?,
+                height: f.need("height", "mm, along the axis")?.number()?,
+            })
+        }
+        "sphere" => {
+            let f = at.fields("a sphere", &["center", "radius"], &[])?;
+            RegionSpec::Sphere(SphereSpec {
+                center: f.read("center", [0.0; 3], three)?,
+                radius: f.need("radius", "mm")?.number()?,
+            })
+        }
+        "halfspace" => {
+            let f = at.fields("a half-space", &["point", "normal"], &[])?;
+            RegionSpec::HalfSpace(HalfSpaceSpec {
+                point: three(f.need("point", "a point on the plane, mm")?)?,
+                normal: three(f.need("normal", "the direction out of the solid")?)?,
+            })
+        }
+        "mesh" => mesh(at)?,
+        "offset" => {
+            let f = at.fields("an offset", &["of", "by"], &[])?;
+            RegionSpec::Offset(OffsetSpec {
+                of: Box::new(region(f.need("of", "the region to grow or shrink")?)?),
+                by: f.need("by", "mm; positive grows")?.number()?,
+            })
+        }
+        _ => {
+            let items = at.list("a list of regions")?;
+            let least = if kind == "difference" { 2 } else { 1 };
+            if items.len() < least {
+                return Err(at.error(format!(
+                    "{kind} needs at least {least} regions, found {}",
+                    items.len()
+                )));
+            }
+            let items = items.iter().map(region).collect::<Read<Vec<_>>>()?;
+            match kind {
+                "union" => RegionSpec::Union(items),
+                "intersection" => RegionSpec::Intersection(items),
+                _ => RegionSpec::Difference(items),
+            }
+        }
+    })
+}
+
+fn cuboid(at: &At) -> Read<BoxSpec> {
+    let f = at.fields("a box", &["size", "center", "min", "max"], &[])?;
+    let corners = ["min", "max"].iter().find_map(|k| f.get(k));
+    let size = ["size", "center"].iter().find_map(|k| f.get(k));
+    match (size, corners) {
+        (Some(_), Some(c)) => {
+            Err(c.error("a box has either size and center, or min and max; found both"))
+        }
+        (None, Some(_)) => Ok(BoxSpec::Corners(BoxCorners {
+            min: three(f.need("min", "the lower corner, mm")?)?,
+            max: three(f.need("max", "the upper corner, mm")?)?,
+        })),
+        _ => Ok(BoxSpec::Size(BoxSize {
+            size: three(f.need("size", "edge lengths [x, y, z] in mm (or give min and max)")?)?,
+            center: f.read("center", [0.0; 3], three)?,
+        })),
+    }
+}
+
+fn mesh(at: &At) -> Read<RegionSpec> {
+    let later = [(
+        "repair",
+        "broken meshes are refused with what is wrong with them; leave the key out",
+    )];
+    let f = at.fields("a mesh", &["path", "unit", "scale"], &later)?;
+    Ok(RegionSpec::Mesh(MeshSpec {
+        path: f
+            .need("path", "the mesh file, relative to the design file")?
+            .text("a path")?
+            .to_string(),
+        unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
+        scale: f.read("scale", 1.0, At::number)?,
+    }))
+}
+
+fn lattice(at: &At) -> Read<LatticeSpec> {
+    let f = at.fields("a lattice", &["cell", "part", "map", "level"], &[])?;
+    let parts = [
+        ("sheet", PartSpec::Sheet),
+        ("lower", PartSpec::Lower),
+        ("upper", PartSpec::Upper),
+    ];
+    Ok(LatticeSpec {
+        cell: cell(f.need("cell", "such as cell = \"gyroid\"")?)?,
+        part: f
+            .need("part", "sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)")?
+            .word("part", &parts)?,
+        map: map(f.need("map", "such as map.affine with wavelength = 4")?)?,
+        level: level(f.need("level", "exactly one of iso, fraction, porosity")?)?,
+    })
+}
+
+/// The cell in a tree of its own.
+pub(super) fn cell_in(node: &Node) -> Read<CellSpec> {
+    let mut at = At::root(node);
+    at.path = "cell".into();
+    cell(&at)
+}
+
+fn cell(at: &At) -> Read<CellSpec> {
+    if at.is_text() {
+        let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
+        return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
+    }
+    let (_, at) = at.kind("cell", &["series"], &LATER_CELL)?;
+    let later = [("group", "write out all its terms")];
+    let f = at.fields("a series", &["terms"], &later)?;
+    let terms = f.need(
+        "terms",
+        "a list of { hkl = [h, k, l], amplitude = 1, phase = 0 }",
+    )?;
+    let terms = terms
+        .list("a list of terms")?
+        .iter()
+        .map(term)
+        .collect::<Read<Vec<_>>>()?;
+    Ok(CellSpec::Kind(CellKind::Series(SeriesSpec { terms })))
+}
+
+fn term(at: &At) -> Read<TermSpec> {
+    let later = [("component", "use phase: 0 for a cosine, -0.25 for a sine")];
+    let f = at.fields("a term", &["hkl", "amplitude", "phase"], &later)?;
+    let hkl = f.need("hkl", "three whole numbers")?;
+    let numbers: [f64; 3] = hkl.numbers("three whole numbers [h, k, l]")?;
+    if numbers.iter().any(|v| v.fract() != 0.0 || v.abs() > 1e6) {
+        return Err(hkl.error(format!("expected three whole numbers, found {numbers:?}")));
+    }
+    Ok(TermSpec {
+        hkl: numbers.map(|v| v as i32),
+        amplitude: f.read("amplitude", 1.0, At::number)?,
+        phase: f.read("phase", 0.0, At::number)?,
+    })
+}
+
+fn map(at: &At) -> Read<MapSpec> {
+    let (kind, at) = at.kind("map", &["affine", "spartan"], &LATER_MAP)?;
+    if kind == "spartan" {
+        let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"], &[])?;
+        let (wavelength, rotate, offset) = common(&f)?;
+        return Ok(MapSpec::Spartan(SpartanSpec {
+            wavelength,
+            rotate,
+            offset,
+        }));
+    }
+    let f = at.fields(
+        "an affine map",
+        &["wavelength", "rotate", "offset", "skew"],
+        &[],
+    )?;
+    let (wavelength, rotate, offset) = common(&f)?;
+    Ok(MapSpec::Affine(AffineSpec {
+        wavelength,
+        rotate,
+        offset,
+        skew: f.read("skew", SkewSpec::default(), skew)?,
+    }))
+}
+
+fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
+    let wavelength = f.need("wavelength", "the cell's edge in mm, one number or three")?;
+    let wavelength = if wavelength.is_list() {
+        OneOrThree::Three(wavelength.numbers("one number or three, mm")?)
+    } else {
+        OneOrThree::One(wavelength.number()?)
+    };
+    Ok((
+        wavelength,
+        f.read("rotate", [0.0; 3], three)?,
+        f.read("offset", [0.0; 3], three)?,
+    ))
+}
+
+fn skew(at: &At) -> Read<SkewSpec> {
+    let f = at.fields(
+        "shears in degrees",
+        &["xy", "xz", "yx", "yz", "zx", "zy"],
+        &[],
+    )?;
+    let angle = |key| f.read(key, 0.0, At::number);
+    Ok(SkewSpec {
+        xy: angle("xy")?,
+        xz: angle("xz")?,
+        yx: angle("yx")?,
+        yz: angle("yz")?,
+        zx: angle("zx")?,
+        zy: angle("zy")?,
+    })
+}
+
+fn level(at: &At) -> Read<LevelSpec> {
+    let later = [(
+        "thickness",
+        "give fraction or iso; the wall thickness that follows is reported by check",
+    )];
+    let f = at.fields(
+        "a level",
+        &["iso", "fraction", "porosity", "of", "fit"],
+        &later,
+    )?;
+    let given: Vec<_> = ["iso", "fraction", "porosity"]
+        .into_iter()
+        .filter_map(|k| Some((k, f.get(k)?)))
+        .collect();
+    let amount = match given.as_slice() {
+        [] => {
+            return Err(f
+                .at
+                .error("no amount given; give exactly one of iso, fraction, porosity"));
+        }
+        [(key, value)] => {
+            let value = grade(value)?;
+            match *key {
+                "iso" => AmountSpec::Iso(value),
+                "fraction" => AmountSpec::Fraction(value),
+                _ => AmountSpec::Porosity(value),
+            }
+        }
+        several => {
+            let names: Vec<&str> = several.iter().map(|g| g.0).collect();
+            let message = format!(
+                "{} at once; give exactly one of iso, fraction, porosity",
+                names.join(" and ")
+            );
+            return Err(several[1].1.error(message));
+        }
+    };
+    let of = f.read("of", Of::Cell, |at| {
+        at.word("word", &[("cell", Of::Cell), ("part", Of::Part)])
+    })?;
+    let fit = f.read("fit", Fit::Table, |at| {
+        at.word("fit", &[("table", Fit::Table), ("spartan", Fit::Spartan)])
+    })?;
+    Ok(LevelSpec { amount, of, fit })
+}
+
+fn grade(at: &At) -> Read<GradeSpec> {
+    if at.is_number() {
+        return Ok(GradeSpec::Constant(at.number()?));
+    }
+    if at.is_list() || at.is_text() {
+        return Err(at.expected("a number or a grade (a table with linear, depth or formula)"));
+    }
+    let (kind, at) = at.kind("grade", &GRADES, &LATER_GRADE)?;
+    Ok(GradeSpec::Kind(match kind {
+        "formula" => GradeKind::Formula(at.text("a formula in x, y, z as text")?.to_string()),
+        "depth" => {
+            let f = at.fields("a grade by depth", &["stops"], &[])?;
+            GradeKind::Depth(DepthSpec { stops: stops(&f)? })
+        }
+        _ => {
+            let f = at.fields("a linear grade", &["along", "stops"], &[])?;
+            let along = three(f.need("along", "the direction [x, y, z]")?)?;
+            GradeKind::Linear(LinearSpec {
+                along,
+                stops: stops(&f)?,
+            })
+        }
+    }))
+}
+
+fn stops(f: &Fields) -> Read<Vec<[f64; 2]>> {
+    let stops = f.need("stops", "a list of [position, value]")?;
+    stops
+        .list("a list of [position, value]")?
+        .iter()
+        .map(|s| s.numbers("[position, value]"))
+        .collect()
+}

@@ -1,0 +1,136 @@
+//! What a design is, in numbers, without meshing it.
+
+use serde_json::{Value as Json, json};
+
+use super::{Built, build::LOOKS, sample};
+use crate::cell::Part;
+use crate::lattice::{Lattice, Level};
+
+/// The least and the greatest of a number over a region.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Varied {
+    pub min: f64,
+    pub max: f64,
+}
+
+impl Varied {
+    fn of(values: &[f64]) -> Varied {
+        let (min, max) = values
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(*v), b.max(*v))
+            });
+        Varied { min, max }
+    }
+
+    fn map(self, f: impl Fn(f64) -> f64) -> Varied {
+        if self.min == self.max {
+            Varied::of(&[f(self.min)])
+        } else {
+            Varied::of(&[f(self.min), f(self.max)])
+        }
+    }
+
+    /// The level t at the points.
+    pub fn of_iso(lattice: &Lattice, points: &[[f64; 3]]) -> Varied {
+        if let Level::Iso(g) | Level::Fraction(g) = &lattice.level
+            && g.constant().is_some()
+        {
+            let mut t = [0.0];
+            lattice.isos(&points[..1], &mut t);
+            return Varied::of(&t);
+        }
+        let mut values = vec![0.0; points.len()];
+        lattice.isos(points, &mut values);
+        Varied::of(&values)
+    }
+
+    /// The solid fraction of the cell at the points.
+    pub fn of_fraction(lattice: &Lattice, points: &[[f64; 3]]) -> Varied {
+        match &lattice.level {
+            Level::Fraction(g) => match g.constant() {
+                Some(v) => Varied { min: v, max: v },
+                None => {
+                    let mut values = vec![0.0; points.len()];
+                    g.values(points, &mut values);
+                    Varied::of(&values)
+                }
+            },
+            // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
+            Level::Iso(_) => {
+                Varied::of_iso(lattice, points).map(|t| lattice.cell.fraction(lattice.part, t))
+            }
+        }
+    }
+
+    fn json(self) -> Json {
+        if self.min == self.max {
+            json!(self.min)
+        } else {
+            json!([self.min, self.max])
+        }
+    }
+}
+
+impl core::fmt::Display for Varied {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.min == self.max {
+            write!(f, "{:.4}", self.min)
+        } else {
+            write!(f, "{:.4} to {:.4}", self.min, self.max)
+        }
+    }
+}
+
+pub(super) fn report(built: &Built) -> Json {
+    let region = &built.solid.region;
+    let bounds = region.bounds();
+    let exact = region.volume();
+    let count = if exact.is_some() { LOOKS } else { 25 * LOOKS };
+    let (points, share) = sample::inside(region, count);
+    let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
+    let mut lattices = serde_json::Map::new();
+    for (name, lattice) in &built.lattices {
+        let iso = Varied::of_iso(lattice, &points);
+        let fraction = Varied::of_fraction(lattice, &points);
+        lattices.insert(
+            name.clone(),
+            json!({
+                "part": match lattice.part { Part::Sheet => "sheet", Part::Lower => "lower", Part::Upper => "upper" },
+                "wavelength": lattice.map.wavelength(),
+                "iso": iso.json(),
+                "fraction": fraction.json(),
+                "porosity": fraction.map(|f| 1.0 - f).json(),
+                "thickness": thickness(lattice, iso),
+                "connected_fraction": lattice.cell.connected_fraction(lattice.part),
+            }),
+        );
+    }
+    json!({
+        "lattices": lattices,
+        "region": {
+            "bounds": [bounds.min, bounds.max],
+            "volume": volume,
+            "volume_exact": exact.is_some(),
+        },
+        "warnings": built.warnings,
+    })
+}
+
+/// The thinnest wall or narrowest neck (mm) at the ends of the level's range; null where there is none.
+fn thickness(lattice: &Lattice, iso: Varied) -> Json {
+    let to_phase = lattice.map.jacobian([0.0; 3]);
+    let at = |t| lattice.cell.thickness(lattice.part, t, &to_phase);
+    match (
+        at(iso.min),
+        if iso.min == iso.max {
+            None
+        } else {
+            at(iso.max)
+        },
+    ) {
+        (Some(a), Some(b)) => Varied::of(&[a, b]).json(),
+        (Some(a), None) | (None, Some(a)) => json!(a),
+        (None, None) => Json::Null,
+    }
+}

@@ -1,0 +1,20 @@
+//! The JSON Schema of a design, generated from the data.
+
+use schemars::{Schema, SchemaGenerator, json_schema};
+use serde_json::Value;
+
+use super::Design;
+use crate::cell::catalogue;
+
+/// The JSON Schema of a design (draft 2020-12).
+pub fn schema() -> Value {
+    let mut v = schemars::schema_for!(Design).to_value();
+    v["title"] = "A Trabecula design".into();
+    v
+}
+
+/// The names of the ready cells.
+pub(super) fn cell_name(_: &mut SchemaGenerator) -> Schema {
+    let names: Vec<&str> = catalogue().iter().map(|n| n.name).collect();
+    json_schema!({ "type": "string", "enum": names })
+}

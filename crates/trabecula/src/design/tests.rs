@@ -1,0 +1,210 @@
+//! Whole designs through the reader and back.
+
+use super::*;
+
+const GOOD: &str = r#"schema = 1
+units = "mm"
+[region.box]
+size = [8, 8.5, 9]
+[lattice.core]
+cell = "gyroid"
+part = "lower"
+[lattice.core.map.affine]
+wavelength = [4, 4, 5]
+rotate = [0, 30, 0]
+skew = { xz = 20 }
+[lattice.core.level]
+porosity = { linear = { along = [0, 0, 1], stops = [[0, 0.5], [9, 0.8]] } }
+"#;
+
+fn refused(text: &str) -> DesignError {
+    match Design::from_toml(text) {
+        Err(e) => e,
+        Ok(_) => panic!("accepted:\n{text}"),
+    }
+}
+
+/// The good design with one line changed.
+fn with(line: &str, instead: &str) -> DesignError {
+    assert!(GOOD.contains(line), "{line}");
+    refused(&GOOD.replacen(line, instead, 1))
+}
+
+#[test]
+fn a_design_survives_toml_and_json() {
+    let d = Design::from_toml(GOOD).expect("good");
+    let strip = |mut d: Design| {
+        d.lines = Lines::default();
+        d
+    };
+    let toml = Design::from_toml(&d.to_toml().expect("writable")).expect("own TOML is readable");
+    let json = Design::from_json(&d.to_json().to_string()).expect("own JSON is readable");
+    assert_eq!(strip(toml), strip(d.clone()));
+    assert_eq!(strip(json), strip(d));
+}
+
+#[test]
+fn every_kind_of_region_and_grade_survives() {
+    for region in [
+        "box = { min = [0, 0, 0], max = [1, 2, 3] }",
+        "cylinder = { base = [0, 0, 0], radius = 2, height = 3 }",
+        "sphere = { radius = 2, center = [1, 0, 0] }",
+        "mesh = { path = \"a.stl\", unit = \"inch\", scale = 2 }",
+        "union = [{ sphere = { radius = 2 } }, { box = { size = [1, 1, 1] } }]",
+        "difference = [{ sphere = { radius = 2 } }, { halfspace = { point = [0, 0, 0], normal = [0, 0, 1] } }]",
+        "offset = { of = { intersection = [{ sphere = { radius = 2 } }] }, by = 0.5 }",
+    ] {
+        for level in [
+            "iso = 0.2",
+            "fraction = { depth = { stops = [[0, 0.2], [1, 0.3]] } }",
+            "fraction = { formula = \"0.3 + 0.1*sin(x/5)\" }",
+            "porosity = 0.7\nof = \"part\"",
+            "porosity = 0.7\nfit = \"spartan\"",
+        ] {
+            let text = format!(
+                "schema = 1\n[region]\n{region}\n[lattice.a]\npart = \"upper\"\n[[lattice.a.cell.series.terms]]\nhkl = \
+                 [1, 0, -2]\nphase = -0.25\n[lattice.a.map.spartan]\nwavelength = 4\n[lattice.a.level]\n{level}\n"
+            );
+            let d = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            let again = Design::from_toml(&d.to_toml().expect("writable")).expect("readable");
+            assert_eq!(again.to_json(), d.to_json(), "{text}");
+        }
+    }
+}
+
+#[test]
+fn slips_are_told_with_path_line_and_nearest_word() {
+    for (line, instead, path, number, nearest) in [
+        ("[region.box]", "[region.bxo]", "region.bxo", 3, "box"),
+        ("size =", "siez =", "region.box.siez", 4, "size"),
+        ("cell =", "cel =", "lattice.core.cel", 6, "cell"),
+        ("\"gyroid\"", "\"gyriod\"", "lattice.core.cell", 6, "gyroid"),
+        ("\"lower\"", "\"lowr\"", "lattice.core.part", 7, "lower"),
+        ("wavelength =", "wavelenght =", "lattice.core.map.affine.wavelenght", 9, "wavelength"),
+        ("map.affine", "map.afine", "lattice.core.map.afine", 8, "affine"),
+        ("porosity =", "porosty =", "lattice.core.level.porosty", 13, "porosity"),
+        ("linear =", "liner =", "lattice.core.level.porosity.liner", 13, "linear"),
+        ("stops =", "stop =", "lattice.core.level.porosity.linear.stop", 13, "stops"),
+        ("xz = 20", "xzz = 20", "lattice.core.map.affine.skew.xzz", 11, "xz"),
+    ] {
+        let e = with(line, instead);
+        assert_eq!((e.path.as_str(), e.line, e.nearest.as_deref()), (path, Some(number), Some(nearest)), "{e}");
+    }
+}
+
+#[test]
+fn words_of_later_versions_are_not_slips() {
+    for (line, instead, path) in [
+        ("units = \"mm\"", "skin = { thickness = 1 }", "skin"),
+        ("units = \"mm\"", "blend = { between = [\"a\", \"b\"] }", "blend"),
+        ("porosity = {", "thickness = {", "lattice.core.level.thickness"),
+        ("map.affine", "map.phase", "lattice.core.map.phase"),
+        ("linear =", "radial =", "lattice.core.level.porosity.radial"),
+    ] {
+        let e = with(line, instead);
+        assert_eq!((e.path.as_str(), e.nearest.as_deref()), (path, None));
+        assert!(e.message.contains("not in this version yet"), "{e}");
+    }
+    let two = GOOD.to_string() + "[lattice.rim]\ncell = \"gyroid\"\n";
+    let e = refused(&two);
+    assert!(e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14), "{e}");
+}
+
+#[test]
+fn exactly_one_amount() {
+    let e = refused(&(GOOD.to_string() + "fraction = 0.3\n"));
+    assert!(e.message.contains("fraction and porosity at once"), "{e}");
+    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.porosity", Some(13)));
+    let e = refused(GOOD.split("porosity").next().unwrap_or_default());
+    assert!(e.message.contains("exactly one of iso, fraction, porosity"), "{e}");
+    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));
+}
+
+#[test]
+fn values_of_the_wrong_type_say_what_was_found() {
+    for (line, instead, found) in [
+        ("schema = 1", "schema = 2", "schema 1, found 2"),
+        ("[8, 8.5, 9]", "8", "found 8"),
+        ("[8, 8.5, 9]", "[8, 9]", "found 2 values"),
+        ("[4, 4, 5]", "\"four\"", "found \"four\""),
+        ("[4, 4, 5]", "{ linear = { along = [1,0,0], stops = [] } }", "cannot vary in space in this version"),
+        ("[0, 30, 0]", "[0, true, 0]", "found true"),
+        ("units = \"mm\"", "units = \"inch\"", "lengths in a design are mm"),
+        ("[[0, 0.5], [9, 0.8]]", "[[0, 0.5, 1]]", "found 3 values"),
+    ] {
+        let e = with(line, instead);
+        assert!(e.message.contains(found), "{e}");
+        assert!(e.line.is_some() && !e.path.is_empty(), "{e}");
+    }
+    let e = refused("schema = 1\nregion = = 2\n");
+    assert_eq!(e.line, Some(2));
+    assert!(refused("").message.contains("\"schema\" is missing"));
+}
+
+#[test]
+fn broken_text_never_panics() {
+    for cut in 0..GOOD.len() {
+        let _ = Design::from_toml(&GOOD[..cut]);
+        let _ = Design::from_json(&GOOD[..cut]);
+    }
+}
+
+/// Every object of the schema has exactly the keys that the reader accepts: an unknown key's message lists them.
+#[test]
+fn the_schema_and_the_reader_agree() {
+    let schema = schema();
+    let defs = schema["$defs"].as_object().expect("definitions");
+    let keys = |name: &str| -> Vec<String> {
+        let object = &defs[name];
+        let mut keys: Vec<String> =
+            object["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()).collect();
+        for option in object["oneOf"].as_array().into_iter().flatten() {
+            keys.extend(option["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()));
+        }
+        keys.sort();
+        keys
+    };
+    let listed = |e: DesignError| -> Vec<String> {
+        let list = e.message.split("Allowed: ").nth(1).unwrap_or_else(|| panic!("{e}")).to_string();
+        let mut words: Vec<String> = list.split(", ").map(str::to_string).collect();
+        words.sort();
+        words
+    };
+    let region = |kind: &str| refused(&format!("schema = 1\n[region.{kind}]\nzzzzzzzz = 1\n"));
+    for (kind, name) in [
+        ("cylinder", "CylinderSpec"),
+        ("sphere", "SphereSpec"),
+        ("halfspace", "HalfSpaceSpec"),
+        ("mesh", "MeshSpec"),
+        ("offset", "OffsetSpec"),
+    ] {
+        assert_eq!(listed(region(kind)), keys(name), "{kind}");
+    }
+    let mut both = keys("BoxSize");
+    both.extend(keys("BoxCorners"));
+    both.sort();
+    assert_eq!(listed(region("box")), both);
+    assert_eq!(listed(refused("schema = 1\n[region]\nzzzzzzzz = 1\n")), keys("RegionSpec"));
+    assert_eq!(listed(with("cell =", "zzzzzzzz =")), keys("LatticeSpec"));
+    assert_eq!(listed(with("wavelength =", "zzzzzzzz =")), keys("AffineSpec"));
+    assert_eq!(listed(with("xz =", "zzzzzzzz =")), keys("SkewSpec"));
+    assert_eq!(listed(with("porosity =", "zzzzzzzz =")), keys("LevelSpec"));
+    assert_eq!(listed(with("map.affine", "map.zzzzzzzz")), keys("MapSpec"));
+    assert_eq!(listed(with("linear =", "zzzzzzzz =")), keys("GradeKind"));
+    assert_eq!(listed(with("along =", "zzzzzzzz =")), keys("LinearSpec"));
+}
+
+/// The committed schema is the generated one. To renew it: `TRABECULA_RENEW=1 cargo test -p trabecula schema`.
+#[test]
+fn the_committed_schema_is_current() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../schema/design.json");
+    let text = serde_json::to_string_pretty(&schema()).expect("JSON") + "\n";
+    if std::env::var_os("TRABECULA_RENEW").is_some() {
+        std::fs::write(path, &text).expect("schema/ exists");
+    }
+    let old = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        old == text,
+        "schema/design.json is stale; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema"
+    );
+}

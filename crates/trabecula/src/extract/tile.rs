@@ -1,0 +1,574 @@
+//! The surface inside one tile.
+//!
+//! Marching cubes with every vertex strictly inside its own grid edge. Then the mesh is closed, manifold, free of
+//! self-intersection and of degenerate triangles by construction (see `table`), whatever the field does; and rounding
+//! to f32 cannot undo it, because rounding is monotone: it maps the grid to a grid and edges to edges.
+//!
+//! Two things move vertices, only ever along their edges:
+//! - a bracketed Newton iteration puts them on the true surface, of lattice or region, whichever ends the solid first;
+//! - a chord lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
+//!   first order in curvature · h². Each triangle measures how far its middle is from the surface, and its vertices
+//!   share the move that cancels its volume error. What is left is of fourth order.
+//!
+//! Where a grid plane lies on a flat face of the region (signed distance exactly zero at its nodes), vertices go to
+//! the node itself, so the face and its straight edges are reproduced exactly.
+//!
+//! Where lattice and region meet inside a cell, `crease` adds a vertex on their common curve.
+//!
+//! A tile looks one cell beyond itself. All it computes there is a function of the grid edge or triangle alone, done
+//! in the same order, so neighbouring tiles find bit-identical vertices.
+
+use multiversion::multiversion;
+
+use crate::field::Field;
+use crate::math::{Vec3, add, cross, norm, scale, sub};
+use crate::solid::Solid;
+
+use super::grid::{Content, Grid, TILE, content};
+use super::crease;
+use super::table::{CASES, EDGES};
+
+/// What a vertex lies on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum On {
+    /// The lattice.
+    Lattice,
+    /// The region's surface.
+    Region,
+    /// A grid plane that is a flat face of the region.
+    Plane,
+    /// The curve where the lattice meets the region's surface.
+    Crease,
+}
+
+/// The surface in one tile.
+#[derive(Default)]
+pub(super) struct Patch {
+    /// Vertex positions.
+    pub vertices: Vec<Vec3>,
+    /// Global key of each vertex: grid node · 8 + axis of its edge, + 3 for the node itself, + 4 for its cell.
+    pub keys: Vec<u64>,
+    /// Whether a neighbouring tile may use the vertex too.
+    pub shared: Vec<bool>,
+    /// Triangles of the tile's own cells.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each triangle, whether it lies on the region's surface.
+    pub cut: Vec<bool>,
+}
+
+/// Buffers that one thread uses again and again.
+#[derive(Default)]
+pub(super) struct Scratch {
+    field: Vec<f32>,
+    region: Vec<f32>,
+    points: Vec<Vec3>,
+    values: Vec<f64>,
+    gradients: Vec<Vec3>,
+    solid: Vec<u64>,
+    crossed: [Vec<u64>; 3],
+    offset: [Vec<u32>; 3],
+    vertices: Vec<Vertex>,
+    triangles: Vec<[u32; 3]>,
+    own: Vec<bool>,
+    /// Cells in which lattice and region may meet.
+    rings: Vec<crease::Ring>,
+    /// Vertices inside cells; their numbers follow those of the vertices on edges.
+    centers: Vec<crease::Center>,
+    moments: Vec<(f64, Vec3)>,
+}
+
+/// A vertex on a grid edge, at `solid` + t · `reach` along `axis`.
+#[derive(Clone, Copy)]
+struct Vertex {
+    /// The solid end of the edge.
+    solid: Vec3,
+    /// Signed length of the edge from its solid to its void end.
+    reach: f64,
+    /// Position on the edge from the solid end (0) to the void end (1).
+    t: f64,
+    /// Index in the block of the lower node of the edge.
+    low: u32,
+    axis: u8,
+    on: On,
+    /// Whether the vertex stands on the region's surface.
+    skin: bool,
+}
+
+impl Vertex {
+    #[inline]
+    fn at(&self, t: f64) -> Vec3 {
+        let mut p = self.solid;
+        p[self.axis as usize] += t * self.reach;
+        p
+    }
+
+    #[inline]
+    fn place(&self) -> Vec3 {
+        self.at(self.t)
+    }
+
+    /// Whether the solid end is the lower one.
+    #[inline]
+    fn up(&self) -> bool {
+        self.reach > 0.0
+    }
+}
+
+/// The nodes of a block, indexed.
+pub(super) struct Nodes<'a> {
+    pub axes: [&'a [f64]; 3],
+    pub shape: [usize; 3],
+    pub stride: [usize; 3],
+}
+
+impl Nodes<'_> {
+    pub fn at(&self, n: usize) -> [usize; 3] {
+        [n % self.shape[0], n / self.stride[1] % self.shape[1], n / self.stride[2]]
+    }
+}
+
+/// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
+pub(super) const BATCH: usize = 2048;
+
+/// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
+pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scratch) -> Option<Patch> {
+    let block = grid.block(tile);
+    let Content::Surface { field, region } = content(solid, &block.bounds()) else { return None };
+    let lattice = solid.field.as_deref().filter(|_| field);
+    let shape = block.shape();
+    let nodes = Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]] };
+
+    s.field.clear();
+    s.region.clear();
+    if let Some(f) = lattice {
+        s.field.resize(block.len(), 0.0);
+        f.fill(&block, &mut s.field);
+    }
+    if region {
+        s.region.resize(block.len(), 0.0);
+        solid.region.fill(&block, &mut s.region);
+    }
+    signs(s, shape);
+    let count = crossings(s, shape);
+    if count == 0 {
+        return None;
+    }
+    list_vertices(s, &nodes);
+    if let Some(f) = lattice {
+        solve(s, &nodes, f, On::Lattice);
+    }
+    if region {
+        solve(s, &nodes, &*solid.region, On::Region);
+    }
+    for v in &mut s.vertices {
+        v.t = if v.on == On::Plane { grid.margin } else { v.t.clamp(grid.margin, 1.0 - grid.margin) };
+    }
+    // Cells of the tile itself, in block coordinates.
+    let from = grid.nodes(tile).map(|r| r.start);
+    let own = [0, 1, 2].map(|a| {
+        let first = tile[a] * TILE - from[a];
+        first..(first + TILE).min(shape[a] - 1)
+    });
+    list_triangles(s, shape, &own);
+    if !s.own.iter().any(|&o| o) {
+        return None;
+    }
+    let mut places: Vec<Vec3> = s.vertices.iter().map(Vertex::place).collect();
+    let mut on: Vec<On> = s.vertices.iter().map(|v| v.on).collect();
+    if let (Some(f), true) = (lattice, region) {
+        let ends = [f, &*solid.region as &dyn Field];
+        let draft = crease::Draft { triangles: &mut s.triangles, own: &mut s.own, places: &places, on: &on };
+        s.centers = crease::sharpen(&s.rings, draft, ends, &nodes);
+        places.extend(s.centers.iter().map(|c| c.place));
+        on.extend(s.centers.iter().map(|_| On::Crease));
+    } else {
+        s.centers.clear();
+    }
+    balance(s, lattice, &*solid.region, &places, &on, grid.margin);
+    let merged = merge_plane_vertices(s, &nodes);
+    Some(gather(s, &nodes, grid, from, &own, merged.as_deref()))
+}
+
+/// The word of signs of each row of nodes.
+fn signs(s: &mut Scratch, shape: [usize; 3]) {
+    let (nx, rows) = (shape[0], shape[1] * shape[2]);
+    s.solid.clear();
+    s.solid.resize(rows, if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 });
+    for samples in [&s.field, &s.region] {
+        keep_negative(&mut s.solid, samples, nx);
+    }
+}
+
+/// Keeps the bits of each word whose value in the word's row is at most zero.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn keep_negative(words: &mut [u64], samples: &[f32], nx: usize) {
+    for (word, row) in words.iter_mut().zip(samples.chunks_exact(nx)) {
+        let mut signs = 0u64;
+        let mut parts = row.chunks_exact(16);
+        let mut shift = 0;
+        for part in parts.by_ref() {
+            let mut bits = 0u16;
+            for (b, v) in part.iter().enumerate() {
+                bits |= u16::from(*v <= 0.0) << b;
+            }
+            signs |= u64::from(bits) << shift;
+            shift += 16;
+        }
+        for (b, v) in parts.remainder().iter().enumerate() {
+            signs |= u64::from(*v <= 0.0) << (shift + b);
+        }
+        *word &= signs;
+    }
+}
+
+/// Marks the grid edges whose ends differ and numbers them: x-edges, then y, then z, each in node order.
+fn crossings(s: &mut Scratch, shape: [usize; 3]) -> usize {
+    let [nx, ny, nz] = shape;
+    let inner = (1u64 << (nx - 1)) - 1;
+    let mut count = 0u32;
+    for axis in 0..3 {
+        s.crossed[axis].clear();
+        s.offset[axis].clear();
+        for k in 0..nz {
+            for j in 0..ny {
+                let row = k * ny + j;
+                let w = s.solid[row];
+                let word = match axis {
+                    0 => (w ^ (w >> 1)) & inner,
+                    1 if j + 1 < ny => w ^ s.solid[row + 1],
+                    2 if k + 1 < nz => w ^ s.solid[row + ny],
+                    _ => 0,
+                };
+                s.crossed[axis].push(word);
+                s.offset[axis].push(count);
+                count += word.count_ones();
+            }
+        }
+    }
+    count as usize
+}
+
+/// The number of the vertex on an edge.
+#[inline]
+fn number(s: &Scratch, axis: usize, row: usize, i: usize) -> u32 {
+    s.offset[axis][row] + (s.crossed[axis][row] & ((1u64 << i) - 1)).count_ones()
+}
+
+fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
+    s.vertices.clear();
+    let [nx, ny, _] = nodes.shape;
+    for axis in 0..3 {
+        for (row, &word) in s.crossed[axis].iter().enumerate() {
+            let mut bits = word;
+            while bits != 0 {
+                let i = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let node = [i, row % ny, row / ny];
+                let mut solid = [nodes.axes[0][node[0]], nodes.axes[1][node[1]], nodes.axes[2][node[2]]];
+                let length = nodes.axes[axis][node[axis] + 1] - nodes.axes[axis][node[axis]];
+                let low = row * nx + i;
+                let high = low + nodes.stride[axis];
+                let up = s.solid[row] >> i & 1 == 1;
+                let (a, b) = if up { (low, high) } else { (high, low) };
+                if !up {
+                    solid[axis] = nodes.axes[axis][node[axis] + 1];
+                }
+                let (ra, rb) = if s.region.is_empty() { (-1.0, -1.0) } else { (s.region[a], s.region[b]) };
+                let on = match rb > 0.0 {
+                    true if ra == 0.0 => On::Plane,
+                    // The lattice may end the solid before the region does; `solve` finds out.
+                    true => On::Region,
+                    false => On::Lattice,
+                };
+                let skin = on == On::Plane || (ra == 0.0 && rb == 0.0);
+                let reach = if up { length } else { -length };
+                s.vertices.push(Vertex { solid, reach, t: 1.0, low: low as u32, axis: axis as u8, on, skin });
+            }
+        }
+    }
+}
+
+/// The void end of a root in hand: a bracket whose lower end is solid, and the present guess.
+#[derive(Clone, Copy)]
+struct Root {
+    vertex: u32,
+    lo: f64,
+    hi: f64,
+    t: f64,
+}
+
+/// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
+const SETTLED: f64 = 1e-3;
+
+/// Finds where the function ends the solid on each edge that it crosses, and keeps the first end.
+fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
+    let Scratch { field, region, points, values, gradients, vertices, .. } = s;
+    let samples = if which == On::Lattice { &*field } else { &*region };
+    let mut roots = Vec::with_capacity(BATCH);
+    let mut from = 0;
+    while from < vertices.len() {
+        roots.clear();
+        while roots.len() < BATCH && from < vertices.len() {
+            let v = &vertices[from];
+            let (low, high) = (v.low as usize, v.low as usize + nodes.stride[v.axis as usize]);
+            let (a, b) = if v.up() { (samples[low], samples[high]) } else { (samples[high], samples[low]) };
+            // Vertices on flat faces are settled; on others the void end is positive if this function crosses.
+            if v.on != On::Plane && b > 0.0 {
+                let t = f64::from(-a) / (f64::from(b) - f64::from(a));
+                roots.push(Root { vertex: from as u32, lo: 0.0, hi: 1.0, t: t.clamp(0.0, 1.0) });
+            }
+            from += 1;
+        }
+        for _ in 0..4 {
+            points.clear();
+            points.extend(roots.iter().map(|r| vertices[r.vertex as usize].at(r.t)));
+            values.resize(roots.len(), 0.0);
+            gradients.resize(roots.len(), [0.0; 3]);
+            f.gradients(points, values, gradients);
+            let mut open = 0;
+            for n in 0..roots.len() {
+                let (mut r, v) = (roots[n], values[n]);
+                let vertex = &mut vertices[r.vertex as usize];
+                *(if v <= 0.0 { &mut r.lo } else { &mut r.hi }) = r.t;
+                let newton = r.t - v / (gradients[n][vertex.axis as usize] * vertex.reach);
+                let next = if newton >= r.lo && newton <= r.hi { newton } else { 0.5 * (r.lo + r.hi) };
+                let step = (next - r.t).abs();
+                r.t = next;
+                if step > SETTLED {
+                    roots[open] = r;
+                    open += 1;
+                } else {
+                    settle(vertex, r.t, which);
+                }
+            }
+            roots.truncate(open);
+            if roots.is_empty() {
+                break;
+            }
+        }
+        for r in &roots {
+            settle(&mut vertices[r.vertex as usize], r.t, which);
+        }
+    }
+}
+
+/// Takes the root if nothing ended the solid before it. The lattice is solved first; where it does not, t is still 1.
+#[inline]
+fn settle(vertex: &mut Vertex, t: f64, which: On) {
+    if t <= vertex.t {
+        (vertex.t, vertex.on) = (t, which);
+    }
+}
+
+/// Lists the triangles of all cells of the block, halo included, and which belong to the tile itself; and the cells
+/// with a single patch that meets both lattice and region, which `crease` fills in its own way.
+fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[std::ops::Range<usize>; 3]) {
+    let [nx, ny, nz] = shape;
+    let inner = (1u64 << (nx - 1)) - 1;
+    let cases = &*CASES;
+    let mixed = !s.field.is_empty() && !s.region.is_empty();
+    let (mut triangles, mut rings) = (core::mem::take(&mut s.triangles), core::mem::take(&mut s.rings));
+    triangles.clear();
+    rings.clear();
+    s.own.clear();
+    for k in 0..nz - 1 {
+        for j in 0..ny - 1 {
+            let row = k * ny + j;
+            let rows = [row, row + 1, row + ny, row + ny + 1];
+            let w = rows.map(|r| s.solid[r]);
+            let any = w[0] | w[1] | w[2] | w[3];
+            let all = w[0] & w[1] & w[2] & w[3];
+            let mut bits = (any | any >> 1) & !(all & all >> 1) & inner;
+            let mine = own[1].contains(&j) && own[2].contains(&k);
+            while bits != 0 {
+                let i = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let pair = |w: u64| (w >> i & 3) as usize;
+                let corners = pair(w[0]) | pair(w[1]) << 2 | pair(w[2]) << 4 | pair(w[3]) << 6;
+                let case = &cases[corners];
+                let mine = mine && own[0].contains(&i);
+                let vertex = |e: u8| {
+                    let (corner, axis) = EDGES[e as usize];
+                    number(s, axis, rows[corner >> 1], i + (corner & 1))
+                };
+                if mixed && let Some(ring) = &case.ring {
+                    let on = |w: On| ring.iter().any(|&e| s.vertices[vertex(e) as usize].on == w);
+                    if on(On::Lattice) && on(On::Region) && !on(On::Plane) {
+                        rings.push(crease::Ring {
+                            cell: (row * nx + i) as u32,
+                            corners: corners as u8,
+                            points: ring.iter().map(|&e| vertex(e)).collect(),
+                            // The fan about a vertex of the ring is kept until `crease` finds a better one.
+                            triangles: triangles.len() as u32,
+                            own: mine,
+                        });
+                    }
+                }
+                triangles.extend(case.triangles.iter().map(|t| t.map(&vertex)));
+                s.own.resize(triangles.len(), mine);
+            }
+        }
+    }
+    (s.triangles, s.rings) = (triangles, rings);
+}
+
+/// Moves vertices along their edges so that each triangle's chord error in volume cancels.
+///
+/// For a surface that is locally quadratic about a triangle with its corners on it, the mean distance of the triangle
+/// from the surface is 3/4 of that at the centroid. The triangle hands this volume, with opposite sign, to its
+/// corners in shares (n · e)², e the corner's edge: what faces its edge can move without running far along it.
+fn balance(s: &mut Scratch, lattice: Option<&dyn Field>, region: &dyn Field, places: &[Vec3], on: &[On], margin: f64) {
+    let Scratch { points, values, gradients, vertices, triangles, moments, .. } = s;
+    moments.clear();
+    moments.resize(vertices.len(), (0.0, [0.0; 3]));
+    for (which, f) in [(On::Lattice, lattice), (On::Region, Some(region))] {
+        let Some(f) = f else { continue };
+        let lies = |v: u32| on[v as usize] == which || on[v as usize] == On::Crease;
+        let smooth: Vec<usize> = (0..triangles.len())
+            .filter(|&i| triangles[i].iter().all(|&v| lies(v)) && triangles[i].iter().any(|&v| on[v as usize] == which))
+            .collect();
+        for batch in smooth.chunks(BATCH) {
+            points.clear();
+            points.extend(batch.iter().map(|&i| {
+                let [a, b, c] = triangles[i].map(|v| places[v as usize]);
+                scale(add(add(a, b), c), 1.0 / 3.0)
+            }));
+            values.resize(batch.len(), 0.0);
+            gradients.resize(batch.len(), [0.0; 3]);
+            f.gradients(points, values, gradients);
+            for ((&i, &v), g) in batch.iter().zip(&*values).zip(&*gradients) {
+                let corners = triangles[i];
+                let [a, b, c] = corners.map(|v| places[v as usize]);
+                let n = cross(sub(b, a), sub(c, a));
+                let (twice, steep) = (norm(n), norm(*g));
+                if !(steep > 0.0) {
+                    continue;
+                }
+                let volume = 0.75 * (v / steep) * 0.5 * twice;
+                // Vertices inside cells stay on their crease.
+                let share = corners.map(|v| vertices.get(v as usize).map_or(0.0, |v| n[v.axis as usize].powi(2)));
+                let sum = share[0] + share[1] + share[2];
+                for (v, share) in corners.into_iter().zip(share) {
+                    if let Some(m) = moments.get_mut(v as usize).filter(|_| sum > 0.0) {
+                        m.0 += volume * share / sum;
+                        m.1 = add(m.1, scale(n, 0.5));
+                    }
+                }
+            }
+        }
+    }
+    for (v, (volume, area)) in vertices.iter_mut().zip(&*moments) {
+        // Volume gained per unit of t: a third of the ring's area as seen along the edge.
+        let gain = area[v.axis as usize] * v.reach / 3.0;
+        if gain > 0.0 {
+            let step = (volume / gain).clamp(-0.25, 0.25);
+            v.t = (v.t - step).clamp(margin, 1.0 - margin);
+        }
+    }
+}
+
+/// Joins the vertices that a node on a flat face of the region sends out, and puts them on the node.
+///
+/// Only where the void directions of the node form one corner of space (at most one per axis, the diagonals between
+/// them void too), so that joining keeps the surface a manifold; elsewhere the vertices stay apart by the margin.
+/// Returns for each vertex the one that stands for it.
+fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) -> Option<Vec<u32>> {
+    if !s.vertices.iter().any(|v| v.on == On::Plane) {
+        return None;
+    }
+    let solid = |i: [usize; 3]| s.solid[i[2] * nodes.shape[1] + i[1]] >> i[0] & 1 == 1;
+    let mut stands: Vec<u32> = (0..s.vertices.len() as u32).collect();
+    let mut first = std::collections::HashMap::new();
+    for i in 0..s.vertices.len() {
+        let v = s.vertices[i];
+        if v.on != On::Plane {
+            continue;
+        }
+        let axis = v.axis as usize;
+        let node = v.low as usize + if v.up() { 0 } else { nodes.stride[axis] };
+        let at = nodes.at(node);
+        if (0..3).any(|a| at[a] == 0 || at[a] + 1 >= nodes.shape[a]) {
+            continue;
+        }
+        let step = |from: [usize; 3], a: usize, up: bool| {
+            let mut to = from;
+            to[a] = if up { to[a] + 1 } else { to[a] - 1 };
+            to
+        };
+        // Void directions that leave the region.
+        let leaves = |a: usize, up: bool| {
+            let to = step(at, a, up);
+            let n = to[0] + to[1] * nodes.stride[1] + to[2] * nodes.stride[2];
+            !solid(to) && s.region[n] > 0.0
+        };
+        let out: Vec<(usize, bool)> =
+            (0..3).flat_map(|a| [(a, false), (a, true)]).filter(|&(a, up)| leaves(a, up)).collect();
+        let one_corner = (0..3).all(|a| out.iter().filter(|o| o.0 == a).count() < 2)
+            && out.iter().all(|&(a, up)| {
+                out.iter().all(|&(b, vp)| a == b || !solid(step(step(at, a, up), b, vp)))
+            })
+            && (out.len() < 3 || !solid(out.iter().fold(at, |p, &(a, up)| step(p, a, up))));
+        if one_corner {
+            stands[i] = *first.entry(node).or_insert(i as u32);
+            s.vertices[i].t = 0.0;
+        }
+    }
+    Some(stands)
+}
+
+/// Gathers the tile's own triangles and the vertices they use.
+fn gather(
+    s: &Scratch,
+    nodes: &Nodes,
+    grid: &Grid,
+    from: [usize; 3],
+    own: &[std::ops::Range<usize>; 3],
+    stands: Option<&[u32]>,
+) -> Patch {
+    let mut patch = Patch::default();
+    let mut renamed = vec![u32::MAX; s.vertices.len() + s.centers.len()];
+    let all = grid.axes.each_ref().map(Vec::len);
+    let key = |at: [usize; 3], kind: u64| {
+        let at = [0, 1, 2].map(|a| (at[a] + from[a]) as u64);
+        (at[0] + all[0] as u64 * (at[1] + all[1] as u64 * at[2])) * 8 + kind
+    };
+    // Position, key, and whether a neighbouring tile may use the vertex as well.
+    let describe = |v: usize| match s.vertices.get(v) {
+        Some(vertex) => {
+            let mut at = nodes.at(vertex.low as usize);
+            let axis = vertex.axis as usize;
+            let on_node = vertex.t == 0.0;
+            if on_node && !vertex.up() {
+                at[axis] += 1;
+            }
+            let shared = (0..3).any(|a| (a != axis || on_node) && (at[a] == own[a].start || at[a] == own[a].end));
+            (vertex.place(), key(at, if on_node { 3 } else { axis as u64 }), shared)
+        }
+        None => {
+            let center = &s.centers[v - s.vertices.len()];
+            let at = nodes.at(center.cell as usize);
+            let shared = (0..3).any(|a| at[a] <= own[a].start || at[a] + 1 >= own[a].end);
+            (center.place, key(at, 4), shared)
+        }
+    };
+    for (t, _) in s.triangles.iter().zip(&s.own).filter(|(_, own)| **own) {
+        let t = stands.map_or(*t, |stands| t.map(|v| stands.get(v as usize).copied().unwrap_or(v)));
+        if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+            continue;
+        }
+        let skin = |v: u32| s.vertices.get(v as usize).is_none_or(|v| v.on != On::Lattice || v.skin);
+        patch.cut.push(t.iter().all(|&v| skin(v)));
+        patch.triangles.push(t.map(|v| {
+            let slot = &mut renamed[v as usize];
+            if *slot == u32::MAX {
+                *slot = patch.vertices.len() as u32;
+                let (place, key, shared) = describe(v as usize);
+                patch.vertices.push(place);
+                patch.keys.push(key);
+                patch.shared.push(shared);
+            }
+            *slot
+        }));
+    }
+    patch
+}

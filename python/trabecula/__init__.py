@@ -1,0 +1,75 @@
+"""Trabecula: lattice design. A region and a lattice make a solid; a lattice is a cell seen through a map, cut by a part
+at a level.
+
+>>> import trabecula as lt
+>>> core = lt.Lattice(cell=lt.cell.gyroid(), part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
+>>> design = lt.Design(region=lt.region.box(size=[20, 20, 20]), lattice={"core": core})
+>>> mesh = design.build().mesh(edge=0.25)
+>>> mesh.closed
+True
+
+Lengths are mm, angles degrees; negative is solid; arrays are (n, 3).
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import cell, grade, level, map, region
+    from .design import Design, Lattice, load
+    from .errors import DesignError, DesignWarning
+    from .mesh import Mesh
+    from .solid import Solid, Voxels, fraction, iso, spartan
+
+__all__ = [
+    "Design",
+    "DesignError",
+    "DesignWarning",
+    "Lattice",
+    "Mesh",
+    "Solid",
+    "Voxels",
+    "__version__",
+    "cell",
+    "fraction",
+    "grade",
+    "iso",
+    "level",
+    "load",
+    "map",
+    "region",
+    "spartan",
+]
+
+# Names are fetched on first use, so that the command's help does not wait for numpy.
+_HOMES = {
+    "Design": "design",
+    "Lattice": "design",
+    "load": "design",
+    "DesignError": "errors",
+    "DesignWarning": "errors",
+    "Mesh": "mesh",
+    "Solid": "solid",
+    "Voxels": "solid",
+    "spartan": "solid",
+    "iso": "solid",
+    "fraction": "solid",
+    "__version__": "_core",
+}
+_MODULES = ("cell", "grade", "level", "map", "region")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
+    if name in _HOMES:
+        value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module {__name__} has no attribute {name}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,141 @@
+"""The design: what a file says, as frozen data, and its road to a solid."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from . import _core
+from .errors import DesignError, DesignWarning
+from .output import extension, whole_file
+
+if TYPE_CHECKING:
+    from .solid import Solid
+
+__all__ = ["Design", "Lattice", "load"]
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A cell seen through a map, cut by a part at a level.
+
+    ``cell`` and ``map`` and ``level`` come from the builders of those names; ``part`` is "sheet" (|f| ≤ t), "lower"
+    (f ≤ t) or "upper" (f ≥ t).
+    """
+
+    cell: str | dict
+    part: str
+    map: dict
+    level: dict
+
+    def to_dict(self) -> dict:
+        """The lattice as plain data."""
+        return {"cell": self.cell, "part": self.part, "map": self.map, "level": self.level}
+
+
+@dataclass(frozen=True)
+class Design:
+    """A lattice part, as data.
+
+    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``).
+    Nothing is checked before ``build``, the last line that can raise.
+    """
+
+    region: dict
+    lattice: Mapping[str, Lattice | dict] | Lattice
+    units: str = "mm"
+    schema: int = 1
+    folder: str | None = field(default=None, compare=False, repr=False)
+    _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
+
+    def to_dict(self) -> dict:
+        """The design as plain data: what stands in its file."""
+        lattices = {"core": self.lattice} if isinstance(self.lattice, Lattice) else self.lattice
+        if isinstance(lattices, Mapping):
+            lattices = {k: v.to_dict() if isinstance(v, Lattice) else v for k, v in lattices.items()}
+        made = {"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices}
+        return copy.deepcopy(made)
+
+    def _checked(self) -> _core.Design:
+        return self._read or _core.Design.from_data(self.to_dict())
+
+    def to_toml(self) -> str:
+        """The design as the text of a TOML file."""
+        return self._checked().to_toml()
+
+    def build(self) -> Solid:
+        """The solid.
+
+        Raises DesignError for anything wrong, and warns (DesignWarning) of what may not be meant, such as a fraction
+        at which the network falls apart.
+        """
+        from .solid import Solid
+
+        made = Solid(self._checked().build(self.folder or os.getcwd()))
+        for warning in made.warnings:
+            warnings.warn(f"{warning['path']}: {warning['message']}", DesignWarning, stacklevel=2)
+        return made
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the design as TOML, or as JSON if the name ends so. Relative mesh paths are kept right."""
+        kind = extension(path, ("toml", "json"))
+        old, new = self.folder or os.getcwd(), os.path.dirname(os.path.abspath(path))
+        data = self.to_dict()
+        data["region"] = _moved(data["region"], old, new)
+        checked = _core.Design.from_data(data)
+        text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
+        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+            out.write(text)
+
+
+def load(path: str | os.PathLike[str]) -> Design:
+    """Reads a design file (TOML, or JSON if the name ends so).
+
+    Raises DesignError, with the line, for anything that is not a design, and OSError for a file that cannot be read.
+    """
+    name = os.fspath(path)
+    if os.path.isdir(name):
+        raise IsADirectoryError(f"{name} is a directory, not a design file")
+    kind = extension(name, ("toml", "json"))
+    try:
+        with open(name, "rb") as file:
+            raw = file.read()
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{name} does not exist") from None
+    except OSError as error:
+        raise OSError(f"{name} cannot be read: {error.strerror or error}") from error
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        message = f"not text in UTF-8 (byte {error.start})"
+        raise DesignError(f"{name}:{line}: {message}", "", line, message) from None
+    read = _core.Design.from_text(text, kind == "json", name)
+    data: dict[str, Any] = json.loads(read.to_json())
+    lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
+    folder = os.path.dirname(os.path.abspath(name))
+    design = Design(data["region"], lattices, data["units"], data["schema"], folder)
+    object.__setattr__(design, "_read", read)
+    return design
+
+
+def _moved(region: Any, old: str, new: str) -> Any:
+    """The region with relative mesh paths turned from folder ``old`` to folder ``new``."""
+    if isinstance(region, list):
+        return [_moved(r, old, new) for r in region]
+    if not isinstance(region, dict):
+        return region
+    mesh = region.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("path"), str) and not os.path.isabs(mesh["path"]):
+        full = os.path.join(old, mesh["path"])
+        try:
+            turned = os.path.relpath(full, new)
+        except ValueError:  # another drive
+            turned = os.path.abspath(full)
+        return {**region, "mesh": {**mesh, "path": turned.replace(os.sep, "/")}}
+    return {k: _moved(v, old, new) for k, v in region.items()}

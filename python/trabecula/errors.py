@@ -1,0 +1,37 @@
+"""What can go wrong with a design, and what may not be meant."""
+
+from __future__ import annotations
+
+__all__ = ["DesignError", "DesignWarning"]
+
+
+class DesignError(ValueError):
+    """A refused design.
+
+    Attributes: ``path`` (of the key, such as ``lattice.core.map.affine.wavelength``), ``line`` (in the file, or None),
+    ``message`` (what is wrong, what is allowed, what to do), ``found`` (what stood there, or None) and ``nearest`` (the
+    nearest right word to a misspelt one, or None). ``str(error)`` says it all in one line.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        path: str = "",
+        line: int | None = None,
+        message: str = "",
+        found: str | None = None,
+        nearest: str | None = None,
+    ):
+        super().__init__(text)
+        self.path = path
+        self.line = line
+        self.message = message or text
+        self.found = found
+        self.nearest = nearest
+
+    def __reduce__(self):
+        return (type(self), (str(self), self.path, self.line, self.message, self.found, self.nearest))
+
+
+class DesignWarning(UserWarning):
+    """Something in a design that is allowed but may not be meant."""

@@ -1,0 +1,31 @@
+"""Grades: numbers that vary in space, accepted where a level's amount stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from .map import _plain
+
+__all__ = ["depth", "formula", "linear"]
+
+Stops = Mapping[float, float] | Iterable[Sequence[float]]
+
+
+def linear(along: Sequence[float], stops: Stops) -> dict:
+    """Piecewise linear in s = along · x, constant beyond the ends; ``stops`` is {s: value} or [(s, value), ...]."""
+    return {"linear": {"along": _plain(along), "stops": _stops(stops)}}
+
+
+def depth(stops: Stops) -> dict:
+    """Piecewise linear in the depth (mm) below the region's surface; ``stops`` is {depth: value} or pairs."""
+    return {"depth": {"stops": _stops(stops)}}
+
+
+def formula(text: str) -> dict:
+    """A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)"; parsed, never run as code."""
+    return {"formula": text}
+
+
+def _stops(stops: Stops) -> list[list[float]]:
+    pairs = sorted(stops.items()) if isinstance(stops, Mapping) else stops
+    return [_plain(p) if hasattr(p, "tolist") else list(p) for p in pairs]

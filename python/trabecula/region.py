@@ -1,0 +1,67 @@
+"""Regions: where the part may be. Lengths in mm."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from .map import _given
+
+__all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "union"]
+
+Point = Sequence[float]
+
+
+def box(
+    size: Point | None = None,
+    center: Point | None = None,
+    *,
+    min: Point | None = None,
+    max: Point | None = None,
+) -> dict:
+    """An axis-aligned box, by ``size`` and ``center`` (the origin unless given) or by the corners ``min`` and ``max``."""
+    return {"box": _given(size=size, center=center, min=min, max=max)}
+
+
+def cylinder(base: Point, radius: float, height: float, axis: Point | None = None) -> dict:
+    """A straight round cylinder from the middle of its lower face, ``base``, along ``axis`` (+z unless given)."""
+    return {"cylinder": _given(base=base, axis=axis, radius=radius, height=height)}
+
+
+def sphere(radius: float, center: Point | None = None) -> dict:
+    """A ball about ``center`` (the origin unless given)."""
+    return {"sphere": _given(center=center, radius=radius)}
+
+
+def halfspace(point: Point, normal: Point) -> dict:
+    """One side of the plane through ``point``; ``normal`` points out of the solid."""
+    return {"halfspace": _given(point=point, normal=normal)}
+
+
+def mesh(path: str | os.PathLike[str], unit: str | None = None, scale: float | None = None) -> dict:
+    """A closed triangle mesh from a file (stl, obj, ply, off, 3mf).
+
+    ``unit`` is that of the file (mm unless given; a 3MF names its own), ``scale`` a factor on top. A relative path
+    starts at the design file, or at the working directory for a design made in Python.
+    """
+    return {"mesh": _given(path=os.fspath(path), unit=unit, scale=scale)}
+
+
+def union(*regions: dict) -> dict:
+    """Points in any of the regions."""
+    return {"union": list(regions)}
+
+
+def intersection(*regions: dict) -> dict:
+    """Points in all of the regions."""
+    return {"intersection": list(regions)}
+
+
+def difference(first: dict, *others: dict) -> dict:
+    """Points in the first region and in none of the others."""
+    return {"difference": [first, *others]}
+
+
+def offset(of: dict, by: float) -> dict:
+    """A region grown by a distance (mm), or shrunk by a negative one."""
+    return {"offset": {"of": of, "by": by}}

@@ -1,0 +1,255 @@
+"""The command: what it prints, its exit status, and that nothing is left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import CUBE
+
+COMMAND = [sys.executable, "-m", "trabecula"]
+
+
+def run(*words, cwd, status=0):
+    """Runs the command and checks its exit status; gives what it printed."""
+    done = subprocess.run([*COMMAND, *map(str, words)], cwd=cwd, capture_output=True, text=True, timeout=300)
+    assert done.returncode == status, f"{words}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def names(folder):
+    """The files in a folder."""
+    return sorted(p.name for p in folder.iterdir())
+
+
+def test_help_is_quick_and_light(tmp_path):
+    """Help starts without numpy and without the core."""
+    code = "import sys, trabecula.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
+    code += "assert not {'numpy', 'trabecula._core'} & set(sys.modules), sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    best = min(timed(tmp_path) for _ in range(5))
+    assert best < 0.3, best
+    for command in ("new", "check", "mesh", "voxels", "measure", "cells", "render"):
+        assert "example" in run(command, "--help", cwd=tmp_path).stdout
+
+
+def timed(cwd):
+    """Seconds for the help page."""
+    start = time.perf_counter()
+    run("--help", cwd=cwd)
+    return time.perf_counter() - start
+
+
+def test_starter_meshes_at_once(tmp_path):
+    """`new` writes a design that the other commands take."""
+    run("new", "a.toml", "--cell", "diamond", cwd=tmp_path)
+    report = json.loads(run("check", "a.toml", "--json", cwd=tmp_path).stdout)
+    assert abs(report["lattices"]["core"]["fraction"] - 0.3) < 1e-12
+    run("mesh", "a.toml", "-o", "a.STL", "--edge", "0.5", cwd=tmp_path)
+    figures = json.loads(run("measure", "a.STL", "--region", "a.toml", "--json", cwd=tmp_path).stdout)
+    assert figures["closed"] and abs(figures["solid_fraction"] - 0.3) < 2e-3
+    assert "exists" in run("new", "a.toml", cwd=tmp_path, status=1).stderr
+    run("new", "a.toml", "--force", cwd=tmp_path)
+    assert '"gyroid"' in run("new", "b.toml", "--cell", "gyriod", cwd=tmp_path, status=1).stderr
+    assert names(tmp_path) == ["a.STL", "a.toml"]
+
+
+def test_check_prints_the_figures(tmp_path, cube):
+    """The keys of the report."""
+    report = json.loads(run("check", cube, "--json", cwd=tmp_path).stdout)
+    it = report["lattices"]["core"]
+    assert {"iso", "fraction", "porosity", "thickness", "connected_fraction"} <= set(it)
+    assert abs(it["iso"] - 0.463951958) < 1e-6
+    assert abs(it["fraction"] + it["porosity"] - 1) < 1e-12
+    assert 0.3 < it["thickness"] < 0.8
+    assert report["warnings"] == []
+    text = run("check", cube, cwd=tmp_path)
+    assert "iso" in text.stdout and text.stderr == ""
+
+
+def test_a_network_that_falls_apart_is_warned_of(tmp_path, cube):
+    """A primitive network at 20 % is loose pieces: its limit is 0.2133."""
+    cube.write_text(CUBE.replace("gyroid", "primitive").replace("sheet", "lower").replace("0.3", "0.2"))
+    done = run("check", cube, "--json", cwd=tmp_path)
+    (warning,) = json.loads(done.stdout)["warnings"]
+    assert warning["path"] == "lattice.core.level.fraction"
+    assert "0.2133" in warning["message"]
+    assert "warning" in run("mesh", cube, "-o", "a.stl", "--edge", "0.5", cwd=tmp_path).stderr
+
+
+def test_a_varying_level_is_reported_as_a_range(tmp_path, cube):
+    """[min, max] where it varies."""
+    cube.write_text(
+        CUBE.replace("fraction = 0.3", "fraction = { linear = { along = [0, 0, 1], stops = [[-4, 0.2], [4, 0.4]] } }")
+    )
+    it = json.loads(run("check", cube, "--json", cwd=tmp_path).stdout)["lattices"]["core"]
+    for key, low, high in (("fraction", 0.2, 0.4), ("porosity", 0.6, 0.8), ("iso", 0.31, 0.62)):
+        assert abs(it[key][0] - low) < 0.005 and abs(it[key][1] - high) < 0.005, (key, it[key])
+    assert it["thickness"][0] < it["thickness"][1]
+
+
+@pytest.mark.parametrize("name", ["a.stl", "a.3MF", "a.ply", "a.Obj"])
+def test_formats_agree(tmp_path, cube, name):
+    """Each format, read back, has the same figures; every figure is there."""
+    summary = json.loads(run("mesh", cube, "-o", name, "--edge", "0.4", "--json", cwd=tmp_path).stdout)
+    figures = json.loads(run("measure", name, "--json", cwd=tmp_path).stdout)
+    keys = "volume area area_lattice area_cut solid_fraction porosity euler pieces cavities closed bounds"
+    assert list(figures) == keys.split()
+    assert figures["porosity"] is None and figures["solid_fraction"] is None
+    assert figures["closed"] and figures["pieces"] == 1 and figures["cavities"] == 0
+    assert abs(figures["volume"] / summary["volume"] - 1) < 1e-5
+    design = json.loads(run("measure", cube, "--edge", "0.4", "--json", cwd=tmp_path).stdout)
+    assert (design["euler"], design["pieces"]) == (figures["euler"], figures["pieces"])
+    assert abs(design["solid_fraction"] - design["volume"] / 512) < 1e-9
+    assert abs(design["area_lattice"] + design["area_cut"] - design["area"]) < 1e-6 * design["area"]
+    within = json.loads(run("measure", name, "--region", cube, "--json", cwd=tmp_path).stdout)
+    assert abs(within["area_cut"] / design["area_cut"] - 1) < 1e-3
+    assert abs(within["solid_fraction"] / design["solid_fraction"] - 1) < 1e-5
+    assert names(tmp_path) == sorted([name, "cube.toml"])
+
+
+def test_threads_do_not_change_a_byte(tmp_path, cube):
+    """Same design, same bytes."""
+    for name in ("one", "three"):
+        threads = {"one": 1, "three": 3}[name]
+        run("mesh", cube, "-o", f"{name}.stl", "--edge", "0.3", "--threads", threads, cwd=tmp_path)
+    assert (tmp_path / "one.stl").read_bytes() == (tmp_path / "three.stl").read_bytes()
+
+
+def test_voxels_and_pictures(tmp_path, cube):
+    """NPY, VTI and PNG."""
+    import numpy as np
+
+    summary = json.loads(run("voxels", cube, "-o", "a.npy", "--step", "0.2", "--json", cwd=tmp_path).stdout)
+    grid = np.load(tmp_path / "a.npy")
+    assert list(grid.shape) == summary["shape"] == [40, 40, 40]
+    assert abs(grid.mean() - 0.3) < 0.01
+    run("voxels", cube, "-o", "a.vti", "--step", "0.5", cwd=tmp_path)
+    assert (tmp_path / "a.vti").read_bytes().startswith(b"<?xml")
+    run("render", cube, "-o", "a.png", "--size", "160x120", "--edge", "0.5", cwd=tmp_path)
+    head = (tmp_path / "a.png").read_bytes()[:24]
+    assert head.startswith(b"\x89PNG") and int.from_bytes(head[16:20], "big") == 160
+
+
+def test_cells(tmp_path):
+    """The list and one cell."""
+    listed = json.loads(run("cells", "--json", cwd=tmp_path).stdout)
+    assert {"gyroid", "gyroid_mirrored", "diamond", "primitive", "iwp", "neovius", "frd"} <= {c["name"] for c in listed}
+    one = json.loads(run("cells", "gyroid", "--json", cwd=tmp_path).stdout)
+    assert abs(one["range"][1] - 1.5) < 1e-9
+    assert "gyroid" in run("cells", cwd=tmp_path).stdout
+    assert '"diamond"' in run("cells", "diamnd", cwd=tmp_path, status=1).stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "part"),
+    [
+        (["mesh", "cube.toml"], 2, "-o"),
+        (["mesh", "cube.toml", "-o", "a.xyz"], 2, ".stl, .3mf, .ply, .obj"),
+        (["mesh", "cube.toml", "-o", "a"], 2, ".stl"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "nan"], 2, "nan"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "-1"], 2, "-1"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "0"], 2, "greater than 0"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "inf"], 2, "inf"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--per-cell", "0"], 2, "at least 2"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--per-cell", "32", "--edge", "1"], 2, "not allowed with"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--threads", "0"], 2, "1 to 4096"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--threads", "1.5"], 2, "whole number"),
+        (["mesh", "cube.stl", "-o", "a.stl"], 2, ".toml, .json"),
+        (["mesh", "none.toml", "-o", "a.stl"], 1, "does not exist"),
+        (["mesh", "folder.toml", "-o", "a.stl"], 1, "is a directory"),
+        (["mesh", "cube.toml", "-o", "folder.stl"], 1, "is a directory"),
+        (["mesh", "cube.toml", "-o", "none/a.stl"], 1, "does not exist"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "1e-9"], 1, "1e-09"),
+        (["mesh", "cube.toml", "-o", "a.3mf", "--edge", "2e-4"], 1, "try edge"),
+        (["measure", "empty.stl"], 1, "empty.stl"),
+        (["measure", "garbage.stl"], 1, "garbage.stl"),
+        (["measure", "garbage.ply"], 1, "garbage.ply"),
+        (["measure", "none.stl"], 1, "does not exist"),
+        (["measure", "folder.stl"], 1, "is a directory"),
+        (["measure", "cube.toml", "--region", "none.toml"], 1, "does not exist"),
+        (["voxels", "cube.toml", "-o", "a.raw"], 2, ".npy, .vti"),
+        (["voxels", "cube.toml", "-o", "a.npy", "--step", "1e-5"], 1, "try step"),
+        (["render", "cube.toml", "-o", "a.jpg"], 2, ".png"),
+        (["render", "cube.toml", "-o", "a.png", "--size", "0x5"], 2, "WIDTHxHEIGHT"),
+        (["new", "cube.txt"], 2, ".toml"),
+        (["new", "none/a.toml"], 1, "does not exist"),
+        (["moosh"], 2, "invalid choice"),
+        ([], 2, "usage"),
+    ],
+    ids=lambda v: " ".join(v) if isinstance(v, list) else None,
+)
+def test_bad_requests(tmp_path, cube, words, status, part):
+    """One clear line, the right status, nothing left behind."""
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "folder.stl").mkdir()
+    (tmp_path / "empty.stl").write_bytes(b"")
+    (tmp_path / "garbage.stl").write_bytes(bytes(range(256)) * 3)
+    (tmp_path / "garbage.ply").write_bytes(b"ply\nnonsense")
+    before = names(tmp_path)
+    done = run(*words, cwd=tmp_path, status=status)
+    assert part in done.stderr, done.stderr
+    assert done.stdout == ""
+    assert words == [] or len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert names(tmp_path) == before
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written(tmp_path, cube):
+    """Said before any work."""
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o555)
+    done = run("mesh", cube, "-o", locked / "a.stl", cwd=tmp_path, status=1)
+    assert "cannot be written" in done.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_a_full_disk(tmp_path, cube):
+    """An error of the system while writing is one line."""
+    code = (
+        "import os, sys, trabecula.output as o, trabecula.cli as c, contextlib\n"
+        "@contextlib.contextmanager\n"
+        "def full(path):\n    yield '/dev/full'\n"
+        "import trabecula.mesh as m; m.whole_file = full\n"
+        f"sys.exit(c.main(['mesh', {str(cube)!r}, '-o', 'a.ply', '--edge', '0.5']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "No space left" in done.stderr and "Traceback" not in done.stderr, done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", ["a.stl", "a.ply"])
+def test_interrupted(tmp_path, cube, which, name):
+    """Ctrl-C in the middle: a quick end, no file, no half file; an older file stays as it was."""
+    cube.write_text(CUBE.replace("[8, 8, 8]", "[40, 40, 40]"))
+    (tmp_path / name).write_text("older")
+    words = [*COMMAND, "mesh", str(cube), "-o", name, "--edge", "0.06", "--progress"]
+    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    assert "meshing" in child.stderr.readline()  # it is in the middle
+    start = time.perf_counter()
+    child.send_signal(which)
+    rest = child.stderr.read()
+    assert child.wait(timeout=60) == 130
+    assert time.perf_counter() - start < 10
+    assert "stopped" in rest and "Traceback" not in rest
+    assert names(tmp_path) == sorted([name, "cube.toml"])
+    assert (tmp_path / name).read_text() == "older"
+
+
+def test_an_older_file_survives_a_refusal(tmp_path, cube):
+    """Files are replaced when the new one is whole."""
+    (tmp_path / "a.stl").write_text("older")
+    cube.write_text(CUBE.replace("0.3", "1.3"))
+    run("mesh", cube, "-o", "a.stl", cwd=tmp_path, status=1)
+    assert (tmp_path / "a.stl").read_text() == "older"
+
+
+def test_output_can_be_closed_early(tmp_path):
+    """A pipe that ends is no mistake."""
+    done = subprocess.run(f"{' '.join(COMMAND)} cells | head -n 1", shell=True, cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout and "Traceback" not in done.stderr and "rror" not in done.stderr

@@ -1,0 +1,194 @@
+"""Bad designs: each gets one error with the place, the line, the number found and the cure."""
+
+import pytest
+import trabecula as lt
+from conftest import CUBE
+
+LEVEL = "lattice.core.level"
+MAP = "lattice.core.map.affine"
+
+# (line of the good design, what stands there instead, path, parts of the message)
+CASES = [
+    # misspelt words
+    ("[region.box]", "[regoin.box]", "regoin", ["unknown key", 'did you mean "region"']),
+    ("[region.box]", "[region.boxx]", "region.boxx", ["unknown region", 'did you mean "box"']),
+    (
+        "size = [8, 8, 8]",
+        "sise = [8, 8, 8]",
+        "region.box.sise",
+        ['did you mean "size"', "Allowed: size, center, min, max"],
+    ),
+    ('cell = "gyroid"', 'cell = "gyriod"', "lattice.core.cell", ['did you mean "gyroid"', "diamond"]),
+    ('part = "sheet"', 'part = "sheets"', "lattice.core.part", ['did you mean "sheet"']),
+    ("wavelength = 4.0", "wavelenght = 4.0", f"{MAP}.wavelenght", ['did you mean "wavelength"']),
+    ("fraction = 0.3", "fracton = 0.3", f"{LEVEL}.fracton", ['did you mean "fraction"']),
+    ('units = "mm"', 'units = "inch"', "units", ["mm", '"inch"']),
+    ("schema = 1", "schema = 7", "schema", ["schema 1", "7"]),
+    # amounts
+    ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["iso and fraction at once", "exactly one"]),
+    ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of iso, fraction, porosity"]),
+    ("fraction = 0.3", "porosity = 0", f"{LEVEL}.porosity", ["porosity is 0", "greater than 0 and less than 1"]),
+    ("fraction = 0.3", "porosity = 1", f"{LEVEL}.porosity", ["porosity is 1", "nothing would be solid"]),
+    ("fraction = 0.3", "porosity = 1.2", f"{LEVEL}.porosity", ["porosity is 1.2"]),
+    ("fraction = 0.3", "porosity = -1", f"{LEVEL}.porosity", ["porosity is -1"]),
+    ("fraction = 0.3", "porosity = nan", f"{LEVEL}.porosity", ["porosity is NaN"]),
+    ("fraction = 0.3", "porosity = 70", f"{LEVEL}.porosity", ["porosity is 70", "write 0.7"]),
+    ("fraction = 0.3", "fraction = inf", f"{LEVEL}.fraction", ["fraction is inf"]),
+    ("fraction = 0.3", "iso = nan", f"{LEVEL}.iso", ["finite", "NaN"]),
+    ("fraction = 0.3", "iso = 9", f"{LEVEL}.iso", ["solid everywhere", "-1.5", "1.5"]),
+    ("fraction = 0.3", "iso = -1", f"{LEVEL}.iso", ["nothing is solid"]),
+    ("fraction = 0.3", 'fraction = "much"', f"{LEVEL}.fraction", ["expected a number", '"much"']),
+    ("fraction = 0.3", "thickness = 0.3", f"{LEVEL}.thickness", ["not in this version yet", "fraction or iso"]),
+    ("fraction = 0.3", 'fraction = 0.3\nfit = "spartan"', f"{LEVEL}.fit", ["part lower"]),
+    ("fraction = 0.3", 'iso = 0.3\nof = "part"', f"{LEVEL}.of", ["fraction or porosity"]),
+    # grades
+    (
+        "fraction = 0.3",
+        "fraction = { linear = { along = [0, 0, 1], stops = [[0, 0.3], [4, 1.0]] } }",
+        f"{LEVEL}.fraction.linear.stops[1]",
+        ["fraction is 1 at position 4"],
+    ),
+    (
+        "fraction = 0.3",
+        "fraction = { depth = { stops = [[3, 0.3], [1, 0.2]] } }",
+        f"{LEVEL}.fraction.depth.stops[1]",
+        ["rise", "1 after 3"],
+    ),
+    (
+        "fraction = 0.3",
+        "fraction = { linear = { along = [0, 0, 0], stops = [[0, 0.3]] } }",
+        f"{LEVEL}.fraction.linear.along",
+        ["direction is zero"],
+    ),
+    (
+        "fraction = 0.3",
+        'fraction = { formula = "0.9 + 0.1*x" }',
+        f"{LEVEL}.fraction.formula",
+        ["fraction is 1.3", "mm"],
+    ),
+    ("fraction = 0.3", 'fraction = { formula = "import os" }', f"{LEVEL}.fraction.formula", []),
+    ("fraction = 0.3", "fraction = { radial = {} }", f"{LEVEL}.fraction.radial", ["not in this version yet"]),
+    ("fraction = 0.3", "fraction = { liner = {} }", f"{LEVEL}.fraction.liner", ['did you mean "linear"']),
+    # maps
+    ("wavelength = 4.0", "wavelength = 0", f"{MAP}.wavelength", ["wavelength is 0", "greater than 0"]),
+    ("wavelength = 4.0", "wavelength = -4", f"{MAP}.wavelength", ["wavelength is -4"]),
+    ("wavelength = 4.0", "wavelength = inf", f"{MAP}.wavelength", ["wavelength is inf"]),
+    ("wavelength = 4.0", "wavelength = [4, 0, 4]", f"{MAP}.wavelength[1]", ["wavelength is 0"]),
+    ("wavelength = 4.0", "wavelength = [4, 4]", f"{MAP}.wavelength", ["2 values"]),
+    ("wavelength = 4.0", "wavelength = 4\nrotate = 30", f"{MAP}.rotate", ["three numbers"]),
+    ("wavelength = 4.0", "wavelength = 4\nskew = { xz = 90 }", f"{MAP}.skew.xz", ["90"]),
+    ("map.affine]", "map.phase]", "lattice.core.map.phase", ["not in this version yet", "affine"]),
+    ("map.affine]", "map.cylinder]", "lattice.core.map.cylinder", ["not in this version yet"]),
+    # cells
+    ('cell = "gyroid"', "cell.tet = {}", "lattice.core.cell.tet", ["not in this version yet"]),
+    ('cell = "gyroid"', "cell.series = { terms = [] }", "lattice.core.cell.series", []),
+    ('cell = "gyroid"', "cell.series = { group = 227 }", "lattice.core.cell.series.group", ["not in this version yet"]),
+    (
+        'cell = "gyroid"',
+        "cell.series = { terms = [{ hkl = [1, 0.5, 0] }] }",
+        "lattice.core.cell.series.terms[0].hkl",
+        ["whole numbers"],
+    ),
+    # regions
+    ("size = [8, 8, 8]", "size = [8, 8]", "region.box.size", ["three numbers", "2 values"]),
+    ("size = [8, 8, 8]", "size = [8, 8, 0]", "region.box.size", ["0"]),
+    ("size = [8, 8, 8]", "size = [8, 8, -8]", "region.box.size", ["-8"]),
+    ("size = [8, 8, 8]", "size = [8, nan, 8]", "region.box.size", ["NaN"]),
+    ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["both"]),
+    ("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = -2", "region.sphere.radius", ["-2"]),
+    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'none.stl'", "region.mesh.path", ["does not exist"]),
+    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.step'", "region.mesh.path", ["stl"]),
+    (
+        "[region.box]\nsize = [8, 8, 8]",
+        "[region.mesh]\npath = 'a.stl'\nunit = 'inches'",
+        "region.mesh.unit",
+        ['"inch"'],
+    ),
+    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.stl'\nrepair = 'auto'", "region.mesh.repair", ["yet"]),
+    (
+        "[region.box]\nsize = [8, 8, 8]",
+        "[region.halfspace]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]",
+        "region",
+        ["has no end", "intersect"],
+    ),
+    (
+        "[region.box]\nsize = [8, 8, 8]",
+        "[region]\nintersection = [{ sphere = { radius = 1 } }, { sphere = { radius = 1, center = [9, 0, 0] } }]",
+        "region",
+        ["empty"],
+    ),
+    # more than there can be
+    (
+        "[lattice.core.level]",
+        "[blend]\nbetween = ['a', 'b']\n[lattice.core.level]",
+        "blend",
+        ["not in this version yet"],
+    ),
+    ('units = "mm"', "skin.thickness = 1", "skin", ["not in this version yet"]),
+    ('units = "mm"', "beams.a.radius = 1", "beams", ["not in this version yet"]),
+    ('units = "mm"', "keep.a.sphere.radius = 1", "keep", ["not in this version yet"]),
+    ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "later version"]),
+    ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
+]
+
+
+@pytest.mark.parametrize(("line", "instead", "path", "parts"), CASES, ids=[c[1].split("\n")[-1][:40] for c in CASES])
+def test_bad_design(tmp_path, line, instead, path, parts):
+    """The error names the file, the line, the path, and says what was found."""
+    assert CUBE.count(line) == 1
+    file = tmp_path / "bad.toml"
+    file.write_text(CUBE.replace(line, instead))
+    with pytest.raises(lt.DesignError) as caught:
+        lt.load(file).build()
+    error = caught.value
+    assert isinstance(error, ValueError)
+    assert error.path.startswith(path), error
+    for part in parts:
+        assert part in error.message, error
+    assert error.line is not None
+    first = CUBE[: CUBE.index(line)].count("\n") + 1
+    last = first + instead.count("\n") + 1
+    assert first <= error.line <= last or path == LEVEL, error
+    assert str(error).startswith(f"{file}:{error.line}: "), error
+    assert "\n" not in str(error)
+
+
+def test_the_same_errors_from_python():
+    """A design made in Python is refused with the same path and message, without a line."""
+    core = lt.Lattice(cell="gyriod", part="sheet", map=lt.map.affine(4), level=lt.level.fraction(0.3))
+    with pytest.raises(lt.DesignError) as caught:
+        lt.Design(region=lt.region.box([8, 8, 8]), lattice={"core": core}).build()
+    assert (caught.value.path, caught.value.nearest, caught.value.line) == ("lattice.core.cell", "gyroid", None)
+
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(4), level={"fraction": object()})
+    with pytest.raises(lt.DesignError, match="of type object"):
+        lt.Design(region=lt.region.box([8, 8, 8]), lattice=core).build()
+
+
+def test_json_has_the_same_errors(tmp_path):
+    """JSON goes the same road."""
+    file = tmp_path / "bad.json"
+    file.write_text('{"schema": 1, "regoin": {}}')
+    with pytest.raises(lt.DesignError, match="region"):
+        lt.load(file)
+    file.write_text('{"schema": 1,')
+    with pytest.raises(lt.DesignError, match="JSON"):
+        lt.load(file)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"\x00" * 64, b"solid nothing", b"[[[[", b"a = 1\nb = \xe9"])
+def test_garbage(tmp_path, content):
+    """Whatever the bytes, one DesignError."""
+    file = tmp_path / "bad.toml"
+    file.write_bytes(content)
+    with pytest.raises(lt.DesignError):
+        lt.load(file)
+
+
+def test_errors_travel(tmp_path):
+    """An error survives pickling, so that worker processes can raise it."""
+    import pickle
+
+    error = lt.DesignError("a.toml:3: x: wrong", "x", 3, "wrong", "y", "z")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.path, again.line, again.nearest) == (str(error), "x", 3, "z")

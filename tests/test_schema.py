@@ -1,0 +1,52 @@
+"""The generated schema is current, is a schema, and agrees with the reader."""
+
+import json
+from pathlib import Path
+
+import pytest
+import trabecula as lt
+from conftest import CUBE
+from trabecula import _core
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_current():
+    """schema/design.json is what the core makes; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema."""
+    committed = json.loads((ROOT / "schema" / "design.json").read_text())
+    assert committed == json.loads(_core.schema())
+
+
+@pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.toml")), ids=lambda p: p.name)
+def test_examples_are_valid(example):
+    """What the reader accepts, the schema accepts."""
+    jsonschema = pytest.importorskip("jsonschema")
+    data = lt.load(example).to_dict()
+    jsonschema.Draft202012Validator(json.loads(_core.schema())).validate(data)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (["region", "box", "sise"], [1, 1, 1]),
+        (["lattice", "core", "cell"], "gyriod"),
+        (["lattice", "core", "part"], "both"),
+        (["lattice", "core", "level", "iso"], 0.2),
+        (["lattice", "core", "level", "fraction"], "much"),
+        (["lattice", "core", "map", "affine", "wavelength"], [1, 2]),
+        (["blend"], {}),
+    ],
+)
+def test_the_schema_refuses_what_the_reader_refuses(tmp_path, keys, value):
+    """A slip in each place is caught by both."""
+    jsonschema = pytest.importorskip("jsonschema")
+    file = tmp_path / "a.toml"
+    file.write_text(CUBE)
+    data = lt.load(file).to_dict()
+    place = data
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    assert not jsonschema.Draft202012Validator(json.loads(_core.schema())).is_valid(data)
+    with pytest.raises(lt.DesignError):
+        _core.Design.from_data(data)
