@@ -25,9 +25,7 @@ def main():
             seconds, peak = timed([a.trabecula, "mesh", str(design), "-o", str(out), "--edge", repr(w.spacing(a.n))])
             triangles, volume = w.read_volume(out)
             error = volume / exact - 1
-            print(
-                f"{work:10} n = {a.n}: {seconds:.3f} s, {peak:.0f} MB, {triangles} triangles, volume error {error:.1e}"
-            )
+            print(f"{work:10} n = {a.n}: {seconds:.3f} s, {peak:.0f} MB, {triangles} triangles, volume error {error:.1e}")
             # 32 samples for each cell: a sheet is within 1e-4 of its volume.
             assert abs(error) < 1e-4, f"{work}: the volume is off by {error:.1e}"
 

@@ -40,9 +40,7 @@ def formula(name, x, y, z):
         "frd": lambda: 4 * cx * cy * cz - pairs,
         "fischer_koch_s": lambda: c2x * sy * cz + cx * c2y * sz + sx * cy * c2z,
         "lidinoid": lambda: 0.5 * (s2x * cy * sz + s2y * cz * sx + s2z * cx * sy) - 0.5 * pairs + 0.15,
-        "split_p": lambda: (
-            1.1 * (s2x * sz * cy + s2y * sx * cz + s2z * sy * cx) - 0.2 * pairs - 0.4 * (c2x + c2y + c2z)
-        ),
+        "split_p": lambda: 1.1 * (s2x * sz * cy + s2y * sx * cz + s2z * sy * cx) - 0.2 * pairs - 0.4 * (c2x + c2y + c2z),
     }[name]()
 
 

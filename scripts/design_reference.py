@@ -42,11 +42,7 @@ def properties(schema):
     rows = []
     for key, value in schema.get("properties", {}).items():
         needed = (
-            "yes"
-            if key in schema.get("required", [])
-            else one_line(json.dumps(value["default"]))
-            if "default" in value
-            else ""
+            "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
         )
         rows.append(f"| `{key}` | {kind(value)} | {needed} | {one_line(value.get('description', ''))} |")
     for join in ("anyOf", "oneOf"):

@@ -88,8 +88,7 @@ class Panel:
     def curve(self, u, v, colour, dash="", width=2.0):
         points = " ".join("{:.2f},{:.2f}".format(*self.at(*q)) for q in zip(u, v, strict=True))
         self.parts.append(
-            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}" '
-            f'stroke-dasharray="{dash}"/>'
+            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}"/>'
         )
 
     def key(self, entries):

@@ -106,8 +106,6 @@ def test_example_designs_check(path):
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.name)
 def test_example_programs_run(path, place):
-    done = subprocess.run(
-        [sys.executable, str(place / "examples" / path.name)], capture_output=True, text=True, timeout=600
-    )
+    done = subprocess.run([sys.executable, str(place / "examples" / path.name)], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
