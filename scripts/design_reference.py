@@ -79,7 +79,8 @@ def python():
         members = [(name, thing)]
         if inspect.ismodule(thing) or inspect.isclass(thing):
             public = sorted(k for k in getattr(thing, "__all__", vars(thing)) if not k.startswith("_"))
-            owned = ((k, getattr(thing, k)) for k in public)
+            owned = [(k, getattr(thing, k)) for k in public]
+            owned = [(k, m) for k, m in owned if callable(m) or hasattr(m, "__get__")]
             keep = inspect.isclass(thing)
             members += [(f"{name}.{k}", m) for k, m in owned if keep or getattr(m, "__module__", "") == thing.__name__]
         for label, member in members:
