@@ -72,7 +72,7 @@ SOLIDS = {
     "lamellae": (
         ((-5,) * 3, (5,) * 3),
         lambda p: box(p, (-5,) * 3, (5,) * 3),
-        lambda p: np.cos(TAU * p[0] / 5) + 0 * p[1] * p[2],
+        lambda p: np.cos(TAU * (p[0] - 0.3) / 5) + 0 * p[1] * p[2],
     ),
     "gyroid_half": (
         ((-5,) * 3, (5,) * 3),
