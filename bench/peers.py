@@ -18,7 +18,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import workloads as w
@@ -51,15 +50,11 @@ def versions(python):
 
 def timed(words):
     """(seconds, peak MB) of a process; raises if it fails."""
-    start = time.perf_counter()
-    child = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    errors = child.stderr.read()
-    _, status, usage = os.wait4(child.pid, 0)
-    seconds = time.perf_counter() - start
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode:
-        raise RuntimeError(f"{words[0]}: exit {child.returncode}: {errors.decode()[-500:]}")
-    return seconds, usage.ru_maxrss / (1024 if sys.platform != "darwin" else 1024**2)
+    done = subprocess.run([sys.executable, "-IS", str(HERE / "timed.py"), *words], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{words[0]}: exit {done.returncode}: {done.stderr[-500:]}")
+    seconds, peak = done.stdout.split()
+    return float(seconds), float(peak)
 
 
 def main():
