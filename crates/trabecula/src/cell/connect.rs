@@ -8,17 +8,22 @@
 //! that matter are played again at their exact levels.
 
 use super::Part;
-use crate::math::{Vec3, sub};
+use rayon::prelude::*;
+
+use crate::math::{Vec3, add, scale, sub, unit};
 
 mod critical;
 mod forest;
 mod grid;
 mod sublattice;
 
-pub(super) use critical::{Function, critical, sample};
+pub(super) use critical::{Critical, Function, critical, sample};
 use forest::{Forest, Joined};
 use grid::{DIRECTIONS, Grid};
 use sublattice::{Int3, Sublattice};
+
+/// The steps along the axes.
+const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 /// How a part's connectivity changes with its level.
 #[derive(Clone, Debug, Default)]
@@ -107,22 +112,10 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// The amount at the critical point near a node at which at most `falling` directions lead to more solid;
-    /// tried from the node and from the middles towards `others`.
+    /// The amount at the critical point near a node from which at most `falling` directions lead to more solid;
+    /// sought from the node and from the middles towards `others`.
     fn refine(&self, node: u32, others: &[u32], falling: usize) -> Option<f64> {
-        self.refined(node, others, falling)
-            .map(|(_, level, _)| level)
-    }
-
-    /// The same with the place and the number of flat directions.
-    fn refined(&self, node: u32, others: &[u32], falling: usize) -> Option<(Vec3, f64, usize)> {
-        let negative = match self.part {
-            Part::Sheet => self.grid.values[node as usize] < 0.0,
-            Part::Lower => false,
-            Part::Upper => true,
-        };
         let here = self.grid.position(node);
-        let reach = 1.5 * 3f64.sqrt() / self.grid.n as f64;
         let middle = |o: &u32| {
             let d = sub(self.grid.position(*o), here).map(|v| v - v.round());
             [0, 1, 2].map(|a| here[a] + d[a] / 2.0)
@@ -130,13 +123,31 @@ impl Sweep<'_> {
         core::iter::once(here)
             .chain(others.iter().map(middle))
             .find_map(|start| {
-                let c = critical(self.f, start, reach)?;
-                let rising = 3 - c.falling - c.flat;
-                let down = if negative { rising } else { c.falling };
+                let c = self.critical(node, start)?;
                 let level = amount(self.part, c.level);
                 let near = (level - self.amounts[node as usize]).abs() <= 3.0 * self.grid.error;
-                (down <= falling && near).then_some((c.at, level, c.flat))
+                (c.falling <= falling && near).then_some(level)
             })
+    }
+
+    /// The critical point near `start`, seen as one of the amount about `node`.
+    fn critical(&self, node: u32, start: Vec3) -> Option<Critical> {
+        let c = critical(self.f, start, 1.5 * 3f64.sqrt() / self.grid.n as f64)?;
+        let negative = match self.part {
+            Part::Sheet => self.grid.values[node as usize] < 0.0,
+            Part::Lower => false,
+            Part::Upper => true,
+        };
+        if !negative {
+            return Some(c);
+        }
+        let [a, b, d] = c.axes;
+        Some(Critical {
+            falling: 3 - c.falling - c.flat,
+            values: [-c.values[2], -c.values[1], -c.values[0]],
+            axes: [d, b, a],
+            ..c
+        })
     }
 
     /// Grows the solid and notes what happens to its pieces.
@@ -220,7 +231,7 @@ impl Sweep<'_> {
                     let sides = [
                         (self.grid.edge(node, k), [0; 3]),
                         (self.grid.edge(mid, l), wrap),
-                        (self.grid.edge(node, (k + 1 | (l + 1)) - 1), [0; 3]),
+                        (self.grid.edge(node, ((k + 1) | (l + 1)) - 1), [0; 3]),
                     ];
                     let mut crossed = sides.iter().filter(|(e, _)| forest.has(*e));
                     if let (Some((a, wa)), Some((b, wb))) =
@@ -243,46 +254,51 @@ impl Sweep<'_> {
         }
     }
 
-    /// The saddles that join what was separate in R³ just before, wherever the nodes that show them lie.
+    /// The saddles that join what was separate in R³ just before, and points of the lines that are extreme.
     fn necks(&self) -> Vec<(Vec3, f64)> {
-        let mut rank = vec![0u32; self.order.len()];
-        for (r, i) in self.order.iter().enumerate() {
-            rank[*i as usize] = r as u32;
-        }
-        let range = self.grid.range();
-        let back = 1.5 * self.grid.error + 1e-6 * range;
+        let back = 1.5 * self.grid.error + 1e-6 * self.grid.range();
+        let n = self.order.len() as u32;
+        // The node nearest to a critical point is at most h√3/2 away, which bounds its slope; and slopes fall towards it.
+        let steepest = 0.866 * self.grid.bend / self.grid.n as f64;
+        let still = |i: &u32| {
+            let here = self.grid.slopes[*i as usize];
+            let near = |d: Int3| self.grid.slopes[self.grid.step(*i, d).0 as usize];
+            here <= steepest
+                && STEPS
+                    .iter()
+                    .all(|d| here <= near(*d) && here <= near(d.map(|c| -c)))
+        };
+        let points: Vec<Critical> = (0..n)
+            .into_par_iter()
+            .filter(still)
+            .filter_map(|i| self.critical(i, self.grid.position(i)))
+            .filter(|c| (c.falling == 1 && c.flat == 0) || (c.falling == 0 && c.flat > 0))
+            .collect();
+        let (saddles, lines): (Vec<_>, Vec<_>) = points.into_iter().partition(|c| c.flat == 0);
         let least = self
             .order
             .first()
             .map_or(0.0, |i| self.amounts[*i as usize]);
-        let mut found: Vec<(Vec3, f64)> = Vec::new();
-        let mut asked = Vec::new();
-        for node in 0..self.order.len() as u32 {
-            let below = self.lower_link(node, &rank);
-            let level = self.amounts[node as usize];
-            if below.len() >= 2 {
-                let others: Vec<u32> = below.iter().map(|b| b.0).collect();
-                let point = self.refined(node, &others, 1);
-                let (at, level, _) = point.unwrap_or((self.grid.position(node), level, 0));
-                let ends: Vec<_> = below
-                    .iter()
-                    .filter_map(|b| self.descend(*b, &rank, level - back))
-                    .collect();
-                if ends.len() >= 2 {
-                    asked.push((level - back, at, level, ends));
-                }
-            }
-            if level - least <= self.grid.error {
-                // A strut that shrinks to a line of extreme f has its necks all along it.
-                if let Some((at, level, 1..)) = self.refined(node, &[], 0) {
-                    found.push((at, level));
-                }
-            }
-        }
+        let extreme = |c: &Critical| amount(self.part, c.level) - least <= self.grid.error;
+        let h = 1.0 / self.grid.n as f64;
+        let mut found = distinct(lines.into_iter().filter(extreme).collect(), 1.8 * h);
+        let mut asked: Vec<_> = distinct(saddles, 0.2 * h)
+            .into_iter()
+            .filter_map(|c| {
+                let level = amount(self.part, c.level);
+                let ends = [1.0, -1.0].map(|side| self.descend(&c, side * h, level - back));
+                // A side may end in a hollow less deep than that.
+                let hollow = ends.iter().fold(level - back, |m, (node, _)| {
+                    m.max(self.amounts[*node as usize])
+                });
+                let limit = hollow + 1e-9 * back;
+                (limit < level).then_some((limit, ends, c))
+            })
+            .collect();
         asked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut forest = Forest::new(self.order.len());
         let mut grown = 0;
-        for (limit, at, level, ends) in asked {
+        for (limit, [(a, v), (b, w)], saddle) in asked {
             while let Some(&node) = self
                 .order
                 .get(grown)
@@ -297,85 +313,56 @@ impl Sweep<'_> {
                     }
                 }
             }
-            let (first, w) = ends[0];
-            let apart = |(end, v): &(u32, Int3)| {
-                !forest.together(first, *end, [0, 1, 2].map(|c| v[c] - w[c]))
-            };
-            if ends[1..].iter().any(apart) {
-                found.push((at, level));
+            if !forest.together(a, b, [0, 1, 2].map(|c| w[c] - v[c])) {
+                found.push(saddle);
             }
         }
-        let sign = if self.part == Part::Upper { -1.0 } else { 1.0 };
-        distinct(found, 0.6 / self.grid.n as f64)
+        found
             .into_iter()
-            .map(|(at, level)| (at, sign * level))
+            .map(|c| (c.at.map(|v| v - v.floor()), c.level))
             .collect()
     }
 
-    /// The pieces of a node's surroundings that are solid before it: the earliest node of each, with its period.
-    fn lower_link(&self, node: u32, rank: &[u32]) -> Vec<(u32, Int3)> {
-        let mut around = [(0u32, [0; 3], [0; 3]); 14];
-        let mut n = 0;
-        for d in DIRECTIONS.iter().flat_map(|d| [*d, d.map(|c| -c)]) {
-            let (near, wrap) = self.grid.step(node, d);
-            if rank[near as usize] < rank[node as usize] {
-                around[n] = (near, wrap, d);
-                n += 1;
+    /// Walks from a saddle, `first` turns along its falling direction and then straight down, to a node near the first
+    /// point solid at `limit`, or near the bottom of a hollow above it.
+    fn descend(&self, saddle: &Critical, first: f64, limit: f64) -> (u32, Int3) {
+        let sign = if self.part == Part::Upper { -1.0 } else { 1.0 };
+        let mut at = add(saddle.at, scale(saddle.axes[0], first));
+        let (mut v, mut g) = sample(self.f, at);
+        let mut step = 0.4 * first.abs();
+        loop {
+            let corners = self
+                .grid
+                .corners(at)
+                .map(|c| (self.amounts[c.0 as usize], c));
+            let lowest = corners
+                .into_iter()
+                .fold(corners[0], |a, b| if b.0 < a.0 { b } else { a });
+            if (sign * v < limit && lowest.0 < limit) || step < 0.01 * first.abs() {
+                return lowest.1;
+            }
+            let next = add(at, scale(unit(g), -sign * step));
+            let (w, k) = sample(self.f, next);
+            if sign * w < sign * v {
+                (at, v, g) = (next, w, k);
+            } else {
+                step *= 0.5;
             }
         }
-        let around = &mut around[..n];
-        around.sort_unstable_by_key(|a| rank[a.0 as usize]);
-        let mut label = [usize::MAX; 14];
-        let mut firsts = Vec::new();
-        for i in 0..n {
-            if label[i] != usize::MAX {
-                continue;
-            }
-            firsts.push((around[i].0, around[i].1));
-            let mut stack = vec![i];
-            while let Some(a) = stack.pop() {
-                label[a] = i;
-                stack.extend((0..n).filter(|&b| {
-                    label[b] == usize::MAX && grid::adjacent(around[a].2, around[b].2)
-                }));
-            }
-        }
-        firsts
-    }
-
-    /// Walks down from a node until the amount is below `limit`; `None` if it ends in a hollow above.
-    fn descend(
-        &self,
-        (mut node, mut period): (u32, Int3),
-        rank: &[u32],
-        limit: f64,
-    ) -> Option<(u32, Int3)> {
-        while self.amounts[node as usize] >= limit {
-            let (next, wrap) = DIRECTIONS
-                .iter()
-                .flat_map(|d| [*d, d.map(|c| -c)])
-                .map(|d| self.grid.step(node, d))
-                .min_by_key(|(near, _)| rank[*near as usize])?;
-            if rank[next as usize] >= rank[node as usize] {
-                return None;
-            }
-            node = next;
-            period = [0, 1, 2].map(|c| period[c] + wrap[c]);
-        }
-        Some((node, period))
     }
 }
 
-/// Points of one period, those nearer than `apart` given once, in order of their level.
-fn distinct(mut points: Vec<(Vec3, f64)>, apart: f64) -> Vec<(Vec3, f64)> {
-    points.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut kept: Vec<(Vec3, f64)> = Vec::new();
-    for (at, level) in points {
-        let same = |k: &(Vec3, f64)| {
-            (0..3).all(|a| (at[a] - k.0[a] - (at[a] - k.0[a]).round()).abs() < apart)
+/// Points of one period, those nearer than `apart` along every axis given once.
+fn distinct(points: Vec<Critical>, apart: f64) -> Vec<Critical> {
+    let mut kept: Vec<Critical> = Vec::new();
+    for p in points {
+        let same = |k: &Critical| {
+            sub(p.at, k.at)
+                .iter()
+                .all(|d| (d - d.round()).abs() < apart)
         };
         if !kept.iter().any(same) {
-            kept.push((at.map(|v| v - v.floor()), level));
+            kept.push(p);
         }
     }
     kept
@@ -402,6 +389,16 @@ fn replay(
     let Some(&eldest) = order.first() else {
         return Vec::new();
     };
+    for e in events.iter_mut().filter(|e| !e.exact) {
+        // On a line of extreme values a piece meets its neighbours where it appears, whatever the samples say.
+        let born = e
+            .pieces
+            .map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
+        let born = born[0].max(born[1]);
+        if e.level - born <= error {
+            (e.level, e.exact) = (born, true);
+        }
+    }
     events.sort_by(|a, b| a.level.total_cmp(&b.level));
     // Spans in which a second piece lives.
     let mut spans = Vec::new();

@@ -1,15 +1,130 @@
 //! Regions: data to signed distance.
 
+use std::sync::Arc;
+
 use super::Loader;
+use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
-use crate::region::Region;
+use crate::fault::Fault;
+use crate::io;
+use crate::math::{add, scale, sub};
+use crate::region::{
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Shape, Sphere, Union,
+};
 
-pub(super) fn region(
-    spec: &RegionSpec,
-    path: &str,
-    loader: &dyn Loader,
-) -> Result<Region, DesignError> {
-    let _ = (spec, path, loader);
-    todo!()
+/// Mesh formats a region may come from.
+const FORMATS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
+
+pub(super) fn region(spec: &RegionSpec, path: &str, loader: &dyn Loader) -> Result<Region, DesignError> {
+    match spec {
+        RegionSpec::Box(b) => cuboid(b, &format!("{path}.box")),
+        RegionSpec::Cylinder(c) => {
+            let path = format!("{path}.cylinder");
+            three(&path, "base", c.base)?;
+            three(&path, "axis", c.axis)?;
+            positive(&path, "radius", c.radius)?;
+            positive(&path, "height", c.height)?;
+            shared(&path, Cylinder::new(c.base, c.axis, c.radius, c.height))
+        }
+        RegionSpec::Sphere(s) => {
+            let path = format!("{path}.sphere");
+            three(&path, "center", s.center)?;
+            positive(&path, "radius", s.radius)?;
+            shared(&path, Sphere::new(s.center, s.radius))
+        }
+        RegionSpec::HalfSpace(h) => {
+            let path = format!("{path}.halfspace");
+            three(&path, "point", h.point)?;
+            three(&path, "normal", h.normal)?;
+            shared(&path, HalfSpace::new(h.point, h.normal))
+        }
+        RegionSpec::Mesh(m) => mesh(m, &format!("{path}.mesh"), loader),
+        RegionSpec::Union(of) => {
+            let path = format!("{path}.union");
+            shared(&path, Union::new(several(of, &path, loader)?))
+        }
+        RegionSpec::Intersection(of) => {
+            let path = format!("{path}.intersection");
+            shared(&path, Intersection::new(several(of, &path, loader)?))
+        }
+        RegionSpec::Difference(of) => {
+            let path = format!("{path}.difference");
+            shared(&path, Difference::new(several(of, &path, loader)?))
+        }
+        RegionSpec::Offset(o) => {
+            let path = format!("{path}.offset");
+            finite(&format!("{path}.by"), o.by)?;
+            shared(&path, Offset::new(region(&o.of, &format!("{path}.of"), loader)?, o.by))
+        }
+    }
+}
+
+fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Region, DesignError> {
+    made.map(|s| Arc::new(s) as Region).map_err(|f| DesignError::fault(path, f))
+}
+
+fn several(of: &[RegionSpec], path: &str, loader: &dyn Loader) -> Result<Vec<Region>, DesignError> {
+    of.iter().enumerate().map(|(i, r)| region(r, &format!("{path}[{i}]"), loader)).collect()
+}
+
+fn three(path: &str, key: &str, v: [f64; 3]) -> Result<(), DesignError> {
+    v.iter().try_for_each(|v| finite(&format!("{path}.{key}"), *v).map(|_| ()))
+}
+
+fn positive(path: &str, key: &str, v: f64) -> Result<(), DesignError> {
+    if v.is_finite() && v > 0.0 {
+        return Ok(());
+    }
+    let message = format!("{key} is {v}; it must be a finite number of mm greater than 0");
+    Err(DesignError::new(format!("{path}.{key}"), message).found(v.to_string()))
+}
+
+fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
+    let (min, max) = match spec {
+        BoxSpec::Size(s) => {
+            three(path, "center", s.center)?;
+            s.size.iter().try_for_each(|v| positive(path, "size", *v))?;
+            let half = scale(s.size, 0.5);
+            (sub(s.center, half), add(s.center, half))
+        }
+        BoxSpec::Corners(c) => {
+            three(path, "min", c.min)?;
+            three(path, "max", c.max)?;
+            for (a, axis) in ["x", "y", "z"].into_iter().enumerate() {
+                if c.min[a] >= c.max[a] {
+                    let message = format!("along {axis}, max is {} and min is {}; max must be the greater", c.max[a], c.min[a]);
+                    return Err(DesignError::new(format!("{path}.max"), message).found(c.max[a].to_string()));
+                }
+            }
+            (c.min, c.max)
+        }
+    };
+    shared(path, Cuboid::new(min, max))
+}
+
+fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, DesignError> {
+    let at = format!("{path}.path");
+    let extension = spec.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
+    if !FORMATS.contains(&extension.as_str()) {
+        let message = format!("the name must end in one of {}; found \"{}\"", FORMATS.join(", "), spec.path);
+        return Err(DesignError::new(at, message).found(&spec.path));
+    }
+    positive(path, "scale", spec.scale)?;
+    let bytes = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
+    let of_file = |f: Fault| DesignError::new(&at, format!("{}: {f}", spec.path)).found(&spec.path);
+    let mut loaded = io::read_mesh(&bytes, &extension).map_err(of_file)?;
+    if let (true, Some(unit)) = (loaded.in_mm, spec.unit)
+        && unit != Unit::Mm
+    {
+        let message = "this file names its own unit and was read in mm; leave unit out";
+        return Err(DesignError::new(format!("{path}.unit"), message));
+    }
+    let factor = spec.scale * if loaded.in_mm { 1.0 } else { spec.unit.unwrap_or(Unit::Mm).in_mm() };
+    if factor != 1.0 {
+        for v in &mut loaded.mesh.vertices {
+            *v = scale(*v, factor);
+        }
+    }
+    MeshRegion::new(loaded.mesh).map(|m| Arc::new(m) as Region).map_err(of_file)
 }

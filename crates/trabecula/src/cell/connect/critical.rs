@@ -16,6 +16,10 @@ pub(in crate::cell) struct Critical {
     pub falling: usize,
     /// Eigenvalues about zero.
     pub flat: usize,
+    /// Eigenvalues of the Hessian, ascending.
+    pub values: Vec3,
+    /// Their unit eigenvectors.
+    pub axes: Mat3,
 }
 
 /// Value and gradient at one point.
@@ -30,7 +34,7 @@ pub(in crate::cell) fn sample(f: Function, u: Vec3) -> (f64, Vec3) {
 pub(in crate::cell) fn critical(f: Function, start: Vec3, reach: f64) -> Option<Critical> {
     const STEP: f64 = 1e-4;
     let mut at = start;
-    for _ in 0..40 {
+    for _ in 0..48 {
         let mut points = [at; 7];
         for a in 0..3 {
             points[1 + 2 * a][a] += STEP;
@@ -49,9 +53,11 @@ pub(in crate::cell) fn critical(f: Function, start: Vec3, reach: f64) -> Option<
             }
         }
         let length = norm(step);
-        if length < 1e-9 {
+        if length < 1e-7 {
             // A flat direction may still climb: then this is no critical point.
             return (norm(g[0]) <= 1e-5 * largest).then(|| Critical {
+                values,
+                axes: vectors,
                 at,
                 level: v[0],
                 falling: values.iter().filter(|v| **v < -1e-3 * largest).count(),
@@ -66,7 +72,7 @@ pub(in crate::cell) fn critical(f: Function, start: Vec3, reach: f64) -> Option<
     None
 }
 
-/// Eigenvalues and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
+/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
 pub(in crate::cell) fn eigen(m: &Mat3) -> (Vec3, Mat3) {
     let mut a = *m;
     let mut vectors = crate::math::IDENTITY;
@@ -95,5 +101,7 @@ pub(in crate::cell) fn eigen(m: &Mat3) -> (Vec3, Mat3) {
     debug_assert!(
         (norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs())
     );
-    ([a[0][0], a[1][1], a[2][2]], vectors)
+    let mut order = [0, 1, 2];
+    order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
+    (order.map(|i| a[i][i]), order.map(|i| vectors[i]))
 }

@@ -17,20 +17,18 @@ pub(super) const DIRECTIONS: [Int3; 7] = [
     [1, 1, 1],
 ];
 
-/// Whether two neighbours of a node, given by their offsets, are neighbours of each other.
-pub(super) fn adjacent(a: Int3, b: Int3) -> bool {
-    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    d.iter().all(|c| (0..=1).contains(c)) || d.iter().all(|c| (-1..=0).contains(c))
-}
-
 /// Samples of a function on n³ nodes of the torus.
 pub(super) struct Grid {
     /// Nodes along each axis.
     pub n: usize,
     /// Values, x fastest.
     pub values: Vec<f64>,
+    /// Lengths of the gradients, per turn.
+    pub slopes: Vec<f64>,
     /// How far the linear interpolant may be from the function: 3h²/8 times its largest second derivative.
     pub error: f64,
+    /// About the largest second derivative, per turn².
+    pub bend: f64,
 }
 
 impl Grid {
@@ -60,10 +58,13 @@ impl Grid {
                     .collect();
                 f(&points, v, g);
             });
+        let steepness = slopes.iter().map(|g| norm(*g)).collect();
         let mut grid = Grid {
             n,
             values,
+            slopes: steepness,
             error: 0.0,
+            bend: 0.0,
         };
         let bend = (0..slopes.len() as u32).into_par_iter().map(|i| {
             let change =
@@ -72,7 +73,8 @@ impl Grid {
                 .max(change(DIRECTIONS[1]))
                 .max(change(DIRECTIONS[3]))
         });
-        grid.error = 0.375 * h * h * bend.reduce(|| 0.0, f64::max);
+        grid.bend = bend.reduce(|| 0.0, f64::max);
+        grid.error = 0.375 * h * h * grid.bend;
         grid
     }
 
@@ -101,6 +103,20 @@ impl Grid {
         let wrap = at.map(|c| if c < 0 { -1 } else { i32::from(c >= n) });
         let on = [0, 1, 2].map(|a| at[a] - n * wrap[a]);
         (((on[2] * n + on[1]) * n + on[0]) as u32, wrap)
+    }
+
+    /// The nodes at the corners of the grid cell that holds a phase, with their periods.
+    pub(super) fn corners(&self, u: Vec3) -> [(u32, Int3); 8] {
+        let n = self.n as i32;
+        let low = u.map(|v| (v * self.n as f64).floor() as i32);
+        core::array::from_fn(|k| {
+            let at = [0, 1, 2].map(|a| low[a] + (k as i32 >> a & 1));
+            let on = at.map(|c| c.rem_euclid(n));
+            (
+                ((on[2] * n + on[1]) * n + on[0]) as u32,
+                at.map(|c| c.div_euclid(n)),
+            )
+        })
     }
 
     /// The number of the edge from `node` along direction k, after all nodes.

@@ -1,0 +1,395 @@
+//! The thinnest place of the periodic solid: walls of sheets, necks of networks, in millimetres.
+//!
+//! Phases relate to space by u = M x; a direction d in space is M d in phase, and ∇ₓf = Mᵀ ∇ᵤf.
+
+use rayon::prelude::*;
+
+use super::Part;
+use super::connect::{Function, critical, sample};
+use crate::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
+
+/// Samples of the mid-surface along each axis of the torus.
+const SAMPLES: usize = 24;
+/// Directions in which a surface is first looked for about a point.
+const DIRECTIONS: usize = 256;
+
+/// Minimum wall thickness (mm) of the sheet |f| ≤ `iso`, where u = `to_phase` · x.
+///
+/// At points of the mid-surface f = 0 the distances along both normals to |f| = iso are added; the least sum is
+/// refined by ever smaller steps along the surface. `None` where there is no wall: no mid-surface, an empty sheet, or
+/// one so thick that no normal leaves it.
+pub fn wall(f: Function, iso: f64, to_phase: &Mat3) -> Option<f64> {
+    if iso.is_nan() || iso <= 0.0 {
+        return None;
+    }
+    let back = transpose(to_phase);
+    // Along a unit vector of space the phase moves by at most this.
+    let speed = spectral_norm(to_phase);
+    let n = SAMPLES;
+    let mut walls: Vec<(f64, Vec3)> = (0..n * n * n)
+        .into_par_iter()
+        .filter_map(|i| {
+            let u = [i % n, i / n % n, i / (n * n)].map(|c| (c as f64 + 0.5) / n as f64);
+            let at = onto_surface(f, u, 1.0 / n as f64)?;
+            Some((thickness_at(f, at, iso, to_phase, &back, speed)?, at))
+        })
+        .collect();
+    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The thinnest few, by a search on the surface round each.
+    let refined = walls.iter().take(8).map(|&(mut least, mut at)| {
+        let mut step = 0.5 / n as f64;
+        while step > 1e-5 {
+            let (_, g) = sample(f, at);
+            let (a, b) = across(unit(g));
+            let next = [a, b, scale(a, -1.0), scale(b, -1.0)]
+                .into_iter()
+                .find_map(|d| {
+                    let p = onto_surface(f, add(at, scale(d, step)), step)?;
+                    let t = thickness_at(f, p, iso, to_phase, &back, speed)?;
+                    (t < least).then_some((t, p))
+                });
+            match next {
+                Some((t, p)) => (least, at) = (t, p),
+                None => step *= 0.5,
+            }
+        }
+        least
+    });
+    refined.reduce(f64::min)
+}
+
+/// The point of f = 0 within `reach` of u, by Newton's method along the gradient.
+fn onto_surface(f: Function, mut u: Vec3, reach: f64) -> Option<Vec3> {
+    let start = u;
+    for _ in 0..12 {
+        let (v, g) = sample(f, u);
+        let steep = dot(g, g);
+        if steep <= 1e-12 {
+            return None;
+        }
+        let step = scale(g, -v / steep);
+        u = add(u, step);
+        if norm(sub(u, start)) > 1.5 * reach {
+            return None;
+        }
+        if norm(step) < 1e-10 {
+            return Some(u);
+        }
+    }
+    None
+}
+
+/// The wall at a point of the mid-surface: distance along one normal to |f| = iso plus that along the other.
+fn thickness_at(
+    f: Function,
+    u: Vec3,
+    iso: f64,
+    to_phase: &Mat3,
+    back: &Mat3,
+    speed: f64,
+) -> Option<f64> {
+    let normal = unit(apply(back, sample(f, u).1));
+    let d = apply(to_phase, normal);
+    let one = first_beyond(f, u, d, speed, |v| v.abs() - iso)?;
+    let other = first_beyond(f, u, scale(d, -1.0), speed, |v| v.abs() - iso)?;
+    Some(one + other)
+}
+
+/// The least s > 0 (mm) at which `outside`(f(u + s d)) is positive, up to two periods; to about 1e-12 of a period.
+fn first_beyond(
+    f: Function,
+    u: Vec3,
+    d: Vec3,
+    speed: f64,
+    outside: impl Fn(f64) -> f64,
+) -> Option<f64> {
+    const STEPS: usize = 192;
+    let value = |s: f64| outside(sample(f, add(u, scale(d, s))).0);
+    let step = 2.0 / (STEPS as f64 * speed);
+    let beyond = (1..=STEPS).find(|k| value(*k as f64 * step) > 0.0)?;
+    let (mut lo, mut hi) = ((beyond - 1) as f64 * step, beyond as f64 * step);
+    for _ in 0..40 {
+        let mid = 0.5 * (lo + hi);
+        if value(mid) > 0.0 { hi = mid } else { lo = mid }
+    }
+    Some(hi)
+}
+
+/// Two unit vectors across a unit vector and each other.
+fn across(n: Vec3) -> (Vec3, Vec3) {
+    let k = (0..3).fold(0, |k, a| if n[a].abs() < n[k].abs() { a } else { k });
+    let mut e = [0.0; 3];
+    e[k] = 1.0;
+    let a = unit(sub(e, scale(n, dot(e, n))));
+    (a, crate::math::cross(n, a))
+}
+
+/// Narrowest neck diameter (mm) of the lower (f ≤ iso) or upper (f ≥ iso) part, where u = `to_phase` · x: twice the
+/// least distance from a neck's saddle to the surface f = iso.
+///
+/// `necks` are those of [`connectivity`](super::connectivity): phases and levels. Where the pieces are loose (no neck
+/// is solid at this level) it is the diameter of the smallest: twice the distance from the extreme of f to the
+/// surface. `None` where the part is empty or full, and for sheets.
+pub fn neck(
+    f: Function,
+    part: Part,
+    iso: f64,
+    necks: &[(Vec3, f64)],
+    to_phase: &Mat3,
+) -> Option<f64> {
+    let sign = match part {
+        Part::Lower => 1.0,
+        Part::Upper => -1.0,
+        Part::Sheet => return None,
+    };
+    let deep: Vec<Vec3> = necks
+        .iter()
+        .filter(|(_, level)| sign * (iso - level) > 0.0)
+        .map(|(at, _)| *at)
+        .collect();
+    let middles = if deep.is_empty() {
+        extremes(f, sign, iso)
+    } else {
+        deep
+    };
+    let radii: Vec<f64> = middles
+        .par_iter()
+        .filter_map(|u| distance(f, *u, iso, sign, to_phase))
+        .collect();
+    radii.into_iter().reduce(f64::min).map(|r| 2.0 * r)
+}
+
+/// The places where sign · f is least, all of them that a grid shows, as far as they are solid at `iso`.
+fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
+    let n = 32;
+    let points: Vec<Vec3> = (0..n * n * n)
+        .map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64 / n as f64))
+        .collect();
+    let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    f(&points, &mut v, &mut g);
+    let low = |i: usize| sign * v[i];
+    let near = |i: usize, d: [usize; 3]| {
+        let at = [i % n + d[0], i / n % n + d[1], i / (n * n) + d[2]].map(|c| c % n);
+        (at[2] * n + at[1]) * n + at[0]
+    };
+    let hollow = |i: &usize| {
+        (0..3).all(|a| {
+            [1, n - 1].into_iter().all(|s| {
+                low(*i)
+                    <= low(near(
+                        *i,
+                        core::array::from_fn(|b| if a == b { s } else { 0 }),
+                    ))
+            })
+        })
+    };
+    let mut found: Vec<Vec3> = Vec::new();
+    for i in (0..points.len()).filter(hollow) {
+        let at = critical(f, points[i], 2.0 / n as f64).map_or(points[i], |c| c.at);
+        let seen = |p: &Vec3| {
+            sub(*p, at)
+                .iter()
+                .all(|d| (d - d.round()).abs() < 0.5 / n as f64)
+        };
+        if sign * (iso - sample(f, at).0) > 0.0 && !found.iter().any(seen) {
+            found.push(at);
+        }
+    }
+    found
+}
+
+/// Distance (mm) from a solid point to the surface f = iso: the nearest of many rays, then the nearest point by
+/// alternating between the tangent plane's foot and the surface.
+fn distance(f: Function, u: Vec3, iso: f64, sign: f64, to_phase: &Mat3) -> Option<f64> {
+    let speed = spectral_norm(to_phase);
+    let back = transpose(to_phase);
+    let reach = |d: Vec3| first_beyond(f, u, apply(to_phase, d), speed, |v| sign * (v - iso));
+    // Points of a sphere on a Fibonacci spiral.
+    let golden = core::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let mut rays: Vec<(f64, Vec3)> = (0..DIRECTIONS)
+        .filter_map(|k| {
+            let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+            let (s, c) = (golden * k as f64).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            let d = [r * c, r * s, z];
+            Some((reach(d)?, d))
+        })
+        .collect();
+    rays.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let nearest = rays.iter().take(3).map(|&(mut least, mut d)| {
+        // Turn the ray towards the outward normal where it ends, as long as that shortens it.
+        let mut turn = 1.0;
+        while turn > 1e-3 {
+            let (_, g) = sample(f, add(u, scale(apply(to_phase, d), least)));
+            let normal = unit(scale(apply(&back, g), sign));
+            let next = unit(add(scale(d, 1.0 - turn), scale(normal, turn)));
+            match reach(next) {
+                Some(s) if s < least - 1e-13 * least => (least, d) = (s, next),
+                _ => turn *= 0.5,
+            }
+        }
+        least
+    });
+    nearest.reduce(f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::{PI, TAU};
+
+    /// cos x + cos y + cos z.
+    fn primitive(u: &[Vec3], v: &mut [f64], g: &mut [Vec3]) {
+        for ((u, v), g) in u.iter().zip(v).zip(g) {
+            *v = u.iter().map(|c| (TAU * c).cos()).sum();
+            *g = u.map(|c| -TAU * (TAU * c).sin());
+        }
+    }
+
+    /// cos x.
+    fn slabs(u: &[Vec3], v: &mut [f64], g: &mut [Vec3]) {
+        for ((u, v), g) in u.iter().zip(v).zip(g) {
+            *v = (TAU * u[0]).cos();
+            *g = [-TAU * (TAU * u[0]).sin(), 0.0, 0.0];
+        }
+    }
+
+    fn cubic(wavelength: f64) -> Mat3 {
+        crate::math::IDENTITY.map(|r| r.map(|v| v / wavelength))
+    }
+
+    fn about(found: Option<f64>, want: f64, tolerance: f64) {
+        assert!(
+            found.is_some_and(|v| (v - want).abs() <= tolerance * want),
+            "{found:?} is not {want}"
+        );
+    }
+
+    #[test]
+    fn flat_walls_have_their_closed_form() {
+        // |cos 2πx| ≤ t about x = 1/4: half width asin(t)/2π.
+        for t in [0.01, 0.3, 0.9f64] {
+            about(wall(&slabs, t, &cubic(5.0)), 5.0 * t.asin() / PI, 1e-8);
+        }
+        // Stretched and turned: only the length along the phase's gradient counts.
+        let r = crate::math::rotation([20.0, 35.0, 50.0]);
+        let map = crate::math::product(
+            &[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]],
+            &transpose(&r),
+        );
+        about(wall(&slabs, 0.3, &map), 4.0 * 0.3f64.asin() / PI, 1e-8);
+    }
+
+    #[test]
+    fn thin_walls_are_their_first_order() {
+        // The gradient of the primitive on f = 0 is greatest where sin² sums most: cos = 0 on all axes, |∇f| = 2π√3.
+        let t = 1e-3;
+        about(
+            wall(&primitive, t, &cubic(4.0)),
+            4.0 * 2.0 * t / (TAU * 3f64.sqrt()),
+            1e-5,
+        );
+    }
+
+    #[test]
+    fn no_wall_where_nothing_or_all_is_solid() {
+        assert_eq!(wall(&primitive, 0.0, &cubic(4.0)), None);
+        assert_eq!(wall(&primitive, -1.0, &cubic(4.0)), None);
+        assert_eq!(wall(&primitive, f64::NAN, &cubic(4.0)), None);
+        assert_eq!(wall(&primitive, 3.5, &cubic(4.0)), None);
+    }
+
+    /// Radius about the saddle (1/2, 1/2, 0) of the primitive's lower neck, in periods: it is round to no order, so the
+    /// nearest point of cos x + cos y = t − 1 in the plane z = 0 across it is found by scanning.
+    fn neck_radius(t: f64) -> f64 {
+        // About x = y = 1/2, z = 0: f = −cos a − cos b + cos c. Nearest within all directions by brute force.
+        let mut least = f64::INFINITY;
+        let n = 400;
+        for i in 0..=n {
+            for j in 0..=n {
+                let (th, ph) = (
+                    PI / 2.0 * f64::from(i) / f64::from(n),
+                    PI / 2.0 * f64::from(j) / f64::from(n),
+                );
+                let d = [th.sin() * ph.cos(), th.sin() * ph.sin(), th.cos()];
+                let f = |r: f64| {
+                    -(TAU * r * d[0]).cos() - (TAU * r * d[1]).cos() + (TAU * r * d[2]).cos() - t
+                };
+                if f(least.min(0.5)) <= 0.0 {
+                    continue;
+                }
+                let (mut lo, mut hi) = (0.0, least.min(0.5));
+                for _ in 0..40 {
+                    let mid = 0.5 * (lo + hi);
+                    if f(mid) > 0.0 { hi = mid } else { lo = mid }
+                }
+                least = hi;
+            }
+        }
+        least
+    }
+
+    #[test]
+    fn necks_of_the_primitive() {
+        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        assert_eq!(necks.len(), 3);
+        for t in [-0.9, -0.5, 0.0] {
+            let want = 2.0 * neck_radius(t);
+            about(
+                neck(&primitive, Part::Lower, t, &necks, &cubic(1.0)),
+                want,
+                1e-4,
+            );
+            // Lengths scale with the wavelength.
+            about(
+                neck(&primitive, Part::Lower, t, &necks, &cubic(7.0)),
+                7.0 * want,
+                1e-4,
+            );
+        }
+        // The upper part is the lower one moved by half a period.
+        let upper = super::super::connectivity(&primitive, Part::Upper).necks;
+        about(
+            neck(&primitive, Part::Upper, 0.5, &upper, &cubic(1.0)),
+            2.0 * neck_radius(-0.5),
+            1e-4,
+        );
+    }
+
+    #[test]
+    fn a_stretched_neck_is_as_thin_as_its_short_side() {
+        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        let map = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]];
+        let long = neck(&primitive, Part::Lower, -0.9, &necks, &map);
+        // Necks along z keep their sections; the nearest point lies across, at cos a = 1 − (1 + t)…: solved on one axis.
+        let section = 2.0 * ((0.9f64).acos() / TAU).min(f64::INFINITY);
+        assert!(
+            long.is_some_and(|v| v <= section * 1.001 && v > 0.5 * section),
+            "{long:?} {section}"
+        );
+    }
+
+    #[test]
+    fn loose_pieces_are_measured_themselves() {
+        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        // Near its minimum −3 the primitive's pieces are balls: f ≈ −3 + (2π r)²/2.
+        let t = -3.0 + 1e-4;
+        about(
+            neck(&primitive, Part::Lower, t, &necks, &cubic(2.0)),
+            2.0 * 2.0 * (2e-4f64).sqrt() / TAU,
+            1e-4,
+        );
+        assert_eq!(
+            neck(&primitive, Part::Lower, -3.5, &necks, &cubic(2.0)),
+            None
+        );
+        assert_eq!(
+            neck(&primitive, Part::Lower, 3.5, &necks, &cubic(2.0)),
+            None
+        );
+        assert_eq!(
+            neck(&primitive, Part::Sheet, 0.5, &necks, &cubic(2.0)),
+            None
+        );
+    }
+}
