@@ -231,7 +231,7 @@ impl Sweep<'_> {
                     let sides = [
                         (self.grid.edge(node, k), [0; 3]),
                         (self.grid.edge(mid, l), wrap),
-                        (self.grid.edge(node, (k + 1 | (l + 1)) - 1), [0; 3]),
+                        (self.grid.edge(node, ((k + 1) | (l + 1)) - 1), [0; 3]),
                     ];
                     let mut crossed = sides.iter().filter(|(e, _)| forest.has(*e));
                     if let (Some((a, wa)), Some((b, wb))) =

@@ -39,9 +39,15 @@ impl Grid {
                     format!("{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible", hi - lo, (hi - lo) / edge),
                 ));
             }
-            let mut stops = vec![lo, hi];
+            let mut stops = Vec::new();
             solid.region.planes(a, &mut stops);
             stops.retain(|s| (lo..=hi).contains(s));
+            // A curved surface touches its bounds in a point; keep nodes off it, where it would leave a needle.
+            for (end, beyond) in [(lo, lo - 0.5 * edge), (hi, hi + 0.5 * edge)] {
+                if !stops.contains(&end) {
+                    stops.push(beyond);
+                }
+            }
             stops.sort_by(f64::total_cmp);
             // Planes closer than a hundredth of a step would make needles; the first of them stands for all.
             stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
@@ -50,7 +56,8 @@ impl Grid {
                 let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
                 nodes.extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
             }
-            nodes.extend([stops[stops.len() - 1], hi.max(stops[stops.len() - 1]) + edge]);
+            let last = stops[stops.len() - 1];
+            nodes.extend([last, hi.max(last) + edge]);
         }
         let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
         let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));

@@ -154,6 +154,9 @@ pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scra
         return None;
     }
     list_vertices(s, &nodes);
+    if region {
+        find_planes(s, &*solid.region, grid.margin);
+    }
     if let Some(f) = lattice {
         solve(s, &nodes, f, On::Lattice);
     }
@@ -275,6 +278,7 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
                 }
                 let (ra, rb) = if s.region.is_empty() { (-1.0, -1.0) } else { (s.region[a], s.region[b]) };
                 let on = match rb > 0.0 {
+                    // Perhaps; `find_planes` looks.
                     true if ra == 0.0 => On::Plane,
                     // The lattice may end the solid before the region does; `solve` finds out.
                     true => On::Region,
@@ -284,6 +288,22 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
                 let reach = if up { length } else { -length };
                 s.vertices.push(Vertex { solid, reach, t: 1.0, low: low as u32, axis: axis as u8, on, skin });
             }
+        }
+    }
+}
+
+/// Tells edges that leave the region through a flat face on their solid node from those that run within the face and
+/// leave it farther on, at the rim.
+fn find_planes(s: &mut Scratch, region: &dyn Field, margin: f64) {
+    let Scratch { points, values, vertices, .. } = s;
+    let candidates: Vec<usize> = (0..vertices.len()).filter(|&i| vertices[i].on == On::Plane).collect();
+    points.clear();
+    points.extend(candidates.iter().map(|&i| vertices[i].at(margin)));
+    values.resize(points.len(), 0.0);
+    region.values(points, values);
+    for (&i, v) in candidates.iter().zip(&*values) {
+        if *v <= 0.0 {
+            vertices[i].on = On::Region;
         }
     }
 }
@@ -314,7 +334,8 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
             let (a, b) = if v.up() { (samples[low], samples[high]) } else { (samples[high], samples[low]) };
             // Vertices on flat faces are settled; on others the void end is positive if this function crosses.
             if v.on != On::Plane && b > 0.0 {
-                let t = f64::from(-a) / (f64::from(b) - f64::from(a));
+                // Along a flat face the value stays zero up to the rim: come from the void.
+                let t = if a == 0.0 { 1.0 } else { f64::from(-a) / (f64::from(b) - f64::from(a)) };
                 roots.push(Root { vertex: from as u32, lo: 0.0, hi: 1.0, t: t.clamp(0.0, 1.0) });
             }
             from += 1;
@@ -495,11 +516,11 @@ fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) -> Option<Vec<u32>> {
             to[a] = if up { to[a] + 1 } else { to[a] - 1 };
             to
         };
-        // Void directions that leave the region.
+        // Directions in which a flat face on the node ends the region.
         let leaves = |a: usize, up: bool| {
-            let to = step(at, a, up);
-            let n = to[0] + to[1] * nodes.stride[1] + to[2] * nodes.stride[2];
-            !solid(to) && s.region[n] > 0.0
+            let low = if up { at } else { step(at, a, false) };
+            let row = low[2] * nodes.shape[1] + low[1];
+            s.crossed[a][row] >> low[0] & 1 == 1 && s.vertices[number(s, a, row, low[0]) as usize].on == On::Plane
         };
         let out: Vec<(usize, bool)> =
             (0..3).flat_map(|a| [(a, false), (a, true)]).filter(|&(a, up)| leaves(a, up)).collect();

@@ -42,7 +42,10 @@ pub struct HalfSpace {
 /// Refuses numbers that are not finite, naming the first.
 fn finite(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     match v.iter().find(|x| !x.is_finite()) {
-        Some(x) => Err(Fault::new(at, format!("{x} is not a position: give three finite numbers, mm"))),
+        Some(x) => Err(Fault::new(
+            at,
+            format!("{x} is not a position: give three finite numbers, mm"),
+        )),
         None => Ok(v),
     }
 }
@@ -52,7 +55,10 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
     if v.is_finite() && v > 0.0 {
         Ok(v)
     } else {
-        Err(Fault::new(at, format!("{v} mm is not a length: give a finite number above zero")))
+        Err(Fault::new(
+            at,
+            format!("{v} mm is not a length: give a finite number above zero"),
+        ))
     }
 }
 
@@ -60,7 +66,10 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
 fn direction(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     let largest = finite(at, v)?.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if largest == 0.0 {
-        return Err(Fault::new(at, "[0, 0, 0] has no direction: give a vector with a length"));
+        return Err(Fault::new(
+            at,
+            "[0, 0, 0] has no direction: give a vector with a length",
+        ));
     }
     if v.iter().filter(|x| **x != 0.0).count() == 1 {
         return Ok(v.map(|x| if x == 0.0 { 0.0 } else { x.signum() }));
@@ -75,7 +84,15 @@ fn coordinate_axis(n: Vec3) -> Option<usize> {
 
 /// The range of n · (p − o) over a box; rounding keeps the order of the terms, so it holds for computed values.
 fn along(b: &Aabb, o: Vec3, n: Vec3) -> Interval {
-    let end = |far: bool| [0, 1, 2].map(|a| if (n[a] > 0.0) == far { b.max[a] } else { b.min[a] });
+    let end = |far: bool| {
+        [0, 1, 2].map(|a| {
+            if (n[a] > 0.0) == far {
+                b.max[a]
+            } else {
+                b.min[a]
+            }
+        })
+    };
     Interval::new(dot(sub(end(false), o), n), dot(sub(end(true), o), n))
 }
 
@@ -95,7 +112,11 @@ fn apart(b: &Aabb, o: Vec3, axes: &[usize]) -> Interval {
 #[inline]
 fn joined<const N: usize>(q: [f64; N]) -> f64 {
     let inside = q.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-    if inside <= 0.0 { inside } else { q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt() }
+    if inside <= 0.0 {
+        inside
+    } else {
+        q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt()
+    }
 }
 
 /// The gradient of `joined`, the pieces' own gradients being `g`.
@@ -104,7 +125,12 @@ fn joined_gradient<const N: usize>(q: [f64; N], g: [Vec3; N]) -> Vec3 {
     if d > 0.0 {
         (0..N).fold([0.0; 3], |s, i| add(s, scale(g[i], q[i].max(0.0) / d)))
     } else {
-        (1..N).fold((q[0], g[0]), |m, i| if q[i] > m.0 { (q[i], g[i]) } else { m }).1
+        (1..N)
+            .fold(
+                (q[0], g[0]),
+                |m, i| if q[i] > m.0 { (q[i], g[i]) } else { m },
+            )
+            .1
     }
 }
 
@@ -116,7 +142,10 @@ impl Cuboid {
         for (a, name) in ["x", "y", "z"].iter().enumerate() {
             if min[a] >= max[a] {
                 let found = format!("{name} runs from {} to {} mm", min[a], max[a]);
-                return Err(Fault::new("max", format!("{found}: each side of a box must have a length above zero")));
+                return Err(Fault::new(
+                    "max",
+                    format!("{found}: each side of a box must have a length above zero"),
+                ));
             }
         }
         Ok(Cuboid { min, max })
@@ -134,7 +163,11 @@ impl Cuboid {
     fn gradient(&self, p: Vec3) -> Vec3 {
         let mut g = [[0.0; 3]; 3];
         for a in 0..3 {
-            g[a][a] = if self.min[a] - p[a] > p[a] - self.max[a] { -1.0 } else { 1.0 };
+            g[a][a] = if self.min[a] - p[a] > p[a] - self.max[a] {
+                -1.0
+            } else {
+                1.0
+            };
         }
         joined_gradient(self.sides(p), g)
     }
@@ -154,7 +187,10 @@ impl Cuboid {
 
 impl Shape for Cuboid {
     fn bounds(&self) -> Aabb {
-        Aabb { min: self.min, max: self.max }
+        Aabb {
+            min: self.min,
+            max: self.max,
+        }
     }
 
     fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
@@ -180,7 +216,13 @@ impl Cylinder {
             let (from, to) = (base[a], base[a] + axis[a] * height);
             (a, [from.min(to), from.max(to)])
         });
-        Ok(Cylinder { base, axis, radius, height, aligned })
+        Ok(Cylinder {
+            base,
+            axis,
+            radius,
+            height,
+            aligned,
+        })
     }
 
     /// Signed distances to the barrel and to the caps.
@@ -190,11 +232,17 @@ impl Cylinder {
         match self.aligned {
             Some((a, [lo, hi])) => {
                 let (u, v) = (d[(a + 1) % 3], d[(a + 2) % 3]);
-                [(u * u + v * v).sqrt() - self.radius, (lo - p[a]).max(p[a] - hi)]
+                [
+                    (u * u + v * v).sqrt() - self.radius,
+                    (lo - p[a]).max(p[a] - hi),
+                ]
             }
             None => {
                 let h = dot(d, self.axis);
-                [norm(sub(d, scale(self.axis, h))) - self.radius, (-h).max(h - self.height)]
+                [
+                    norm(sub(d, scale(self.axis, h))) - self.radius,
+                    (-h).max(h - self.height),
+                ]
             }
         }
     }
@@ -210,12 +258,22 @@ impl Cylinder {
         let mut radial = unit(sub(d, scale(self.axis, h)));
         if radial == [0.0; 3] {
             // On the axis every radial direction is as good: take one square to it.
-            let least = (0..3).fold(0, |m, a| if self.axis[a].abs() < self.axis[m].abs() { a } else { m });
+            let least = (0..3).fold(0, |m, a| {
+                if self.axis[a].abs() < self.axis[m].abs() {
+                    a
+                } else {
+                    m
+                }
+            });
             let mut e = [0.0; 3];
             e[least] = 1.0;
             radial = unit(cross(self.axis, e));
         }
-        let cap = if h * 2.0 < self.height { scale(self.axis, -1.0) } else { self.axis };
+        let cap = if h * 2.0 < self.height {
+            scale(self.axis, -1.0)
+        } else {
+            self.axis
+        };
         joined_gradient(self.sides(p), [radial, cap])
     }
 
@@ -227,7 +285,10 @@ impl Cylinder {
                 let cap = |v: f64| (lo - v).max(v - hi);
                 let ends = [b.min[a], b.max[a]].map(cap);
                 let low = ends[0].min(ends[1]).min(cap(middle));
-                (apart(b, self.base, &[(a + 1) % 3, (a + 2) % 3]), Interval::new(low, ends[0].max(ends[1])))
+                (
+                    apart(b, self.base, &[(a + 1) % 3, (a + 2) % 3]),
+                    Interval::new(low, ends[0].max(ends[1])),
+                )
             }
             None => {
                 let far = norm(b.size()) / 2.0;
@@ -236,11 +297,19 @@ impl Cylinder {
                 let far = far + 1e-14 * (far + norm(sub(b.center(), self.base)));
                 let h = along(b, self.base, self.axis);
                 let cap = |v: f64| (-v).max(v - self.height);
-                let low = cap((self.height / 2.0).clamp(h.lo, h.hi)).min(cap(h.lo)).min(cap(h.hi));
-                (Interval::new((r - far).max(0.0), r + far), Interval::new(low, cap(h.lo).max(cap(h.hi))))
+                let low = cap((self.height / 2.0).clamp(h.lo, h.hi))
+                    .min(cap(h.lo))
+                    .min(cap(h.hi));
+                (
+                    Interval::new((r - far).max(0.0), r + far),
+                    Interval::new(low, cap(h.lo).max(cap(h.hi))),
+                )
             }
         };
-        Interval::new(joined([r.lo - self.radius, h.lo]), joined([r.hi - self.radius, h.hi]))
+        Interval::new(
+            joined([r.lo - self.radius, h.lo]),
+            joined([r.hi - self.radius, h.hi]),
+        )
     }
 }
 
@@ -277,7 +346,10 @@ impl Shape for Cylinder {
 impl Sphere {
     /// The ball about a point (mm). Errors if a number is not finite or the radius not above zero.
     pub fn new(center: Vec3, radius: f64) -> Result<Self, Fault> {
-        Ok(Sphere { center: finite("center", center)?, radius: length("radius", radius)? })
+        Ok(Sphere {
+            center: finite("center", center)?,
+            radius: length("radius", radius)?,
+        })
     }
 
     #[inline]
@@ -298,7 +370,11 @@ impl Sphere {
 
 impl Shape for Sphere {
     fn bounds(&self) -> Aabb {
-        Aabb { min: self.center, max: self.center }.grown(self.radius)
+        Aabb {
+            min: self.center,
+            max: self.center,
+        }
+        .grown(self.radius)
     }
 
     fn level_planes(&self, _: usize, _: f64, _: &mut Vec<f64>) {}
@@ -312,7 +388,10 @@ impl HalfSpace {
     /// The side of the plane through `point` (mm) that `normal` (any length) points away from. Errors if a
     /// number is not finite or the normal is zero.
     pub fn new(point: Vec3, normal: Vec3) -> Result<Self, Fault> {
-        Ok(HalfSpace { point: finite("point", point)?, normal: direction("normal", normal)? })
+        Ok(HalfSpace {
+            point: finite("point", point)?,
+            normal: direction("normal", normal)?,
+        })
     }
 
     #[inline]
@@ -333,7 +412,11 @@ impl Shape for HalfSpace {
     fn bounds(&self) -> Aabb {
         let mut b = Aabb::ALL;
         if let Some(a) = coordinate_axis(self.normal) {
-            *(if self.normal[a] > 0.0 { &mut b.max[a] } else { &mut b.min[a] }) = self.point[a];
+            *(if self.normal[a] > 0.0 {
+                &mut b.max[a]
+            } else {
+                &mut b.min[a]
+            }) = self.point[a];
         }
         b
     }
@@ -384,13 +467,34 @@ mod tests {
 
     fn shapes() -> Vec<(&'static str, Arc<dyn Shape>)> {
         vec![
-            ("box", Arc::new(Cuboid::new([-1.0, -2.0, 0.1], [1.3, 0.7, 2.0]).unwrap())),
-            ("z cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [0.0, 0.0, 3.0], 0.8, 1.7).unwrap())),
-            ("-x cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [-1.0, 0.0, 0.0], 0.8, 1.7).unwrap())),
-            ("cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5], 0.8, 1.7).unwrap())),
-            ("ball", Arc::new(Sphere::new([0.1, 0.2, -0.3], 1.1).unwrap())),
-            ("half-space", Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5]).unwrap())),
-            ("y half-space", Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [0.0, -7.0, 0.0]).unwrap())),
+            (
+                "box",
+                Arc::new(Cuboid::new([-1.0, -2.0, 0.1], [1.3, 0.7, 2.0]).unwrap()),
+            ),
+            (
+                "z cylinder",
+                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [0.0, 0.0, 3.0], 0.8, 1.7).unwrap()),
+            ),
+            (
+                "-x cylinder",
+                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [-1.0, 0.0, 0.0], 0.8, 1.7).unwrap()),
+            ),
+            (
+                "cylinder",
+                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5], 0.8, 1.7).unwrap()),
+            ),
+            (
+                "ball",
+                Arc::new(Sphere::new([0.1, 0.2, -0.3], 1.1).unwrap()),
+            ),
+            (
+                "half-space",
+                Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5]).unwrap()),
+            ),
+            (
+                "y half-space",
+                Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [0.0, -7.0, 0.0]).unwrap()),
+            ),
         ]
     }
 
@@ -410,8 +514,17 @@ mod tests {
         let c = Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 2.0, 10.0).unwrap();
         assert_eq!(at(&c, [0.0, 0.0, 5.0]), -2.0);
         assert_eq!(at(&c, [3.0, 4.0, 14.0]), 5.0);
-        assert_eq!(at(&Sphere::new([1.0, 0.0, 0.0], 2.0).unwrap(), [4.0, 4.0, 0.0]), 3.0);
-        assert_eq!(at(&HalfSpace::new([0.0, 0.0, 1.0], [0.0, 0.0, 9.0]).unwrap(), [7.0, 8.0, 3.0]), 2.0);
+        assert_eq!(
+            at(&Sphere::new([1.0, 0.0, 0.0], 2.0).unwrap(), [4.0, 4.0, 0.0]),
+            3.0
+        );
+        assert_eq!(
+            at(
+                &HalfSpace::new([0.0, 0.0, 1.0], [0.0, 0.0, 9.0]).unwrap(),
+                [7.0, 8.0, 3.0]
+            ),
+            2.0
+        );
         assert_eq!(b.volume(), Some(48.0));
         assert_eq!(c.volume(), Some(40.0 * PI));
     }
@@ -446,12 +559,29 @@ mod tests {
 
     #[test]
     fn bad_numbers_are_refused_where_they_stand() {
-        assert_eq!(Cuboid::new([0.0; 3], [1.0, 0.0, 1.0]).unwrap_err().at, "max");
-        assert_eq!(Cuboid::new([f64::NAN, 0.0, 0.0], [1.0; 3]).unwrap_err().at, "min");
+        assert_eq!(
+            Cuboid::new([0.0; 3], [1.0, 0.0, 1.0]).unwrap_err().at,
+            "max"
+        );
+        assert_eq!(
+            Cuboid::new([f64::NAN, 0.0, 0.0], [1.0; 3]).unwrap_err().at,
+            "min"
+        );
         assert_eq!(Sphere::new([0.0; 3], -1.0).unwrap_err().at, "radius");
-        assert_eq!(Sphere::new([0.0; 3], f64::INFINITY).unwrap_err().at, "radius");
-        assert_eq!(Cylinder::new([0.0; 3], [0.0; 3], 1.0, 1.0).unwrap_err().at, "axis");
-        assert_eq!(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 0.0).unwrap_err().at, "height");
+        assert_eq!(
+            Sphere::new([0.0; 3], f64::INFINITY).unwrap_err().at,
+            "radius"
+        );
+        assert_eq!(
+            Cylinder::new([0.0; 3], [0.0; 3], 1.0, 1.0).unwrap_err().at,
+            "axis"
+        );
+        assert_eq!(
+            Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 0.0)
+                .unwrap_err()
+                .at,
+            "height"
+        );
         assert_eq!(HalfSpace::new([0.0; 3], [0.0; 3]).unwrap_err().at, "normal");
     }
 
