@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-
 import trabecula as lt
 
 stem = lt.region.mesh(Path(__file__).parent / "parts" / "hip_stem.stl")  # a closed surface, mm

@@ -40,15 +40,22 @@ def formula(name, x, y, z):
         "frd": lambda: 4 * cx * cy * cz - pairs,
         "fischer_koch_s": lambda: c2x * sy * cz + cx * c2y * sz + sx * cy * c2z,
         "lidinoid": lambda: 0.5 * (s2x * cy * sz + s2y * cz * sx + s2z * cx * sy) - 0.5 * pairs + 0.15,
-        "split_p": lambda: 1.1 * (s2x * sz * cy + s2y * sx * cz + s2z * sy * cx)
-        - 0.2 * pairs
-        - 0.4 * (c2x + c2y + c2z),
+        "split_p": lambda: 1.1 * (s2x * sz * cy + s2y * sx * cz + s2z * sy * cx) - 0.2 * pairs - 0.4 * (c2x + c2y + c2z),
     }[name]()
 
 
-CELLS = (
-    "gyroid gyroid_mirrored diamond primitive iwp neovius frd fischer_koch_s lidinoid split_p".split()
-)
+CELLS = [
+    "gyroid",
+    "gyroid_mirrored",
+    "diamond",
+    "primitive",
+    "iwp",
+    "neovius",
+    "frd",
+    "fischer_koch_s",
+    "lidinoid",
+    "split_p",
+]
 # Levels (of f <= t) at which the fraction is wanted; rounded values near 0.05, 0.1, 0.2, 0.3, 0.5, 0.7 and 0.9.
 LEVELS = {
     "gyroid": [-1.33, -1.2, -0.91, -0.62, 0.0, 0.62, 1.2],
@@ -137,7 +144,10 @@ def main():
         print(f"range = [{least:.5f}, {greatest:.5f}]")
         print(f"euler = {euler(name)}")
         print(f"area = {area(name, a.lines // 2, a.samples // 2):.5f}")
-        print("lower = [" + ", ".join(f"[{t}, {v:.6f}]" for t, v in zip(LEVELS[name], fractions)) + "]\n", flush=True)
+        print(
+            "lower = [" + ", ".join(f"[{t}, {v:.6f}]" for t, v in zip(LEVELS[name], fractions, strict=True)) + "]\n",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Writes the generated reference: docs/generated/{design,command,python}.md, from the schema, the help and the docstrings."""
+"""Writes docs/generated/{design,command,python}.md from the schema, the help pages and the docstrings."""
 
+import contextlib
 import inspect
 import json
 import subprocess
@@ -12,7 +13,7 @@ import trabecula
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs" / "generated"
 STAMP = "<!-- Made by scripts/design_reference.py; do not edit. -->"
-COMMANDS = "new check mesh voxels measure cells render".split()
+COMMANDS = ["new", "check", "mesh", "voxels", "measure", "cells", "render"]
 
 
 def kind(schema):
@@ -40,7 +41,9 @@ def properties(schema):
     """Rows for the keys of an object, those of its alternatives included."""
     rows = []
     for key, value in schema.get("properties", {}).items():
-        needed = "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
+        needed = (
+            "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
+        )
         rows.append(f"| `{key}` | {kind(value)} | {needed} | {one_line(value.get('description', ''))} |")
     for join in ("anyOf", "oneOf"):
         for part in schema.get(join, []):
@@ -76,14 +79,13 @@ def python():
         members = [(name, thing)]
         if inspect.ismodule(thing) or inspect.isclass(thing):
             public = sorted(k for k in getattr(thing, "__all__", vars(thing)) if not k.startswith("_"))
-            owned = ((k, getattr(thing, k)) for k in public)
+            owned = [(k, getattr(thing, k)) for k in public]
+            owned = [(k, m) for k, m in owned if callable(m) or hasattr(m, "__get__")]
             keep = inspect.isclass(thing)
             members += [(f"{name}.{k}", m) for k, m in owned if keep or getattr(m, "__module__", "") == thing.__name__]
         for label, member in members:
-            try:
+            with contextlib.suppress(TypeError, ValueError):
                 label += str(inspect.signature(member)) if callable(member) else ""
-            except (TypeError, ValueError):
-                pass
             lines += [f"### `{label}`", "", inspect.getdoc(member) or "", ""]
     return "\n".join(lines)
 

@@ -11,7 +11,6 @@ polynomial's t realises minus the porosity asked for.
 from pathlib import Path
 
 import numpy as np
-
 import trabecula
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,12 +31,12 @@ BLUE, RED, GREEN, GREY = "#1f5fa8", "#c0392b", "#2a7f4f", "#8a8a8a"
 
 def exact(cell, porosity):
     """t at which f <= t leaves this porosity."""
-    return np.array([trabecula.iso(cell, 1 - p, part="lower") for p in porosity])
+    return trabecula.iso(cell, 1 - porosity, part="lower")
 
 
 def realised(cell, levels):
     """The porosity of f <= t."""
-    return np.array([1 - trabecula.fraction(cell, t, part="lower") for t in levels])
+    return 1 - trabecula.fraction(cell, levels, part="lower")
 
 
 def odd_fit(cell):
@@ -87,7 +86,7 @@ class Panel:
             self.text(x + w / 2, y + h + 40, words, 13)
 
     def curve(self, u, v, colour, dash="", width=2.0):
-        points = " ".join("{:.2f},{:.2f}".format(*self.at(*q)) for q in zip(u, v))
+        points = " ".join("{:.2f},{:.2f}".format(*self.at(*q)) for q in zip(u, v, strict=True))
         self.parts.append(
             f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}"/>'
         )
@@ -138,7 +137,7 @@ def picture(fits):
 def plain(odd):
     """Coefficients of p^9 ... p^0 of an odd polynomial in p - 1/2."""
     out = np.poly1d([0.0])
-    for k, c in zip(range(1, 10, 2), odd):
+    for k, c in zip(range(1, 10, 2), odd, strict=True):
         out = out + c * np.poly1d([1, -0.5]) ** k
     return out.coeffs
 
@@ -151,8 +150,9 @@ def page(odd, rows):
         "",
         "![t against porosity for gyroid and diamond, with the errors of polynomials](../images/porosity.svg)",
         "",
-        'Figure 1 of "Equations for SPARTAN Gyroids and Diamonds", remade: solid is f ≤ t. The blue line is the exact table;',
-        "below, the porosity realised by a polynomial's t minus the porosity asked for. [Errata](../concepts/errata.md).",
+        'Figure 1 of "Equations for SPARTAN Gyroids and Diamonds", remade: solid is f ≤ t. The blue line is the exact',
+        "table; below, the porosity realised by a polynomial's t minus the porosity asked for.",
+        "[Errata](../concepts/errata.md).",
         "",
         "| cell | polynomial | largest error, 0.005 ≤ p ≤ 0.995 | rms | largest, 0.05 ≤ p ≤ 0.95 |",
         "|---|---|---|---|---|",

@@ -81,7 +81,7 @@ def stem():
     rows = natural_spline(knots, STATIONS, at)
 
     rings = []
-    for u, row in zip(at, rows):
+    for u, row in zip(at, rows, strict=True):
         round_off = np.sqrt(1 - (1 - min(u, TIP) / TIP) ** 2)
         rings.append(section(row, (round_off, round_off), 0.0))
     last = rows[-1]

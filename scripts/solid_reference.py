@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reference numbers for corpus/designs, independent of the core: numpy and the formulas, written out once more here.
 
-Volume and areas come from dense parallel lines, as in cell_reference.py; Euler number, pieces and cavities from the cubes
-of a fine grid (scipy labels them). Where a number is known in closed form, corpus/solids.toml says so and uses that.
+Volume and areas come from dense parallel lines, as in cell_reference.py; Euler number, pieces and cavities from the
+cubes of a fine grid (scipy labels them). Where a number is known in closed form, corpus/solids.toml uses that.
 
     python scripts/solid_reference.py [--lines 300] [NAME ...]
 """
@@ -63,22 +63,31 @@ def iso(n):
 
 
 SHEAR = np.array([[1, 0, -np.tan(np.radians(20))], [0, 1, 0], [0, 0, 1]])
+MOVED = (0.3, 0.7, 1.1)
 T30 = 0.463951958  # gyroid, sheet, fraction 0.30: corpus/cells.toml
 D35 = 0.365449953  # diamond, f >= t, fraction 0.35: the sheet of fraction 0.3 has this half-level, and V(-t) = 0.35
 
 # name: (bounds, region, lattice), negative inside
 SOLIDS = {
-    "lamellae": (((-5,) * 3, (5,) * 3), lambda p: box(p, (-5,) * 3, (5,) * 3), lambda p: np.cos(TAU * p[0] / 5) + 0 * p[1] * p[2]),
-    "gyroid_half": (((-5,) * 3, (5,) * 3), lambda p: box(p, (-5,) * 3, (5,) * 3), lambda p: seen("gyroid", p, iso(5))),
+    "lamellae": (
+        ((-5,) * 3, (5,) * 3),
+        lambda p: box(p, (-5,) * 3, (5,) * 3),
+        lambda p: np.cos(TAU * (p[0] - 0.3) / 5) + 0 * p[1] * p[2],
+    ),
+    "gyroid_half": (
+        ((-5,) * 3, (5,) * 3),
+        lambda p: box(p, (-5,) * 3, (5,) * 3),
+        lambda p: seen("gyroid", p, iso(5), MOVED),
+    ),
     "gyroid_sheet_30": (
         ((0,) * 3, (10,) * 3),
         lambda p: box(p, (0,) * 3, (10,) * 3),
-        lambda p: np.abs(seen("gyroid", p, iso(5))) - T30,
+        lambda p: np.abs(seen("gyroid", p, iso(5), MOVED)) - T30,
     ),
     "diamond_upper_porous": (
         ((0,) * 3, (12, 10, 8)),
         lambda p: box(p, (0,) * 3, (12, 10, 8)),
-        lambda p: D35 - seen("diamond", p, np.diag([1 / 6, 1 / 5, 1 / 4])),
+        lambda p: D35 - seen("diamond", p, np.diag([1 / 6, 1 / 5, 1 / 4]), MOVED),
     ),
     "primitive_cavities": (
         ((-2.5,) * 3, (7.5,) * 3),
@@ -103,7 +112,7 @@ SOLIDS = {
     "linear_slab": (
         ((0,) * 3, (20, 8, 8)),
         lambda p: box(p, (0,) * 3, (20, 8, 8)),
-        lambda p: np.abs(seen("gyroid", p, iso(4))) - ramp(p[0], 2, 0.2, 18, 0.9),
+        lambda p: np.abs(seen("gyroid", p, iso(4), MOVED)) - ramp(p[0], 2, 0.2, 18, 0.9),
     ),
     "depth_ball": (
         ((-7,) * 3, (7,) * 3),
@@ -116,7 +125,7 @@ SOLIDS = {
         lambda p: np.abs(seen("diamond", p, iso(5))) - (0.4 + 0.1 * np.sin(p[0] / 3)),
     ),
     "skewed_lens": (
-        ((-9, -9, -1.5), (9, 9, 5.5)),
+        ((-9.5, -9.5, -1.5), (9.5, 9.5, 5.5)),
         lens,
         lambda p: -seen("neovius", p, iso(6) @ SHEAR),
     ),
@@ -124,12 +133,12 @@ SOLIDS = {
 
 
 def sweep(bounds, region, lattice, axis, n, samples):
-    """(part of the line that is solid, lattice crossings, cut crossings), summed over lines along `axis`, as measures."""
+    """(volume, this axis' share of the lattice and cut areas), from lines along `axis`."""
     low, high = (np.array(b, float) for b in bounds)
     size = high - low
     one, two = (k for k in range(3) if k != axis)
-    first = low[one] + size[one] * (np.arange(n) + 0.371) / n
-    second = low[two] + size[two] * (np.arange(n) + 0.138) / n
+    first = low[one] + size[one] * (np.arange(n) + 0.5) / n
+    second = low[two] + size[two] * (np.arange(n) + 0.5) / n
     # A margin, so that surfaces on the bounds are crossed.
     start, stop = low[axis] - 0.01 * size[axis], high[axis] + 0.01 * size[axis]
     along = np.linspace(start, stop, samples + 1)
@@ -170,7 +179,7 @@ def topology(bounds, region, lattice, n):
     """(Euler number of the surface, pieces, cavities) from the cubes of a grid whose corners are all inside."""
     low, high = (np.array(b, float) for b in bounds)
     step = (high - low).max() / n
-    axes = [np.arange(a - 1.63 * step, b + 2 * step, step) for a, b in zip(low, high)]
+    axes = [np.arange(a - 1.63 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     p = np.meshgrid(*axes, indexing="ij", sparse=True)
     inside = np.maximum(region(p), lattice(p)) <= 0
     euler = 0
@@ -178,7 +187,9 @@ def topology(bounds, region, lattice, n):
         block = inside
         for axis in range(3):
             if mask >> axis & 1:
-                block = np.logical_and(*(np.take(block, np.arange(block.shape[axis])[s], axis) for s in (slice(1, None), slice(None, -1))))
+                block = np.logical_and(
+                    *(np.take(block, np.arange(block.shape[axis])[s], axis) for s in (slice(1, None), slice(None, -1)))
+                )
         euler += (-1) ** bin(mask).count("1") * int(block.sum())
     pieces = ndimage.label(inside)[1]
     voids = ndimage.label(~inside, np.ones((3, 3, 3)))[1] - 1

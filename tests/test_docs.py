@@ -1,8 +1,8 @@
 """The code in the README, the docs and the examples runs and does what it says.
 
-In a page's order, in one folder that holds `examples/`: a `toml` block that begins with `# file: NAME` is saved under that
-name and checked; another that has `schema` is checked as it stands; the rest must parse. Lines of a `sh` block are commands.
-`python` blocks of a page share their names.
+In a page's order, in one folder that holds `examples/`: a `toml` block that begins with `# file: NAME` is saved under
+that name and checked; another that has `schema` is checked as it stands; the rest must parse. Lines of a `sh` block are
+commands. `python` blocks of a page share their names.
 """
 
 import os

@@ -1,0 +1,118 @@
+"""The numbers of corpus/, through Python and through the command."""
+
+import json
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trabecula
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = pytest.importorskip("tomli")
+
+CORPUS = Path(__file__).resolve().parent.parent / "corpus"
+CELLS = tomllib.loads((CORPUS / "cells.toml").read_text(encoding="utf-8"))
+SOLIDS = tomllib.loads((CORPUS / "solids.toml").read_text(encoding="utf-8"))
+TOLERANCE = CELLS["tolerance"]
+PARTS = ("sheet", "lower", "upper")
+
+
+def command(*words):
+    """What `trabecula ... --json` prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", "trabecula", *map(str, words), "--json"], capture_output=True, text=True, timeout=600
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def listed():
+    """`trabecula cells --json` by name."""
+    return {cell["name"]: cell for cell in command("cells")}
+
+
+cells = pytest.mark.parametrize(("name", "row"), CELLS["cells"].items(), ids=list(CELLS["cells"]))
+
+
+def test_corpus_has_every_named_cell(listed):
+    assert set(listed) == set(CELLS["cells"])
+
+
+@cells
+def test_range(name, row, listed):
+    assert listed[name]["range"] == pytest.approx(row["range"], abs=TOLERANCE["range"])
+
+
+@cells
+def test_fraction_at_levels(name, row):
+    t, fraction = np.array(row["lower_at"]).T
+    assert np.abs(trabecula.fraction(name, t, part="lower") - fraction).max() < TOLERANCE["fraction"]
+    assert np.abs(trabecula.fraction(name, t, part="upper") - (1 - fraction)).max() < TOLERANCE["fraction"]
+
+
+@cells
+def test_level_realises_its_fraction(name, row):
+    """The reference's fraction at our level is the one asked for: levels differ by the error over dV/dt."""
+    for part in PARTS:
+        if f"iso_{part}" not in row:
+            continue
+        asked, t = np.array(row[f"iso_{part}"]).T
+        step = 1e-3
+        below, at, above = trabecula.fraction(name, t + np.array([[-step], [0.0], [step]]), part=part)
+        assert np.abs(at - asked).max() < TOLERANCE["fraction"], part
+        error = (trabecula.iso(name, asked, part=part) - t) * (above - below) / (2 * step)
+        assert np.abs(error).max() < TOLERANCE["fraction"], part
+
+
+@cells
+def test_fraction_and_level_are_inverse(name, row):
+    asked = np.array([0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.98])
+    for part in PARTS:
+        back = trabecula.fraction(name, trabecula.iso(name, asked, part=part), part=part)
+        assert np.abs(back - asked).max() < TOLERANCE["fraction"], part
+
+
+@cells
+def test_limits_of_connectivity(name, row, listed):
+    for part in ("lower", "upper"):
+        least, tolerance = row[f"connected_{part}"]
+        assert listed[name]["connected_fraction"][part][-1][0] == pytest.approx(least, abs=tolerance), part
+
+
+def agree(found, row):
+    """Compares a measure report with its row."""
+    assert found["closed"]
+    for key, expected in row.items():
+        if isinstance(expected, list):
+            value, tolerance = expected
+            assert found[key] == pytest.approx(value, rel=tolerance, abs=tolerance), key
+        elif key != "why":
+            assert found[key] == expected, key
+
+
+solids = pytest.mark.parametrize(("name", "row"), SOLIDS.items(), ids=list(SOLIDS))
+
+
+def test_every_design_has_a_row():
+    assert {path.stem for path in (CORPUS / "designs").glob("*.toml")} == set(SOLIDS)
+
+
+@solids
+def test_solid_by_python(name, row):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", trabecula.DesignWarning)
+        agree(trabecula.load(CORPUS / "designs" / f"{name}.toml").build().mesh(per_cell=32).measure(), row)
+
+
+@solids
+def test_solid_by_the_command_and_a_file(name, row, tmp_path):
+    """The same measures of the STL as it is read back, after rounding to single precision."""
+    design = CORPUS / "designs" / f"{name}.toml"
+    command("mesh", design, "-o", tmp_path / "out.stl", "--per-cell", 32)
+    agree(command("measure", tmp_path / "out.stl", "--region", design), row)
