@@ -80,7 +80,17 @@ class Solid(Picture):
 
     def estimate(self, edge: float | None = None, per_cell: float | None = None) -> dict:
         """What a surface will take: grid cells, triangles, bytes of memory, bytes of a binary STL."""
-        return self._core.estimate(self.spacing(edge, per_cell))
+        return self._need(self.spacing(edge, per_cell))
+
+    def _need(self, spacing: float) -> dict:
+        """The estimate; at fine spacings that of a coarser one, scaled, since triangles grow as spacing to the −2."""
+        need = self._core.estimate(spacing)
+        coarse = self.wavelength / 32
+        if spacing < coarse:
+            far = self._core.estimate(coarse)
+            for key in ("triangles", "memory", "stl"):
+                need[key] = far[key] * (coarse / spacing) ** 2
+        return need
 
     def mesh(
         self,
@@ -95,7 +105,7 @@ class Solid(Picture):
         result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
         """
         spacing = self.spacing(edge, per_cell)
-        need = self._core.estimate(spacing)
+        need = self._need(spacing)
         fits(need["memory"], f"{need['triangles']:.3g} triangles", spacing, 2)
         core = self._core.mesh(spacing, _threads(threads), progress)
         return Mesh(core, self._core.region, spacing)
@@ -112,7 +122,7 @@ class Solid(Picture):
         extension(path, ("stl",))
         check_place(path)
         spacing = self.spacing(edge, per_cell)
-        need = self._core.estimate(spacing)
+        need = self._need(spacing)
         fits(need["stl"], f"{need['triangles']:.3g} triangles", spacing, 2, os.fspath(path))
         with whole_file(path) as temporary:
             return self._core.stream_stl(temporary, spacing, _threads(threads), progress)

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
+use trabecula::io;
 
 use crate::design::Folder;
 use crate::error;
@@ -283,5 +284,19 @@ impl Voxels {
             .clone()
             .into_pyarray(py)
             .reshape([nz, ny, nx])
+    }
+
+    /// Writes the voxels to `path` as `npy` (indexed [x, y, z]) or `vti`.
+    fn write(&self, py: Python<'_>, path: PathBuf, extension: &str) -> PyResult<()> {
+        let v = &self.voxels;
+        let written = run(py, None, None, |_| {
+            let mut out = BufWriter::with_capacity(1 << 20, File::create(path)?);
+            match extension {
+                "npy" => io::npy::write(v, &mut out)?,
+                _ => io::vti::write(v, &mut out)?,
+            }
+            out.flush()
+        })?;
+        Ok(written?)
     }
 }
