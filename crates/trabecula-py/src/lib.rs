@@ -99,16 +99,34 @@ mod _core {
                 return Err(pyo3::exceptions::PyValueError::new_err(message));
             }
         };
-        let bad = |v: &&f64| if to_iso { !(**v > 0.0 && **v < 1.0) } else { !v.is_finite() };
+        let bad = |v: &&f64| {
+            if to_iso {
+                !(**v > 0.0 && **v < 1.0)
+            } else {
+                !v.is_finite()
+            }
+        };
         if let Some(v) = values.iter().find(bad) {
             let name = if to_iso { "fraction" } else { "iso" };
-            let allowed = if to_iso { "greater than 0 and less than 1" } else { "a finite number" };
-            return Err(pyo3::exceptions::PyValueError::new_err(format!("{name} is {v}; it must be {allowed}")));
+            let allowed = if to_iso {
+                "greater than 0 and less than 1"
+            } else {
+                "a finite number"
+            };
+            return Err(pyo3::exceptions::PyValueError::new_err(format!(
+                "{name} is {v}; it must be {allowed}"
+            )));
         }
         let node = crate::design::node(cell, 0)?;
         let done = crate::run::run(py, None, None, |_| {
             let cell = trabecula::design::cell(&node)?;
-            let one = |v: &f64| if to_iso { cell.iso(part, *v).0 } else { cell.fraction(part, *v) };
+            let one = |v: &f64| {
+                if to_iso {
+                    cell.iso(part, *v).0
+                } else {
+                    cell.fraction(part, *v)
+                }
+            };
             Ok(values.iter().map(one).collect())
         })?;
         done.map_err(|e| crate::error::design(py, &e))

@@ -201,12 +201,24 @@ pub struct Region {
 impl Region {
     /// The region of a design, or of a file with the key `region` alone, as text; `folder` is where paths start.
     #[staticmethod]
-    fn from_text(py: Python<'_>, text: &str, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
+    fn from_text(
+        py: Python<'_>,
+        text: &str,
+        json: bool,
+        file: String,
+        folder: PathBuf,
+    ) -> PyResult<Region> {
         let region = run(py, None, None, |_| {
-            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
+            let node = if json {
+                Node::from_json(text)?
+            } else {
+                Node::from_toml(text)?
+            };
             design::region(&node, &Folder(folder))
         })?;
-        region.map(|region| Region { region }).map_err(|e| error::design(py, &e.in_file(&file)))
+        region
+            .map(|region| Region { region })
+            .map_err(|e| error::design(py, &e.in_file(&file)))
     }
 
     /// The region under the key `region` of a dictionary.
@@ -214,7 +226,9 @@ impl Region {
     fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>, folder: PathBuf) -> PyResult<Region> {
         let node = crate::design::node(data, 0)?;
         let region = run(py, None, None, |_| design::region(&node, &Folder(folder)))?;
-        region.map(|region| Region { region }).map_err(|e| error::design(py, &e))
+        region
+            .map(|region| Region { region })
+            .map_err(|e| error::design(py, &e))
     }
 
     /// Signed distance at points (n, 3), mm, negative inside.
@@ -292,8 +306,8 @@ impl Voxels {
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, File::create(path)?);
             match extension {
-                "npy" => io::npy::write(v, &mut out)?,
-                _ => io::vti::write(v, &mut out)?,
+                "npy" => io::write_npy(v.shape, &v.solid, &mut out)?,
+                _ => io::write_vti(v, &mut out)?,
             }
             out.flush()
         })?;

@@ -36,7 +36,12 @@ pub struct Cell {
 impl Cell {
     /// A cell from its series.
     pub fn new(series: Series) -> Cell {
-        Cell { series, range: OnceLock::new(), table: OnceLock::new(), connect: Default::default() }
+        Cell {
+            series,
+            range: OnceLock::new(),
+            table: OnceLock::new(),
+            connect: Default::default(),
+        }
     }
 
     /// The series.
@@ -49,11 +54,15 @@ impl Cell {
         *self.range.get_or_init(|| {
             const N: usize = 48;
             let node = |i: usize| i as f64 / N as f64;
-            let u: Vec<Vec3> = (0..N * N * N).map(|i| [node(i % N), node(i / N % N), node(i / N / N)]).collect();
+            let u: Vec<Vec3> = (0..N * N * N)
+                .map(|i| [node(i % N), node(i / N % N), node(i / N / N)])
+                .collect();
             let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
             self.gradients(&u, &mut v, &mut g);
             let climb = |sign: f64| {
-                let best = (0..v.len()).max_by(|&a, &b| (sign * v[a]).total_cmp(&(sign * v[b]))).unwrap_or(0);
+                let best = (0..v.len())
+                    .max_by(|&a, &b| (sign * v[a]).total_cmp(&(sign * v[b])))
+                    .unwrap_or(0);
                 let (mut p, mut top, mut slope) = (u[best], sign * v[best], g[best]);
                 // A step along the gradient of length |g| / curvature never overshoots a maximum.
                 let step = sign / self.series.curvature();
@@ -97,7 +106,8 @@ impl Cell {
     }
 
     fn table(&self) -> &quantile::Quantile {
-        self.table.get_or_init(|| quantile::Quantile::new(&self.series))
+        self.table
+            .get_or_init(|| quantile::Quantile::new(&self.series))
     }
 
     /// A bound of |∂f/∂x| (per mm) where phases are u = `to_phase` · x: the largest of a grid of samples, plus what
@@ -105,7 +115,9 @@ impl Cell {
     pub fn steepness(&self, to_phase: &Mat3) -> f64 {
         const N: usize = 24;
         let node = |i: usize| i as f64 / N as f64;
-        let u: Vec<Vec3> = (0..N * N * N).map(|i| [node(i % N), node(i / N % N), node(i / N / N)]).collect();
+        let u: Vec<Vec3> = (0..N * N * N)
+            .map(|i| [node(i % N), node(i / N % N), node(i / N / N)])
+            .collect();
         let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
         self.gradients(&u, &mut v, &mut g);
         let back = transpose(to_phase);
@@ -117,12 +129,16 @@ impl Cell {
     /// The intervals of solid fraction in which the periodic solid is one piece in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
         let intervals = &self.connectivity(part).intervals;
-        intervals.iter().map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0))).collect()
+        intervals
+            .iter()
+            .map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0)))
+            .collect()
     }
 
     /// How the part's connectivity changes with its level.
     pub fn connectivity(&self, part: Part) -> &Connectivity {
-        self.connect[part as usize].get_or_init(|| connectivity(&|u, v, g| self.gradients(u, v, g), part))
+        self.connect[part as usize]
+            .get_or_init(|| connectivity(&|u, v, g| self.gradients(u, v, g), part))
     }
 
     /// Minimum wall thickness (sheet) or narrowest neck diameter (lower, upper) at level `iso`, in mm, where
@@ -154,11 +170,26 @@ mod tests {
     fn levels_meet_the_exact_table() {
         let mut worst = 0.0f64;
         for (name, exact) in [
-            ("primitive", [1.621288768, 0.699339635, -0.350257343, -1.621288768]),
-            ("gyroid", [1.197145736, 0.616271908, -0.310118842, -1.197145736]),
-            ("diamond", [0.956046064, 0.486154728, -0.244025551, -0.956046064]),
-            ("iwp", [2.690253869, 1.616965106, -0.536676981, -3.004409420]),
-            ("neovius", [4.85675248, 0.97441010, -0.45917736, -4.85675248]),
+            (
+                "primitive",
+                [1.621288768, 0.699339635, -0.350257343, -1.621288768],
+            ),
+            (
+                "gyroid",
+                [1.197145736, 0.616271908, -0.310118842, -1.197145736],
+            ),
+            (
+                "diamond",
+                [0.956046064, 0.486154728, -0.244025551, -0.956046064],
+            ),
+            (
+                "iwp",
+                [2.690253869, 1.616965106, -0.536676981, -3.004409420],
+            ),
+            (
+                "neovius",
+                [4.85675248, 0.97441010, -0.45917736, -4.85675248],
+            ),
             ("frd", [1.84234279, 1.12393167, -0.15343933, -2.15672535]),
             ("fischer_koch_s", [0.785258, 0.403888, -0.203414, -0.785258]),
         ] {
@@ -167,7 +198,10 @@ mod tests {
                 let error = (cell.fraction(Part::Lower, t) - (1.0 - p)).abs();
                 println!("{name} {p} {error:.2e}");
                 worst = worst.max(error);
-                assert!(error < 1e-4, "{name} at porosity {p}: fraction off by {error:.2e}");
+                assert!(
+                    error < 1e-4,
+                    "{name} at porosity {p}: fraction off by {error:.2e}"
+                );
             }
         }
         // The promise is 1e-4; cubes of 1/96 cell do several times better.
@@ -182,11 +216,17 @@ mod tests {
                 let p = f64::from(i) / 50.0;
                 for part in [Part::Sheet, Part::Lower, Part::Upper] {
                     let (t, slope) = cell.iso(part, p);
-                    assert!((cell.fraction(part, t) - p).abs() < 1e-9, "{} {part:?} {p}", n.name);
+                    assert!(
+                        (cell.fraction(part, t) - p).abs() < 1e-9,
+                        "{} {part:?} {p}",
+                        n.name
+                    );
                     assert!(slope.is_finite() && slope != 0.0);
                 }
                 let t = cell.iso(Part::Sheet, p).0;
-                let sum = cell.fraction(Part::Sheet, t) + cell.fraction(Part::Lower, -t) + cell.fraction(Part::Upper, t);
+                let sum = cell.fraction(Part::Sheet, t)
+                    + cell.fraction(Part::Lower, -t)
+                    + cell.fraction(Part::Upper, t);
                 assert!((sum - 1.0).abs() < 1e-6, "{} {p}: {sum}", n.name);
             }
         }
@@ -206,7 +246,10 @@ mod tests {
             ("fischer_koch_s", Part::Lower, 0.1148),
         ] {
             let found = cell(name).connected_fraction(part);
-            assert!((found[0][0] - limit).abs() < 1e-4, "{name} {part:?}: {found:?}, expected from {limit}");
+            assert!(
+                (found[0][0] - limit).abs() < 1e-4,
+                "{name} {part:?}: {found:?}, expected from {limit}"
+            );
             assert!((found[found.len() - 1][1] - 1.0).abs() < 1e-12);
         }
     }
@@ -222,7 +265,10 @@ mod tests {
             ("frd", -7.0, 2.0),
         ] {
             let r = cell(name).range();
-            assert!((r.lo - lo).abs() < 1e-6 && (r.hi - hi).abs() < 1e-6, "{name} {r:?}");
+            assert!(
+                (r.lo - lo).abs() < 1e-6 && (r.hi - hi).abs() < 1e-6,
+                "{name} {r:?}"
+            );
         }
     }
 }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::fault::Fault;
 use crate::field::{Block, Field};
+use crate::io::stl;
 use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 use crate::solid::Solid;
@@ -127,7 +128,11 @@ fn each_tile<T: Send>(
             .into_par_iter()
             .with_max_len(1)
             .map(|i| {
-                let mut mine = scratch.lock().ok().and_then(|mut s| s.pop()).unwrap_or_default();
+                let mut mine = scratch
+                    .lock()
+                    .ok()
+                    .and_then(|mut s| s.pop())
+                    .unwrap_or_default();
                 let patch = tile::extract(solid, grid, grid.tile(i), &mut mine);
                 if let Ok(mut s) = scratch.lock() {
                     s.push(mine);
@@ -167,22 +172,38 @@ pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surf
     let mut out = Surface::default();
     // Vertices on the borders of tiles, by grid edge.
     let mut border: HashMap<u64, u32> = HashMap::new();
-    each_tile(solid, &grid, progress, |p| p, |patch| {
-        let mut names = Vec::with_capacity(patch.vertices.len());
-        for ((v, key), shared) in patch.vertices.iter().zip(&patch.keys).zip(&patch.shared) {
-            let vertices = &mut out.mesh.vertices;
-            let new = u32::try_from(vertices.len())
-                .map_err(|_| Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL")))?;
-            let name = if *shared { *border.entry(*key).or_insert(new) } else { new };
-            if name == new {
-                vertices.push(*v);
+    each_tile(
+        solid,
+        &grid,
+        progress,
+        |p| p,
+        |patch| {
+            let mut names = Vec::with_capacity(patch.vertices.len());
+            for ((v, key), shared) in patch.vertices.iter().zip(&patch.keys).zip(&patch.shared) {
+                let vertices = &mut out.mesh.vertices;
+                let new = u32::try_from(vertices.len()).map_err(|_| {
+                    Stopped::Refused(Fault::new(
+                        "edge",
+                        "more than 2^32 vertices; use a larger edge, or STL",
+                    ))
+                })?;
+                let name = if *shared {
+                    *border.entry(*key).or_insert(new)
+                } else {
+                    new
+                };
+                if name == new {
+                    vertices.push(*v);
+                }
+                names.push(name);
             }
-            names.push(name);
-        }
-        out.mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
-        out.cut.extend_from_slice(&patch.cut);
-        Ok(())
-    })?;
+            out.mesh
+                .triangles
+                .extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+            out.cut.extend_from_slice(&patch.cut);
+            Ok(())
+        },
+    )?;
     Ok(out)
 }
 
@@ -203,15 +224,22 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
     out.write_all(&[0; 84]).map_err(Stopped::Io)?;
     let cook = |patch: Patch| {
         let corners = |t: &[u32; 3]| t.map(|v| patch.vertices[v as usize]);
-        let mut part = Summary { triangles: patch.triangles.len() as u64, ..Summary::default() };
+        let mut part = Summary {
+            triangles: patch.triangles.len() as u64,
+            ..Summary::default()
+        };
         let mut records = Vec::with_capacity(50 * patch.triangles.len());
         for (t, cut) in patch.triangles.iter().zip(&patch.cut) {
             let t = corners(t);
             let [a, b, c] = t.map(|p| sub(p, middle));
             part.volume += dot(a, cross(b, c)) / 6.0;
             let area = norm(cross(sub(b, a), sub(c, a))) / 2.0;
-            *(if *cut { &mut part.area_cut } else { &mut part.area_lattice }) += area;
-            push_record(&mut records, t.map(|p| p.map(|x| x as f32)));
+            *(if *cut {
+                &mut part.area_cut
+            } else {
+                &mut part.area_lattice
+            }) += area;
+            stl::push_record(&mut records, t.map(|p| p.map(|x| x as f32)));
         }
         (part, records)
     };
@@ -226,11 +254,11 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
         }
         out.write_all(&records).map_err(Stopped::Io)
     })?;
-    let mut header = [b' '; 84];
-    let title = concat!("binary STL, mm, by trabecula ", env!("CARGO_PKG_VERSION"));
-    header[..title.len()].copy_from_slice(title.as_bytes());
-    header[80..].copy_from_slice(&(summary.triangles as u32).to_le_bytes());
-    out.seek(io::SeekFrom::Start(0)).and_then(|_| out.write_all(&header)).and_then(|()| out.flush()).map_err(Stopped::Io)?;
+    let header = stl::header(summary.triangles as u32);
+    out.seek(io::SeekFrom::Start(0))
+        .and_then(|_| out.write_all(&header))
+        .and_then(|()| out.flush())
+        .map_err(Stopped::Io)?;
     Ok(summary)
 }
 
@@ -254,53 +282,54 @@ pub struct Voxels {
 pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxels, Stopped> {
     Grid::new(solid, step).map_err(|f| Stopped::Refused(Fault::new("step", f.message)))?;
     let bounds = solid.region.bounds();
-    let shape = bounds.size().map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
+    let shape = bounds
+        .size()
+        .map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
     let count = shape.iter().map(|&n| n as f64).product::<f64>();
     if count > (1u64 << 33) as f64 {
-        let message = format!("{step} mm makes {count:.2e} voxels; at most 8.6e9 are possible: use a step above {:.3} mm", step * (count / 8e9).cbrt());
+        let message = format!(
+            "{step} mm makes {count:.2e} voxels; at most 8.6e9 are possible: use a step above {:.3} mm",
+            step * (count / 8e9).cbrt()
+        );
         return Err(Stopped::Refused(Fault::new("step", message)));
     }
     let extent = shape.map(|n| n as f64 * step);
     let origin = [0, 1, 2].map(|a| bounds.center()[a] - extent[a] / 2.0);
-    let axes = [0, 1, 2].map(|a| (0..shape[a]).map(|i| origin[a] + (i as f64 + 0.5) * step).collect::<Vec<f64>>());
-    let mut out = Voxels { origin, step, shape, solid: vec![0; shape.iter().product()] };
+    let axes = [0, 1, 2].map(|a| {
+        (0..shape[a])
+            .map(|i| origin[a] + (i as f64 + 0.5) * step)
+            .collect::<Vec<f64>>()
+    });
+    let mut out = Voxels {
+        origin,
+        step,
+        shape,
+        solid: vec![0; shape.iter().product()],
+    };
     let layer = shape[0] * shape[1];
     let slab = (layer * rayon::current_num_threads()).max(1);
     for (n, layers) in out.solid.chunks_mut(slab).enumerate() {
-        layers.par_chunks_mut(layer).enumerate().for_each(|(i, layer)| {
-            let z = n * rayon::current_num_threads() + i;
-            let block = Block { axes: [&axes[0], &axes[1], &axes[2][z..=z]] };
-            let mut samples = vec![0f32; layer.len()];
-            layer.fill(1);
-            let fields = [Some(&*solid.region as &dyn Field), solid.field.as_deref()];
-            for f in fields.into_iter().flatten() {
-                f.fill(&block, &mut samples);
-                for (o, v) in layer.iter_mut().zip(&samples) {
-                    *o &= u8::from(*v <= 0.0);
+        layers
+            .par_chunks_mut(layer)
+            .enumerate()
+            .for_each(|(i, layer)| {
+                let z = n * rayon::current_num_threads() + i;
+                let block = Block {
+                    axes: [&axes[0], &axes[1], &axes[2][z..=z]],
+                };
+                let mut samples = vec![0f32; layer.len()];
+                layer.fill(1);
+                let fields = [Some(&*solid.region as &dyn Field), solid.field.as_deref()];
+                for f in fields.into_iter().flatten() {
+                    f.fill(&block, &mut samples);
+                    for (o, v) in layer.iter_mut().zip(&samples) {
+                        *o &= u8::from(*v <= 0.0);
+                    }
                 }
-            }
-        });
+            });
         if !progress.step((n + 1) as u64, shape[2].div_ceil(slab / layer) as u64) {
             return Err(Stopped::Interrupted);
         }
     }
     Ok(out)
-}
-
-/// One triangle of a binary STL: normal, corners, no attributes.
-#[inline]
-fn push_record(out: &mut Vec<u8>, t: [[f32; 3]; 3]) {
-    let [a, b, c] = t;
-    let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
-    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let long = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    let s = if long > 0.0 { 1.0 / long } else { 0.0 };
-    let floats = [
-        n[0] * s, n[1] * s, n[2] * s, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
-    ];
-    let mut record = [0u8; 50];
-    for (slot, v) in record.chunks_exact_mut(4).zip(floats) {
-        slot.copy_from_slice(&v.to_le_bytes());
-    }
-    out.extend_from_slice(&record);
 }

@@ -12,7 +12,10 @@ pub struct Fault {
 impl Fault {
     /// A fault at `at`.
     pub fn new(at: impl Into<String>, message: impl Into<String>) -> Self {
-        Fault { at: at.into(), message: message.into() }
+        Fault {
+            at: at.into(),
+            message: message.into(),
+        }
     }
 
     /// The same fault, its place moved under `key`.
@@ -28,7 +31,11 @@ impl Fault {
 
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        if self.at.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.at, self.message) }
+        if self.at.is_empty() {
+            f.write_str(&self.message)
+        } else {
+            write!(f, "{}: {}", self.at, self.message)
+        }
     }
 }
 

@@ -1,8 +1,4 @@
 //! File formats by extension. Formats are leaves: bytes in, mesh out; mesh in, `io::Write` out.
-//!
-//! Writers format chunks of fixed size in parallel and write them in order, so memory stays bounded and the
-//! bytes are the same whatever the thread count. Readers never trust a count: memory follows the bytes present.
-
 use std::io;
 use std::ops::Range;
 
@@ -11,21 +7,27 @@ use rayon::prelude::*;
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
-mod decimal;
 mod join;
-pub mod npy;
-pub mod obj;
-pub mod off;
-pub mod ply;
-pub mod stl;
+mod npy;
+mod number;
+mod obj;
+mod off;
+mod ply;
+pub(crate) mod stl;
 mod text;
-pub mod threemf;
-pub mod vti;
-mod xml;
-mod zip;
+mod threemf;
+mod vti;
+
+pub use npy::write_npy;
+pub use vti::write_vti;
+
+/// Extensions of the mesh formats that can be read.
+pub const READABLE: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
+/// Extensions of the mesh formats that can be written.
+pub const WRITABLE: [&str; 4] = ["stl", "ply", "obj", "3mf"];
 
 /// What a mesh file held.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Loaded {
     /// The mesh, vertices of equal position joined, in the file's own unit unless the format names one (3MF: mm).
     pub mesh: Mesh,
@@ -33,25 +35,44 @@ pub struct Loaded {
     pub in_mm: bool,
 }
 
-/// Reads a mesh from the bytes of a file whose name ends in `extension` (any letter case, no dot): stl, obj, ply, off, 3mf.
-///
-/// Polygons become fans of triangles. Vertices of bit-equal position (with −0 = 0) are joined, across bodies too;
-/// triangles stay as they are, in the file's order, even those of no area. A file that cannot be read whole, or
-/// that holds no triangle, is a fault that names the line or byte.
-pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
-    let extension = extension.to_ascii_lowercase();
-    let mesh = match extension.as_str() {
-        "stl" => stl::read(bytes)?,
-        "obj" => obj::read(bytes)?,
-        "ply" => ply::read(bytes)?,
-        "off" => off::read(bytes)?,
-        "3mf" => threemf::read(bytes)?,
-        other => {
-            let message = format!("cannot read mesh files named .{other}; use .stl, .obj, .ply, .off or .3mf");
-            return Err(Fault::new("", message));
-        }
+fn unknown(extension: &str, known: &[&str]) -> String {
+    let found = if extension.is_empty() {
+        "no extension".to_string()
+    } else {
+        format!("extension \"{extension}\"")
     };
-    Ok(Loaded { mesh, in_mm: extension == "3mf" })
+    format!("{found}: known mesh formats are {}", known.join(", "))
+}
+
+/// Reads a mesh from the bytes of a file whose name ends in `extension` (any letter case, no dot): stl, obj, ply,
+/// off, 3mf.
+///
+/// Polygons become fans of triangles; vertices that no face uses are dropped.
+///
+/// **Errors**: an unknown extension; an empty, truncated or malformed file (with line or byte); coordinates that
+/// are not finite; indices out of range; a file without faces.
+pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
+    let kind = extension.to_ascii_lowercase();
+    if !READABLE.contains(&kind.as_str()) {
+        return Err(Fault::new("", unknown(extension, &READABLE)));
+    }
+    if bytes.is_empty() {
+        return Err(Fault::new("", "the file is empty (0 bytes)"));
+    }
+    let mesh = match kind.as_str() {
+        "stl" => stl::read(bytes),
+        "obj" => obj::read(bytes),
+        "ply" => ply::read(bytes),
+        "off" => off::read(bytes),
+        _ => threemf::read(bytes),
+    }?;
+    if mesh.triangles.is_empty() {
+        return Err(Fault::new("", "the file holds no triangle"));
+    }
+    Ok(Loaded {
+        mesh,
+        in_mm: kind == "3mf",
+    })
 }
 
 /// Facts written into formats that carry metadata.
@@ -65,79 +86,160 @@ pub struct Metadata {
     pub application: String,
 }
 
-/// Writes a mesh in the format of `extension` (any letter case): stl (binary), ply (binary), obj, 3mf.
+/// Writes a mesh in the format of `extension` (any letter case, no dot): stl (binary), ply (binary), obj, 3mf.
 ///
-/// STL and 3MF carry the f32 nearest to each coordinate, PLY and OBJ the f64 itself. An error of kind `InvalidInput`
-/// says that the mesh does not fit the format: a coordinate that is not finite (in f32 where the format holds f32),
-/// a vertex index out of range, too many triangles, or an unknown extension.
-pub fn write_mesh<W: io::Write>(mesh: &Mesh, extension: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    match extension.to_ascii_lowercase().as_str() {
-        "stl" => stl::write(mesh, meta, out),
+/// The bytes do not depend on the number of threads.
+///
+/// **Errors**: whatever `out` reports, unchanged; `InvalidInput` for an unknown extension, an index out of range, a
+/// coordinate that is not finite in single precision, or more triangles or vertices than the format can count.
+pub fn write_mesh<W: io::Write>(
+    mesh: &Mesh,
+    extension: &str,
+    meta: &Metadata,
+    out: &mut W,
+) -> io::Result<()> {
+    let kind = extension.to_ascii_lowercase();
+    if !WRITABLE.contains(&kind.as_str()) {
+        return Err(invalid(unknown(extension, &WRITABLE)));
+    }
+    let count = mesh.vertices.len();
+    if let Some(i) = mesh
+        .triangles
+        .par_iter()
+        .position_first(|t| t.iter().any(|&v| v as usize >= count))
+    {
+        return Err(invalid(format!(
+            "triangle {i} is {:?}, but there are {count} vertices",
+            mesh.triangles[i]
+        )));
+    }
+    let outside = |p: &[f64; 3]| p.iter().any(|x| !(*x as f32).is_finite());
+    if let Some(i) = mesh.vertices.par_iter().position_first(outside) {
+        return Err(invalid(format!(
+            "vertex {i} at {:?} is not finite in single precision",
+            mesh.vertices[i]
+        )));
+    }
+    match kind.as_str() {
+        "stl" => stl::write(mesh, out),
+        "ply" => ply::write(mesh, out),
         "obj" => obj::write(mesh, meta, out),
-        "ply" => ply::write(mesh, meta, out),
-        "3mf" => threemf::write(mesh, meta, out),
-        other => Err(refused(format!("cannot write meshes as .{other}; use .stl, .ply, .obj or .3mf"))),
+        _ => threemf::write(mesh, meta, out),
     }
 }
 
-/// The error of a mesh that a format cannot hold.
-fn refused(message: String) -> io::Error {
+fn invalid(message: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, message)
 }
 
-/// Checks that coordinates are finite and at most `largest` in size, and that indices are in range.
-fn check(mesh: &Mesh, largest: f64) -> io::Result<()> {
-    let holds = |p: &[f64; 3]| p.iter().all(|x| x.abs() <= largest);
-    if let Some(i) = mesh.vertices.par_iter().position_first(|p| !holds(p)) {
-        let [x, y, z] = mesh.vertices[i];
-        return Err(refused(format!("vertex {i} is at ({x:e}, {y:e}, {z:e}); coordinates must be finite and at most {largest:e}")));
-    }
-    let count = mesh.vertices.len();
-    if let Some(i) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= count)) {
-        return Err(refused(format!("triangle {i} names vertices {:?}; the mesh has {count}", mesh.triangles[i])));
-    }
-    Ok(())
-}
-
-/// Makes items `0..count` in parallel and hands them on in order, a bounded number at a time.
-fn ordered<T: Send>(
+/// Makes pieces of `count` items, `chunk` at a time, on all threads, and takes them in order. A few pieces per
+/// thread are held at once; their limits depend on `chunk` alone.
+fn in_order<T: Send>(
     count: usize,
-    make: impl Fn(usize) -> T + Sync,
-    mut sink: impl FnMut(T) -> io::Result<()>,
+    chunk: usize,
+    make: impl Fn(Range<usize>) -> T + Sync,
+    mut take: impl FnMut(T) -> io::Result<()>,
 ) -> io::Result<()> {
+    let chunks = count.div_ceil(chunk);
     let batch = 4 * rayon::current_num_threads();
-    for start in (0..count).step_by(batch) {
-        let made: Vec<T> = (start..count.min(start + batch)).into_par_iter().map(&make).collect();
-        made.into_iter().try_for_each(&mut sink)?;
+    for first in (0..chunks).step_by(batch) {
+        let piece = |i: usize| make(i * chunk..count.min((i + 1) * chunk));
+        let made: Vec<T> = (first..chunks.min(first + batch))
+            .into_par_iter()
+            .map(piece)
+            .collect();
+        made.into_iter().try_for_each(&mut take)?;
     }
     Ok(())
 }
 
-/// Writes the records `0..count`, formatted in parallel by `format` in chunks of `CHUNK` records of about `size` bytes.
-fn write_records<W: io::Write>(
-    count: usize,
-    size: usize,
-    out: &mut W,
-    format: impl Fn(Range<usize>, &mut Vec<u8>) + Sync,
-) -> io::Result<()> {
-    let make = |chunk: usize| {
-        let range = chunk_range(chunk, count);
-        let mut bytes = Vec::with_capacity(range.len() * size);
-        format(range, &mut bytes);
-        bytes
-    };
-    ordered(count.div_ceil(CHUNK), make, |bytes| out.write_all(&bytes))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Records formatted at a time: 1 to 2 MB of text.
-const CHUNK: usize = 1 << 15;
+    /// A corner of a cube, outward.
+    pub fn tetrahedron() -> Mesh {
+        Mesh {
+            vertices: vec![
+                [0.0; 3],
+                [1.5, 0.0, 0.0],
+                [0.0, 2.25, 0.0],
+                [0.0, 0.0, 3.125],
+            ],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        }
+    }
 
-/// The records of chunk `chunk` of `0..count`.
-fn chunk_range(chunk: usize, count: usize) -> Range<usize> {
-    chunk * CHUNK..count.min((chunk + 1) * CHUNK)
-}
+    /// Every truncation below `whole` bytes is refused, and no garbled byte brings the reader down.
+    pub fn refuses_damage(extension: &str, bytes: &[u8], whole: usize) {
+        for n in 0..whole {
+            let r = read_mesh(&bytes[..n], extension);
+            assert!(
+                r.is_err(),
+                "{extension} cut at {n} of {} was taken",
+                bytes.len()
+            );
+        }
+        let mut seed = 3u64;
+        let mut next = || {
+            seed = seed
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (seed >> 33) as usize
+        };
+        for _ in 0..3000 {
+            let mut bad = bytes.to_vec();
+            for _ in 0..1 + next() % 4 {
+                let i = next() % bad.len();
+                bad[i] = next() as u8;
+            }
+            if let Ok(loaded) = read_mesh(&bad, extension) {
+                assert!(loaded.mesh.vertices.iter().flatten().all(|v| v.is_finite()));
+                let n = loaded.mesh.vertices.len() as u32;
+                assert!(loaded.mesh.triangles.iter().flatten().all(|v| *v < n));
+            }
+            let noise: Vec<u8> = (0..next() % 400).map(|_| next() as u8).collect();
+            assert!(read_mesh(&noise, extension).is_err());
+        }
+    }
 
-/// Text on one line: line breaks and other control characters become spaces.
-fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    #[test]
+    fn extensions_in_any_case_and_unknown_ones_named() {
+        let mesh = tetrahedron();
+        for kind in WRITABLE {
+            let mut bytes = Vec::new();
+            let upper = kind.to_uppercase();
+            write_mesh(&mesh, &upper, &Metadata::default(), &mut bytes).unwrap();
+            let back = read_mesh(&bytes, &upper).unwrap();
+            assert_eq!(back.mesh.volume(), mesh.volume(), "{kind}");
+            assert_eq!(back.in_mm, kind == "3mf");
+        }
+        let fault = read_mesh(b"x", "step").unwrap_err();
+        assert_eq!(
+            fault.message,
+            "extension \"step\": known mesh formats are stl, obj, ply, off, 3mf"
+        );
+        assert!(write_mesh(&mesh, "", &Metadata::default(), &mut Vec::new()).is_err());
+        for kind in READABLE {
+            assert_eq!(
+                read_mesh(b"", kind).unwrap_err().message,
+                "the file is empty (0 bytes)"
+            );
+        }
+    }
+
+    #[test]
+    fn meshes_that_no_file_can_hold_are_refused() {
+        for (v, t) in [
+            ([0.0, 0.0, 1e40], [0, 1, 2]),
+            ([0.0, f64::NAN, 0.0], [0, 1, 2]),
+            ([0.0; 3], [0, 1, 7]),
+        ] {
+            let mut mesh = tetrahedron();
+            mesh.vertices[1] = v;
+            mesh.triangles[2] = t;
+            let e = write_mesh(&mesh, "stl", &Metadata::default(), &mut Vec::new()).unwrap_err();
+            assert_eq!(e.kind(), io::ErrorKind::InvalidInput);
+        }
+    }
 }

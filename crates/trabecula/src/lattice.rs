@@ -8,7 +8,9 @@ use crate::cell::{Cell, Part, Term};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::{Affine, Map};
-use crate::math::{Aabb, Interval, Vec3, add, apply, dot, norm, scale, sin_cos_turns, sub, transpose};
+use crate::math::{
+    Aabb, Interval, Vec3, add, apply, dot, norm, scale, sin_cos_turns, sub, transpose,
+};
 
 /// How much of the cell is solid.
 #[derive(Clone)]
@@ -53,7 +55,14 @@ impl Lattice {
             Level::Iso(g) => g.constant(),
             Level::Fraction(g) => g.constant().map(|p| cell.iso(part, p).0),
         };
-        Lattice { cell, map, part, level, steepness, uniform }
+        Lattice {
+            cell,
+            map,
+            part,
+            level,
+            steepness,
+            uniform,
+        }
     }
 
     /// Fills the level t at points (mm).
@@ -184,9 +193,15 @@ impl Field for Lattice {
                     self.isos(&points, &mut isos);
                 }
                 match self.part {
-                    Part::Sheet => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = f.abs() - t as f32),
+                    Part::Sheet => row
+                        .iter_mut()
+                        .zip(&isos)
+                        .for_each(|(f, &t)| *f = f.abs() - t as f32),
                     Part::Lower => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f -= t as f32),
-                    Part::Upper => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = t as f32 - *f),
+                    Part::Upper => row
+                        .iter_mut()
+                        .zip(&isos)
+                        .for_each(|(f, &t)| *f = t as f32 - *f),
                 }
             }
         }
@@ -238,14 +253,30 @@ impl RowWaves {
                 }
             }
             let scaled = |a: f64| (t.amplitude * turn(a).0, t.amplitude * turn(a).1);
-            along_y.push(block.axes[1].iter().map(|y| scaled(k[1] * y + phase)).collect());
+            along_y.push(
+                block.axes[1]
+                    .iter()
+                    .map(|y| scaled(k[1] * y + phase))
+                    .collect(),
+            );
             along_z.push(block.axes[2].iter().map(|z| turn(k[2] * z)).collect());
         }
         let along_x = numbers
             .iter()
-            .map(|n| block.axes[0].iter().map(|x| turn(n * x)).map(|(c, s)| (c as f32, s as f32)).unzip())
+            .map(|n| {
+                block.axes[0]
+                    .iter()
+                    .map(|x| turn(n * x))
+                    .map(|(c, s)| (c as f32, s as f32))
+                    .unzip()
+            })
             .collect();
-        RowWaves { along_x, groups, along_y, along_z }
+        RowWaves {
+            along_x,
+            groups,
+            along_y,
+            along_z,
+        }
     }
 
     /// The complex amplitude of each wave along the row (j, k).
@@ -277,7 +308,14 @@ fn sum_waves(tables: &[(Vec<f32>, Vec<f32>)], coefficients: &[(f32, f32)], row: 
 pub fn sample_points(b: &Aabb, n: usize) -> Vec<Vec3> {
     let step = scale(b.size(), 1.0 / n as f64);
     let node = |i: usize, a: usize| (i as f64 + 0.5) * step[a];
-    (0..n * n * n).map(|i| add(b.min, [node(i % n, 0), node(i / n % n, 1), node(i / n / n, 2)])).collect()
+    (0..n * n * n)
+        .map(|i| {
+            add(
+                b.min,
+                [node(i % n, 0), node(i / n % n, 1), node(i / n / n, 2)],
+            )
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -292,11 +330,14 @@ mod tests {
 
     #[test]
     fn block_equals_points_and_bounds_hold() {
-        let map = Affine::rigid([4.0, 5.0, 6.0], [10.0, 20.0, 30.0], [0.1, 0.2, 0.3], &[]).expect("valid");
+        let map = Affine::rigid([4.0, 5.0, 6.0], [10.0, 20.0, 30.0], [0.1, 0.2, 0.3], &[])
+            .expect("valid");
         for part in [Part::Sheet, Part::Lower, Part::Upper] {
             let l = lattice(part, Level::Fraction(Grade::Constant(0.3)), map);
             let axis: Vec<f64> = (0..17).map(|i| 0.21 * f64::from(i) - 1.3).collect();
-            let block = Block { axes: [&axis, &axis, &axis] };
+            let block = Block {
+                axes: [&axis, &axis, &axis],
+            };
             let mut out = vec![0f32; block.len()];
             l.fill(&block, &mut out);
             let b = l.bound(&block.bounds());

@@ -1,7 +1,9 @@
 //! Maps from position (mm) to phase (turns).
 
 use crate::fault::Fault;
-use crate::math::{IDENTITY, Mat3, Vec3, apply, determinant, inverse, product, rotation, scale, transpose};
+use crate::math::{
+    IDENTITY, Mat3, Vec3, apply, determinant, inverse, product, rotation, scale, transpose,
+};
 
 /// An affine map u = M x + b.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +25,12 @@ impl Affine {
     ///
     /// # Errors
     /// Wavelengths that are not positive and finite, angles that are not finite, shears that flatten space.
-    pub fn rigid(wavelength: Vec3, rotate: Vec3, offset: Vec3, skew: &[Skew]) -> Result<Affine, Fault> {
+    pub fn rigid(
+        wavelength: Vec3,
+        rotate: Vec3,
+        offset: Vec3,
+        skew: &[Skew],
+    ) -> Result<Affine, Fault> {
         let d = per_wavelength(wavelength)?;
         finite("rotate", &rotate)?;
         let mut shear = IDENTITY;
@@ -40,10 +47,16 @@ impl Affine {
         if !(determinant(&shear) > 1e-6) {
             return Err(Fault::new(
                 "skew",
-                format!("these shears together flatten or invert space (determinant {:.3}); use smaller angles", determinant(&shear)),
+                format!(
+                    "these shears together flatten or invert space (determinant {:.3}); use smaller angles",
+                    determinant(&shear)
+                ),
             ));
         }
-        let matrix = product(&d, &product(&transpose(&rotation(rotate)), &inverse(&shear)));
+        let matrix = product(
+            &d,
+            &product(&transpose(&rotation(rotate)), &inverse(&shear)),
+        );
         Self::about(matrix, offset, wavelength)
     }
 
@@ -55,12 +68,20 @@ impl Affine {
     pub fn spartan(wavelength: Vec3, rotate: Vec3, offset: Vec3) -> Result<Affine, Fault> {
         let d = per_wavelength(wavelength)?;
         finite("rotate", &rotate)?;
-        Self::about(product(&transpose(&rotation(rotate)), &d), offset, wavelength)
+        Self::about(
+            product(&transpose(&rotation(rotate)), &d),
+            offset,
+            wavelength,
+        )
     }
 
     fn about(matrix: Mat3, offset: Vec3, wavelength: Vec3) -> Result<Affine, Fault> {
         finite("offset", &offset)?;
-        Ok(Affine { matrix, shift: scale(apply(&matrix, offset), -1.0), wavelength })
+        Ok(Affine {
+            matrix,
+            shift: scale(apply(&matrix, offset), -1.0),
+            wavelength,
+        })
     }
 }
 
@@ -74,7 +95,10 @@ fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
 fn per_wavelength(wavelength: Vec3) -> Result<Mat3, Fault> {
     for w in wavelength {
         if !(w > 0.0 && w.is_finite()) || !(1.0 / w).is_finite() {
-            return Err(Fault::new("wavelength", format!("{w} mm; a wavelength is a positive, finite length")));
+            return Err(Fault::new(
+                "wavelength",
+                format!("{w} mm; a wavelength is a positive, finite length"),
+            ));
         }
     }
     let mut d = IDENTITY;
@@ -138,13 +162,18 @@ mod tests {
 
     #[test]
     fn offset_moves_the_lattice_and_skew_shears_it() {
-        let plain = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("valid"));
-        let moved = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.3, -0.2, 5.0], &[]).expect("valid"));
+        let plain =
+            Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("valid"));
+        let moved = Map::Affine(
+            Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.3, -0.2, 5.0], &[]).expect("valid"),
+        );
         let (mut u, mut v) = ([[0.0; 3]], [[0.0; 3]]);
         plain.phases(&[[1.0, 2.0, 3.0]], &mut u);
         moved.phases(&[[1.3, 1.8, 8.0]], &mut v);
         assert!(norm(sub(u[0], v[0])) < 1e-14);
-        let skewed = Map::Affine(Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 2, 45.0)]).expect("valid"));
+        let skewed = Map::Affine(
+            Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 2, 45.0)]).expect("valid"),
+        );
         skewed.phases(&[[3.0, 0.0, 3.0]], &mut u);
         assert!(norm(sub(u[0], [0.0, 0.0, 3.0])) < 1e-14);
     }

@@ -147,14 +147,16 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
                 + w * (1.0 / 120.0
                     + w * (-1.0 / 5040.0
                         + w * (1.0 / 362880.0
-                            + w * (-1.0 / 39916800.0 + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
+                            + w * (-1.0 / 39916800.0
+                                + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
     let c = 1.0
         + w * (-0.5
             + w * (1.0 / 24.0
                 + w * (-1.0 / 720.0
                     + w * (1.0 / 40320.0
                         + w * (-1.0 / 3628800.0
-                            + w * (1.0 / 479001600.0 + w * (-1.0 / 87178291200.0 + w / 20922789888000.0)))))));
+                            + w * (1.0 / 479001600.0
+                                + w * (-1.0 / 87178291200.0 + w / 20922789888000.0)))))));
     // The quadrant modulo 4, as a float, so that no integer conversion breaks the vector loop.
     let k = q - 4.0 * ((q * 0.25 - 0.375 + ROUND) - ROUND);
     let odd = k == 1.0 || k == 3.0;
@@ -175,9 +177,15 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing; growing it by points gives their bounds.
-    pub const EMPTY: Aabb = Aabb { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+    pub const EMPTY: Aabb = Aabb {
+        min: [f64::INFINITY; 3],
+        max: [f64::NEG_INFINITY; 3],
+    };
     /// The box that contains everything.
-    pub const ALL: Aabb = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
+    pub const ALL: Aabb = Aabb {
+        min: [f64::NEG_INFINITY; 3],
+        max: [f64::INFINITY; 3],
+    };
 
     /// The smallest box that holds this one and `p`.
     pub fn with(mut self, p: Vec3) -> Aabb {
@@ -204,7 +212,10 @@ impl Aabb {
 
     /// The box grown by `by` on every side.
     pub fn grown(self, by: f64) -> Aabb {
-        Aabb { min: self.min.map(|v| v - by), max: self.max.map(|v| v + by) }
+        Aabb {
+            min: self.min.map(|v| v - by),
+            max: self.max.map(|v| v + by),
+        }
     }
 
     /// Its middle.
@@ -311,7 +322,10 @@ mod tests {
             let (s, c) = sin_cos_turns(u);
             let (ls, lc) = (core::f64::consts::TAU * (u - u.floor())).sin_cos();
             // The library's own argument 2πu is rounded by up to 4e-16.
-            assert!((s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15, "{u}: {s} {ls} {c} {lc}");
+            assert!(
+                (s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15,
+                "{u}: {s} {ls} {c} {lc}"
+            );
         }
     }
 

@@ -45,6 +45,9 @@ impl Mesh {
 
     /// Bounds of the vertices that triangles use.
     pub fn bounds(&self) -> Aabb {
-        self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &v| b.with(self.vertices[v as usize]))
+        self.triangles
+            .iter()
+            .flatten()
+            .fold(Aabb::EMPTY, |b, &v| b.with(self.vertices[v as usize]))
     }
 }

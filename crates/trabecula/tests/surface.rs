@@ -14,17 +14,29 @@ use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::measure::{non_manifold_vertices, self_intersections, size};
 use trabecula::mesh::Mesh;
-use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
+use trabecula::region::{
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union,
+};
 use trabecula::solid::Solid;
 
-fn lattice(name: &str, part: Part, level: Level, wavelength: [f64; 3], rotate: [f64; 3]) -> Arc<dyn Field> {
+fn lattice(
+    name: &str,
+    part: Part,
+    level: Level,
+    wavelength: [f64; 3],
+    rotate: [f64; 3],
+) -> Arc<dyn Field> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
     Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
 }
 
 fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
-    Solid { region, field, wavelength: 1.0 }
+    Solid {
+        region,
+        field,
+        wavelength: 1.0,
+    }
 }
 
 fn cube(edge: f64) -> Region {
@@ -37,19 +49,34 @@ fn ball(radius: f64) -> Region {
 
 /// The mesh as a file in single precision holds it.
 fn rounded(mesh: &Mesh) -> Mesh {
-    let vertices = mesh.vertices.iter().map(|v| v.map(|x| f64::from(x as f32) + 0.0)).collect();
-    Mesh { vertices, triangles: mesh.triangles.clone() }
+    let vertices = mesh
+        .vertices
+        .iter()
+        .map(|v| v.map(|x| f64::from(x as f32) + 0.0))
+        .collect();
+    Mesh {
+        vertices,
+        triangles: mesh.triangles.clone(),
+    }
 }
 
 /// Every guarantee, on the mesh as re-read from single precision.
 fn check(what: &str, s: &Surface) {
     let m = rounded(&s.mesh);
     let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(places.len(), m.vertices.len(), "{what}: vertices fall together in single precision");
+    assert_eq!(
+        places.len(),
+        m.vertices.len(),
+        "{what}: vertices fall together in single precision"
+    );
     assert_eq!(s.cut.len(), m.triangles.len());
     let found = size(&m);
     assert!(found.closed, "{what}: not closed");
-    assert_eq!(non_manifold_vertices(&m), 0, "{what}: a vertex with two fans");
+    assert_eq!(
+        non_manifold_vertices(&m),
+        0,
+        "{what}: a vertex with two fans"
+    );
     assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
     for i in 0..m.triangles.len() {
         let [a, b, c] = m.corners(i);
@@ -60,14 +87,23 @@ fn check(what: &str, s: &Surface) {
 #[test]
 fn a_sheet_of_32_samples_a_cell_is_within_1e_4_of_its_volume() {
     // |G| ≤ 0.463951958 has the fraction 0.3 (exact table); eight whole cells.
-    let field = lattice("gyroid", Part::Sheet, Level::Iso(Grade::Constant(0.463951958)), [1.0; 3], [0.0; 3]);
+    let field = lattice(
+        "gyroid",
+        Part::Sheet,
+        Level::Iso(Grade::Constant(0.463951958)),
+        [1.0; 3],
+        [0.0; 3],
+    );
     let solid = solid(cube(2.0), Some(field));
     let errors = [16.0, 32.0, 64.0].map(|n| {
         let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
         (s.mesh.volume() / (0.3 * 8.0) - 1.0).abs()
     });
     println!("sheet volume errors at 16, 32, 64 samples a cell: {errors:?}");
-    assert!(errors[1] < 1e-4 && errors[2] < errors[0] / 16.0, "{errors:?}");
+    assert!(
+        errors[1] < 1e-4 && errors[2] < errors[0] / 16.0,
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -76,7 +112,10 @@ fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
     let errors = [8.0, 16.0, 32.0].map(|n| {
         let s = surface(&solid(ball(1.0), None), 1.0 / n, &Silent).expect("surface");
         assert!(s.cut.iter().all(|c| *c));
-        [(s.mesh.area() / exact[0] - 1.0).abs(), (s.mesh.volume() / exact[1] - 1.0).abs()]
+        [
+            (s.mesh.area() / exact[0] - 1.0).abs(),
+            (s.mesh.volume() / exact[1] - 1.0).abs(),
+        ]
     });
     println!("ball area and volume errors at 8, 16, 32 steps a radius: {errors:?}");
     for w in errors.windows(2) {
@@ -88,13 +127,25 @@ fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
 
 #[test]
 fn vertices_come_to_the_surface_as_the_second_power() {
-    let field = lattice("diamond", Part::Upper, Level::Fraction(Grade::Constant(0.3)), [1.0, 1.2, 0.9], [10.0, 20.0, 30.0]);
+    let field = lattice(
+        "diamond",
+        Part::Upper,
+        Level::Fraction(Grade::Constant(0.3)),
+        [1.0, 1.2, 0.9],
+        [10.0, 20.0, 30.0],
+    );
     let solid = solid(ball(1.0), Some(field));
     let worst = [12.0, 24.0, 48.0].map(|n| {
         let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
-        let (mut v, mut g) = (vec![0.0; s.mesh.vertices.len()], vec![[0.0; 3]; s.mesh.vertices.len()]);
+        let (mut v, mut g) = (
+            vec![0.0; s.mesh.vertices.len()],
+            vec![[0.0; 3]; s.mesh.vertices.len()],
+        );
         solid.gradients(&s.mesh.vertices, &mut v, &mut g);
-        v.iter().zip(&g).map(|(v, g)| v.abs() / g.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max)
+        v.iter()
+            .zip(&g)
+            .map(|(v, g)| v.abs() / g.iter().map(|x| x * x).sum::<f64>().sqrt())
+            .fold(0.0, f64::max)
     });
     println!("farthest vertex at 12, 24, 48 steps a radius: {worst:?}");
     // A factor of 16 over two halvings at second order; 4 at first. The maximum over vertices is not smooth in h.
@@ -103,7 +154,15 @@ fn vertices_come_to_the_surface_as_the_second_power() {
 
 #[test]
 fn boxes_and_caps_are_exact() {
-    let s = surface(&solid(Arc::new(Cuboid::new([-1.0, 0.3, 2.0], [0.7, 1.1, 2.9]).expect("box")), None), 0.13, &Silent).expect("surface");
+    let s = surface(
+        &solid(
+            Arc::new(Cuboid::new([-1.0, 0.3, 2.0], [0.7, 1.1, 2.9]).expect("box")),
+            None,
+        ),
+        0.13,
+        &Silent,
+    )
+    .expect("surface");
     check("box", &s);
     let want: f64 = 1.7 * 0.8 * 0.9;
     let area = 2.0 * (1.7 * 0.8 + 0.8 * 0.9 + 0.9 * 1.7);
@@ -111,10 +170,14 @@ fn boxes_and_caps_are_exact() {
     let errors = [s.mesh.volume() / want - 1.0, s.mesh.area() / area - 1.0];
     assert!(errors.iter().all(|e| e.abs() < 1e-12), "{errors:?}");
     assert_eq!(size(&s.mesh).euler, 2);
-    let disc = Arc::new(Cylinder::new([0.1, 0.2, 0.3], [0.0, 0.0, 1.0], 1.0, 0.5).expect("cylinder"));
+    let disc =
+        Arc::new(Cylinder::new([0.1, 0.2, 0.3], [0.0, 0.0, 1.0], 1.0, 0.5).expect("cylinder"));
     let s = surface(&solid(disc, None), 0.05, &Silent).expect("surface");
     check("disc", &s);
-    assert!((s.mesh.bounds().min[2] - 0.3).abs() < 1e-15 && (s.mesh.bounds().max[2] - 0.8).abs() < 1e-15);
+    assert!(
+        (s.mesh.bounds().min[2] - 0.3).abs() < 1e-15
+            && (s.mesh.bounds().max[2] - 0.8).abs() < 1e-15
+    );
     // The rim is a polygon on the circle: area and volume too small by the order of (h/r)²/6 at most.
     assert!((s.mesh.volume() / (0.5 * PI) - 1.0).abs() < 0.05f64.powi(2) / 6.0);
 }
@@ -123,11 +186,24 @@ fn boxes_and_caps_are_exact() {
 fn topology_of_the_unit_cells_is_that_of_the_literature() {
     // Euler characteristic of the surface f = 0 in one cubic cell. The mesh of the f ≤ 0 solid in n³ cells of a box is
     // closed by caps, so compare through the periodic interior: χ grows by χ_cell · n³ to leading order.
-    for (name, chi) in [("primitive", -4), ("gyroid", -8), ("diamond", -16), ("iwp", -12)] {
+    for (name, chi) in [
+        ("primitive", -4),
+        ("gyroid", -8),
+        ("diamond", -16),
+        ("iwp", -12),
+    ] {
         let euler = |n: f64| {
-            let field = lattice(name, Part::Lower, Level::Iso(Grade::Constant(0.0)), [1.0; 3], [0.0; 3]);
+            let field = lattice(
+                name,
+                Part::Lower,
+                Level::Iso(Grade::Constant(0.0)),
+                [1.0; 3],
+                [0.0; 3],
+            );
             // Off the symmetry planes, so that no critical point lies on a face of the box.
-            let region = Arc::new(Cuboid::new([0.13, 0.17, 0.21], [n + 0.13, n + 0.17, n + 0.21]).expect("box"));
+            let region = Arc::new(
+                Cuboid::new([0.13, 0.17, 0.21], [n + 0.13, n + 0.17, n + 0.21]).expect("box"),
+            );
             let s = surface(&solid(region, Some(field)), 1.0 / 20.0, &Silent).expect("surface");
             size(&s.mesh).euler
         };
@@ -139,14 +215,27 @@ fn topology_of_the_unit_cells_is_that_of_the_literature() {
 
 #[test]
 fn same_bytes_for_any_number_of_threads_and_both_roads_agree() {
-    let field = lattice("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.25)), [1.0, 1.1, 0.9], [5.0, 15.0, 25.0]);
+    let field = lattice(
+        "gyroid",
+        Part::Sheet,
+        Level::Fraction(Grade::Constant(0.25)),
+        [1.0, 1.1, 0.9],
+        [5.0, 15.0, 25.0],
+    );
     let solid = solid(ball(1.7), Some(field));
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("pool");
         pool.install(|| {
             let mut stl = Cursor::new(Vec::new());
             let summary = stream_stl(&solid, 0.025, &mut stl, &Silent).expect("stl");
-            (surface(&solid, 0.025, &Silent).expect("surface"), stl.into_inner(), summary)
+            (
+                surface(&solid, 0.025, &Silent).expect("surface"),
+                stl.into_inner(),
+                summary,
+            )
         })
     };
     let (one, stl, summary) = run(1);
@@ -175,7 +264,13 @@ fn every_named_cell_and_part_has_its_fraction() {
     // Whole cells of every kind: mesh volume over box is the fraction asked for.
     for n in catalogue() {
         for (part, fraction) in [(Part::Sheet, 0.35), (Part::Lower, 0.5), (Part::Upper, 0.6)] {
-            let field = lattice(n.name, part, Level::Fraction(Grade::Constant(fraction)), [1.0; 3], [0.0; 3]);
+            let field = lattice(
+                n.name,
+                part,
+                Level::Fraction(Grade::Constant(fraction)),
+                [1.0; 3],
+                [0.0; 3],
+            );
             let s = surface(&solid(cube(1.0), Some(field)), 1.0 / 48.0, &Silent).expect("surface");
             let error = (s.mesh.volume() - fraction).abs();
             // Balanced volume: fourth order in 2π·top/48 with waves up to index 4 in these cells.
@@ -188,26 +283,49 @@ fn every_named_cell_and_part_has_its_fraction() {
 fn a_graded_fraction_is_met() {
     let stops = vec![[0.0, 0.15], [8.0, 0.6]];
     let grade = Grade::linear([0.0, 0.0, 1.0], stops).expect("grade");
-    for (name, part) in [("gyroid", Part::Sheet), ("diamond", Part::Lower), ("primitive", Part::Sheet)] {
-        let field = lattice(name, part, Level::Fraction(grade.clone()), [1.0; 3], [0.0; 3]);
+    for (name, part) in [
+        ("gyroid", Part::Sheet),
+        ("diamond", Part::Lower),
+        ("primitive", Part::Sheet),
+    ] {
+        let field = lattice(
+            name,
+            part,
+            Level::Fraction(grade.clone()),
+            [1.0; 3],
+            [0.0; 3],
+        );
         let region = Arc::new(Cuboid::new([0.0; 3], [1.0, 1.0, 8.0]).expect("box"));
         let v = voxels(&solid(region, Some(field)), 1.0 / 64.0, &Silent).expect("voxels");
         let layer = v.shape[0] * v.shape[1];
-        let mean: Vec<f64> =
-            v.solid.chunks(layer).map(|l| l.iter().map(|&b| f64::from(b)).sum::<f64>() / layer as f64).collect();
+        let mean: Vec<f64> = v
+            .solid
+            .chunks(layer)
+            .map(|l| l.iter().map(|&b| f64::from(b)).sum::<f64>() / layer as f64)
+            .collect();
         // A smooth window two cells wide: 1 + cos over 2 × 64 layers.
         for centre in (64..8 * 64 - 64).step_by(16) {
-            let weights: Vec<f64> = (0..128).map(|i| 1.0 - (2.0 * PI * (f64::from(i) + 0.5) / 128.0).cos()).collect();
-            let got: f64 = (0..128).map(|i| weights[i] * mean[centre - 64 + i]).sum::<f64>() / weights.iter().sum::<f64>();
+            let weights: Vec<f64> = (0..128)
+                .map(|i| 1.0 - (2.0 * PI * (f64::from(i) + 0.5) / 128.0).cos())
+                .collect();
+            let got: f64 = (0..128)
+                .map(|i| weights[i] * mean[centre - 64 + i])
+                .sum::<f64>()
+                / weights.iter().sum::<f64>();
             let want = 0.15 + 0.45 * (centre as f64 / 64.0) / 8.0;
-            assert!((got - want).abs() < 0.005, "{name} at {centre}: {got} for {want}");
+            assert!(
+                (got - want).abs() < 0.005,
+                "{name} at {centre}: {got} for {want}"
+            );
         }
     }
 }
 
 /// A region of one of seven kinds, shaped by three numbers.
 fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
-    let cylinder = |axis| Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region;
+    let cylinder = |axis| {
+        Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region
+    };
     let block = || Arc::new(Cuboid::new([-r, -1.0, -t], [t, r, 1.0]).expect("box")) as Region;
     match kind {
         0 => block(),
@@ -215,7 +333,9 @@ fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
         2 => cylinder([0.0, 0.0, 1.0]),
         3 => cylinder([0.3, 0.2 + s, 1.0]),
         4 => Arc::new(Union::new(vec![block(), ball(r)]).expect("union")),
-        5 => Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference")),
+        5 => {
+            Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference"))
+        }
         _ => {
             let half = HalfSpace::new([s, 0.0, 0.1], [s, 1.0, 0.5]).expect("half-space");
             Arc::new(Intersection::new(vec![ball(r), Arc::new(half)]).expect("intersection"))

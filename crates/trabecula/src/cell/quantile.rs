@@ -27,7 +27,13 @@ pub(super) struct Quantile {
 
 impl Quantile {
     pub(super) fn new(series: &Series) -> Quantile {
-        let top = series.terms().iter().flat_map(|t| t.hkl).map(i32::unsigned_abs).max().unwrap_or(1) as usize;
+        let top = series
+            .terms()
+            .iter()
+            .flat_map(|t| t.hkl)
+            .map(i32::unsigned_abs)
+            .max()
+            .unwrap_or(1) as usize;
         let n = (CUBES * top.div_ceil(2)).clamp(CUBES, 192);
         let h = 1.0 / n as f64;
         let mean = series.averaged(h);
@@ -39,14 +45,27 @@ impl Quantile {
             .map(|k| {
                 // Every row is shifted along itself by another amount (multiples of plastic-number fractions), so that
                 // cubes do not sample symmetric places alike and the errors of their ramps average out.
-                let shift = |j: usize| (j as f64 * 0.7548776662466927 + k as f64 * 0.5698402909980532).fract();
+                let shift = |j: usize| {
+                    (j as f64 * 0.7548776662466927 + k as f64 * 0.5698402909980532).fract()
+                };
                 let node = |i: usize, s: f64| (i as f64 + s) * h;
-                let u: Vec<_> = (0..n * n).map(|i| [node(i % n, shift(i / n)), node(i / n, 0.397), node(k, 0.633)]).collect();
+                let u: Vec<_> = (0..n * n)
+                    .map(|i| {
+                        [
+                            node(i % n, shift(i / n)),
+                            node(i / n, 0.397),
+                            node(k, 0.633),
+                        ]
+                    })
+                    .collect();
                 let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
                 mean.gradients(&u, &mut v, &mut g);
                 // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
                 let width = |g: &[f64; 3]| (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h;
-                v.iter().zip(&g).map(|(&v, g)| (v, width(g).max(0.5 * step))).collect()
+                v.iter()
+                    .zip(&g)
+                    .map(|(&v, g)| (v, width(g).max(0.5 * step)))
+                    .collect()
             })
             .collect();
         let (mut constant, mut slope) = (vec![0.0; LEVELS + 1], vec![0.0; LEVELS + 1]);
@@ -69,8 +88,16 @@ impl Quantile {
             })
             .collect();
         let at = |t: f64| interpolate(&lower, (t - start) / step);
-        let sheet = (0..LEVELS / 2).map(|i| step * i as f64).map(|t| at(t) - at(-t)).collect();
-        Quantile { start, step, lower, sheet }
+        let sheet = (0..LEVELS / 2)
+            .map(|i| step * i as f64)
+            .map(|t| at(t) - at(-t))
+            .collect();
+        Quantile {
+            start,
+            step,
+            lower,
+            sheet,
+        }
     }
 
     /// Solid fraction of the part at level t.
@@ -113,9 +140,17 @@ fn interpolate(table: &[f64], x: f64) -> f64 {
 fn invert(table: &[f64], v: f64) -> (f64, f64) {
     let i = table.partition_point(|&t| t < v).clamp(1, table.len() - 1);
     let (a, b) = (table[i - 1], table[i]);
-    let s = if b > a { ((v - a) / (b - a)).clamp(0.0, 1.0) } else { 0.5 };
+    let s = if b > a {
+        ((v - a) / (b - a)).clamp(0.0, 1.0)
+    } else {
+        0.5
+    };
     let (lo, hi) = (i.saturating_sub(8), (i + 7).min(table.len() - 1));
     let rise = table[hi] - table[lo];
-    let slope = if rise > 0.0 { (hi - lo) as f64 / rise } else { 0.0 };
+    let slope = if rise > 0.0 {
+        (hi - lo) as f64 / rise
+    } else {
+        0.0
+    };
     ((i - 1) as f64 + s, slope)
 }

@@ -39,11 +39,17 @@ impl Series {
         for (i, t) in terms.iter().enumerate() {
             let at = |key: &str| format!("terms[{i}].{key}");
             if let Some(h) = t.hkl.iter().find(|h| h.unsigned_abs() > MAX_INDEX as u32) {
-                return Err(Fault::new(at("hkl"), format!("{h} is out of range; indices run from -{MAX_INDEX} to {MAX_INDEX}")));
+                return Err(Fault::new(
+                    at("hkl"),
+                    format!("{h} is out of range; indices run from -{MAX_INDEX} to {MAX_INDEX}"),
+                ));
             }
             for (key, v) in [("amplitude", t.amplitude), ("phase", t.phase)] {
                 if !v.is_finite() {
-                    return Err(Fault::new(at(key), format!("{v} is not a number; give a finite one")));
+                    return Err(Fault::new(
+                        at(key),
+                        format!("{v} is not a number; give a finite one"),
+                    ));
                 }
             }
             largest = largest.max(t.amplitude.abs());
@@ -65,7 +71,17 @@ impl Series {
                 amplitude: re.hypot(im),
                 phase: im.atan2(re) / core::f64::consts::TAU,
             })
-            .map(|t| if t.hkl == [0; 3] { Term { amplitude: t.amplitude * sin_cos_turns(t.phase).1, phase: 0.0, ..t } } else { t })
+            .map(|t| {
+                if t.hkl == [0; 3] {
+                    Term {
+                        amplitude: t.amplitude * sin_cos_turns(t.phase).1,
+                        phase: 0.0,
+                        ..t
+                    }
+                } else {
+                    t
+                }
+            })
             .filter(|t| t.amplitude.abs() > 1e-14 * largest)
             .collect();
         if terms.iter().all(|t| t.hkl == [0; 3]) {
@@ -90,7 +106,10 @@ impl Series {
     /// A bound of the largest second derivative of f in any direction of phase space: Σ |amplitude| |2πh|².
     pub fn curvature(&self) -> f64 {
         let squared = |h: [i32; 3]| h.iter().map(|&v| f64::from(v * v)).sum::<f64>();
-        self.terms.iter().map(|t| t.amplitude.abs() * core::f64::consts::TAU.powi(2) * squared(t.hkl)).sum()
+        self.terms
+            .iter()
+            .map(|t| t.amplitude.abs() * core::f64::consts::TAU.powi(2) * squared(t.hkl))
+            .sum()
     }
 
     /// The series whose value at a point is the mean of this one over the cube of edge `h` (turns) about the point.
@@ -99,8 +118,13 @@ impl Series {
             let x = core::f64::consts::PI * f64::from(k) * h;
             if x == 0.0 { 1.0 } else { x.sin() / x }
         };
-        let mean = |t: &Term| Term { amplitude: t.amplitude * t.hkl.iter().map(|&k| sinc(k)).product::<f64>(), ..*t };
-        Series { terms: self.terms.iter().map(mean).collect() }
+        let mean = |t: &Term| Term {
+            amplitude: t.amplitude * t.hkl.iter().map(|&k| sinc(k)).product::<f64>(),
+            ..*t
+        };
+        Series {
+            terms: self.terms.iter().map(mean).collect(),
+        }
     }
 
     /// Values and gradients (per turn) at phases `u` (turns). The three slices have equal length.
@@ -108,7 +132,13 @@ impl Series {
     /// Every point gets the same arithmetic wherever it stands in the batch, so equal points give equal bits.
     pub fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let waves: Vec<Wave> = self.terms.iter().map(Wave::new).collect();
-        let top = self.terms.iter().flat_map(|t| t.hkl).map(i32::unsigned_abs).max().unwrap_or(0) as usize;
+        let top = self
+            .terms
+            .iter()
+            .flat_map(|t| t.hkl)
+            .map(i32::unsigned_abs)
+            .max()
+            .unwrap_or(0) as usize;
         evaluate(&waves, top, u, values, gradients);
     }
 }
@@ -124,7 +154,11 @@ struct Wave {
 impl Wave {
     fn new(t: &Term) -> Wave {
         let (s, c) = sin_cos_turns(t.phase);
-        Wave { hkl: t.hkl, re: t.amplitude * c, im: t.amplitude * s }
+        Wave {
+            hkl: t.hkl,
+            re: t.amplitude * c,
+            im: t.amplitude * s,
+        }
     }
 }
 
@@ -145,8 +179,12 @@ fn times(a: &mut (Lanes, Lanes), b: &(Lanes, Lanes), sign: f64) {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn evaluate(waves: &[Wave], top: usize, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-    let mut powers: [Powers; 3] = core::array::from_fn(|_| vec![([1.0; LANES], [0.0; LANES]); top + 1]);
-    let blocks = u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES));
+    let mut powers: [Powers; 3] =
+        core::array::from_fn(|_| vec![([1.0; LANES], [0.0; LANES]); top + 1]);
+    let blocks = u
+        .chunks(LANES)
+        .zip(values.chunks_mut(LANES))
+        .zip(gradients.chunks_mut(LANES));
     for ((u, values), gradients) in blocks {
         for a in 0..3 {
             let mut w = [0.0; LANES];
@@ -170,7 +208,11 @@ fn evaluate(waves: &[Wave], top: usize, u: &[Vec3], values: &mut [f64], gradient
             for a in 0..3 {
                 let n = w.hkl[a];
                 if n != 0 {
-                    times(&mut z, &powers[a][n.unsigned_abs() as usize], f64::from(n.signum()));
+                    times(
+                        &mut z,
+                        &powers[a][n.unsigned_abs() as usize],
+                        f64::from(n.signum()),
+                    );
                 }
             }
             for l in 0..LANES {
@@ -197,12 +239,17 @@ mod tests {
     use super::*;
 
     fn term(hkl: [i32; 3], amplitude: f64, phase: f64) -> Term {
-        Term { hkl, amplitude, phase }
+        Term {
+            hkl,
+            amplitude,
+            phase,
+        }
     }
 
     #[test]
     fn opposite_waves_merge_and_constants_are_refused() {
-        let s = Series::new(vec![term([1, 0, 0], 1.0, 0.1), term([-1, 0, 0], 1.0, -0.1)]).expect("valid");
+        let s = Series::new(vec![term([1, 0, 0], 1.0, 0.1), term([-1, 0, 0], 1.0, -0.1)])
+            .expect("valid");
         assert_eq!(s.terms().len(), 1);
         assert!((s.terms()[0].amplitude - 2.0).abs() < 1e-15);
         assert!(Series::new(vec![term([0, 0, 0], 1.0, 0.0)]).is_err());
@@ -220,7 +267,9 @@ mod tests {
             term([0, 0, 0], 0.5, 0.0),
         ])
         .expect("valid");
-        let u: Vec<Vec3> = (0..37).map(|i| [0.37 * f64::from(i), 0.11 * f64::from(i) - 2.0, 1.7]).collect();
+        let u: Vec<Vec3> = (0..37)
+            .map(|i| [0.37 * f64::from(i), 0.11 * f64::from(i) - 2.0, 1.7])
+            .collect();
         let (mut v, mut g) = (vec![0.0; 37], vec![[0.0; 3]; 37]);
         s.gradients(&u, &mut v, &mut g);
         for i in 0..37 {

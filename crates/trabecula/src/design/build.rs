@@ -120,7 +120,10 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
 }
 
 /// The cell, and its name if it has one.
-pub(super) fn cell<'a>(spec: &'a CellSpec, path: &str) -> Result<(Option<&'a str>, Cell), DesignError> {
+pub(super) fn cell<'a>(
+    spec: &'a CellSpec,
+    path: &str,
+) -> Result<(Option<&'a str>, Cell), DesignError> {
     let (name, terms, at) = match spec {
         CellSpec::Name(name) => {
             let known = named(name).ok_or_else(|| {
@@ -135,7 +138,11 @@ pub(super) fn cell<'a>(spec: &'a CellSpec, path: &str) -> Result<(Option<&'a str
                 finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
                 finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
             }
-            let term = |t: &TermSpec| Term { hkl: t.hkl, amplitude: t.amplitude, phase: t.phase };
+            let term = |t: &TermSpec| Term {
+                hkl: t.hkl,
+                amplitude: t.amplitude,
+                phase: t.phase,
+            };
             (None, s.terms.iter().map(term).collect(), at)
         }
     };

@@ -172,7 +172,12 @@ fn check_formula(
 fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) -> f64 {
     let (points, _) = sample::inside(place.region, 1_000_000);
     // At level zero the field is |f|, f or −f; the part at level t is where that is at most t, t or −t.
-    let at_zero = Lattice::new(cell.clone(), map.clone(), part, Level::Iso(Grade::Constant(0.0)));
+    let at_zero = Lattice::new(
+        cell.clone(),
+        map.clone(),
+        part,
+        Level::Iso(Grade::Constant(0.0)),
+    );
     let mut values = vec![0.0; points.len()];
     at_zero.values(&points, &mut values);
     let k = ((target * values.len() as f64) as usize).min(values.len() - 1);

@@ -104,11 +104,18 @@ pub(super) fn design(node: &Node) -> Read<Design> {
 /// The region in a design, or in a tree that says nothing else.
 pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
     let at = At::root(node);
-    if at.entries("a design or a region")?.iter().any(|(key, _)| *key == "lattice") {
+    if at
+        .entries("a design or a region")?
+        .iter()
+        .any(|(key, _)| *key == "lattice")
+    {
         return Ok(design(node)?.region);
     }
     let f = at.fields("a region file", &["schema", "units", "region"], &[])?;
-    region(f.need("region", "say where the part may be, such as [region.box] with size = [20, 20, 20]")?)
+    region(f.need(
+        "region",
+        "say where the part may be, such as [region.box] with size = [20, 20, 20]",
+    )?)
 }
 
 fn three(at: &At) -> Read<[f64; 3]> {

@@ -10,13 +10,18 @@ use crate::fault::Fault;
 use crate::io;
 use crate::math::{add, scale, sub};
 use crate::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Shape, Sphere, Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Shape,
+    Sphere, Union,
 };
 
 /// Mesh formats a region may come from.
 const FORMATS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
 
-pub(super) fn region(spec: &RegionSpec, path: &str, loader: &dyn Loader) -> Result<Region, DesignError> {
+pub(super) fn region(
+    spec: &RegionSpec,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<Region, DesignError> {
     match spec {
         RegionSpec::Box(b) => cuboid(b, &format!("{path}.box")),
         RegionSpec::Cylinder(c) => {
@@ -55,21 +60,29 @@ pub(super) fn region(spec: &RegionSpec, path: &str, loader: &dyn Loader) -> Resu
         RegionSpec::Offset(o) => {
             let path = format!("{path}.offset");
             finite(&format!("{path}.by"), o.by)?;
-            shared(&path, Offset::new(region(&o.of, &format!("{path}.of"), loader)?, o.by))
+            shared(
+                &path,
+                Offset::new(region(&o.of, &format!("{path}.of"), loader)?, o.by),
+            )
         }
     }
 }
 
 fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Region, DesignError> {
-    made.map(|s| Arc::new(s) as Region).map_err(|f| DesignError::fault(path, f))
+    made.map(|s| Arc::new(s) as Region)
+        .map_err(|f| DesignError::fault(path, f))
 }
 
 fn several(of: &[RegionSpec], path: &str, loader: &dyn Loader) -> Result<Vec<Region>, DesignError> {
-    of.iter().enumerate().map(|(i, r)| region(r, &format!("{path}[{i}]"), loader)).collect()
+    of.iter()
+        .enumerate()
+        .map(|(i, r)| region(r, &format!("{path}[{i}]"), loader))
+        .collect()
 }
 
 fn three(path: &str, key: &str, v: [f64; 3]) -> Result<(), DesignError> {
-    v.iter().try_for_each(|v| finite(&format!("{path}.{key}"), *v).map(|_| ()))
+    v.iter()
+        .try_for_each(|v| finite(&format!("{path}.{key}"), *v).map(|_| ()))
 }
 
 fn positive(path: &str, key: &str, v: f64) -> Result<(), DesignError> {
@@ -93,8 +106,12 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
             three(path, "max", c.max)?;
             for (a, axis) in ["x", "y", "z"].into_iter().enumerate() {
                 if c.min[a] >= c.max[a] {
-                    let message = format!("along {axis}, max is {} and min is {}; max must be the greater", c.max[a], c.min[a]);
-                    return Err(DesignError::new(format!("{path}.max"), message).found(c.max[a].to_string()));
+                    let message = format!(
+                        "along {axis}, max is {} and min is {}; max must be the greater",
+                        c.max[a], c.min[a]
+                    );
+                    return Err(DesignError::new(format!("{path}.max"), message)
+                        .found(c.max[a].to_string()));
                 }
             }
             (c.min, c.max)
@@ -105,13 +122,23 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
 
 fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, DesignError> {
     let at = format!("{path}.path");
-    let extension = spec.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
+    let extension = spec
+        .path
+        .rsplit_once('.')
+        .map_or("", |(_, e)| e)
+        .to_lowercase();
     if !FORMATS.contains(&extension.as_str()) {
-        let message = format!("the name must end in one of {}; found \"{}\"", FORMATS.join(", "), spec.path);
+        let message = format!(
+            "the name must end in one of {}; found \"{}\"",
+            FORMATS.join(", "),
+            spec.path
+        );
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     positive(path, "scale", spec.scale)?;
-    let bytes = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
+    let bytes = loader
+        .load(&spec.path)
+        .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let of_file = |f: Fault| DesignError::new(&at, format!("{}: {f}", spec.path)).found(&spec.path);
     let mut loaded = io::read_mesh(&bytes, &extension).map_err(of_file)?;
     if let (true, Some(unit)) = (loaded.in_mm, spec.unit)
@@ -120,11 +147,18 @@ fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, Desi
         let message = "this file names its own unit and was read in mm; leave unit out";
         return Err(DesignError::new(format!("{path}.unit"), message));
     }
-    let factor = spec.scale * if loaded.in_mm { 1.0 } else { spec.unit.unwrap_or(Unit::Mm).in_mm() };
+    let factor = spec.scale
+        * if loaded.in_mm {
+            1.0
+        } else {
+            spec.unit.unwrap_or(Unit::Mm).in_mm()
+        };
     if factor != 1.0 {
         for v in &mut loaded.mesh.vertices {
             *v = scale(*v, factor);
         }
     }
-    MeshRegion::new(loaded.mesh).map(|m| Arc::new(m) as Region).map_err(of_file)
+    MeshRegion::new(loaded.mesh)
+        .map(|m| Arc::new(m) as Region)
+        .map_err(of_file)
 }

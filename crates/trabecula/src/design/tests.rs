@@ -80,15 +80,55 @@ fn slips_are_told_with_path_line_and_nearest_word() {
         ("cell =", "cel =", "lattice.core.cel", 6, "cell"),
         ("\"gyroid\"", "\"gyriod\"", "lattice.core.cell", 6, "gyroid"),
         ("\"lower\"", "\"lowr\"", "lattice.core.part", 7, "lower"),
-        ("wavelength =", "wavelenght =", "lattice.core.map.affine.wavelenght", 9, "wavelength"),
-        ("map.affine", "map.afine", "lattice.core.map.afine", 8, "affine"),
-        ("porosity =", "porosty =", "lattice.core.level.porosty", 13, "porosity"),
-        ("linear =", "liner =", "lattice.core.level.porosity.liner", 13, "linear"),
-        ("stops =", "stop =", "lattice.core.level.porosity.linear.stop", 13, "stops"),
-        ("xz = 20", "xzz = 20", "lattice.core.map.affine.skew.xzz", 11, "xz"),
+        (
+            "wavelength =",
+            "wavelenght =",
+            "lattice.core.map.affine.wavelenght",
+            9,
+            "wavelength",
+        ),
+        (
+            "map.affine",
+            "map.afine",
+            "lattice.core.map.afine",
+            8,
+            "affine",
+        ),
+        (
+            "porosity =",
+            "porosty =",
+            "lattice.core.level.porosty",
+            13,
+            "porosity",
+        ),
+        (
+            "linear =",
+            "liner =",
+            "lattice.core.level.porosity.liner",
+            13,
+            "linear",
+        ),
+        (
+            "stops =",
+            "stop =",
+            "lattice.core.level.porosity.linear.stop",
+            13,
+            "stops",
+        ),
+        (
+            "xz = 20",
+            "xzz = 20",
+            "lattice.core.map.affine.skew.xzz",
+            11,
+            "xz",
+        ),
     ] {
         let e = with(line, instead);
-        assert_eq!((e.path.as_str(), e.line, e.nearest.as_deref()), (path, Some(number), Some(nearest)), "{e}");
+        assert_eq!(
+            (e.path.as_str(), e.line, e.nearest.as_deref()),
+            (path, Some(number), Some(nearest)),
+            "{e}"
+        );
     }
 }
 
@@ -96,8 +136,16 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 fn words_of_later_versions_are_not_slips() {
     for (line, instead, path) in [
         ("units = \"mm\"", "skin = { thickness = 1 }", "skin"),
-        ("units = \"mm\"", "blend = { between = [\"a\", \"b\"] }", "blend"),
-        ("porosity = {", "thickness = {", "lattice.core.level.thickness"),
+        (
+            "units = \"mm\"",
+            "blend = { between = [\"a\", \"b\"] }",
+            "blend",
+        ),
+        (
+            "porosity = {",
+            "thickness = {",
+            "lattice.core.level.thickness",
+        ),
         ("map.affine", "map.phase", "lattice.core.map.phase"),
         ("linear =", "radial =", "lattice.core.level.porosity.radial"),
     ] {
@@ -107,16 +155,25 @@ fn words_of_later_versions_are_not_slips() {
     }
     let two = GOOD.to_string() + "[lattice.rim]\ncell = \"gyroid\"\n";
     let e = refused(&two);
-    assert!(e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14), "{e}");
+    assert!(
+        e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14),
+        "{e}"
+    );
 }
 
 #[test]
 fn exactly_one_amount() {
     let e = refused(&(GOOD.to_string() + "fraction = 0.3\n"));
     assert!(e.message.contains("fraction and porosity at once"), "{e}");
-    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.porosity", Some(13)));
+    assert_eq!(
+        (e.path.as_str(), e.line),
+        ("lattice.core.level.porosity", Some(13))
+    );
     let e = refused(GOOD.split("porosity").next().unwrap_or_default());
-    assert!(e.message.contains("exactly one of iso, fraction, porosity"), "{e}");
+    assert!(
+        e.message.contains("exactly one of iso, fraction, porosity"),
+        "{e}"
+    );
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));
 }
 
@@ -127,9 +184,17 @@ fn values_of_the_wrong_type_say_what_was_found() {
         ("[8, 8.5, 9]", "8", "found 8"),
         ("[8, 8.5, 9]", "[8, 9]", "found 2 values"),
         ("[4, 4, 5]", "\"four\"", "found \"four\""),
-        ("[4, 4, 5]", "{ linear = { along = [1,0,0], stops = [] } }", "cannot vary in space in this version"),
+        (
+            "[4, 4, 5]",
+            "{ linear = { along = [1,0,0], stops = [] } }",
+            "cannot vary in space in this version",
+        ),
         ("[0, 30, 0]", "[0, true, 0]", "found true"),
-        ("units = \"mm\"", "units = \"inch\"", "lengths in a design are mm"),
+        (
+            "units = \"mm\"",
+            "units = \"inch\"",
+            "lengths in a design are mm",
+        ),
         ("[[0, 0.5], [9, 0.8]]", "[[0, 0.5, 1]]", "found 3 values"),
     ] {
         let e = with(line, instead);
@@ -156,16 +221,31 @@ fn the_schema_and_the_reader_agree() {
     let defs = schema["$defs"].as_object().expect("definitions");
     let keys = |name: &str| -> Vec<String> {
         let object = &defs[name];
-        let mut keys: Vec<String> =
-            object["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()).collect();
+        let mut keys: Vec<String> = object["properties"]
+            .as_object()
+            .into_iter()
+            .flatten()
+            .map(|(k, _)| k.clone())
+            .collect();
         for option in object["oneOf"].as_array().into_iter().flatten() {
-            keys.extend(option["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()));
+            keys.extend(
+                option["properties"]
+                    .as_object()
+                    .into_iter()
+                    .flatten()
+                    .map(|(k, _)| k.clone()),
+            );
         }
         keys.sort();
         keys
     };
     let listed = |e: DesignError| -> Vec<String> {
-        let list = e.message.split("Allowed: ").nth(1).unwrap_or_else(|| panic!("{e}")).to_string();
+        let list = e
+            .message
+            .split("Allowed: ")
+            .nth(1)
+            .unwrap_or_else(|| panic!("{e}"))
+            .to_string();
         let mut words: Vec<String> = list.split(", ").map(str::to_string).collect();
         words.sort();
         words
@@ -184,9 +264,15 @@ fn the_schema_and_the_reader_agree() {
     both.extend(keys("BoxCorners"));
     both.sort();
     assert_eq!(listed(region("box")), both);
-    assert_eq!(listed(refused("schema = 1\n[region]\nzzzzzzzz = 1\n")), keys("RegionSpec"));
+    assert_eq!(
+        listed(refused("schema = 1\n[region]\nzzzzzzzz = 1\n")),
+        keys("RegionSpec")
+    );
     assert_eq!(listed(with("cell =", "zzzzzzzz =")), keys("LatticeSpec"));
-    assert_eq!(listed(with("wavelength =", "zzzzzzzz =")), keys("AffineSpec"));
+    assert_eq!(
+        listed(with("wavelength =", "zzzzzzzz =")),
+        keys("AffineSpec")
+    );
     assert_eq!(listed(with("xz =", "zzzzzzzz =")), keys("SkewSpec"));
     assert_eq!(listed(with("porosity =", "zzzzzzzz =")), keys("LevelSpec"));
     assert_eq!(listed(with("map.affine", "map.zzzzzzzz")), keys("MapSpec"));

@@ -57,8 +57,18 @@ const INSET: f64 = 1.0 / 64.0;
 
 /// Adds a vertex to every ring whose two surfaces meet inside its cell, and turns the edges between such cells.
 /// `ends` are the lattice and the region.
-pub(super) fn sharpen(rings: &[Ring], draft: Draft, ends: [&dyn Field; 2], nodes: &Nodes) -> Vec<Center> {
-    let Draft { triangles, own, places, on } = draft;
+pub(super) fn sharpen(
+    rings: &[Ring],
+    draft: Draft,
+    ends: [&dyn Field; 2],
+    nodes: &Nodes,
+) -> Vec<Center> {
+    let Draft {
+        triangles,
+        own,
+        places,
+        on,
+    } = draft;
     let mut centers: Vec<Center> = Vec::new();
     // Rim segments that cut the corner, by their two points: their triangle, and their cell's inner vertex.
     let mut corners: HashMap<(u32, u32), (usize, usize)> = HashMap::new();
@@ -70,7 +80,11 @@ pub(super) fn sharpen(rings: &[Ring], draft: Draft, ends: [&dyn Field; 2], nodes
         for k in 0..n {
             let (a, b) = (ring.points[k], ring.points[(k + 1) % n]);
             // The cone has two triangles more than the fan it replaces.
-            let slot = if k < n - 2 { ring.triangles as usize + k } else { triangles.len() };
+            let slot = if k < n - 2 {
+                ring.triangles as usize + k
+            } else {
+                triangles.len()
+            };
             if slot == triangles.len() {
                 triangles.push([0; 3]);
                 own.push(ring.own);
@@ -92,7 +106,10 @@ pub(super) fn sharpen(rings: &[Ring], draft: Draft, ends: [&dyn Field; 2], nodes
                 Some(_) => {}
             }
         }
-        centers.push(Center { cell: ring.cell, place });
+        centers.push(Center {
+            cell: ring.cell,
+            place,
+        });
     }
     centers
 }
@@ -100,11 +117,17 @@ pub(super) fn sharpen(rings: &[Ring], draft: Draft, ends: [&dyn Field; 2], nodes
 /// Whether the edge from an inner vertex to that of a neighbouring cell passes inside their common face, and the face
 /// holds one segment only.
 fn passes(ring: &Ring, place: Vec3, neighbour: &Center, nodes: &Nodes) -> bool {
-    let (here, there) = (nodes.at(ring.cell as usize), nodes.at(neighbour.cell as usize));
-    let Some(axis) = (0..3).find(|&a| here[a] != there[a]) else { return false };
+    let (here, there) = (
+        nodes.at(ring.cell as usize),
+        nodes.at(neighbour.cell as usize),
+    );
+    let Some(axis) = (0..3).find(|&a| here[a] != there[a]) else {
+        return false;
+    };
     let upper = here[axis] < there[axis];
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let solid = |du: usize, dv: usize| ring.corners >> (usize::from(upper) << axis | du << u | dv << v) & 1;
+    let solid =
+        |du: usize, dv: usize| ring.corners >> (usize::from(upper) << axis | du << u | dv << v) & 1;
     if solid(0, 0) == solid(1, 1) && solid(0, 1) == solid(1, 0) {
         return false;
     }
@@ -119,7 +142,13 @@ fn passes(ring: &Ring, place: Vec3, neighbour: &Center, nodes: &Nodes) -> bool {
 }
 
 /// For each ring, the point of its cell on both surfaces, if there is one: Newton's method with the shortest step.
-fn meet(rings: &[Ring], places: &[Vec3], on: &[On], ends: [&dyn Field; 2], nodes: &Nodes) -> Vec<Option<Vec3>> {
+fn meet(
+    rings: &[Ring],
+    places: &[Vec3],
+    on: &[On],
+    ends: [&dyn Field; 2],
+    nodes: &Nodes,
+) -> Vec<Option<Vec3>> {
     let mut found = Vec::with_capacity(rings.len());
     for batch in rings.chunks(BATCH) {
         let mut points: Vec<Vec3> = Vec::with_capacity(batch.len());
@@ -147,11 +176,16 @@ fn meet(rings: &[Ring], places: &[Vec3], on: &[On], ends: [&dyn Field; 2], nodes
             for (i, ring) in batch.iter().enumerate() {
                 let steep = [norm(gradients[0][i]), norm(gradients[1][i])];
                 let (f, g) = (values[0][i] / steep[0], values[1][i] / steep[1]);
-                let (a, b) = (scale(gradients[0][i], 1.0 / steep[0]), scale(gradients[1][i], 1.0 / steep[1]));
+                let (a, b) = (
+                    scale(gradients[0][i], 1.0 / steep[0]),
+                    scale(gradients[1][i], 1.0 / steep[1]),
+                );
                 let c = dot(a, b);
                 let at = nodes.at(ring.cell as usize);
                 let span = |k: usize| (nodes.axes[k][at[k]], nodes.axes[k][at[k] + 1]);
-                let size = (0..3).map(|k| span(k).1 - span(k).0).fold(f64::INFINITY, f64::min);
+                let size = (0..3)
+                    .map(|k| span(k).1 - span(k).0)
+                    .fold(f64::INFINITY, f64::min);
                 // Surfaces within ten degrees of each other have no crease worth a vertex. (NaN fails as well.)
                 if !(1.0 - c * c > 0.03) {
                     simple[i] = false;

@@ -21,14 +21,23 @@ pub(super) struct Grid {
 impl Grid {
     pub(super) fn new(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
         if !(edge > 0.0 && edge.is_finite()) {
-            return Err(Fault::new("edge", format!("{edge} mm; the grid spacing is a positive, finite length")));
+            return Err(Fault::new(
+                "edge",
+                format!("{edge} mm; the grid spacing is a positive, finite length"),
+            ));
         }
         let bounds = solid.region.bounds();
         if bounds.is_empty() {
-            return Err(Fault::new("region", "the region is empty; there is nothing to fill"));
+            return Err(Fault::new(
+                "region",
+                "the region is empty; there is nothing to fill",
+            ));
         }
         if !bounds.is_finite() {
-            return Err(Fault::new("region", "the region is not bounded; intersect it with a box, cylinder, sphere or mesh"));
+            return Err(Fault::new(
+                "region",
+                "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
+            ));
         }
         let mut axes: [Vec<f64>; 3] = Default::default();
         for (a, nodes) in axes.iter_mut().enumerate() {
@@ -36,7 +45,11 @@ impl Grid {
             if (hi - lo) / edge > MOST {
                 return Err(Fault::new(
                     "edge",
-                    format!("{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible", hi - lo, (hi - lo) / edge),
+                    format!(
+                        "{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible",
+                        hi - lo,
+                        (hi - lo) / edge
+                    ),
                 ));
             }
             let mut stops = Vec::new();
@@ -54,12 +67,16 @@ impl Grid {
             nodes.push(stops[0] - edge);
             for w in stops.windows(2) {
                 let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
-                nodes.extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
+                nodes
+                    .extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
             }
             let last = stops[stops.len() - 1];
             nodes.extend([last, hi.max(last) + edge]);
         }
-        let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
+        let finest = axes
+            .iter()
+            .flat_map(|n| n.windows(2).map(|w| w[1] - w[0]))
+            .fold(f64::INFINITY, f64::min);
         let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
         // Eight units in the last place of the farthest f32 coordinate between any two points of an edge: rounding
         // keeps their order, hence every guarantee.
@@ -74,7 +91,10 @@ impl Grid {
                 ),
             ));
         }
-        Ok(Grid { axes, margin: needed.max(1.0 / 4096.0) })
+        Ok(Grid {
+            axes,
+            margin: needed.max(1.0 / 4096.0),
+        })
     }
 
     /// Number of cells along each axis.
@@ -95,13 +115,17 @@ impl Grid {
 
     /// First and one-past-last node of a tile with its halo.
     pub(super) fn nodes(&self, tile: [usize; 3]) -> [std::ops::Range<usize>; 3] {
-        [0, 1, 2].map(|a| (tile[a] * TILE).saturating_sub(1)..((tile[a] + 1) * TILE + 2).min(self.axes[a].len()))
+        [0, 1, 2].map(|a| {
+            (tile[a] * TILE).saturating_sub(1)..((tile[a] + 1) * TILE + 2).min(self.axes[a].len())
+        })
     }
 
     /// The nodes of a tile with its halo.
     pub(super) fn block(&self, tile: [usize; 3]) -> Block<'_> {
         let n = self.nodes(tile);
-        Block { axes: [0, 1, 2].map(|a| &self.axes[a][n[a].clone()]) }
+        Block {
+            axes: [0, 1, 2].map(|a| &self.axes[a][n[a].clone()]),
+        }
     }
 }
 
@@ -130,5 +154,9 @@ pub(super) fn content(solid: &Solid, b: &Aabb) -> Content {
             f.hi >= 0.0
         }
     };
-    if region || field { Content::Surface { field, region } } else { Content::None }
+    if region || field {
+        Content::Surface { field, region }
+    } else {
+        Content::None
+    }
 }

@@ -24,8 +24,8 @@ use crate::field::Field;
 use crate::math::{Vec3, add, cross, norm, scale, sub};
 use crate::solid::Solid;
 
-use super::grid::{Content, Grid, TILE, content};
 use super::crease;
+use super::grid::{Content, Grid, TILE, content};
 use super::table::{CASES, EDGES};
 
 /// What a vertex lies on.
@@ -123,7 +123,11 @@ pub(super) struct Nodes<'a> {
 
 impl Nodes<'_> {
     pub fn at(&self, n: usize) -> [usize; 3] {
-        [n % self.shape[0], n / self.stride[1] % self.shape[1], n / self.stride[2]]
+        [
+            n % self.shape[0],
+            n / self.stride[1] % self.shape[1],
+            n / self.stride[2],
+        ]
     }
 }
 
@@ -131,12 +135,23 @@ impl Nodes<'_> {
 pub(super) const BATCH: usize = 2048;
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
-pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scratch) -> Option<Patch> {
+pub(super) fn extract(
+    solid: &Solid,
+    grid: &Grid,
+    tile: [usize; 3],
+    s: &mut Scratch,
+) -> Option<Patch> {
     let block = grid.block(tile);
-    let Content::Surface { field, region } = content(solid, &block.bounds()) else { return None };
+    let Content::Surface { field, region } = content(solid, &block.bounds()) else {
+        return None;
+    };
     let lattice = solid.field.as_deref().filter(|_| field);
     let shape = block.shape();
-    let nodes = Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]] };
+    let nodes = Nodes {
+        axes: block.axes,
+        shape,
+        stride: [1, shape[0], shape[0] * shape[1]],
+    };
 
     s.field.clear();
     s.region.clear();
@@ -164,7 +179,11 @@ pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scra
         solve(s, &nodes, &*solid.region, On::Region);
     }
     for v in &mut s.vertices {
-        v.t = if v.on == On::Plane { grid.margin } else { v.t.clamp(grid.margin, 1.0 - grid.margin) };
+        v.t = if v.on == On::Plane {
+            grid.margin
+        } else {
+            v.t.clamp(grid.margin, 1.0 - grid.margin)
+        };
     }
     // Cells of the tile itself, in block coordinates.
     let from = grid.nodes(tile).map(|r| r.start);
@@ -180,7 +199,12 @@ pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scra
     let mut on: Vec<On> = s.vertices.iter().map(|v| v.on).collect();
     if let (Some(f), true) = (lattice, region) {
         let ends = [f, &*solid.region as &dyn Field];
-        let draft = crease::Draft { triangles: &mut s.triangles, own: &mut s.own, places: &places, on: &on };
+        let draft = crease::Draft {
+            triangles: &mut s.triangles,
+            own: &mut s.own,
+            places: &places,
+            on: &on,
+        };
         s.centers = crease::sharpen(&s.rings, draft, ends, &nodes);
         places.extend(s.centers.iter().map(|c| c.place));
         on.extend(s.centers.iter().map(|_| On::Crease));
@@ -196,7 +220,8 @@ pub(super) fn extract(solid: &Solid, grid: &Grid, tile: [usize; 3], s: &mut Scra
 fn signs(s: &mut Scratch, shape: [usize; 3]) {
     let (nx, rows) = (shape[0], shape[1] * shape[2]);
     s.solid.clear();
-    s.solid.resize(rows, if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 });
+    s.solid
+        .resize(rows, if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 });
     for samples in [&s.field, &s.region] {
         keep_negative(&mut s.solid, samples, nx);
     }
@@ -267,7 +292,11 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let node = [i, row % ny, row / ny];
-                let mut solid = [nodes.axes[0][node[0]], nodes.axes[1][node[1]], nodes.axes[2][node[2]]];
+                let mut solid = [
+                    nodes.axes[0][node[0]],
+                    nodes.axes[1][node[1]],
+                    nodes.axes[2][node[2]],
+                ];
                 let length = nodes.axes[axis][node[axis] + 1] - nodes.axes[axis][node[axis]];
                 let low = row * nx + i;
                 let high = low + nodes.stride[axis];
@@ -276,7 +305,11 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
                 if !up {
                     solid[axis] = nodes.axes[axis][node[axis] + 1];
                 }
-                let (ra, rb) = if s.region.is_empty() { (-1.0, -1.0) } else { (s.region[a], s.region[b]) };
+                let (ra, rb) = if s.region.is_empty() {
+                    (-1.0, -1.0)
+                } else {
+                    (s.region[a], s.region[b])
+                };
                 let on = match rb > 0.0 {
                     // Perhaps; `find_planes` looks.
                     true if ra == 0.0 => On::Plane,
@@ -286,7 +319,15 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
                 };
                 let skin = on == On::Plane || (ra == 0.0 && rb == 0.0);
                 let reach = if up { length } else { -length };
-                s.vertices.push(Vertex { solid, reach, t: 1.0, low: low as u32, axis: axis as u8, on, skin });
+                s.vertices.push(Vertex {
+                    solid,
+                    reach,
+                    t: 1.0,
+                    low: low as u32,
+                    axis: axis as u8,
+                    on,
+                    skin,
+                });
             }
         }
     }
@@ -295,8 +336,15 @@ fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
 /// Tells edges that leave the region through a flat face on their solid node from those that run within the face and
 /// leave it farther on, at the rim.
 fn find_planes(s: &mut Scratch, region: &dyn Field, margin: f64) {
-    let Scratch { points, values, vertices, .. } = s;
-    let candidates: Vec<usize> = (0..vertices.len()).filter(|&i| vertices[i].on == On::Plane).collect();
+    let Scratch {
+        points,
+        values,
+        vertices,
+        ..
+    } = s;
+    let candidates: Vec<usize> = (0..vertices.len())
+        .filter(|&i| vertices[i].on == On::Plane)
+        .collect();
     points.clear();
     points.extend(candidates.iter().map(|&i| vertices[i].at(margin)));
     values.resize(points.len(), 0.0);
@@ -322,21 +370,49 @@ const SETTLED: f64 = 1e-3;
 
 /// Finds where the function ends the solid on each edge that it crosses, and keeps the first end.
 fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
-    let Scratch { field, region, points, values, gradients, vertices, .. } = s;
-    let samples = if which == On::Lattice { &*field } else { &*region };
+    let Scratch {
+        field,
+        region,
+        points,
+        values,
+        gradients,
+        vertices,
+        ..
+    } = s;
+    let samples = if which == On::Lattice {
+        &*field
+    } else {
+        &*region
+    };
     let mut roots = Vec::with_capacity(BATCH);
     let mut from = 0;
     while from < vertices.len() {
         roots.clear();
         while roots.len() < BATCH && from < vertices.len() {
             let v = &vertices[from];
-            let (low, high) = (v.low as usize, v.low as usize + nodes.stride[v.axis as usize]);
-            let (a, b) = if v.up() { (samples[low], samples[high]) } else { (samples[high], samples[low]) };
+            let (low, high) = (
+                v.low as usize,
+                v.low as usize + nodes.stride[v.axis as usize],
+            );
+            let (a, b) = if v.up() {
+                (samples[low], samples[high])
+            } else {
+                (samples[high], samples[low])
+            };
             // Vertices on flat faces are settled; on others the void end is positive if this function crosses.
             if v.on != On::Plane && b > 0.0 {
                 // Along a flat face the value stays zero up to the rim: come from the void.
-                let t = if a == 0.0 { 1.0 } else { f64::from(-a) / (f64::from(b) - f64::from(a)) };
-                roots.push(Root { vertex: from as u32, lo: 0.0, hi: 1.0, t: t.clamp(0.0, 1.0) });
+                let t = if a == 0.0 {
+                    1.0
+                } else {
+                    f64::from(-a) / (f64::from(b) - f64::from(a))
+                };
+                roots.push(Root {
+                    vertex: from as u32,
+                    lo: 0.0,
+                    hi: 1.0,
+                    t: t.clamp(0.0, 1.0),
+                });
             }
             from += 1;
         }
@@ -352,7 +428,11 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
                 let vertex = &mut vertices[r.vertex as usize];
                 *(if v <= 0.0 { &mut r.lo } else { &mut r.hi }) = r.t;
                 let newton = r.t - v / (gradients[n][vertex.axis as usize] * vertex.reach);
-                let next = if newton >= r.lo && newton <= r.hi { newton } else { 0.5 * (r.lo + r.hi) };
+                let next = if newton >= r.lo && newton <= r.hi {
+                    newton
+                } else {
+                    0.5 * (r.lo + r.hi)
+                };
                 let step = (next - r.t).abs();
                 r.t = next;
                 if step > SETTLED {
@@ -388,7 +468,10 @@ fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[std::ops::Range<usi
     let inner = (1u64 << (nx - 1)) - 1;
     let cases = &*CASES;
     let mixed = !s.field.is_empty() && !s.region.is_empty();
-    let (mut triangles, mut rings) = (core::mem::take(&mut s.triangles), core::mem::take(&mut s.rings));
+    let (mut triangles, mut rings) = (
+        core::mem::take(&mut s.triangles),
+        core::mem::take(&mut s.rings),
+    );
     triangles.clear();
     rings.clear();
     s.own.clear();
@@ -438,15 +521,33 @@ fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[std::ops::Range<usi
 /// For a surface that is locally quadratic about a triangle with its corners on it, the mean distance of the triangle
 /// from the surface is 3/4 of that at the centroid. The triangle hands this volume, with opposite sign, to its
 /// corners in shares (n · e)², e the corner's edge: what faces its edge can move without running far along it.
-fn balance(s: &mut Scratch, lattice: Option<&dyn Field>, region: &dyn Field, places: &[Vec3], on: &[On], margin: f64) {
-    let Scratch { points, values, gradients, vertices, triangles, moments, .. } = s;
+fn balance(
+    s: &mut Scratch,
+    lattice: Option<&dyn Field>,
+    region: &dyn Field,
+    places: &[Vec3],
+    on: &[On],
+    margin: f64,
+) {
+    let Scratch {
+        points,
+        values,
+        gradients,
+        vertices,
+        triangles,
+        moments,
+        ..
+    } = s;
     moments.clear();
     moments.resize(vertices.len(), (0.0, [0.0; 3]));
     for (which, f) in [(On::Lattice, lattice), (On::Region, Some(region))] {
         let Some(f) = f else { continue };
         let lies = |v: u32| on[v as usize] == which || on[v as usize] == On::Crease;
         let smooth: Vec<usize> = (0..triangles.len())
-            .filter(|&i| triangles[i].iter().all(|&v| lies(v)) && triangles[i].iter().any(|&v| on[v as usize] == which))
+            .filter(|&i| {
+                triangles[i].iter().all(|&v| lies(v))
+                    && triangles[i].iter().any(|&v| on[v as usize] == which)
+            })
             .collect();
         for batch in smooth.chunks(BATCH) {
             points.clear();
@@ -467,7 +568,11 @@ fn balance(s: &mut Scratch, lattice: Option<&dyn Field>, region: &dyn Field, pla
                 }
                 let volume = 0.75 * (v / steep) * 0.5 * twice;
                 // Vertices inside cells stay on their crease.
-                let share = corners.map(|v| vertices.get(v as usize).map_or(0.0, |v| n[v.axis as usize].powi(2)));
+                let share = corners.map(|v| {
+                    vertices
+                        .get(v as usize)
+                        .map_or(0.0, |v| n[v.axis as usize].powi(2))
+                });
                 let sum = share[0] + share[1] + share[2];
                 for (v, share) in corners.into_iter().zip(share) {
                     if let Some(m) = moments.get_mut(v as usize).filter(|_| sum > 0.0) {
@@ -520,13 +625,17 @@ fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) -> Option<Vec<u32>> {
         let leaves = |a: usize, up: bool| {
             let low = if up { at } else { step(at, a, false) };
             let row = low[2] * nodes.shape[1] + low[1];
-            s.crossed[a][row] >> low[0] & 1 == 1 && s.vertices[number(s, a, row, low[0]) as usize].on == On::Plane
+            s.crossed[a][row] >> low[0] & 1 == 1
+                && s.vertices[number(s, a, row, low[0]) as usize].on == On::Plane
         };
-        let out: Vec<(usize, bool)> =
-            (0..3).flat_map(|a| [(a, false), (a, true)]).filter(|&(a, up)| leaves(a, up)).collect();
+        let out: Vec<(usize, bool)> = (0..3)
+            .flat_map(|a| [(a, false), (a, true)])
+            .filter(|&(a, up)| leaves(a, up))
+            .collect();
         let one_corner = (0..3).all(|a| out.iter().filter(|o| o.0 == a).count() < 2)
             && out.iter().all(|&(a, up)| {
-                out.iter().all(|&(b, vp)| a == b || !solid(step(step(at, a, up), b, vp)))
+                out.iter()
+                    .all(|&(b, vp)| a == b || !solid(step(step(at, a, up), b, vp)))
             })
             && (out.len() < 3 || !solid(out.iter().fold(at, |p, &(a, up)| step(p, a, up))));
         if one_corner {
@@ -562,8 +671,13 @@ fn gather(
             if on_node && !vertex.up() {
                 at[axis] += 1;
             }
-            let shared = (0..3).any(|a| (a != axis || on_node) && (at[a] == own[a].start || at[a] == own[a].end));
-            (vertex.place(), key(at, if on_node { 3 } else { axis as u64 }), shared)
+            let shared = (0..3)
+                .any(|a| (a != axis || on_node) && (at[a] == own[a].start || at[a] == own[a].end));
+            (
+                vertex.place(),
+                key(at, if on_node { 3 } else { axis as u64 }),
+                shared,
+            )
         }
         None => {
             let center = &s.centers[v - s.vertices.len()];
@@ -573,11 +687,17 @@ fn gather(
         }
     };
     for (t, _) in s.triangles.iter().zip(&s.own).filter(|(_, own)| **own) {
-        let t = stands.map_or(*t, |stands| t.map(|v| stands.get(v as usize).copied().unwrap_or(v)));
+        let t = stands.map_or(*t, |stands| {
+            t.map(|v| stands.get(v as usize).copied().unwrap_or(v))
+        });
         if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
             continue;
         }
-        let skin = |v: u32| s.vertices.get(v as usize).is_none_or(|v| v.on != On::Lattice || v.skin);
+        let skin = |v: u32| {
+            s.vertices
+                .get(v as usize)
+                .is_none_or(|v| v.on != On::Lattice || v.skin)
+        };
         patch.cut.push(t.iter().all(|&v| skin(v)));
         patch.triangles.push(t.map(|v| {
             let slot = &mut renamed[v as usize];

@@ -1,19 +1,33 @@
-//! NumPy's array file, version 1.0.
+//! NumPy's NPY, version 1.0.
+//!
+//! Source: NumPy Enhancement Proposal 1, A Simple File Format for NumPy Arrays.
 
-use std::io;
+use std::io::{self, Write};
 
-use crate::extract::Voxels;
+use super::invalid;
 
-/// Writes voxels as a uint8 array of shape (nx, ny, nz) in Fortran order: `a[x, y, z]` is 1 where solid.
-pub fn write<W: io::Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
-    let [x, y, z] = voxels.shape;
-    let dict = format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");
-    // Magic, version and length take 10 bytes; the data begins at a multiple of 64, after a line break.
-    let length = (10 + dict.len() + 1).next_multiple_of(64) - 10;
+/// Writes bytes that run with x fastest as an array that NumPy indexes `[x, y, z]` (`uint8`, Fortran order).
+///
+/// **Errors**: what `out` reports; `InvalidInput` if there are not x·y·z bytes.
+pub fn write_npy<W: Write>(shape: [usize; 3], data: &[u8], out: &mut W) -> io::Result<()> {
+    let [x, y, z] = shape;
+    if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(data.len()) {
+        return Err(invalid(format!(
+            "an array of {x} × {y} × {z} does not have {} bytes",
+            data.len()
+        )));
+    }
+    let mut header =
+        format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");
+    // Magic, version and length take ten bytes; the data begin at a multiple of 64.
+    while (10 + header.len() + 1) % 64 != 0 {
+        header.push(' ');
+    }
+    header.push('\n');
     out.write_all(b"\x93NUMPY\x01\x00")?;
-    out.write_all(&(length as u16).to_le_bytes())?;
-    writeln!(out, "{dict:<width$}", width = length - 1)?;
-    out.write_all(&voxels.solid)
+    out.write_all(&(header.len() as u16).to_le_bytes())?;
+    out.write_all(header.as_bytes())?;
+    out.write_all(data)
 }
 
 #[cfg(test)]
@@ -21,16 +35,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn header_is_aligned_and_names_the_shape() {
-        let voxels = Voxels { origin: [0.0; 3], step: 1.0, shape: [2, 3, 1], solid: vec![1, 0, 1, 0, 0, 1] };
+    fn header_is_padded_and_names_the_shape() {
         let mut bytes = Vec::new();
-        write(&voxels, &mut bytes).expect("a Vec takes everything");
-        let length = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
-        assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
-        assert_eq!((10 + length) % 64, 0);
-        let text = std::str::from_utf8(&bytes[10..10 + length]).expect("the header is ASCII");
-        assert!(text.starts_with("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3, 1), }"));
-        assert!(text.ends_with('\n'));
-        assert_eq!(bytes[10 + length..], voxels.solid);
+        write_npy([2, 3, 1], &[1, 0, 1, 0, 1, 0], &mut bytes).unwrap();
+        assert_eq!(bytes.len(), 128 + 6);
+        assert_eq!(bytes[8..10], 118u16.to_le_bytes());
+        let header = String::from_utf8_lossy(&bytes[10..128]).to_string();
+        assert!(
+            header.starts_with("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3, 1), }")
+        );
+        assert!(header.ends_with(" \n"));
+        assert!(write_npy([2, 3, 2], &[0; 6], &mut bytes).is_err());
+        assert!(write_npy([usize::MAX, 3, 2], &[0; 6], &mut bytes).is_err());
     }
 }

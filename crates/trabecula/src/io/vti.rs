@@ -1,32 +1,39 @@
-//! VTK image data (XML), for viewers and simulation.
+//! VTK image data (VTI) of voxels.
+//!
+//! Source: Kitware, VTK File Formats, XML formats.
 
-use std::io;
+use std::io::{self, Write};
 
+use super::invalid;
 use crate::extract::Voxels;
 
-/// Writes voxels as cell data `solid` (UInt8) of a VTK ImageData file: one appended raw block with a UInt64 length,
-/// origin and spacing in mm.
-pub fn write<W: io::Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
+/// Writes voxels as image data with the cell array `solid` (`UInt8`), raw and appended.
+///
+/// **Errors**: what `out` reports; `InvalidInput` if the voxels do not fill their shape.
+pub fn write_vti<W: Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
     let [x, y, z] = voxels.shape;
-    let [ox, oy, oz] = voxels.origin;
-    let h = voxels.step;
-    let extent = format!("0 {x} 0 {y} 0 {z}");
+    let count = voxels.solid.len();
+    if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(count) {
+        return Err(invalid(format!(
+            "a grid of {x} × {y} × {z} does not have {count} voxels"
+        )));
+    }
+    let ([ox, oy, oz], step) = (voxels.origin, voxels.step);
     write!(
         out,
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
-<ImageData WholeExtent="{extent}" Origin="{ox} {oy} {oz}" Spacing="{h} {h} {h}">
-<Piece Extent="{extent}">
-<PointData></PointData>
+<ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{ox} {oy} {oz}" Spacing="{step} {step} {step}">
+<Piece Extent="0 {x} 0 {y} 0 {z}">
 <CellData Scalars="solid">
-<DataArray type="UInt8" Name="solid" format="appended" RangeMin="0" RangeMax="1" offset="0"></DataArray>
+<DataArray type="UInt8" Name="solid" format="appended" offset="0"/>
 </CellData>
 </Piece>
 </ImageData>
 <AppendedData encoding="raw">
 _"#
     )?;
-    out.write_all(&(voxels.solid.len() as u64).to_le_bytes())?;
+    out.write_all(&(count as u64).to_le_bytes())?;
     out.write_all(&voxels.solid)?;
     out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
 }
@@ -36,15 +43,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn block_follows_the_underscore() {
-        let voxels = Voxels { origin: [-1.0, 0.5, 2.0], step: 0.25, shape: [2, 1, 3], solid: vec![1, 0, 0, 1, 1, 1] };
+    fn the_data_follow_their_length() {
+        let voxels = Voxels {
+            origin: [-1.0, 0.5, 0.0],
+            step: 0.25,
+            shape: [2, 1, 2],
+            solid: vec![1, 2, 3, 4],
+        };
         let mut bytes = Vec::new();
-        write(&voxels, &mut bytes).expect("a Vec takes everything");
-        let at = bytes.iter().position(|&b| b == b'_').expect("an underscore starts the data") + 1;
-        let head = String::from_utf8_lossy(&bytes[..at]);
-        assert!(head.contains(r#"WholeExtent="0 2 0 1 0 3" Origin="-1 0.5 2" Spacing="0.25 0.25 0.25""#));
-        assert_eq!(bytes[at..at + 8], 6u64.to_le_bytes());
-        assert_eq!(bytes[at + 8..at + 14], voxels.solid);
-        assert_eq!(&bytes[at + 14..], b"\n</AppendedData>\n</VTKFile>\n");
+        write_vti(&voxels, &mut bytes).unwrap();
+        let at = bytes
+            .windows(13)
+            .position(|w| w == b"\n_\x04\0\0\0\0\0\0\0\x01\x02\x03")
+            .unwrap();
+        assert_eq!(bytes[at + 13], 4);
+        let head = String::from_utf8_lossy(&bytes[..at]).to_string();
+        assert!(
+            head.contains(
+                r#"WholeExtent="0 2 0 1 0 2" Origin="-1 0.5 0" Spacing="0.25 0.25 0.25""#
+            )
+        );
+        assert!(
+            write_vti(
+                &Voxels {
+                    solid: vec![0; 3],
+                    ..voxels
+                },
+                &mut bytes
+            )
+            .is_err()
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! What a formula can compute: every operation's value, partial derivatives and range.
 
-use core::f64::consts::{FRAC_PI_2, LN_10, PI, TAU};
+use core::f64::consts::{LN_10, PI, TAU};
 
 use crate::math::Interval;
 
@@ -451,7 +451,7 @@ mod tests {
         let near =
             |a: Interval, b: Interval| (a.lo - b.lo).abs() < 1e-12 && (a.hi - b.hi).abs() < 1e-12;
         assert!(near(
-            Sin.range([i(0.0, FRAC_PI_2), none, none]),
+            Sin.range([i(0.0, core::f64::consts::FRAC_PI_2), none, none]),
             i(0.0, 1.0)
         ));
         assert!(near(
