@@ -68,6 +68,13 @@ pub trait Field: Send + Sync {
         }
     }
 
+    /// As `fill`, for a block at most 64 nodes wide, where only nodes whose bit is set in `wanted` (one word for each
+    /// row along x) need a value. Fields that are dear to evaluate override it.
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        let _ = wanted;
+        self.fill(block, out);
+    }
+
     /// The value at one point (mm).
     fn value(&self, p: Vec3) -> f64 {
         let mut v = [0.0];

@@ -169,40 +169,50 @@ impl Field for Lattice {
         }
     }
 
-    /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
-    /// multiplications per distinct wave number along x and no trigonometry.
     fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.fill_rows(block, None, out);
+    }
+
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        self.fill_rows(block, Some(wanted), out);
+    }
+}
+
+impl Lattice {
+    /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
+    /// multiplications per distinct wave number along x and no trigonometry. Only a level that varies is looked up
+    /// node by node, and only where it is wanted.
+    fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
         let Map::Affine(map) = &self.map;
         let waves = RowWaves::new(self.cell.series().terms(), map, block);
         let [xs, ys, zs] = block.axes;
+        let mut isos = vec![self.uniform.unwrap_or(0.0); xs.len()];
         let mut points: Vec<Vec3> = Vec::new();
-        let mut isos = vec![0.0; xs.len()];
-        if let Some(t) = self.uniform {
-            isos.fill(t);
-        }
+        let mut found: Vec<f64> = Vec::new();
         let mut coefficients = Vec::with_capacity(waves.groups.len());
-        let mut rows = out.chunks_exact_mut(xs.len());
-        for k in 0..zs.len() {
-            for j in 0..ys.len() {
-                let Some(row) = rows.next() else { return };
-                waves.coefficients(j, k, &mut coefficients);
-                sum_waves(&waves.along_x, &coefficients, row);
-                if self.uniform.is_none() {
-                    points.clear();
-                    points.extend(xs.iter().map(|&x| [x, ys[j], zs[k]]));
-                    self.isos(&points, &mut isos);
+        for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
+            let (j, k) = (n % ys.len(), n / ys.len());
+            let word = wanted.map_or(u64::MAX, |w| w[n]);
+            let here = |i: usize| wanted.is_none() || word >> i & 1 == 1;
+            if word == 0 {
+                row.fill(1.0);
+                continue;
+            }
+            waves.coefficients(j, k, &mut coefficients);
+            sum_waves(&waves.along_x, &coefficients, row);
+            if self.uniform.is_none() {
+                points.clear();
+                points.extend((0..xs.len()).filter(|&i| here(i)).map(|i| [xs[i], ys[j], zs[k]]));
+                found.resize(points.len(), 0.0);
+                self.isos(&points, &mut found);
+                for (i, t) in (0..xs.len()).filter(|&i| here(i)).zip(&found) {
+                    isos[i] = *t;
                 }
-                match self.part {
-                    Part::Sheet => row
-                        .iter_mut()
-                        .zip(&isos)
-                        .for_each(|(f, &t)| *f = f.abs() - t as f32),
-                    Part::Lower => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f -= t as f32),
-                    Part::Upper => row
-                        .iter_mut()
-                        .zip(&isos)
-                        .for_each(|(f, &t)| *f = t as f32 - *f),
-                }
+            }
+            match self.part {
+                Part::Sheet => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = f.abs() - t as f32),
+                Part::Lower => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f -= t as f32),
+                Part::Upper => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = t as f32 - *f),
             }
         }
     }

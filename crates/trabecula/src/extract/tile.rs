@@ -155,13 +155,18 @@ pub(super) fn extract(
 
     s.field.clear();
     s.region.clear();
-    if let Some(f) = lattice {
-        s.field.resize(block.len(), 0.0);
-        f.fill(&block, &mut s.field);
-    }
     if region {
         s.region.resize(block.len(), 0.0);
         solid.region.fill(&block, &mut s.region);
+    }
+    if let Some(f) = lattice {
+        s.field.resize(block.len(), 0.0);
+        if region {
+            let wanted = near_negative(&s.region, shape);
+            f.fill_where(&block, &wanted, &mut s.field);
+        } else {
+            f.fill(&block, &mut s.field);
+        }
     }
     signs(s, shape);
     let count = crossings(s, shape);
@@ -225,6 +230,20 @@ fn signs(s: &mut Scratch, shape: [usize; 3]) {
     for samples in [&s.field, &s.region] {
         keep_negative(&mut s.solid, samples, nx);
     }
+}
+
+/// For each row, the nodes whose value is at most zero and those next to them.
+fn near_negative(samples: &[f32], [nx, ny, nz]: [usize; 3]) -> Vec<u64> {
+    let mut inside = vec![if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 }; ny * nz];
+    keep_negative(&mut inside, samples, nx);
+    let at = |j: usize, k: usize| if j < ny && k < nz { inside[k * ny + j] } else { 0 };
+    let around = |row: usize| {
+        let (j, k) = (row % ny, row / ny);
+        let w = at(j, k);
+        let beside = at(j.wrapping_sub(1), k) | at(j + 1, k) | at(j, k.wrapping_sub(1)) | at(j, k + 1);
+        w | w << 1 | w >> 1 | beside
+    };
+    (0..ny * nz).map(around).collect()
 }
 
 /// Keeps the bits of each word whose value in the word's row is at most zero.
