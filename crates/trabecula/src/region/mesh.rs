@@ -85,7 +85,12 @@ impl MeshRegion {
     /// Everything about `p`; `hint` is a triangle likely to be near and never changes the answer.
     #[inline]
     fn sample(&self, p: Vec3, hint: Option<u32>) -> Sample {
-        let Some(t) = self.bvh.nearest(p, hint) else {
+        self.measure(p, self.bvh.nearest(p, hint))
+    }
+
+    /// Everything about `p` from the triangle nearest to it.
+    fn measure(&self, p: Vec3, nearest: Option<u32>) -> Sample {
+        let Some(t) = nearest else {
             // Too far for a squared distance, or not a number.
             let distance = if p.iter().any(|v| v.is_nan()) {
                 f64::NAN
@@ -147,7 +152,7 @@ impl MeshRegion {
         block: &Block,
         lo: [usize; 3],
         hi: [usize; 3],
-        hint: Option<u32>,
+        hint: &mut Option<u32>,
         out: &mut [f32],
     ) {
         let first: Vec3 = std::array::from_fn(|a| block.axes[a][lo[a]]);
@@ -159,18 +164,22 @@ impl MeshRegion {
                 (first[a] + last[a]) / 2.0
             }
         });
-        let here = self.sample(center, hint);
-        let d = here.distance;
         let shape = block.shape();
         let index = |x: usize, y: usize, z: usize| (z * shape[1] + y) * shape[0] + x;
         if (0..3).all(|a| hi[a] - lo[a] == 1) {
-            out[index(lo[0], lo[1], lo[2])] = round(d);
+            let here = self.sample(center, *hint);
+            *hint = here.triangle;
+            out[index(lo[0], lo[1], lo[2])] = round(here.distance);
             return;
         }
         let reach = norm(std::array::from_fn(|a| {
             reach(block.axes[a], lo[a], hi[a], center[a])
-        }));
-        if d.abs() > reach * (1.0 + 1e-12) {
+        })) * (1.0 + 1e-12);
+        // One triangle within reach is enough to go on halving.
+        let found = self.bvh.search(center, *hint, reach * reach);
+        *hint = found.map(|(t, _)| t);
+        if found.is_none_or(|(_, d2)| d2 > reach * reach) {
+            let d = self.measure(center, *hint).distance;
             for z in lo[2]..hi[2] {
                 for y in lo[1]..hi[1] {
                     let (dy, dz) = (block.axes[1][y] - center[1], block.axes[2][z] - center[2]);
@@ -196,8 +205,8 @@ impl MeshRegion {
         let (mut before, mut after) = (hi, lo);
         before[a] = middle;
         after[a] = middle;
-        self.carve(block, lo, before, here.triangle, out);
-        self.carve(block, after, hi, here.triangle, out);
+        self.carve(block, lo, before, hint, out);
+        self.carve(block, after, hi, hint, out);
     }
 }
 
@@ -265,7 +274,7 @@ impl Field for MeshRegion {
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
         if !block.is_empty() {
-            self.carve(block, [0; 3], block.shape(), None, out);
+            self.carve(block, [0; 3], block.shape(), &mut None, out);
         }
     }
 }
