@@ -494,8 +494,8 @@ mod tests {
         let r = region(wavy(3, 10.0));
         let mut random = Random(7);
         let mut crossings = 0;
-        for round_ in 0..30 {
-            let step = [0.15, 0.4, 1.2][round_ % 3];
+        for run in 0..30 {
+            let step = [0.15, 0.4, 1.2][run % 3];
             let start = random.point(11.0);
             let n: [usize; 3] =
                 std::array::from_fn(|_| 1 + (20.0 * random.number().abs()) as usize);
@@ -549,63 +549,67 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "a measurement"]
-    fn speed() {
-        use std::time::Instant;
-        for n in [6, 7] {
-            let mesh = wavy(n, 100.0);
-            let t = Instant::now();
-            let check = check::check(&mesh);
-            let checked = t.elapsed();
-            assert!(check.is_ok());
-            let t = Instant::now();
-            let r = region(mesh);
-            println!(
-                "{} triangles: check {checked:.3?}, all {:.3?}",
-                r.vertices.len(),
-                t.elapsed()
-            );
-            let mut random = Random(8);
-            let near: Vec<Vec3> = (0..200_000)
-                .map(|_| {
-                    let c = r.bvh.corners
-                        [((random.number() + 1.0) / 2.0 * r.vertices.len() as f64) as usize];
-                    add(c[0], random.point(1.0))
-                })
-                .collect();
-            let mut out = vec![0.0; near.len()];
-            let t = Instant::now();
-            r.values(&near, &mut out);
-            println!(
-                "near: {:.0} ns",
-                t.elapsed().as_nanos() as f64 / near.len() as f64
-            );
-            let far: Vec<Vec3> = (0..20_000).map(|_| random.point(110.0)).collect();
-            let t = Instant::now();
-            r.values(&far, &mut out[..far.len()]);
-            println!(
-                "anywhere: {:.0} ns",
-                t.elapsed().as_nanos() as f64 / far.len() as f64
-            );
-            let axis: Vec<f64> = (0..256)
-                .map(|i| -112.0 + 224.0 * f64::from(i) / 255.0)
-                .collect();
-            let mut out = vec![0f32; 1 << 24];
-            let t = Instant::now();
-            r.fill(&Block { axes: [&axis; 3] }, &mut out);
-            println!("256³ fill: {:.3?}", t.elapsed());
-            let mut out = vec![0f32; 64 * 64 * 64];
-            let t = Instant::now();
-            for k in 0..64 {
-                let part = |s: usize| &axis[64 * s..64 * (s + 1)];
-                r.fill(
-                    &Block {
-                        axes: [part(k % 4), part(k / 4 % 4), part(k / 16)],
-                    },
-                    &mut out,
+    fn needles_and_sharp_edges_keep_their_sign() {
+        let mut flat = wavy(3, 10.0);
+        for p in &mut flat.vertices {
+            p[2] *= 0.002;
+        }
+        let mut random = Random(9);
+        for r in [
+            region(flat),
+            region(torus(3.0, 0.5, 3, 400)),
+            region(torus(3.0, 1.0, 300, 3)),
+        ] {
+            let size = r.bounds.size();
+            for _ in 0..1000 {
+                let p: Vec3 = std::array::from_fn(|a| 0.6 * size[a] * random.number());
+                // How often the surface goes around p, by solid angles.
+                let half: f64 = r
+                    .bvh
+                    .corners
+                    .iter()
+                    .map(|t| {
+                        let [a, b, c] = t.map(|q| sub(q, p));
+                        let (la, lb, lc) = (norm(a), norm(b), norm(c));
+                        let x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+                        dot(a, cross(b, c)).atan2(x)
+                    })
+                    .sum();
+                let around = half / core::f64::consts::TAU;
+                assert!((around - around.round()).abs() < 1e-6);
+                assert_eq!(
+                    r.value(p) < 0.0,
+                    around > 0.5,
+                    "{p:?}: {}, {around}",
+                    r.value(p)
                 );
             }
-            println!("as 64³ blocks: {:.3?}", t.elapsed());
+        }
+    }
+
+    #[test]
+    fn blocks_that_share_nodes_agree() {
+        let r = region(wavy(3, 10.0));
+        let axis: Vec<f64> = (0..33).map(|i| -12.8 + 0.8 * f64::from(i)).collect();
+        let whole = |axes: [&[f64]; 3]| {
+            let block = Block { axes };
+            let mut out = vec![0f32; block.len()];
+            r.fill(&block, &mut out);
+            out
+        };
+        let all = whole([&axis; 3]);
+        let reach = 0.8;
+        for k in 0..8 {
+            let from = [0, 1, 2].map(|a| 16 * (k >> a & 1));
+            let out = whole(from.map(|f| &axis[f..f + 17]));
+            for (i, v) in out.iter().enumerate() {
+                let n = [i % 17 + from[0], i / 17 % 17 + from[1], i / 289 + from[2]];
+                let w = all[(n[2] * 33 + n[1]) * 33 + n[0]];
+                assert_eq!(*v > 0.0, w > 0.0);
+                if r.value(n.map(|j| axis[j])).abs() <= reach {
+                    assert_eq!(*v, w);
+                }
+            }
         }
     }
 }
