@@ -102,6 +102,30 @@ pub(super) fn closest_on_triangle(p: Vec3, [a, b, c]: &[Vec3; 3]) -> (Vec3, Feat
     )
 }
 
+/// The nearest triangle so far.
+struct Best {
+    triangle: u32,
+    distance2: f64,
+    /// Boxes beyond this are not looked into.
+    limit: f64,
+}
+
+impl Best {
+    #[inline(always)]
+    fn test(&mut self, p: Vec3, triangle: u32, corners: &[Vec3; 3]) {
+        let (q, _) = closest_on_triangle(p, corners);
+        let away = sub(p, q);
+        let d = dot(away, away);
+        if d < self.distance2 || (d == self.distance2 && triangle < self.triangle) {
+            *self = Best {
+                triangle,
+                distance2: d,
+                limit: d * SLACK,
+            };
+        }
+    }
+}
+
 /// The tree. Triangles are named by their place in leaf order.
 #[derive(Clone, Debug)]
 pub(super) struct Bvh {
@@ -141,30 +165,28 @@ impl Bvh {
     /// `hint` is a triangle likely to be near: it bounds the search and never changes the answer.
     #[inline]
     pub fn nearest(&self, p: Vec3, hint: Option<u32>) -> Option<u32> {
-        let mut found = None;
-        let mut best = f64::INFINITY;
-        let mut limit = f64::INFINITY;
-        let mut test = |t: u32, limit: &mut f64| {
-            let (q, _) = closest_on_triangle(p, &self.corners[t as usize]);
-            let d = sub(p, q);
-            let d = dot(d, d);
-            if d < best || (d == best && found.is_some_and(|f| t < f)) {
-                best = d;
-                *limit = d * SLACK;
-                found = Some(t);
-            }
+        self.search(p, hint, -1.0).map(|(t, _)| t)
+    }
+
+    /// The nearest triangle and its squared distance, or the first that is found within `enough` (squared).
+    pub fn search(&self, p: Vec3, hint: Option<u32>, enough: f64) -> Option<(u32, f64)> {
+        let mut best = Best {
+            triangle: u32::MAX,
+            distance2: f64::INFINITY,
+            limit: f64::INFINITY,
         };
         if let Some(t) = hint {
-            test(t, &mut limit);
+            best.test(p, t, &self.corners[t as usize]);
         }
         let mut stack = [(0u32, 0f64); STACK];
         let mut depth = 0;
         let mut at = 0;
-        loop {
+        while best.distance2 > enough {
             let node = &self.nodes[at as usize];
             if node.count > 0 {
-                for t in node.first..node.first + node.count {
-                    test(t, &mut limit);
+                let leaf = node.first as usize..(node.first + node.count) as usize;
+                for (t, corners) in (node.first..).zip(&self.corners[leaf]) {
+                    best.test(p, t, corners);
                 }
             } else {
                 let i = node.first as usize;
@@ -175,8 +197,8 @@ impl Bvh {
                 } else {
                     ((node.first, near), (node.first + 1, far))
                 };
-                if near.1 <= limit {
-                    if far.1 <= limit {
+                if near.1 <= best.limit {
+                    if far.1 <= best.limit {
                         stack[depth] = far;
                         depth += 1;
                     }
@@ -184,17 +206,13 @@ impl Bvh {
                     continue;
                 }
             }
-            loop {
-                if depth == 0 {
-                    return found;
-                }
-                depth -= 1;
-                if stack[depth].1 <= limit {
-                    at = stack[depth].0;
-                    break;
-                }
+            // The nearest that waits and is still worth a look.
+            match (0..depth).rev().find(|&i| stack[i].1 <= best.limit) {
+                Some(i) => (at, depth) = (stack[i].0, i),
+                None => break,
             }
         }
+        (best.triangle != u32::MAX).then_some((best.triangle, best.distance2))
     }
 
     /// Twice the area vector of a triangle: its normal, not of unit length.

@@ -67,11 +67,11 @@ struct Defects {
 impl Defects {
     /// Notes `n` defects of a kind, unless there are none.
     fn count(&mut self, n: usize, what: &str, how: &str) -> &mut Self {
-        let plural = match what {
+        let plural = match what.strip_suffix("body") {
             _ if n == 1 => what.to_string(),
-            "vertex" => "vertices".to_string(),
-            _ if what.ends_with("body") => format!("{}ies", what.trim_end_matches('y')),
-            _ => format!("{what}s"),
+            Some(kind) => format!("{kind}bodies"),
+            None if what == "vertex" => "vertices".to_string(),
+            None => format!("{what}s"),
         };
         if n > 0 {
             self.list
