@@ -49,7 +49,7 @@ def test_starter_meshes_at_once(tmp_path):
     run("new", "a.toml", "--cell", "diamond", cwd=tmp_path)
     report = json.loads(run("check", "a.toml", "--json", cwd=tmp_path).stdout)
     assert abs(report["lattices"]["core"]["fraction"] - 0.3) < 1e-12
-    run("mesh", "a.toml", "-o", "a.STL", "--edge", "0.5", cwd=tmp_path)
+    run("mesh", "a.toml", "-o", "a.STL", "--edge", "0.25", cwd=tmp_path)
     figures = json.loads(run("measure", "a.STL", "--region", "a.toml", "--json", cwd=tmp_path).stdout)
     assert figures["closed"] and abs(figures["solid_fraction"] - 0.3) < 2e-3
     assert "exists" in run("new", "a.toml", cwd=tmp_path, status=1).stderr

@@ -82,7 +82,7 @@ def test_fraction_and_level_are_inverse(name, row):
 def test_limits_of_connectivity(name, row, listed):
     for part in ("lower", "upper"):
         least, tolerance = row[f"connected_{part}"]
-        assert listed[name]["connected_fraction"][part][-1][0] == pytest.approx(least, abs=tolerance), part
+        assert listed[name]["connected_fraction"][part][0][0] == pytest.approx(least, abs=tolerance), part
 
 
 def agree(found, row):

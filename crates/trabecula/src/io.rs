@@ -59,11 +59,13 @@ pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
     if bytes.is_empty() {
         return Err(Fault::new("", "the file is empty (0 bytes)"));
     }
+    // Some editors put a byte order mark before text.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mesh = match kind.as_str() {
         "stl" => stl::read(bytes),
-        "obj" => obj::read(bytes),
-        "ply" => ply::read(bytes),
-        "off" => off::read(bytes),
+        "obj" => obj::read(text),
+        "ply" => ply::read(text),
+        "off" => off::read(text),
         _ => threemf::read(bytes),
     }?;
     if mesh.triangles.is_empty() {
@@ -226,6 +228,12 @@ mod tests {
                 "the file is empty (0 bytes)"
             );
         }
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_passed_over() {
+        let text = b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(read_mesh(text, "obj").unwrap().mesh.area(), 0.5);
     }
 
     #[test]

@@ -202,7 +202,11 @@ impl Lattice {
             sum_waves(&waves.along_x, &coefficients, row);
             if self.uniform.is_none() {
                 points.clear();
-                points.extend((0..xs.len()).filter(|&i| here(i)).map(|i| [xs[i], ys[j], zs[k]]));
+                points.extend(
+                    (0..xs.len())
+                        .filter(|&i| here(i))
+                        .map(|i| [xs[i], ys[j], zs[k]]),
+                );
                 found.resize(points.len(), 0.0);
                 self.isos(&points, &mut found);
                 for (i, t) in (0..xs.len()).filter(|&i| here(i)).zip(&found) {
@@ -210,9 +214,15 @@ impl Lattice {
                 }
             }
             match self.part {
-                Part::Sheet => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = f.abs() - t as f32),
+                Part::Sheet => row
+                    .iter_mut()
+                    .zip(&isos)
+                    .for_each(|(f, &t)| *f = f.abs() - t as f32),
                 Part::Lower => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f -= t as f32),
-                Part::Upper => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f = t as f32 - *f),
+                Part::Upper => row
+                    .iter_mut()
+                    .zip(&isos)
+                    .for_each(|(f, &t)| *f = t as f32 - *f),
             }
         }
     }

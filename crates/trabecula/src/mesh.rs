@@ -1,5 +1,7 @@
 //! Triangle meshes: indexed, in f64, counter-clockwise seen from outside.
 
+use std::collections::HashMap;
+
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 
 /// An indexed triangle mesh.
@@ -49,5 +51,87 @@ impl Mesh {
             .iter()
             .flatten()
             .fold(Aabb::EMPTY, |b, &v| b.with(self.vertices[v as usize]))
+    }
+
+    /// The rounding that single precision gives coordinates of this size, mm: what a file of `f32` leaves between
+    /// two readings of one point.
+    pub fn single_rounding(&self) -> f64 {
+        let b = self.bounds();
+        let largest = b
+            .min
+            .iter()
+            .chain(&b.max)
+            .fold(0.0f64, |m, x| m.max(x.abs()));
+        largest * f64::from(f32::EPSILON)
+    }
+
+    /// The mesh with vertices closer than `tolerance` (mm) made one, triangles that collapse left out.
+    ///
+    /// A vertex goes to the first kept one within reach, in order. Coordinates must be finite; a tolerance that is
+    /// not above zero joins nothing.
+    pub fn joined(&self, tolerance: f64) -> Mesh {
+        if !(tolerance > 0.0 && tolerance.is_finite()) {
+            return self.clone();
+        }
+        let cell = 4.0 * tolerance;
+        let index = |x: f64| (x / cell).floor() as i64;
+        let mut kept: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(self.vertices.len());
+        let mut vertices: Vec<Vec3> = Vec::with_capacity(self.vertices.len());
+        let mut to = Vec::with_capacity(self.vertices.len());
+        for &p in &self.vertices {
+            let lo = p.map(|x| index(x - tolerance));
+            let hi = p.map(|x| index(x + tolerance));
+            let cells = (lo[0]..=hi[0]).flat_map(|x| {
+                (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z]))
+            });
+            let near = cells
+                .filter_map(|c| kept.get(&c))
+                .flatten()
+                .filter(|&&v| norm(sub(vertices[v as usize], p)) <= tolerance)
+                .min();
+            to.push(match near {
+                Some(&v) => v,
+                None => {
+                    let v = vertices.len() as u32;
+                    kept.entry(p.map(index)).or_default().push(v);
+                    vertices.push(p);
+                    v
+                }
+            });
+        }
+        let moved = self.triangles.iter().map(|t| t.map(|v| to[v as usize]));
+        let triangles = moved
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        Mesh {
+            vertices,
+            triangles,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn close_vertices_join_and_thin_triangles_go() {
+        let mesh = Mesh {
+            vertices: vec![
+                [0.0; 3],
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [-1e-9, 1e-9, -1e-9],
+                [1.0, 1.0, 0.0],
+                [1.0 + 1e-6, 0.0, 0.0],
+            ],
+            triangles: vec![[0, 1, 2], [3, 2, 4], [0, 3, 1], [5, 4, 2]],
+        };
+        let joined = mesh.joined(1e-8);
+        assert_eq!(joined.triangles, [[0, 1, 2], [0, 2, 3], [4, 3, 2]]);
+        assert_eq!(joined.vertices.len(), 5);
+        assert_eq!(mesh.joined(1e-5).vertices.len(), 4);
+        assert_eq!(mesh.joined(0.0), mesh);
+        assert!((mesh.single_rounding() - 1.000001 * 2f64.powi(-23)).abs() < 1e-20);
     }
 }

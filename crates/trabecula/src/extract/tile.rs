@@ -236,11 +236,18 @@ fn signs(s: &mut Scratch, shape: [usize; 3]) {
 fn near_negative(samples: &[f32], [nx, ny, nz]: [usize; 3]) -> Vec<u64> {
     let mut inside = vec![if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 }; ny * nz];
     keep_negative(&mut inside, samples, nx);
-    let at = |j: usize, k: usize| if j < ny && k < nz { inside[k * ny + j] } else { 0 };
+    let at = |j: usize, k: usize| {
+        if j < ny && k < nz {
+            inside[k * ny + j]
+        } else {
+            0
+        }
+    };
     let around = |row: usize| {
         let (j, k) = (row % ny, row / ny);
         let w = at(j, k);
-        let beside = at(j.wrapping_sub(1), k) | at(j + 1, k) | at(j, k.wrapping_sub(1)) | at(j, k + 1);
+        let beside =
+            at(j.wrapping_sub(1), k) | at(j + 1, k) | at(j, k.wrapping_sub(1)) | at(j, k + 1);
         w | w << 1 | w >> 1 | beside
     };
     (0..ny * nz).map(around).collect()
@@ -375,12 +382,12 @@ fn find_planes(s: &mut Scratch, region: &dyn Field, margin: f64) {
     }
 }
 
-/// The void end of a root in hand: a bracket whose lower end is solid, and the present guess.
+/// A root in hand: the nearest places known to be solid and void, with their values, and the present guess.
 #[derive(Clone, Copy)]
 struct Root {
     vertex: u32,
-    lo: f64,
-    hi: f64,
+    solid: (f64, f64),
+    void: (f64, f64),
     t: f64,
 }
 
@@ -420,22 +427,19 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
             };
             // Vertices on flat faces are settled; on others the void end is positive if this function crosses.
             if v.on != On::Plane && b > 0.0 {
+                let (a, b) = (f64::from(a), f64::from(b));
                 // Along a flat face the value stays zero up to the rim: come from the void.
-                let t = if a == 0.0 {
-                    1.0
-                } else {
-                    f64::from(-a) / (f64::from(b) - f64::from(a))
-                };
+                let t = if a == 0.0 { 1.0 } else { -a / (b - a) };
                 roots.push(Root {
                     vertex: from as u32,
-                    lo: 0.0,
-                    hi: 1.0,
-                    t: t.clamp(0.0, 1.0),
+                    solid: (0.0, a),
+                    void: (1.0, b),
+                    t,
                 });
             }
             from += 1;
         }
-        for _ in 0..4 {
+        for _ in 0..6 {
             points.clear();
             points.extend(roots.iter().map(|r| vertices[r.vertex as usize].at(r.t)));
             values.resize(roots.len(), 0.0);
@@ -445,12 +449,13 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
             for n in 0..roots.len() {
                 let (mut r, v) = (roots[n], values[n]);
                 let vertex = &mut vertices[r.vertex as usize];
-                *(if v <= 0.0 { &mut r.lo } else { &mut r.hi }) = r.t;
+                *(if v <= 0.0 { &mut r.solid } else { &mut r.void }) = (r.t, v);
+                let ((lo, a), (hi, b)) = (r.solid, r.void);
                 let newton = r.t - v / (gradients[n][vertex.axis as usize] * vertex.reach);
-                let next = if newton >= r.lo && newton <= r.hi {
+                let next = if newton >= lo && newton <= hi {
                     newton
                 } else {
-                    0.5 * (r.lo + r.hi)
+                    lo - (hi - lo) * a / (b - a)
                 };
                 let step = (next - r.t).abs();
                 r.t = next;

@@ -73,9 +73,8 @@ pub fn push_f32(out: &mut Vec<u8>, v: f32) {
     let mut n = 0;
     for _ in 0..3 {
         let power = POWERS[decimals] as f64;
-        let rounded = (a * power).round();
-        n = rounded as u64;
-        if (rounded / power - a).abs() <= reach {
+        n = (a * power + 0.5) as u64;
+        if (n as f64 / power - a).abs() <= reach {
             break;
         }
         decimals += 1;

@@ -8,6 +8,7 @@ use super::number::{push_f32, push_u32};
 use super::{Metadata, in_order, invalid};
 use crate::mesh::Mesh;
 
+mod deflate;
 mod read;
 mod xml;
 mod zip;
@@ -68,7 +69,7 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
             push_f32(&mut text, z);
             text.extend_from_slice(b"\"/>\n");
         }
-        zip::deflate(&text)
+        zip::deflate_rows(&text)
     };
     let mut put = |piece| {
         model.push(piece);
@@ -87,7 +88,7 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
             push_u32(&mut text, *c);
             text.extend_from_slice(b"\"/>\n");
         }
-        zip::deflate(&text)
+        zip::deflate_rows(&text)
     };
     in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)?;
     let tail = "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";

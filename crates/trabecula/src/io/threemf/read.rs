@@ -1,6 +1,7 @@
 //! Reading of 3MF: what the build items place, in millimetres.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::MODEL;
 use super::xml::{Event, Scanner, attribute, required};
@@ -88,10 +89,10 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut waiting: Vec<String> = outside(&main).collect();
     files.insert(String::new(), main);
     while let Some(path) = waiting.pop() {
-        if !files.contains_key(&path) {
-            let part = model(&archive.file(&path)?)?;
+        if let Entry::Vacant(place) = files.entry(path) {
+            let part = model(&archive.file(place.key())?)?;
             waiting.extend(outside(&part));
-            files.insert(path, part);
+            place.insert(part);
         }
     }
     // Instances multiply what the file holds; a small file that asks for billions is refused.

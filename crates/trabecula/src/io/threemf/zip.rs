@@ -26,6 +26,17 @@ pub struct Piece {
     size: u64,
 }
 
+/// Deflates rows of one pattern.
+pub fn deflate_rows(text: &[u8]) -> Piece {
+    let mut crc = Crc::new();
+    crc.update(text);
+    Piece {
+        bytes: super::deflate::rows(text),
+        crc,
+        size: text.len() as u64,
+    }
+}
+
 /// Deflates text on its own, up to a byte boundary.
 pub fn deflate(text: &[u8]) -> Piece {
     let mut crc = Crc::new();
