@@ -23,7 +23,7 @@ mod table;
 mod tile;
 
 use grid::Grid;
-use tile::{Patch, Scratch};
+use tile::{Scratch, View};
 
 /// Told how far the work is; answers whether to go on.
 pub trait Progress: Sync {
@@ -100,7 +100,8 @@ pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
         .map_init(Scratch::default, |scratch, i| {
             // Odd multiples of a share of the whole: the middles of equal runs of tiles.
             let index = (2 * i + 1) * total / (2 * sampled);
-            tile::extract(solid, &grid, grid.tile(index), scratch).map_or(0, |p| p.triangles.len())
+            tile::extract(solid, &grid, grid.tile(index), scratch)
+                .map_or(0, |v| v.triangles().count())
         })
         .sum();
     let triangles = found as f64 * total as f64 / sampled as f64;
@@ -113,12 +114,26 @@ pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
     })
 }
 
+/// A used buffer, or a new one. Memory that is not returned to the system need not be cleared by it again.
+fn borrow<T: Default>(pool: &Mutex<Vec<T>>) -> T {
+    pool.lock()
+        .ok()
+        .and_then(|mut p| p.pop())
+        .unwrap_or_default()
+}
+
+fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
+    if let Ok(mut p) = pool.lock() {
+        p.push(buffer);
+    }
+}
+
 /// Extracts all tiles, a few at a time, and hands what `cook` makes of them to `take` in order.
 fn each_tile<T: Send>(
     solid: &Solid,
     grid: &Grid,
     progress: &dyn Progress,
-    cook: impl Fn(Patch) -> T + Sync,
+    cook: impl Fn(View) -> T + Sync,
     mut take: impl FnMut(T) -> Result<(), Stopped> + Send,
 ) -> Result<(), Stopped> {
     let total: usize = grid.tiles().iter().product();
@@ -128,16 +143,10 @@ fn each_tile<T: Send>(
             .into_par_iter()
             .with_max_len(1)
             .map(|i| {
-                let mut mine = scratch
-                    .lock()
-                    .ok()
-                    .and_then(|mut s| s.pop())
-                    .unwrap_or_default();
-                let patch = tile::extract(solid, grid, grid.tile(i), &mut mine);
-                if let Ok(mut s) = scratch.lock() {
-                    s.push(mine);
-                }
-                patch.map(&cook)
+                let mut mine = borrow(&scratch);
+                let found = tile::extract(solid, grid, grid.tile(i), &mut mine).map(&cook);
+                give_back(&scratch, mine);
+                found
             })
             .collect()
     };
@@ -176,7 +185,7 @@ pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surf
         solid,
         &grid,
         progress,
-        |p| p,
+        |view| view.patch(),
         |patch| {
             let mut names = Vec::with_capacity(patch.vertices.len());
             for ((v, key), shared) in patch.vertices.iter().zip(&patch.keys).zip(&patch.shared) {
@@ -222,19 +231,18 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
     let middle = solid.region.bounds().center();
     let mut summary = Summary::default();
     out.write_all(&[0; 84]).map_err(Stopped::Io)?;
-    let cook = |patch: Patch| {
-        let corners = |t: &[u32; 3]| t.map(|v| patch.vertices[v as usize]);
-        let mut part = Summary {
-            triangles: patch.triangles.len() as u64,
-            ..Summary::default()
-        };
-        let mut records = Vec::with_capacity(50 * patch.triangles.len());
-        for (t, cut) in patch.triangles.iter().zip(&patch.cut) {
-            let t = corners(t);
+    let spare = Mutex::new(Vec::<Vec<u8>>::new());
+    let cook = |view: View| {
+        let mut part = Summary::default();
+        let mut records = borrow(&spare);
+        let places = view.places();
+        for (t, cut) in view.triangles() {
+            let t = t.map(|v| places[v as usize]);
             let [a, b, c] = t.map(|p| sub(p, middle));
+            part.triangles += 1;
             part.volume += dot(a, cross(b, c)) / 6.0;
             let area = norm(cross(sub(b, a), sub(c, a))) / 2.0;
-            *(if *cut {
+            *(if cut {
                 &mut part.area_cut
             } else {
                 &mut part.area_lattice
@@ -243,7 +251,7 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
         }
         (part, records)
     };
-    each_tile(solid, &grid, progress, cook, |(part, records)| {
+    each_tile(solid, &grid, progress, cook, |(part, mut records)| {
         summary.triangles += part.triangles;
         summary.volume += part.volume;
         summary.area_lattice += part.area_lattice;
@@ -252,7 +260,10 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
             let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
             return Err(Stopped::Refused(Fault::new("edge", message)));
         }
-        out.write_all(&records).map_err(Stopped::Io)
+        out.write_all(&records).map_err(Stopped::Io)?;
+        records.clear();
+        give_back(&spare, records);
+        Ok(())
     })?;
     let header = stl::header(summary.triangles as u32);
     out.seek(io::SeekFrom::Start(0))

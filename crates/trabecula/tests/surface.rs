@@ -95,15 +95,13 @@ fn a_sheet_of_32_samples_a_cell_is_within_1e_4_of_its_volume() {
         [0.0; 3],
     );
     let solid = solid(cube(2.0), Some(field));
-    let errors = [16.0, 32.0, 64.0].map(|n| {
+    let errors = [32.0, 64.0].map(|n| {
         let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
         (s.mesh.volume() / (0.3 * 8.0) - 1.0).abs()
     });
-    println!("sheet volume errors at 16, 32, 64 samples a cell: {errors:?}");
-    assert!(
-        errors[1] < 1e-4 && errors[2] < errors[0] / 16.0,
-        "{errors:?}"
-    );
+    println!("sheet volume errors at 32 and 64 samples a cell: {errors:?}");
+    // 1e-4 is promised; what is left is of fourth order, so half the spacing has a sixteenth of it.
+    assert!(errors[0] < 1e-4 && errors[1] < 1e-4 / 16.0, "{errors:?}");
 }
 
 #[test]

@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use crate::field::Field;
-use crate::math::{Vec3, add, dot, norm, scale, sub};
+use crate::math::{Vec3, add, dot, norm, scale, sub, unit};
 
 use super::tile::{BATCH, Nodes, On};
 
@@ -40,6 +40,8 @@ pub(super) struct Center {
     /// The cell, by the index of its lower node.
     pub cell: u32,
     pub place: Vec3,
+    /// Unit normals of the lattice and of the region's surface.
+    pub normals: [Vec3; 2],
 }
 
 /// The block's surface as it stands when creases are looked for.
@@ -74,7 +76,9 @@ pub(super) fn sharpen(
     let mut corners: HashMap<(u32, u32), (usize, usize)> = HashMap::new();
     let meetings = meet(rings, places, on, ends, nodes);
     for (ring, place) in rings.iter().zip(meetings) {
-        let Some(place) = place else { continue };
+        let Some((place, normals)) = place else {
+            continue;
+        };
         let this = (places.len() + centers.len()) as u32;
         let n = ring.points.len();
         for k in 0..n {
@@ -109,6 +113,7 @@ pub(super) fn sharpen(
         centers.push(Center {
             cell: ring.cell,
             place,
+            normals,
         });
     }
     centers
@@ -141,14 +146,14 @@ fn passes(ring: &Ring, place: Vec3, neighbour: &Center, nodes: &Nodes) -> bool {
     })
 }
 
-/// For each ring, the point of its cell on both surfaces, if there is one: Newton's method with the shortest step.
+/// For each ring, the point of its cell on both surfaces and their unit normals, if there is one: Newton's method with the shortest step.
 fn meet(
     rings: &[Ring],
     places: &[Vec3],
     on: &[On],
     ends: [&dyn Field; 2],
     nodes: &Nodes,
-) -> Vec<Option<Vec3>> {
+) -> Vec<Option<(Vec3, [Vec3; 2])>> {
     let mut found = Vec::with_capacity(rings.len());
     for batch in rings.chunks(BATCH) {
         let mut points: Vec<Vec3> = Vec::with_capacity(batch.len());
@@ -205,7 +210,9 @@ fn meet(
                 }
             }
         }
-        found.extend(points.iter().zip(&simple).map(|(p, ok)| ok.then_some(*p)));
+        found.extend((0..batch.len()).map(|i| {
+            simple[i].then(|| (points[i], [unit(gradients[0][i]), unit(gradients[1][i])]))
+        }));
     }
     found
 }

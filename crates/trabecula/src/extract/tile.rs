@@ -7,8 +7,8 @@
 //! Two things move vertices, only ever along their edges:
 //! - a bracketed Newton iteration puts them on the true surface, of lattice or region, whichever ends the solid first;
 //! - a chord lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
-//!   first order in curvature · h². Each triangle measures how far its middle is from the surface, and its vertices
-//!   share the move that cancels its volume error. What is left is of fourth order.
+//!   first order in curvature · h². Each triangle learns from the normals at its corners how far it lies from the
+//!   surface, and its vertices share the move that cancels its volume error. What is left is of fourth order.
 //!
 //! Where a grid plane lies on a flat face of the region (signed distance exactly zero at its nodes), vertices go to
 //! the node itself, so the face and its straight edges are reproduced exactly.
@@ -18,10 +18,12 @@
 //! A tile looks one cell beyond itself. All it computes there is a function of the grid edge or triangle alone, done
 //! in the same order, so neighbouring tiles find bit-identical vertices.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 
 use crate::field::Field;
-use crate::math::{Vec3, add, cross, norm, scale, sub};
+use crate::math::{Vec3, cross, dot, norm, sub, unit};
 use crate::solid::Solid;
 
 use super::crease;
@@ -41,7 +43,7 @@ pub(super) enum On {
     Crease,
 }
 
-/// The surface in one tile.
+/// The surface in one tile, by itself.
 #[derive(Default)]
 pub(super) struct Patch {
     /// Vertex positions.
@@ -74,7 +76,15 @@ pub(super) struct Scratch {
     rings: Vec<crease::Ring>,
     /// Vertices inside cells; their numbers follow those of the vertices on edges.
     centers: Vec<crease::Center>,
-    moments: Vec<(f64, Vec3)>,
+    /// Places of all vertices, and what they lie on.
+    places: Vec<Vec3>,
+    on: Vec<On>,
+    /// Unit normals of the vertices on edges.
+    normals: Vec<Vec3>,
+    /// For each vertex on an edge: the volume it is to lose, and three times what it loses per mm along its edge.
+    moments: Vec<(f64, f64)>,
+    /// For each vertex on an edge, the one that stands for it; empty where all stand for themselves.
+    stands: Vec<u32>,
 }
 
 /// A vertex on a grid edge, at `solid` + t · `reach` along `axis`.
@@ -134,13 +144,24 @@ impl Nodes<'_> {
 /// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
 pub(super) const BATCH: usize = 2048;
 
+/// The surface found in a tile, in the buffers that it was found in.
+pub(super) struct View<'a> {
+    s: &'a Scratch,
+    nodes: Nodes<'a>,
+    grid: &'a Grid,
+    /// First node of the block.
+    from: [usize; 3],
+    /// Cells of the tile itself, in block coordinates.
+    own: [Range<usize>; 3],
+}
+
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
-pub(super) fn extract(
+pub(super) fn extract<'a>(
     solid: &Solid,
-    grid: &Grid,
+    grid: &'a Grid,
     tile: [usize; 3],
-    s: &mut Scratch,
-) -> Option<Patch> {
+    s: &'a mut Scratch,
+) -> Option<View<'a>> {
     let block = grid.block(tile);
     let Content::Surface { field, region } = content(solid, &block.bounds()) else {
         return None;
@@ -153,24 +174,19 @@ pub(super) fn extract(
         stride: [1, shape[0], shape[0] * shape[1]],
     };
 
-    s.field.clear();
-    s.region.clear();
+    // No samples mean: solid everywhere. Every sample is written, so nothing needs clearing.
+    s.region.resize(if region { block.len() } else { 0 }, 0.0);
+    s.field.resize(if field { block.len() } else { 0 }, 0.0);
     if region {
-        s.region.resize(block.len(), 0.0);
         solid.region.fill(&block, &mut s.region);
     }
-    if let Some(f) = lattice {
-        s.field.resize(block.len(), 0.0);
-        if region {
-            let wanted = near_negative(&s.region, shape);
-            f.fill_where(&block, &wanted, &mut s.field);
-        } else {
-            f.fill(&block, &mut s.field);
-        }
+    match lattice {
+        Some(f) if region => f.fill_where(&block, &near_negative(&s.region, shape), &mut s.field),
+        Some(f) => f.fill(&block, &mut s.field),
+        None => {}
     }
     signs(s, shape);
-    let count = crossings(s, shape);
-    if count == 0 {
+    if crossings(s, shape) == 0 {
         return None;
     }
     list_vertices(s, &nodes);
@@ -190,7 +206,6 @@ pub(super) fn extract(
             v.t.clamp(grid.margin, 1.0 - grid.margin)
         };
     }
-    // Cells of the tile itself, in block coordinates.
     let from = grid.nodes(tile).map(|r| r.start);
     let own = [0, 1, 2].map(|a| {
         let first = tile[a] * TILE - from[a];
@@ -200,25 +215,31 @@ pub(super) fn extract(
     if !s.own.iter().any(|&o| o) {
         return None;
     }
-    let mut places: Vec<Vec3> = s.vertices.iter().map(Vertex::place).collect();
-    let mut on: Vec<On> = s.vertices.iter().map(|v| v.on).collect();
+    s.places.clear();
+    s.places.extend(s.vertices.iter().map(Vertex::place));
+    s.on.clear();
+    s.on.extend(s.vertices.iter().map(|v| v.on));
+    s.centers.clear();
     if let (Some(f), true) = (lattice, region) {
-        let ends = [f, &*solid.region as &dyn Field];
         let draft = crease::Draft {
             triangles: &mut s.triangles,
             own: &mut s.own,
-            places: &places,
-            on: &on,
+            places: &s.places,
+            on: &s.on,
         };
-        s.centers = crease::sharpen(&s.rings, draft, ends, &nodes);
-        places.extend(s.centers.iter().map(|c| c.place));
-        on.extend(s.centers.iter().map(|_| On::Crease));
-    } else {
-        s.centers.clear();
+        s.centers = crease::sharpen(&s.rings, draft, [f, &*solid.region], &nodes);
+        s.places.extend(s.centers.iter().map(|c| c.place));
+        s.on.extend(s.centers.iter().map(|_| On::Crease));
     }
-    balance(s, lattice, &*solid.region, &places, &on, grid.margin);
-    let merged = merge_plane_vertices(s, &nodes);
-    Some(gather(s, &nodes, grid, from, &own, merged.as_deref()))
+    balance(s, grid.margin);
+    merge_plane_vertices(s, &nodes);
+    Some(View {
+        s,
+        nodes,
+        grid,
+        from,
+        own,
+    })
 }
 
 /// The word of signs of each row of nodes.
@@ -257,25 +278,24 @@ fn near_negative(samples: &[f32], [nx, ny, nz]: [usize; 3]) -> Vec<u64> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn keep_negative(words: &mut [u64], samples: &[f32], nx: usize) {
     for (word, row) in words.iter_mut().zip(samples.chunks_exact(nx)) {
-        let mut signs = 0u64;
-        let mut parts = row.chunks_exact(16);
-        let mut shift = 0;
-        for part in parts.by_ref() {
-            let mut bits = 0u16;
-            for (b, v) in part.iter().enumerate() {
-                bits |= u16::from(*v <= 0.0) << b;
-            }
-            signs |= u64::from(bits) << shift;
-            shift += 16;
+        let mut bytes = [0u8; 64];
+        for (byte, v) in bytes.iter_mut().zip(row) {
+            *byte = u8::from(*v <= 0.0);
         }
-        for (b, v) in parts.remainder().iter().enumerate() {
-            signs |= u64::from(*v <= 0.0) << (shift + b);
+        let mut signs = 0u64;
+        for (i, eight) in bytes.chunks_exact(8).enumerate() {
+            let mut low = [0u8; 8];
+            low.copy_from_slice(eight);
+            // Eight bytes of 0 or 1 gathered into the top byte, the first lowest.
+            let bits = u64::from_le_bytes(low).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            signs |= bits << (8 * i);
         }
         *word &= signs;
     }
 }
 
 /// Marks the grid edges whose ends differ and numbers them: x-edges, then y, then z, each in node order.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn crossings(s: &mut Scratch, shape: [usize; 3]) -> usize {
     let [nx, ny, nz] = shape;
     let inner = (1u64 << (nx - 1)) - 1;
@@ -303,11 +323,12 @@ fn crossings(s: &mut Scratch, shape: [usize; 3]) -> usize {
 }
 
 /// The number of the vertex on an edge.
-#[inline]
+#[inline(always)]
 fn number(s: &Scratch, axis: usize, row: usize, i: usize) -> u32 {
     s.offset[axis][row] + (s.crossed[axis][row] & ((1u64 << i) - 1)).count_ones()
 }
 
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
     s.vertices.clear();
     let [nx, ny, _] = nodes.shape;
@@ -393,6 +414,8 @@ struct Root {
 
 /// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
 const SETTLED: f64 = 1e-3;
+/// Most rounds of the iteration.
+const ROUNDS: usize = 6;
 
 /// Finds where the function ends the solid on each edge that it crosses, and keeps the first end.
 fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
@@ -403,8 +426,10 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
         values,
         gradients,
         vertices,
+        normals,
         ..
     } = s;
+    normals.resize(vertices.len(), [0.0; 3]);
     let samples = if which == On::Lattice {
         &*field
     } else {
@@ -439,7 +464,7 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
             }
             from += 1;
         }
-        for _ in 0..6 {
+        for round in 0..ROUNDS {
             points.clear();
             points.extend(roots.iter().map(|r| vertices[r.vertex as usize].at(r.t)));
             values.resize(roots.len(), 0.0);
@@ -459,11 +484,13 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
                 };
                 let step = (next - r.t).abs();
                 r.t = next;
-                if step > SETTLED {
+                if step > SETTLED && round + 1 < ROUNDS {
                     roots[open] = r;
                     open += 1;
-                } else {
-                    settle(vertex, r.t, which);
+                } else if r.t <= vertex.t {
+                    // Nothing ended the solid before. (The lattice is solved first; where it does not, t is still 1.)
+                    (vertex.t, vertex.on) = (r.t, which);
+                    normals[r.vertex as usize] = unit(gradients[n]);
                 }
             }
             roots.truncate(open);
@@ -471,23 +498,13 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
                 break;
             }
         }
-        for r in &roots {
-            settle(&mut vertices[r.vertex as usize], r.t, which);
-        }
-    }
-}
-
-/// Takes the root if nothing ended the solid before it. The lattice is solved first; where it does not, t is still 1.
-#[inline]
-fn settle(vertex: &mut Vertex, t: f64, which: On) {
-    if t <= vertex.t {
-        (vertex.t, vertex.on) = (t, which);
     }
 }
 
 /// Lists the triangles of all cells of the block, halo included, and which belong to the tile itself; and the cells
 /// with a single patch that meets both lattice and region, which `crease` fills in its own way.
-fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[std::ops::Range<usize>; 3]) {
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
+fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[Range<usize>; 3]) {
     let [nx, ny, nz] = shape;
     let inner = (1u64 << (nx - 1)) - 1;
     let cases = &*CASES;
@@ -542,77 +559,59 @@ fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[std::ops::Range<usi
 
 /// Moves vertices along their edges so that each triangle's chord error in volume cancels.
 ///
-/// For a surface that is locally quadratic about a triangle with its corners on it, the mean distance of the triangle
-/// from the surface is 3/4 of that at the centroid. The triangle hands this volume, with opposite sign, to its
-/// corners in shares (n · e)², e the corner's edge: what faces its edge can move without running far along it.
-fn balance(
-    s: &mut Scratch,
-    lattice: Option<&dyn Field>,
-    region: &dyn Field,
-    places: &[Vec3],
-    on: &[On],
-    margin: f64,
-) {
+/// A surface that is locally quadratic, through the corners of a triangle, lies on average Σ II(e)/24 above it, e the
+/// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
+/// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
+/// edge: what faces its edge can move without running far along it. Vertices on creases and flat faces stay.
+fn balance(s: &mut Scratch, margin: f64) {
     let Scratch {
-        points,
-        values,
-        gradients,
         vertices,
         triangles,
+        places,
+        on,
+        normals,
+        centers,
         moments,
         ..
     } = s;
     moments.clear();
-    moments.resize(vertices.len(), (0.0, [0.0; 3]));
-    for (which, f) in [(On::Lattice, lattice), (On::Region, Some(region))] {
-        let Some(f) = f else { continue };
-        let lies = |v: u32| on[v as usize] == which || on[v as usize] == On::Crease;
-        let smooth: Vec<usize> = (0..triangles.len())
-            .filter(|&i| {
-                triangles[i].iter().all(|&v| lies(v))
-                    && triangles[i].iter().any(|&v| on[v as usize] == which)
-            })
-            .collect();
-        for batch in smooth.chunks(BATCH) {
-            points.clear();
-            points.extend(batch.iter().map(|&i| {
-                let [a, b, c] = triangles[i].map(|v| places[v as usize]);
-                scale(add(add(a, b), c), 1.0 / 3.0)
-            }));
-            values.resize(batch.len(), 0.0);
-            gradients.resize(batch.len(), [0.0; 3]);
-            f.gradients(points, values, gradients);
-            for ((&i, &v), g) in batch.iter().zip(&*values).zip(&*gradients) {
-                let corners = triangles[i];
-                let [a, b, c] = corners.map(|v| places[v as usize]);
-                let n = cross(sub(b, a), sub(c, a));
-                let (twice, steep) = (norm(n), norm(*g));
-                if !(steep > 0.0) {
-                    continue;
-                }
-                let volume = 0.75 * (v / steep) * 0.5 * twice;
-                // Vertices inside cells stay on their crease.
-                let share = corners.map(|v| {
-                    vertices
-                        .get(v as usize)
-                        .map_or(0.0, |v| n[v.axis as usize].powi(2))
-                });
-                let sum = share[0] + share[1] + share[2];
-                for (v, share) in corners.into_iter().zip(share) {
-                    if let Some(m) = moments.get_mut(v as usize).filter(|_| sum > 0.0) {
-                        m.0 += volume * share / sum;
-                        m.1 = add(m.1, scale(n, 0.5));
-                    }
+    moments.resize(vertices.len(), (0.0, 0.0));
+    for t in triangles.iter() {
+        let kinds = t.map(|v| on[v as usize]);
+        // The surface that all corners lie on, if there is one.
+        let Some(&which) = kinds.iter().find(|k| **k != On::Crease) else {
+            continue;
+        };
+        if which == On::Plane || kinds.iter().any(|k| *k != which && *k != On::Crease) {
+            continue;
+        }
+        let [a, b, c] = t.map(|v| places[v as usize]);
+        let [na, nb, nc] = t.map(|v| match normals.get(v as usize) {
+            Some(n) => *n,
+            None => centers[v as usize - normals.len()].normals[usize::from(which == On::Region)],
+        });
+        let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
+        let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
+        let n = cross(ab, sub(c, a));
+        let volume = above * 0.5 * norm(n);
+        let facing = t.map(|v| vertices.get(v as usize).map_or(0.0, |v| n[v.axis as usize]));
+        let sum = facing[0] * facing[0] + facing[1] * facing[1] + facing[2] * facing[2];
+        if sum > 0.0 {
+            for (&v, facing) in t.iter().zip(facing) {
+                if let Some(m) = moments.get_mut(v as usize) {
+                    m.0 += volume * facing * facing / sum;
+                    m.1 += 0.5 * facing;
                 }
             }
         }
     }
-    for (v, (volume, area)) in vertices.iter_mut().zip(&*moments) {
+    for ((v, place), &(volume, area)) in vertices.iter_mut().zip(places).zip(&*moments) {
         // Volume gained per unit of t: a third of the ring's area as seen along the edge.
-        let gain = area[v.axis as usize] * v.reach / 3.0;
+        let gain = area * v.reach / 3.0;
         if gain > 0.0 {
             let step = (volume / gain).clamp(-0.25, 0.25);
-            v.t = (v.t - step).clamp(margin, 1.0 - margin);
+            v.t = (v.t + step).clamp(margin, 1.0 - margin);
+            *place = v.place();
         }
     }
 }
@@ -621,13 +620,13 @@ fn balance(
 ///
 /// Only where the void directions of the node form one corner of space (at most one per axis, the diagonals between
 /// them void too), so that joining keeps the surface a manifold; elsewhere the vertices stay apart by the margin.
-/// Returns for each vertex the one that stands for it.
-fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) -> Option<Vec<u32>> {
+fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) {
+    s.stands.clear();
     if !s.vertices.iter().any(|v| v.on == On::Plane) {
-        return None;
+        return;
     }
     let solid = |i: [usize; 3]| s.solid[i[2] * nodes.shape[1] + i[1]] >> i[0] & 1 == 1;
-    let mut stands: Vec<u32> = (0..s.vertices.len() as u32).collect();
+    s.stands.extend(0..s.vertices.len() as u32);
     let mut first = std::collections::HashMap::new();
     for i in 0..s.vertices.len() {
         let v = s.vertices[i];
@@ -663,77 +662,96 @@ fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) -> Option<Vec<u32>> {
             })
             && (out.len() < 3 || !solid(out.iter().fold(at, |p, &(a, up)| step(p, a, up))));
         if one_corner {
-            stands[i] = *first.entry(node).or_insert(i as u32);
+            s.stands[i] = *first.entry(node).or_insert(i as u32);
             s.vertices[i].t = 0.0;
+            s.places[i] = s.vertices[i].solid;
         }
     }
-    Some(stands)
 }
 
-/// Gathers the tile's own triangles and the vertices they use.
-fn gather(
-    s: &Scratch,
-    nodes: &Nodes,
-    grid: &Grid,
-    from: [usize; 3],
-    own: &[std::ops::Range<usize>; 3],
-    stands: Option<&[u32]>,
-) -> Patch {
-    let mut patch = Patch::default();
-    let mut renamed = vec![u32::MAX; s.vertices.len() + s.centers.len()];
-    let all = grid.axes.each_ref().map(Vec::len);
-    let key = |at: [usize; 3], kind: u64| {
-        let at = [0, 1, 2].map(|a| (at[a] + from[a]) as u64);
-        (at[0] + all[0] as u64 * (at[1] + all[1] as u64 * at[2])) * 8 + kind
-    };
-    // Position, key, and whether a neighbouring tile may use the vertex as well.
-    let describe = |v: usize| match s.vertices.get(v) {
-        Some(vertex) => {
-            let mut at = nodes.at(vertex.low as usize);
-            let axis = vertex.axis as usize;
-            let on_node = vertex.t == 0.0;
-            if on_node && !vertex.up() {
-                at[axis] += 1;
-            }
-            let shared = (0..3)
-                .any(|a| (a != axis || on_node) && (at[a] == own[a].start || at[a] == own[a].end));
-            (
-                vertex.place(),
-                key(at, if on_node { 3 } else { axis as u64 }),
-                shared,
-            )
-        }
-        None => {
-            let center = &s.centers[v - s.vertices.len()];
-            let at = nodes.at(center.cell as usize);
-            let shared = (0..3).any(|a| at[a] <= own[a].start || at[a] + 1 >= own[a].end);
-            (center.place, key(at, 4), shared)
-        }
-    };
-    for (t, _) in s.triangles.iter().zip(&s.own).filter(|(_, own)| **own) {
-        let t = stands.map_or(*t, |stands| {
-            t.map(|v| stands.get(v as usize).copied().unwrap_or(v))
-        });
-        if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
-            continue;
-        }
+impl View<'_> {
+    /// Places of the vertices that `triangles` names.
+    pub fn places(&self) -> &[Vec3] {
+        &self.s.places
+    }
+
+    /// The triangles of the tile's own cells, and whether they lie on the region's surface.
+    pub fn triangles(&self) -> impl Iterator<Item = ([u32; 3], bool)> {
+        let s = self.s;
+        let stands = |v: u32| s.stands.get(v as usize).copied().unwrap_or(v);
         let skin = |v: u32| {
             s.vertices
                 .get(v as usize)
                 .is_none_or(|v| v.on != On::Lattice || v.skin)
         };
-        patch.cut.push(t.iter().all(|&v| skin(v)));
-        patch.triangles.push(t.map(|v| {
-            let slot = &mut renamed[v as usize];
-            if *slot == u32::MAX {
-                *slot = patch.vertices.len() as u32;
-                let (place, key, shared) = describe(v as usize);
-                patch.vertices.push(place);
-                patch.keys.push(key);
-                patch.shared.push(shared);
+        let own = s.triangles.iter().zip(&s.own).filter(|(_, own)| **own);
+        own.map(move |(t, _)| {
+            if s.stands.is_empty() {
+                *t
+            } else {
+                t.map(stands)
             }
-            *slot
-        }));
+        })
+        .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+        .map(move |t| (t, t.iter().all(|&v| skin(v))))
     }
-    patch
+
+    /// The tile's surface by itself, with what stitching needs.
+    pub fn patch(&self) -> Patch {
+        let mut patch = Patch::default();
+        let mut renamed = vec![u32::MAX; self.s.places.len()];
+        for (t, cut) in self.triangles() {
+            patch.cut.push(cut);
+            patch.triangles.push(t.map(|v| {
+                let slot = &mut renamed[v as usize];
+                if *slot == u32::MAX {
+                    *slot = patch.vertices.len() as u32;
+                    let (key, shared) = self.name(v as usize);
+                    patch.vertices.push(self.s.places[v as usize]);
+                    patch.keys.push(key);
+                    patch.shared.push(shared);
+                }
+                *slot
+            }));
+        }
+        patch
+    }
+
+    /// Global key of a vertex, and whether a neighbouring tile may use it as well.
+    fn name(&self, v: usize) -> (u64, bool) {
+        let View {
+            s,
+            nodes,
+            grid,
+            from,
+            own,
+        } = self;
+        let (at, kind, shared) = match s.vertices.get(v) {
+            Some(vertex) => {
+                let mut at = nodes.at(vertex.low as usize);
+                let axis = vertex.axis as usize;
+                let on_node = vertex.t == 0.0;
+                if on_node && !vertex.up() {
+                    at[axis] += 1;
+                }
+                let border = |a: usize| at[a] == own[a].start || at[a] == own[a].end;
+                let shared = (0..3).any(|a| (a != axis || on_node) && border(a));
+                (at, if on_node { 3 } else { axis as u64 }, shared)
+            }
+            None => {
+                let at = nodes.at(s.centers[v - s.vertices.len()].cell as usize);
+                (
+                    at,
+                    4,
+                    (0..3).any(|a| at[a] <= own[a].start || at[a] + 1 >= own[a].end),
+                )
+            }
+        };
+        let at = [0, 1, 2].map(|a| (at[a] + from[a]) as u64);
+        let all = grid.axes.each_ref().map(|a| a.len() as u64);
+        (
+            (at[0] + all[0] * (at[1] + all[1] * at[2])) * 8 + kind,
+            shared,
+        )
+    }
 }

@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 
 use super::Shape;
 use crate::fault::Fault;
-use crate::field::Field;
+use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// An axis-aligned box.
@@ -134,6 +134,18 @@ fn joined_gradient<const N: usize>(q: [f64; N], g: [Vec3; N]) -> Vec3 {
     }
 }
 
+/// Fills a block from a function of position that is cheap and can be inlined.
+#[inline(always)]
+fn fill_rows(block: &Block, out: &mut [f32], f: impl Fn(Vec3) -> f64) {
+    let [xs, ys, zs] = block.axes;
+    let nodes = zs.iter().flat_map(|&z| ys.iter().map(move |&y| (y, z)));
+    for ((y, z), row) in nodes.zip(out.chunks_exact_mut(xs.len().max(1))) {
+        for (o, &x) in row.iter_mut().zip(xs) {
+            *o = f([x, y, z]) as f32;
+        }
+    }
+}
+
 impl Cuboid {
     /// The box between two corners (mm). Errors if a coordinate is not finite or a side has no length.
     pub fn new(min: Vec3, max: Vec3) -> Result<Self, Fault> {
@@ -198,6 +210,10 @@ impl Shape for Cuboid {
         if lo < hi {
             out.extend([lo, hi]);
         }
+    }
+
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        fill_rows(block, out, |p| self.distance(p) - level);
     }
 
     fn volume(&self) -> Option<f64> {
@@ -338,6 +354,10 @@ impl Shape for Cylinder {
         }
     }
 
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        fill_rows(block, out, |p| self.distance(p) - level);
+    }
+
     fn volume(&self) -> Option<f64> {
         Some(PI * self.radius * self.radius * self.height)
     }
@@ -378,6 +398,10 @@ impl Shape for Sphere {
     }
 
     fn level_planes(&self, _: usize, _: f64, _: &mut Vec<f64>) {}
+
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        fill_rows(block, out, |p| self.distance(p) - level);
+    }
 
     fn volume(&self) -> Option<f64> {
         Some(4.0 / 3.0 * PI * self.radius.powi(3))
@@ -427,6 +451,10 @@ impl Shape for HalfSpace {
         }
     }
 
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        fill_rows(block, out, |p| self.distance(p) - level);
+    }
+
     fn volume(&self) -> Option<f64> {
         None
     }
@@ -453,6 +481,10 @@ macro_rules! field {
                     return Interval::new(f64::NEG_INFINITY, f64::INFINITY);
                 }
                 self.range(b)
+            }
+
+            fn fill(&self, block: &Block, out: &mut [f32]) {
+                self.fill_level(block, 0.0, out);
             }
         }
     )*};
