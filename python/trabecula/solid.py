@@ -83,13 +83,11 @@ class Solid(Picture):
         return self._need(self.spacing(edge, per_cell))
 
     def _need(self, spacing: float) -> dict:
-        """The estimate; at fine spacings that of a coarser one, scaled, since triangles grow as spacing to the −2."""
-        need = self._core.estimate(spacing)
-        coarse = self.wavelength / 32
-        if spacing < coarse:
-            far = self._core.estimate(coarse)
-            for key in ("triangles", "memory", "stl"):
-                need[key] = far[key] * (coarse / spacing) ** 2
+        """The estimate, at fine spacings scaled from a coarser one: triangles grow as spacing to the −2."""
+        coarse = max(spacing, self.wavelength / 16)
+        need = self._core.estimate(coarse)
+        for key in ("triangles", "memory", "stl"):
+            need[key] *= (coarse / spacing) ** 2
         return need
 
     def mesh(

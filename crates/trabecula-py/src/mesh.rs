@@ -52,23 +52,12 @@ impl Mesh {
         })
     }
 
-    /// The same mesh, its triangles that lie on the region's boundary (within `tolerance`, mm) marked as cuts.
-    fn split_by(&self, py: Python<'_>, region: &Region, tolerance: f64) -> PyResult<Mesh> {
-        let (surface, region) = (&self.surface, &region.region);
-        let surface = run(py, None, None, |_| {
-            let mut distance = vec![0.0; surface.mesh.vertices.len()];
-            region.values(&surface.mesh.vertices, &mut distance);
-            let on = |v: &u32| distance[*v as usize].abs() <= tolerance;
-            let cut = surface
-                .mesh
-                .triangles
-                .iter()
-                .map(|t| t.iter().all(on))
-                .collect();
-            Surface {
-                mesh: surface.mesh.clone(),
-                cut,
-            }
+    /// The same mesh, its triangles that lie on the region's boundary marked as cuts.
+    fn split_by(&self, py: Python<'_>, region: &Region) -> PyResult<Mesh> {
+        let (mesh, region) = (&self.surface.mesh, &region.region);
+        let surface = run(py, None, None, |_| Surface {
+            cut: measure::cut_triangles(mesh, &**region),
+            mesh: mesh.clone(),
         })?;
         Ok(Mesh {
             surface,

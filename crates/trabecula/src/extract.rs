@@ -150,7 +150,8 @@ fn each_tile<T: Send>(
             })
             .collect()
     };
-    let batch = 4 * rayon::current_num_threads();
+    // Enough tiles that threads seldom wait for each other, few enough that they fit in some tens of megabytes.
+    let batch = 16 * rayon::current_num_threads();
     let mut ready: Vec<Option<T>> = Vec::new();
     let mut next = 0;
     loop {
@@ -237,17 +238,17 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
         let mut records = borrow(&spare);
         let places = view.places();
         for (t, cut) in view.triangles() {
-            let t = t.map(|v| places[v as usize]);
-            let [a, b, c] = t.map(|p| sub(p, middle));
+            let [a, b, c] = t.map(|v| places[v as usize]);
+            let n = cross(sub(b, a), sub(c, a));
+            let twice = norm(n);
             part.triangles += 1;
-            part.volume += dot(a, cross(b, c)) / 6.0;
-            let area = norm(cross(sub(b, a), sub(c, a))) / 2.0;
+            part.volume += dot(sub(a, middle), n) / 6.0;
             *(if cut {
                 &mut part.area_cut
             } else {
                 &mut part.area_lattice
-            }) += area;
-            stl::push_record(&mut records, t.map(|p| p.map(|x| x as f32)));
+            }) += twice / 2.0;
+            stl::push_record(&mut records, [a, b, c].map(|p| p.map(|x| x as f32)));
         }
         (part, records)
     };

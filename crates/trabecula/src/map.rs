@@ -36,7 +36,7 @@ impl Affine {
         let mut shear = IDENTITY;
         for &(of, by, degrees) in skew {
             let name: String = [of, by].map(|a| ['x', 'y', 'z'][a]).iter().collect();
-            if !(degrees.abs() < 90.0) {
+            if degrees.is_nan() || degrees.abs() >= 90.0 {
                 return Err(Fault::new(
                     format!("skew.{name}"),
                     format!("{degrees} degrees; a shear angle lies between -90 and 90, exclusive"),
@@ -44,7 +44,7 @@ impl Affine {
             }
             shear[of][by] += degrees.to_radians().tan();
         }
-        if !(determinant(&shear) > 1e-6) {
+        if determinant(&shear).is_nan() || determinant(&shear) <= 1e-6 {
             return Err(Fault::new(
                 "skew",
                 format!(
@@ -94,7 +94,7 @@ fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
 
 fn per_wavelength(wavelength: Vec3) -> Result<Mat3, Fault> {
     for w in wavelength {
-        if !(w > 0.0 && w.is_finite()) || !(1.0 / w).is_finite() {
+        if !(w > 0.0 && w.is_finite() && (1.0 / w).is_finite()) {
             return Err(Fault::new(
                 "wavelength",
                 format!("{w} mm; a wavelength is a positive, finite length"),

@@ -6,11 +6,13 @@ use crate::math::{Aabb, cross, norm, sub};
 use crate::mesh::Mesh;
 
 mod adjacency;
+mod cut;
 mod exact;
 mod intersect;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
+pub use cut::cut_triangles;
 pub use intersect::self_intersections;
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.

@@ -42,8 +42,8 @@ struct Camera {
 }
 
 impl Camera {
-    /// A camera with a narrow lens, so far off that the box's corners fill the picture but for a margin.
-    fn new(bounds: &Aabb, view: &View, size: [usize; 2]) -> Camera {
+    /// A camera with a narrow lens, such that the points fill the picture but for a margin.
+    fn new(bounds: &Aabb, points: &[Vec3], view: &View, size: [usize; 2]) -> Camera {
         let (az, el) = (
             view.azimuth.to_radians(),
             view.elevation.clamp(-90.0, 90.0).to_radians(),
@@ -61,21 +61,14 @@ impl Camera {
             middle: size.map(|n| n as f64 / 2.0),
         };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for k in 0..8 {
-            let corner = [0, 1, 2].map(|a| {
-                if k >> a & 1 == 0 {
-                    bounds.min[a]
-                } else {
-                    bounds.max[a]
-                }
-            });
-            let [x, y, _] = camera.project(corner);
+        for p in points {
+            let [x, y, _] = camera.project(*p);
             for (a, v) in [x, y].into_iter().enumerate() {
                 low[a] = low[a].min(v - camera.middle[a]);
                 high[a] = high[a].max(v - camera.middle[a]);
             }
         }
-        let room = [0, 1].map(|a| 0.88 * size[a] as f64 / (high[a] - low[a]).max(1e-12));
+        let room = [0, 1].map(|a| 0.92 * size[a] as f64 / (high[a] - low[a]).max(1e-12));
         camera.focal = room[0].min(room[1]);
         for a in 0..2 {
             camera.middle[a] -= camera.focal * (low[a] + high[a]) / 2.0;
@@ -137,7 +130,7 @@ pub fn render(surface: &Surface, view: &View) -> Vec<u8> {
     let drawn = !bounds.is_empty() && bounds.is_finite();
     let angles = view.azimuth.is_finite() && view.elevation.is_finite();
     let picture = if drawn && angles {
-        let camera = Camera::new(&bounds, view, size);
+        let camera = Camera::new(&bounds, &surface.mesh.vertices, view, size);
         let raster = Raster::draw(surface, &camera, size);
         shade::shade(surface, &camera, &raster)
     } else {

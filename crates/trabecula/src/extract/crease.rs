@@ -192,7 +192,7 @@ fn meet(
                     .map(|k| span(k).1 - span(k).0)
                     .fold(f64::INFINITY, f64::min);
                 // Surfaces within ten degrees of each other have no crease worth a vertex. (NaN fails as well.)
-                if !(1.0 - c * c > 0.03) {
+                if c.is_nan() || 1.0 - c * c <= 0.03 {
                     simple[i] = false;
                     continue;
                 }

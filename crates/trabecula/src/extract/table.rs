@@ -29,6 +29,8 @@ pub(super) const EDGES: [(usize, usize); 12] = [
 
 /// What a pattern of solid corners makes.
 pub(super) struct Case {
+    /// The edges that triangles use, each once.
+    pub edges: Vec<u8>,
     /// Triangles as indices into `EDGES`, counter-clockwise seen from the void.
     pub triangles: Vec<[u8; 3]>,
     /// The loop around the patch, where there is only one: counter-clockwise seen from the void.
@@ -40,8 +42,13 @@ pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
     core::array::from_fn(|case| {
         let loops = loops(case);
         let triangles = loops.iter().flat_map(|l| fan(l)).collect();
+        let edges = loops.iter().flatten().map(|&e| e as u8).collect();
         let ring = (loops.len() == 1).then(|| loops[0].iter().map(|&e| e as u8).collect());
-        Case { triangles, ring }
+        Case {
+            edges,
+            triangles,
+            ring,
+        }
     })
 });
 

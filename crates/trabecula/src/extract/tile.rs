@@ -532,10 +532,12 @@ fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[Range<usize>; 3]) {
                 let corners = pair(w[0]) | pair(w[1]) << 2 | pair(w[2]) << 4 | pair(w[3]) << 6;
                 let case = &cases[corners];
                 let mine = mine && own[0].contains(&i);
-                let vertex = |e: u8| {
+                let mut names = [0u32; 12];
+                for &e in &case.edges {
                     let (corner, axis) = EDGES[e as usize];
-                    number(s, axis, rows[corner >> 1], i + (corner & 1))
-                };
+                    names[e as usize] = number(s, axis, rows[corner >> 1], i + (corner & 1));
+                }
+                let vertex = |e: u8| names[e as usize];
                 if mixed && let Some(ring) = &case.ring {
                     let on = |w: On| ring.iter().any(|&e| s.vertices[vertex(e) as usize].on == w);
                     if on(On::Lattice) && on(On::Region) && !on(On::Plane) {

@@ -93,6 +93,7 @@ impl Shadows {
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
         let eye = Camera::new(
             &surface.mesh.bounds(),
+            &surface.mesh.vertices,
             &View {
                 size,
                 azimuth,
