@@ -165,7 +165,7 @@ def test_cells(tmp_path):
         (["mesh", "folder.toml", "-o", "a.stl"], 1, "is a directory"),
         (["mesh", "cube.toml", "-o", "folder.stl"], 1, "is a directory"),
         (["mesh", "cube.toml", "-o", "none/a.stl"], 1, "does not exist"),
-        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "1e-9"], 1, "0.000000001 mm"),
+        (["mesh", "cube.toml", "-o", "a.stl", "--edge", "1e-9"], 1, "1e-09"),
         (["mesh", "cube.toml", "-o", "a.3mf", "--edge", "2e-4"], 1, "try edge"),
         (["measure", "empty.stl"], 1, "empty.stl"),
         (["measure", "garbage.stl"], 1, "garbage.stl"),

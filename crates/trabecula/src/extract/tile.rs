@@ -593,6 +593,10 @@ fn balance(s: &mut Scratch, margin: f64) {
             None => centers[v as usize - normals.len()].normals[usize::from(which == On::Region)],
         });
         let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
+        // A turn of more than 45 degrees within a triangle is an edge of the region, or a cell hardly sampled.
+        if dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+            continue;
+        }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
         let n = cross(ab, sub(c, a));
         let volume = above * 0.5 * norm(n);
@@ -681,11 +685,6 @@ impl View<'_> {
     pub fn triangles(&self) -> impl Iterator<Item = ([u32; 3], bool)> {
         let s = self.s;
         let stands = |v: u32| s.stands.get(v as usize).copied().unwrap_or(v);
-        let skin = |v: u32| {
-            s.vertices
-                .get(v as usize)
-                .is_none_or(|v| v.on != On::Lattice || v.skin)
-        };
         let own = s.triangles.iter().zip(&s.own).filter(|(_, own)| **own);
         own.map(move |(t, _)| {
             if s.stands.is_empty() {
@@ -695,7 +694,20 @@ impl View<'_> {
             }
         })
         .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
-        .map(move |t| (t, t.iter().all(|&v| skin(v))))
+        .map(move |t| (t, self.is_cut(t)))
+    }
+
+    /// Whether a triangle lies on the region's surface: none of its corners is on the lattice alone, and where some
+    /// are on the rim of a flat face, all are in that face's plane.
+    fn is_cut(&self, t: [u32; 3]) -> bool {
+        let s = self.s;
+        let (mut rim, mut skin) = (false, true);
+        for v in t.iter().filter_map(|&v| s.vertices.get(v as usize)) {
+            rim |= v.on == On::Lattice;
+            skin &= v.on != On::Lattice || v.skin;
+        }
+        let [a, b, c] = t.map(|v| s.places[v as usize]);
+        skin && (!rim || (0..3).any(|k| a[k] == b[k] && b[k] == c[k]))
     }
 
     /// The tile's surface by itself, with what stitching needs.
