@@ -132,22 +132,35 @@ fn vertices_come_to_the_surface_as_the_second_power() {
         [1.0, 1.2, 0.9],
         [10.0, 20.0, 30.0],
     );
-    let solid = solid(ball(1.0), Some(field));
-    let worst = [12.0, 24.0, 48.0].map(|n| {
-        let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
-        let (mut v, mut g) = (
-            vec![0.0; s.mesh.vertices.len()],
-            vec![[0.0; 3]; s.mesh.vertices.len()],
-        );
-        solid.gradients(&s.mesh.vertices, &mut v, &mut g);
+    let region = ball(1.0);
+    let solid = solid(region.clone(), Some(field.clone()));
+    let distances = |f: &dyn Field, points: &[[f64; 3]]| -> Vec<f64> {
+        let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+        f.gradients(points, &mut v, &mut g);
         v.iter()
             .zip(&g)
-            .map(|(v, g)| v.abs() / g.iter().map(|x| x * x).sum::<f64>().sqrt())
-            .fold(0.0, f64::max)
+            .map(|(v, g)| v / g.iter().map(|x| x * x).sum::<f64>().sqrt())
+            .collect()
+    };
+    // Away from the creases, and on them (within a step of both surfaces).
+    let worst = [12.0, 24.0, 48.0].map(|n| {
+        let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
+        let (a, b) = (
+            distances(&*field, &s.mesh.vertices),
+            distances(&*region, &s.mesh.vertices),
+        );
+        let mut worst = [0.0f64; 2];
+        for (a, b) in a.iter().zip(&b) {
+            let crease = usize::from(a.abs().max(b.abs()) < 1.0 / n);
+            worst[crease] = worst[crease].max(a.max(*b).abs());
+        }
+        worst
     });
-    println!("farthest vertex at 12, 24, 48 steps a radius: {worst:?}");
-    // A factor of 16 over two halvings at second order; 4 at first. The maximum over vertices is not smooth in h.
-    assert!(worst[2] < worst[0] / 10.0, "{worst:?}");
+    println!("farthest vertex, on faces and creases, at 12, 24, 48 steps a radius: {worst:?}");
+    // On faces a factor of 16 over two halvings at second order; 4 at first. The maximum is not smooth in h. On
+    // creases a vertex that the curve only brushes stands up to half a step off: first order.
+    assert!(worst[2][0] < worst[0][0] / 10.0, "{worst:?}");
+    assert!(worst[2][1] < 0.5 / 48.0, "{worst:?}");
 }
 
 #[test]
