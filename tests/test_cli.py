@@ -230,7 +230,9 @@ def test_interrupted(tmp_path, cube, which, name):
     cube.write_text(CUBE.replace("[8, 8, 8]", "[40, 40, 40]"))
     (tmp_path / name).write_text("older")
     words = [*COMMAND, "mesh", str(cube), "-o", name, "--edge", "0.06", "--progress"]
-    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    # A shell that starts tests in the background has them ignore Ctrl-C, and children inherit that.
+    default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True, preexec_fn=default)
     assert "meshing" in child.stderr.readline()  # it is in the middle
     start = time.perf_counter()
     child.send_signal(which)
