@@ -277,20 +277,6 @@ def check(args) -> None:
         print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
 
 
-def warn_thin(solid, edge: float) -> None:
-    """Warns of walls and necks that the grid cannot carry."""
-    if solid.wavelength / edge >= 64:
-        return  # only fractions of a hundredth or two are that thin, and `check` tells
-    for name, lattice in solid.report()["lattices"].items():
-        thin = lattice["thickness"]
-        thin = thin[0] if isinstance(thin, list) else thin
-        if thin is not None and thin < 1.5 * edge:
-            say(
-                f"warning: lattice.{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
-                f"{edge:g} mm and may break up in the mesh; use an edge of {thin / 2:.2g} mm or less"
-            )
-
-
 def mesh(args) -> None:
     """``trabecula mesh``."""
     from .output import check_place
@@ -299,7 +285,6 @@ def mesh(args) -> None:
     start = time.perf_counter()
     solid = build(args.design)
     options = resolved(args)
-    warn_thin(solid, solid.spacing(**options))
     with Progress("meshing", args.progress) as progress:
         if kind_of(args.output) == "stl":
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
@@ -598,7 +583,9 @@ fraction = 0.30             # of the cell; porosity = 0.70 says the same
 def main(argv: list[str] | None = None) -> int:
     """Runs the command; gives its exit status."""
     import signal
+    import warnings
 
+    warnings.showwarning = lambda message, *rest, **more: say(f"warning: {message}")
     top = parser()
     args = top.parse_args(argv)
     if args.version:

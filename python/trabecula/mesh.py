@@ -168,7 +168,7 @@ class Mesh(Picture):
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""
         kind = extension(path, WRITES)
-        title = os.path.splitext(os.path.basename(os.fspath(path)))[0]
+        title = "Lattice part"  # not the file's name: the same solid is the same bytes
         with whole_file(path) as temporary:
             self._core.write(temporary, kind, title)
 

@@ -78,7 +78,7 @@ def fits(need: float, what: str, edge: float, power: int, path: str | None = Non
     have = free_memory() if path is None else float(shutil.disk_usage(os.path.dirname(os.path.abspath(path))).free)
     if have is None or need <= 0.9 * have:
         return
-    better = edge * (need / (0.8 * have)) ** (1 / power)
+    better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
     kind = "memory" if path is None else "disk space"
     raise ValueError(
         f"{word} {edge:g} mm needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free; "

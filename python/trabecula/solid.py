@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _core
 from .design import Design, Lattice
+from .errors import DesignWarning
 from .mesh import Mesh, Picture
 from .output import check_place, extension, fits, whole_file
 
@@ -82,6 +84,21 @@ class Solid(Picture):
         """What a surface will take: grid cells, triangles, bytes of memory, bytes of a binary STL."""
         return self._need(self.spacing(edge, per_cell))
 
+    def _warn_thin(self, spacing: float) -> None:
+        """Warns of walls and necks that the grid cannot carry."""
+        if self.wavelength / spacing >= 64:
+            return  # only fractions of a hundredth or two are that thin, and `report` tells
+        for name, lattice in self.report()["lattices"].items():
+            thin = lattice["thickness"]
+            thin = thin[0] if isinstance(thin, list) else thin
+            if thin is not None and 0 < thin < 1.5 * spacing:
+                warnings.warn(
+                    f"lattice.{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
+                    f"{spacing:g} mm and may break up in the mesh; use an edge of {thin / 2:.2g} mm or less",
+                    DesignWarning,
+                    stacklevel=3,
+                )
+
     def _need(self, spacing: float) -> dict:
         """The estimate, at fine spacings scaled from a coarser one: triangles grow as spacing to the −2."""
         coarse = max(spacing, self.wavelength / 16)
@@ -105,6 +122,7 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         fits(need["memory"], f"{need['triangles']:.3g} triangles", spacing, 2)
+        self._warn_thin(spacing)
         core = self._core.mesh(spacing, _threads(threads), progress)
         return Mesh(core, self._core.region, spacing)
 
@@ -122,6 +140,7 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         fits(need["stl"], f"{need['triangles']:.3g} triangles", spacing, 2, os.fspath(path))
+        self._warn_thin(spacing)
         with whole_file(path) as temporary:
             return self._core.stream_stl(temporary, spacing, _threads(threads), progress)
 

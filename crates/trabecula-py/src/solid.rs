@@ -46,7 +46,14 @@ fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
             a.shape()
         )));
     }
-    Ok(a.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect())
+    let points: Vec<[f64; 3]> = a.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect();
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(i) => Err(PyValueError::new_err(format!(
+            "points[{i}] is {:?}; a position is three finite numbers, mm",
+            points[i]
+        ))),
+        None => Ok(points),
+    }
 }
 
 fn values<'py>(

@@ -128,6 +128,17 @@ fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
     }
 }
 
+/// Refuses an empty surface, which no part is.
+fn not_empty(triangles: u64, edge: f64) -> Result<(), Stopped> {
+    if triangles > 0 {
+        return Ok(());
+    }
+    let message = format!(
+        "no surface was found with grid steps of {edge} mm: the solid is thinner than they are; use a smaller edge"
+    );
+    Err(Stopped::Refused(Fault::new("edge", message)))
+}
+
 /// Extracts all tiles, a few at a time, and hands what `cook` makes of them to `take` in order.
 fn each_tile<T: Send>(
     solid: &Solid,
@@ -214,6 +225,7 @@ pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surf
             Ok(())
         },
     )?;
+    not_empty(out.mesh.triangles.len() as u64, edge)?;
     Ok(out)
 }
 
@@ -266,6 +278,7 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
         give_back(&spare, records);
         Ok(())
     })?;
+    not_empty(summary.triangles, edge)?;
     let header = stl::header(summary.triangles as u32);
     out.seek(io::SeekFrom::Start(0))
         .and_then(|_| out.write_all(&header))

@@ -127,9 +127,8 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
 /// Narrowest neck diameter (mm) of the lower (f ≤ iso) or upper (f ≥ iso) part, where u = `to_phase` · x: twice the
 /// least distance from a neck's saddle to the surface f = iso.
 ///
-/// `necks` are those of [`connectivity`](super::connectivity): phases and levels. Where the pieces are loose (no neck
-/// is solid at this level) it is the diameter of the smallest: twice the distance from the extreme of f to the
-/// surface. `None` where the part is empty or full, and for sheets.
+/// `necks` are those of [`connectivity`](super::connectivity): phases and levels. Where every neck is
+/// closed and the pieces are loose it is zero. `None` where the part is empty or full, and for sheets.
 pub fn neck(
     f: Function,
     part: Part,
@@ -147,12 +146,11 @@ pub fn neck(
         .filter(|(_, level)| sign * (iso - level) > 0.0)
         .map(|(at, _)| *at)
         .collect();
-    let middles = if deep.is_empty() {
-        extremes(f, sign, iso)
-    } else {
-        deep
-    };
-    let radii: Vec<f64> = middles
+    if deep.is_empty() {
+        // Every neck is closed: loose pieces, if any.
+        return (!extremes(f, sign, iso).is_empty()).then_some(0.0);
+    }
+    let radii: Vec<f64> = deep
         .par_iter()
         .filter_map(|u| distance(f, *u, iso, sign, to_phase))
         .collect();
@@ -370,15 +368,12 @@ mod tests {
     }
 
     #[test]
-    fn loose_pieces_are_measured_themselves() {
+    fn loose_pieces_have_no_neck() {
         let necks = super::super::connectivity(&primitive, Part::Lower).necks;
-        // Near its minimum −3 the primitive's pieces are balls: f ≈ −3 + (2π r)²/2.
-        let t = -3.0 + 1e-4;
-        about(
-            neck(&primitive, Part::Lower, t, &necks, &cubic(2.0)),
-            2.0 * 2.0 * (2e-4f64).sqrt() / TAU,
-            1e-4,
-        );
+        for t in [-3.0 + 1e-4, -1.001] {
+            let found = neck(&primitive, Part::Lower, t, &necks, &cubic(2.0));
+            assert_eq!(found, Some(0.0), "{t}");
+        }
         assert_eq!(
             neck(&primitive, Part::Lower, -3.5, &necks, &cubic(2.0)),
             None

@@ -57,7 +57,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let message = "the region has no end; intersect it with a box or another bounded region";
         return Err(DesignError::new("region", message));
     }
-    let (points, _) = sample::inside(&space, LOOKS);
+    let (mut points, _) = sample::inside(&space, LOOKS);
     if points.is_empty() {
         let [x, y, z] = bounds.size();
         let message = format!(
@@ -65,6 +65,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         );
         return Err(DesignError::new("region", message));
     }
+    points.extend(sample::nodes(&space));
     let largest = bounds.size().into_iter().fold(0.0, f64::max);
     if !(0.1..=2000.0).contains(&largest) {
         let message = format!("the region is {largest:.4} mm across; is its unit right?");

@@ -87,7 +87,8 @@ pub(super) fn report(built: &Built) -> Json {
     let bounds = region.bounds();
     let exact = region.volume();
     let count = if exact.is_some() { LOOKS } else { 25 * LOOKS };
-    let (points, share) = sample::inside(region, count);
+    let (mut points, share) = sample::inside(region, count);
+    points.extend(sample::nodes(region));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
     let mut lattices = serde_json::Map::new();
     for (name, lattice) in &built.lattices {
@@ -117,20 +118,17 @@ pub(super) fn report(built: &Built) -> Json {
     })
 }
 
-/// The thinnest wall or narrowest neck (mm) at the ends of the level's range; null where there is none.
+/// The thinnest wall or narrowest neck (mm), at five levels where the level varies; null where there is none.
 fn thickness(lattice: &Lattice, iso: Varied) -> Json {
     let to_phase = lattice.map.jacobian([0.0; 3]);
-    let at = |t| lattice.cell.thickness(lattice.part, t, &to_phase);
-    match (
-        at(iso.min),
-        if iso.min == iso.max {
-            None
-        } else {
-            at(iso.max)
-        },
-    ) {
-        (Some(a), Some(b)) => Varied::of(&[a, b]).json(),
-        (Some(a), None) | (None, Some(a)) => json!(a),
-        (None, None) => Json::Null,
+    let steps = if iso.min == iso.max { 1 } else { 5 };
+    let level = |i: usize| iso.min + (iso.max - iso.min) * i as f64 / (steps - 1).max(1) as f64;
+    let found: Vec<f64> = (0..steps)
+        .filter_map(|i| lattice.cell.thickness(lattice.part, level(i), &to_phase))
+        .collect();
+    if found.is_empty() {
+        Json::Null
+    } else {
+        Varied::of(&found).json()
     }
 }

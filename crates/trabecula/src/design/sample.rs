@@ -22,6 +22,30 @@ pub(super) fn inside(region: &Region, count: usize) -> (Vec<Vec3>, f64) {
     (points, share)
 }
 
+/// Nodes of a coarse grid over the bounds, ends included, that lie in the region or on its surface: where a number
+/// that varies takes its extremes in a box, and near them elsewhere.
+pub(super) fn nodes(region: &Region) -> Vec<Vec3> {
+    const N: usize = 12;
+    let (b, size) = (region.bounds(), region.bounds().size());
+    let at = |i: usize, a: usize| {
+        if i == N {
+            b.max[a]
+        } else {
+            b.min[a] + size[a] * i as f64 / N as f64
+        }
+    };
+    let count = (N + 1).pow(3);
+    let grid = (0..count).map(|i| {
+        [
+            at(i % (N + 1), 0),
+            at(i / (N + 1) % (N + 1), 1),
+            at(i / (N + 1).pow(2), 2),
+        ]
+    });
+    let reach = 1e-9 * size.into_iter().fold(0.0, f64::max);
+    grid.filter(|p| region.value(*p) <= reach).collect()
+}
+
 fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3> {
     const BATCH: usize = 4096;
     let mut kept = Vec::new();

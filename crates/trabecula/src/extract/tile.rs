@@ -593,8 +593,8 @@ fn balance(s: &mut Scratch, margin: f64) {
             None => centers[v as usize - normals.len()].normals[usize::from(which == On::Region)],
         });
         let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
-        // A turn of more than 45 degrees within a triangle is an edge of the region, or a cell hardly sampled.
-        if dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+        // A turn of more than 45 degrees within a triangle is an edge of the region, not its curvature.
+        if which == On::Region && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
