@@ -284,6 +284,7 @@ def mesh(args) -> None:
     check_place(args.output)
     start = time.perf_counter()
     solid = build(args.design)
+    keep_inputs(args.design, args.output)
     options = resolved(args)
     with Progress("meshing", args.progress) as progress:
         if kind_of(args.output) == "stl":
@@ -310,6 +311,8 @@ def mesh(args) -> None:
 
 def voxels(args) -> None:
     """``trabecula voxels``."""
+    import numpy  # noqa: F401  before the work: an interrupt during a late import is not clean
+
     from .output import check_place
 
     check_place(args.output)
@@ -337,6 +340,8 @@ def measure(args) -> None:
     if args.region:
         made = made.within(region(args.region))
     figures = made.measure()
+    if (figures["solid_fraction"] or 0) > 1.01:
+        say(f"warning: {args.file} holds more than the region does; they may not be in the same place or unit")
     if not figures["closed"]:
         say(f"warning: {args.file} is not closed, so its volume and what follows from it mean little")
     if args.json:
@@ -405,6 +410,24 @@ def render(args) -> None:
 
 
 # --- what they share -------------------------------------------------------------------------------------------------
+
+
+def files_of(tree) -> list[str]:
+    """The files that a region names."""
+    if isinstance(tree, dict):
+        own = [tree["path"]] if isinstance(tree.get("path"), str) else []
+        return own + [name for branch in tree.values() for name in files_of(branch)]
+    return [name for branch in tree for name in files_of(branch)] if isinstance(tree, list) else []
+
+
+def keep_inputs(design: str, output: str) -> None:
+    """Refuses an output that is the design, or a file that the design reads."""
+    from .design import load
+
+    folder = os.path.dirname(os.path.abspath(design))
+    for name in [design, *(os.path.join(folder, f) for f in files_of(load(design).to_dict().get("region")))]:
+        if os.path.exists(name) and os.path.exists(output) and os.path.samefile(name, output):
+            raise Refused(f"{output} is read by this design; name another output")
 
 
 def build(path: str, tell: bool = True):
@@ -504,8 +527,9 @@ class Progress:
         if self.terminal:
             if now - self.last >= 0.1:
                 self.last = now
-                sys.stderr.write("\r" + text.ljust(self.width))
-                sys.stderr.flush()
+                with contextlib.suppress(OSError, ValueError):
+                    sys.stderr.write("\r" + text.ljust(self.width))
+                    sys.stderr.flush()
                 self.width = len(text)
         elif int(10 * share) > self.tenth:
             self.tenth = int(10 * share)
@@ -514,8 +538,9 @@ class Progress:
     def clear(self) -> None:
         """Takes the line away."""
         if self.width:
-            sys.stderr.write("\r" + " " * self.width + "\r")
-            sys.stderr.flush()
+            with contextlib.suppress(OSError, ValueError):
+                sys.stderr.write("\r" + " " * self.width + "\r")
+                sys.stderr.flush()
             self.width = 0
 
 
@@ -540,8 +565,9 @@ def span(v) -> str:
 
 
 def say(text: str) -> None:
-    """Words go to stderr."""
-    print(text, file=sys.stderr)
+    """Words go to stderr; where nobody reads it, they are lost and the work goes on."""
+    with contextlib.suppress(OSError, ValueError):
+        print(text, file=sys.stderr, flush=True)
 
 
 STARTER = """\
@@ -585,6 +611,9 @@ def main(argv: list[str] | None = None) -> int:
     import signal
     import warnings
 
+    for name in ("stdout", "stderr"):  # a door that was closed before we came
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     warnings.showwarning = lambda message, *rest, **more: say(f"warning: {message}")
     top = parser()
     args = top.parse_args(argv)
@@ -598,6 +627,8 @@ def main(argv: list[str] | None = None) -> int:
         return 2
     with contextlib.suppress(ValueError):  # not the main thread
         signal.signal(signal.SIGTERM, _terminated)
+        if hasattr(signal, "SIGHUP"):  # the terminal was closed
+            signal.signal(signal.SIGHUP, _terminated)
     try:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
@@ -611,7 +642,7 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (Refused, ValueError, OSError, MemoryError) as error:
+    except (Refused, ValueError, OverflowError, OSError, MemoryError) as error:
         if os.environ.get("TRABECULA_DEBUG"):
             raise
         text = str(error) or type(error).__name__

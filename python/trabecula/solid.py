@@ -77,8 +77,14 @@ class Solid(Picture):
         if edge is not None and per_cell is not None:
             raise ValueError("give edge or per_cell, not both")
         if edge is None:
-            return self.wavelength / _positive("per_cell", PER_CELL if per_cell is None else per_cell)
-        return _positive("edge", edge)
+            edge = self.wavelength / _positive("per_cell", PER_CELL if per_cell is None else per_cell)
+        edge = _positive("edge", edge)
+        if edge > self.wavelength / 2:
+            raise ValueError(
+                f"a grid step of {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm, and shows "
+                f"nothing of the lattice; {self.wavelength / PER_CELL:.3g} mm is usual"
+            )
+        return edge
 
     def estimate(self, edge: float | None = None, per_cell: float | None = None) -> dict:
         """What a surface will take: grid cells, triangles, bytes of memory, bytes of a binary STL."""

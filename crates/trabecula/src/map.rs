@@ -77,6 +77,14 @@ impl Affine {
 
     fn about(matrix: Mat3, offset: Vec3, wavelength: Vec3) -> Result<Affine, Fault> {
         finite("offset", &offset)?;
+        // Beyond it the phase has fewer than six digits left.
+        let far = wavelength.iter().copied().fold(f64::INFINITY, f64::min) * 1e9;
+        if let Some(o) = offset.iter().find(|o| o.abs() > far) {
+            return Err(Fault::new(
+                "offset",
+                format!("{o:e} mm; an offset is at most 1e9 wavelengths, {far:e} mm here"),
+            ));
+        }
         Ok(Affine {
             matrix,
             shift: scale(apply(&matrix, offset), -1.0),
@@ -86,6 +94,12 @@ impl Affine {
 }
 
 fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
+    if key == "rotate" && v.iter().any(|d| d.abs() > 1e6) {
+        return Err(Fault::new(
+            key,
+            format!("{v:?} degrees; an angle is at most 1e6 degrees either way"),
+        ));
+    }
     match v.iter().find(|c| !c.is_finite()) {
         Some(c) => Err(Fault::new(key, format!("{c} is not a finite number"))),
         None => Ok(()),

@@ -52,6 +52,13 @@ impl Series {
                     ));
                 }
             }
+            if t.amplitude.abs() > 1e100 {
+                let message = format!(
+                    "{:e} is out of range; an amplitude is at most 1e100 either way",
+                    t.amplitude
+                );
+                return Err(Fault::new(at("amplitude"), message));
+            }
             largest = largest.max(t.amplitude.abs());
             // cos(−a) = cos(a): one wave vector of each pair stands for both.
             let first = t.hkl.iter().find(|h| **h != 0).copied().unwrap_or(1);

@@ -212,7 +212,22 @@ fn mesh(at: &At) -> Read<RegionSpec> {
     }))
 }
 
+/// Keys that stand one level deeper, where beginners look for them: the key and its table.
+const DEEPER: [(&str, &str); 6] = [
+    ("iso", "level"),
+    ("fraction", "level"),
+    ("porosity", "level"),
+    ("wavelength", "map.affine"),
+    ("rotate", "map.affine"),
+    ("offset", "map.affine"),
+];
+
 fn lattice(at: &At) -> Read<LatticeSpec> {
+    for (key, entry) in at.entries("a lattice")? {
+        if let Some((_, table)) = DEEPER.iter().find(|d| d.0 == key) {
+            return Err(entry.error(format!("{key} goes under [{}.{table}]", at.path)));
+        }
+    }
     let f = at.fields("a lattice", &["cell", "part", "map", "level"], &[])?;
     let parts = [
         ("sheet", PartSpec::Sheet),

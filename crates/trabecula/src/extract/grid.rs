@@ -52,6 +52,15 @@ impl Grid {
                     ),
                 ));
             }
+            if hi - lo < 0.05 * edge {
+                let message = format!(
+                    "the region is only {:e} mm thick along {}, less than a twentieth of the grid step of {edge} mm; use an edge of {:e} mm or less",
+                    hi - lo,
+                    ["x", "y", "z"][a],
+                    20.0 * (hi - lo)
+                );
+                return Err(Fault::new("edge", message));
+            }
             let mut stops = Vec::new();
             solid.region.planes(a, &mut stops);
             stops.retain(|s| (lo..=hi).contains(s));

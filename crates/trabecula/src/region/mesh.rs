@@ -4,6 +4,7 @@ use super::Shape;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::measure::self_intersections;
 use crate::mesh::Mesh;
 
 mod check;
@@ -51,6 +52,20 @@ impl MeshRegion {
             mesh = mesh.joined(mesh.single_rounding());
         }
         let pairs = check::check(&mesh)?;
+        const MANY: usize = 1000;
+        let crossing = self_intersections(&mesh, MANY);
+        if crossing > 0 {
+            let found = if crossing < MANY {
+                crossing.to_string()
+            } else {
+                format!("{MANY} or more")
+            };
+            let message = format!(
+                "the mesh of {} triangles crosses itself ({found} pairs of triangles), so what is inside is not plain; unite its bodies first",
+                mesh.triangles.len()
+            );
+            return Err(Fault::new("", message));
+        }
         let count = mesh.triangles.len();
         let faces: Vec<Face> = (0..count)
             .map(|i| {
