@@ -164,11 +164,9 @@ impl Solid {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let summary = run(py, threads, progress, |p| {
-            let mut out =
-                BufWriter::with_capacity(1 << 20, File::create(path).map_err(Stopped::Io)?);
-            let summary = extract::stream_stl(&self.built.solid, edge, &mut out, p)?;
-            out.flush().map_err(Stopped::Io)?;
-            Ok(summary)
+            // Whole tiles are written at once: a buffer would only copy them.
+            let mut out = File::create(path).map_err(Stopped::Io)?;
+            extract::stream_stl(&self.built.solid, edge, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
         let d = PyDict::new(py);
