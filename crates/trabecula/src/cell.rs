@@ -52,11 +52,7 @@ impl Cell {
     /// Least and greatest value of f on the torus: the extremes of a grid, improved by climbing from each.
     pub fn range(&self) -> Interval {
         *self.range.get_or_init(|| {
-            const N: usize = 48;
-            let node = |i: usize| i as f64 / N as f64;
-            let u: Vec<Vec3> = (0..N * N * N)
-                .map(|i| [node(i % N), node(i / N % N), node(i / N / N)])
-                .collect();
+            let u = torus(48);
             let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
             self.gradients(&u, &mut v, &mut g);
             let climb = |sign: f64| {
@@ -114,10 +110,7 @@ impl Cell {
     /// the curvature can add between them.
     pub fn steepness(&self, to_phase: &Mat3) -> f64 {
         const N: usize = 24;
-        let node = |i: usize| i as f64 / N as f64;
-        let u: Vec<Vec3> = (0..N * N * N)
-            .map(|i| [node(i % N), node(i / N % N), node(i / N / N)])
-            .collect();
+        let u = torus(N);
         let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
         self.gradients(&u, &mut v, &mut g);
         let back = transpose(to_phase);
@@ -155,6 +148,14 @@ impl Cell {
     pub fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         self.series.gradients(u, values, gradients);
     }
+}
+
+/// The nodes (turns) of an n³ grid over the torus.
+fn torus(n: usize) -> Vec<Vec3> {
+    let node = |i: usize| i as f64 / n as f64;
+    (0..n * n * n)
+        .map(|i| [node(i % n), node(i / n % n), node(i / n / n)])
+        .collect()
 }
 
 #[cfg(test)]
