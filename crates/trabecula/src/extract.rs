@@ -17,8 +17,10 @@ use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 use crate::solid::Solid;
 
-mod crease;
+mod cap;
 mod grid;
+mod knot;
+mod signs;
 mod table;
 mod tile;
 
@@ -100,8 +102,7 @@ pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
         .map_init(Scratch::default, |scratch, i| {
             // Odd multiples of a share of the whole: the middles of equal runs of tiles.
             let index = (2 * i + 1) * total / (2 * sampled);
-            tile::extract(solid, &grid, grid.tile(index), scratch)
-                .map_or(0, |v| v.triangles().count())
+            tile::extract(&grid, grid.tile(index), scratch).map_or(0, |v| v.triangles().count())
         })
         .sum();
     let triangles = found as f64 * total as f64 / sampled as f64;
@@ -141,7 +142,6 @@ fn not_empty(triangles: u64, edge: f64) -> Result<(), Stopped> {
 
 /// Extracts all tiles, a few at a time, and hands what `cook` makes of them to `take` in order.
 fn each_tile<T: Send>(
-    solid: &Solid,
     grid: &Grid,
     progress: &dyn Progress,
     cook: impl Fn(View) -> T + Sync,
@@ -155,7 +155,7 @@ fn each_tile<T: Send>(
             .with_max_len(1)
             .map(|i| {
                 let mut mine = borrow(&scratch);
-                let found = tile::extract(solid, grid, grid.tile(i), &mut mine).map(&cook);
+                let found = tile::extract(grid, grid.tile(i), &mut mine).map(&cook);
                 give_back(&scratch, mine);
                 found
             })
@@ -192,9 +192,8 @@ pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surf
     let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
     let mut out = Surface::default();
     // Vertices on the borders of tiles, by grid edge.
-    let mut border: HashMap<u64, u32> = HashMap::new();
+    let mut border: HashMap<u128, u32> = HashMap::new();
     each_tile(
-        solid,
         &grid,
         progress,
         |view| view.patch(),
@@ -264,7 +263,7 @@ pub fn stream_stl<W: io::Write + io::Seek + Send>(
         }
         (part, records)
     };
-    each_tile(solid, &grid, progress, cook, |(part, mut records)| {
+    each_tile(&grid, progress, cook, |(part, mut records)| {
         summary.triangles += part.triangles;
         summary.volume += part.volume;
         summary.area_lattice += part.area_lattice;

@@ -1,5 +1,7 @@
 //! The one trait the extractor sees: value, gradient and bound. Negative is solid.
 
+use std::sync::Arc;
+
 use crate::math::{Aabb, Interval, Vec3};
 
 /// The nodes of a structured block: every combination of the three coordinate lists (mm), x running fastest.
@@ -73,6 +75,16 @@ pub trait Field: Send + Sync {
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
         let _ = wanted;
         self.fill(block, out);
+    }
+
+    /// The smooth functions whose greatest this is; none if it is smooth itself.
+    fn parts(&self) -> Vec<Arc<dyn Field>> {
+        Vec::new()
+    }
+
+    /// A bound of the length of the gradient, per mm, if one is known.
+    fn slope(&self) -> f64 {
+        1.0
     }
 
     /// The value at one point (mm).

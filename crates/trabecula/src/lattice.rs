@@ -8,9 +8,7 @@ use crate::cell::{Cell, Part, Term};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::{Affine, Map};
-use crate::math::{
-    Aabb, Interval, Vec3, add, apply, dot, norm, scale, sin_cos_turns, sub, transpose,
-};
+use crate::math::{Aabb, Interval, Vec3, add, apply, dot, norm, scale, sin_cos_turns, transpose};
 
 /// How much of the cell is solid.
 #[derive(Clone)]
@@ -45,6 +43,8 @@ pub struct Lattice {
     steepness: f64,
     /// t, where it does not vary.
     uniform: Option<f64>,
+    /// Set for one of the two sides of a sheet: the part, lower or upper, whose inequality it is.
+    side: Option<Part>,
 }
 
 impl Lattice {
@@ -62,7 +62,22 @@ impl Lattice {
             level,
             steepness,
             uniform,
+            side: None,
         }
+    }
+
+    /// The sign of f and that of t in the value; f by its magnitude for a whole sheet.
+    fn signs(&self) -> (f64, f64) {
+        match (self.part, self.side) {
+            (Part::Sheet, Some(Part::Upper)) => (-1.0, -1.0),
+            (Part::Upper, _) => (-1.0, 1.0),
+            _ => (1.0, -1.0),
+        }
+    }
+
+    /// Whether the value has the crease of |f|.
+    fn folded(&self) -> bool {
+        self.part == Part::Sheet && self.side.is_none()
     }
 
     /// Fills the level t at points (mm).
@@ -112,12 +127,10 @@ impl Field for Lattice {
         self.cell.gradients(&u, out, &mut scratch);
         let mut t = vec![0.0; points.len()];
         self.isos(points, &mut t);
+        let (s, c) = self.signs();
+        let folded = self.folded();
         for (f, t) in out.iter_mut().zip(t) {
-            *f = match self.part {
-                Part::Sheet => f.abs() - t,
-                Part::Lower => *f - t,
-                Part::Upper => t - *f,
-            };
+            *f = s * if folded { f.abs() } else { *f } + c * t;
         }
     }
 
@@ -137,13 +150,12 @@ impl Field for Lattice {
                 }
             }
         }
+        let (s, c) = self.signs();
+        let folded = self.folded();
         for i in 0..n {
-            let (f, g) = (values[i], gradients[i]);
-            (values[i], gradients[i]) = match self.part {
-                Part::Sheet if f < 0.0 => (-f - t[i], sub(scale(g, -1.0), dt[i])),
-                Part::Sheet | Part::Lower => (f - t[i], sub(g, dt[i])),
-                Part::Upper => (t[i] - f, sub(dt[i], g)),
-            };
+            let s = if folded && values[i] < 0.0 { -s } else { s };
+            values[i] = s * values[i] + c * t[i];
+            gradients[i] = add(scale(gradients[i], s), scale(dt[i], c));
         }
     }
 
@@ -162,11 +174,30 @@ impl Field for Lattice {
                 Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
             }
         };
-        match self.part {
-            Part::Sheet => f.abs() - t,
-            Part::Lower => f - t,
-            Part::Upper => t - f,
+        match (self.part, self.side) {
+            (Part::Sheet, Some(Part::Upper)) => -f - t,
+            (Part::Sheet, None) => f.abs() - t,
+            (Part::Upper, _) => t - f,
+            _ => f - t,
         }
+    }
+
+    fn parts(&self) -> Vec<Arc<dyn Field>> {
+        if !self.folded() {
+            return Vec::new();
+        }
+        let side = |part| {
+            let side = Some(part);
+            Arc::new(Lattice {
+                side,
+                ..self.clone()
+            }) as Arc<dyn Field>
+        };
+        vec![side(Part::Lower), side(Part::Upper)]
+    }
+
+    fn slope(&self) -> f64 {
+        self.steepness
     }
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
@@ -190,6 +221,8 @@ impl Lattice {
         let mut points: Vec<Vec3> = Vec::new();
         let mut found: Vec<f64> = Vec::new();
         let mut coefficients = Vec::with_capacity(waves.groups.len());
+        let (s, c) = self.signs();
+        let (s, c) = (s as f32, c as f32);
         for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
             let (j, k) = (n % ys.len(), n / ys.len());
             let word = wanted.map_or(u64::MAX, |w| w[n]);
@@ -213,16 +246,11 @@ impl Lattice {
                     isos[i] = *t;
                 }
             }
-            match self.part {
-                Part::Sheet => row
-                    .iter_mut()
-                    .zip(&isos)
-                    .for_each(|(f, &t)| *f = f.abs() - t as f32),
-                Part::Lower => row.iter_mut().zip(&isos).for_each(|(f, &t)| *f -= t as f32),
-                Part::Upper => row
-                    .iter_mut()
-                    .zip(&isos)
-                    .for_each(|(f, &t)| *f = t as f32 - *f),
+            if self.folded() {
+                row.iter_mut().for_each(|f| *f = f.abs());
+            }
+            for (f, &t) in row.iter_mut().zip(&isos) {
+                *f = s * *f + c * t as f32;
             }
         }
     }

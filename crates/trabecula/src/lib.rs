@@ -7,6 +7,7 @@
 pub mod cell;
 pub mod design;
 pub mod extract;
+pub mod face;
 pub mod fault;
 pub mod field;
 pub mod grade;

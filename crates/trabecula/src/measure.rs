@@ -13,7 +13,7 @@ mod intersect;
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
 pub use cut::cut_triangles;
-pub use intersect::self_intersections;
+pub use intersect::{is_embedded, self_intersections};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::face::{Face, Tree};
 use crate::field::{Block, Field};
 use crate::math::Aabb;
 
@@ -51,8 +52,18 @@ pub trait Shape: Field {
         }
     }
 
+    /// Adds to `out` the smooth faces of the solid within distance `by` (mm) of the shape, or deeper than −`by` in it;
+    /// returns how they make it. The faces' numbers are their places in `out`.
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree;
+
     /// Exact volume (mm³) where it is known in closed form.
     fn volume(&self) -> Option<f64>;
+}
+
+/// A solid of one face that is smooth as far as its signed distance is.
+fn one_face(field: Arc<dyn Field>, out: &mut Vec<Face>) -> Tree {
+    out.push(Face::distance(field));
+    Tree::Face(out.len() - 1)
 }
 
 /// A shared region.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::face::{Face, Tree};
 use crate::field::Field;
 use crate::math::{Aabb, Interval, Vec3};
 use crate::region::Region;
@@ -15,6 +16,30 @@ pub struct Solid {
     pub field: Option<Arc<dyn Field>>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
+}
+
+impl Solid {
+    /// The smooth faces of the solid and how they make it.
+    pub fn faces(&self) -> (Vec<Face>, Tree) {
+        let mut faces = Vec::new();
+        let mut all = vec![self.region.clone().faces(0.0, &mut faces)];
+        if let Some(field) = &self.field {
+            let mut parts = field.parts();
+            if parts.is_empty() {
+                parts.push(field.clone());
+            }
+            for part in parts {
+                all.push(Tree::Face(faces.len()));
+                faces.push(Face {
+                    slope: part.slope(),
+                    field: part,
+                    plane: None,
+                    cut: false,
+                });
+            }
+        }
+        (faces, Tree::All(all))
+    }
 }
 
 /// As a field, the greater of the lattice's value and the region's signed distance: negative in the finished part,

@@ -107,7 +107,7 @@ fn a_sheet_of_32_samples_a_cell_is_within_1e_4_of_its_volume() {
 #[test]
 fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
     let exact = [4.0 * PI, 4.0 / 3.0 * PI];
-    let errors = [8.0, 16.0, 32.0].map(|n| {
+    let errors = [8.0, 16.0, 32.0, 64.0, 128.0].map(|n| {
         let s = surface(&solid(ball(1.0), None), 1.0 / n, &Silent).expect("surface");
         assert!(s.cut.iter().all(|c| *c));
         [
@@ -115,12 +115,14 @@ fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
             (s.mesh.volume() / exact[1] - 1.0).abs(),
         ]
     });
-    println!("ball area and volume errors at 8, 16, 32 steps a radius: {errors:?}");
+    println!("ball area and volume errors at 8, 16 … 128 steps a radius: {errors:?}");
     for w in errors.windows(2) {
-        // Order p means a ratio of 2^p: 4 for area; volume is balanced to fourth order, ratio 16.
+        // Order p means a ratio of 2^p: 4 for area.
         assert!((3.2..5.0).contains(&(w[0][0] / w[1][0])), "{errors:?}");
-        assert!(w[0][1] / w[1][1] > 10.0, "{errors:?}");
     }
+    // The second order of volume is balanced away; what is left is of third order or higher, and depends on how the
+    // ball lies in the grid: over four halvings at least a factor of 2^(4 · 2.8).
+    assert!(errors[0][1] / errors[4][1] > 2f64.powf(11.2), "{errors:?}");
 }
 
 #[test]
@@ -378,4 +380,82 @@ proptest! {
         check(&format!("full {text} edge {edge}"), &full);
         prop_assert!(s.mesh.volume() <= full.mesh.volume() * (1.0 + 0.5 * edge) + 1e-9);
     }
+}
+
+#[test]
+#[ignore]
+fn campaign() {
+    let e = |n: &str, d: f64| std::env::var(n).map_or(d, |e| e.parse().unwrap());
+    let (from, n) = (e("FROM", 0.0) as u64, e("N", 300.0) as u64);
+    let mut bad = [0; 6];
+    for seed in from..from + n {
+        let mut state = seed.wrapping_mul(0x9E3779B97F4A7C15) ^ 0x1234567;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            let x = state ^ (state >> 33);
+            (x.wrapping_mul(0xff51afd7ed558ccd) >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for _ in 0..4 {
+            random();
+        }
+        let kind = (random() * 7.0) as usize;
+        let region = region(
+            kind,
+            0.5 + random(),
+            random() * 0.8 - 0.4,
+            0.2 + 0.8 * random(),
+        );
+        let name = catalogue()[(random() * 10.0) as usize].name;
+        let part = [Part::Sheet, Part::Lower, Part::Upper][(random() * 3.0) as usize];
+        let fraction = 0.03 + 0.94 * random();
+        let rotate = [0; 3].map(|_| random() * 360.0 - 180.0);
+        let wavelength = [0; 3].map(|_| 0.5 + random());
+        let edge = 0.04 + 0.26 * random();
+        let field = lattice(
+            name,
+            part,
+            Level::Fraction(Grade::Constant(fraction)),
+            wavelength,
+            rotate,
+        );
+        let Ok(s) = surface(&solid(region.clone(), Some(field)), edge, &Silent) else {
+            continue;
+        };
+        let m = rounded(&s.mesh);
+        let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
+        let flat = (0..m.triangles.len())
+            .filter(|&i| {
+                let [a, b, c] = m.corners(i);
+                a == b || b == c || c == a
+            })
+            .count();
+        let found = [
+            m.vertices.len() - places.len(),
+            usize::from(!size(&m).closed),
+            non_manifold_vertices(&m) as usize,
+            self_intersections(&m, 50),
+            flat,
+        ];
+        if found.iter().any(|f| *f > 0) {
+            println!(
+                "seed {seed}: kind {kind} {name} {part:?} {fraction:.2} edge {edge:.3} tris {}: dup {} open {} fans {} cross {} flat {}",
+                m.triangles.len(),
+                found[0],
+                found[1],
+                found[2],
+                found[3],
+                found[4]
+            );
+            for (b, f) in bad.iter_mut().zip(found) {
+                *b += usize::from(f > 0);
+            }
+            bad[5] += 1;
+        }
+    }
+    println!(
+        "of {n}: dup {} open {} fans {} cross {} flat {}: bad {}",
+        bad[0], bad[1], bad[2], bad[3], bad[4], bad[5]
+    );
 }

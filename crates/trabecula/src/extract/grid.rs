@@ -1,5 +1,7 @@
-//! The rectilinear grid: even steps between the planes of the region, and one step of padding around it.
+//! The rectilinear grid: even steps between the planes of the region, and one step of padding around it; and what is
+//! known of the solid in a block of it.
 
+use crate::face::{Face, Sign, Tree};
 use crate::fault::Fault;
 use crate::field::Block;
 use crate::math::Aabb;
@@ -11,11 +13,39 @@ pub(super) const TILE: usize = 61;
 /// Most node planes along an axis.
 const MOST: f64 = 4e6;
 
-/// Node planes along the three axes (mm, ascending). The outermost ones lie outside the region.
+/// The solid on its grid.
 pub(super) struct Grid {
+    /// Node planes along the three axes (mm, ascending). The outermost ones lie outside the region.
     pub axes: [Vec<f64>; 3],
     /// Points stay this far from the ends of their grid edges, as a share of the edge.
     pub margin: f64,
+    /// The step asked for, mm.
+    pub step: f64,
+    /// The smooth faces of the solid.
+    pub faces: Vec<Face>,
+    /// How they make it.
+    tree: Tree,
+    /// For each face, the number of the node plane that it is, if it is one: then it needs no samples.
+    laid: Vec<Option<usize>>,
+}
+
+/// What is known of the solid in a block without sampling it.
+pub(super) struct Local {
+    /// The solid, by the numbers of faces here: those in `live`, then those in `flat`.
+    pub tree: Tree,
+    /// Faces that may change sign at the block's nodes.
+    pub live: Vec<usize>,
+    /// Faces that are node planes within the block.
+    pub flat: Vec<Flat>,
+}
+
+/// A face that is a node plane.
+pub(super) struct Flat {
+    pub axis: usize,
+    /// The plane's number in the block.
+    pub at: usize,
+    /// Whether the solid lies below.
+    pub below: bool,
 }
 
 impl Grid {
@@ -39,6 +69,13 @@ impl Grid {
                 "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
             ));
         }
+        let (faces, tree) = solid.faces();
+        // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
+        // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
+        let mut required = Vec::new();
+        tree.each_required(&mut |f| required.push(f));
+        let planes = required.iter().filter_map(|&f| Some((f, faces[f].plane?)));
+        let planes: Vec<_> = planes.collect();
         let mut axes: [Vec<f64>; 3] = Default::default();
         for (a, nodes) in axes.iter_mut().enumerate() {
             let (lo, hi) = (bounds.min[a], bounds.max[a]);
@@ -61,26 +98,43 @@ impl Grid {
                 );
                 return Err(Fault::new("edge", message));
             }
-            let mut stops = Vec::new();
-            solid.region.planes(a, &mut stops);
+            let mut stops: Vec<f64> = planes
+                .iter()
+                .filter(|p| p.1.axis == a)
+                .map(|p| p.1.at)
+                .collect();
             stops.retain(|s| (lo..=hi).contains(s));
-            // A curved surface touches its bounds in a point; keep nodes off it, where it would leave a needle.
-            for (end, beyond) in [(lo, lo - 0.5 * edge), (hi, hi + 0.5 * edge)] {
-                if !stops.contains(&end) {
-                    stops.push(beyond);
+            stops.sort_by(f64::total_cmp);
+            // Planes closer than a hundredth of a step would make needles; the others are faces like any other.
+            stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
+            // Other flat faces, and the points where a curved one touches its bounds, are best met half-way.
+            let mut flats = vec![lo, hi];
+            solid.region.planes(a, &mut flats);
+            flats.retain(|s| (lo..=hi).contains(s));
+            for at in flats {
+                // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes.
+                let share = [0.4, 0.5, 0.6][a];
+                if stops.iter().all(|s| (s - at).abs() > 0.75 * edge) {
+                    stops.extend([at - share * edge, at + (1.0 - share) * edge]);
                 }
             }
             stops.sort_by(f64::total_cmp);
-            // Planes closer than a hundredth of a step would make needles; the first of them stands for all.
-            stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
-            nodes.push(stops[0] - edge);
+            if stops.is_empty() {
+                stops.push(lo);
+            }
+            let below = ((stops[0] - lo) / edge).max(0.0).ceil() + 1.0;
+            nodes.extend((0..below as usize).map(|i| stops[0] - edge * (below - i as f64)));
             for w in stops.windows(2) {
                 let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
                 nodes
                     .extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
             }
             let last = stops[stops.len() - 1];
-            nodes.extend([last, hi.max(last) + edge]);
+            nodes.push(last);
+            while nodes[nodes.len() - 1] <= hi {
+                nodes.push(nodes[nodes.len() - 1] + edge);
+            }
+            nodes.push(nodes[nodes.len() - 1] + edge);
         }
         let finest = axes
             .iter()
@@ -89,7 +143,8 @@ impl Grid {
         let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
         // Eight units in the last place of the farthest f32 coordinate between any two points of an edge: rounding
         // keeps their order, hence every guarantee.
-        let needed = 8.0 * farthest * f64::from(f32::EPSILON) / finest;
+        let resolution = farthest * f64::from(f32::EPSILON);
+        let needed = 8.0 * resolution / finest;
         if needed > 0.125 {
             return Err(Fault::new(
                 "edge",
@@ -100,9 +155,17 @@ impl Grid {
                 ),
             ));
         }
+        let mut laid = vec![None; faces.len()];
+        for (f, p) in planes {
+            laid[f] = axes[p.axis].iter().position(|&x| x == p.at);
+        }
         Ok(Grid {
             axes,
             margin: needed.max(1.0 / 4096.0),
+            step: edge,
+            faces,
+            tree,
+            laid,
         })
     }
 
@@ -136,36 +199,61 @@ impl Grid {
             axes: [0, 1, 2].map(|a| &self.axes[a][n[a].clone()]),
         }
     }
-}
 
-/// What proven bounds say of a block.
-pub(super) enum Content {
-    /// No surface crosses it.
-    None,
-    /// Which of lattice and region must be sampled.
-    Surface { field: bool, region: bool },
-}
-
-/// Looks at a block through bounds alone.
-pub(super) fn content(solid: &Solid, b: &Aabb) -> Content {
-    let r = solid.region.bound(b);
-    if r.lo > 0.0 {
-        return Content::None;
-    }
-    let region = r.hi >= 0.0;
-    let field = match &solid.field {
-        None => false,
-        Some(f) => {
-            let f = f.bound(b);
-            if f.lo > 0.0 {
-                return Content::None;
-            }
-            f.hi >= 0.0
+    /// What bounds and places say of the solid in a block; `None` if no surface crosses it.
+    pub(super) fn local(&self, nodes: &[std::ops::Range<usize>; 3], b: &Aabb) -> Option<Local> {
+        let (mut live, mut flat) = (Vec::new(), Vec::new());
+        let mut signs = Vec::with_capacity(self.faces.len());
+        for (f, face) in self.faces.iter().enumerate() {
+            signs.push(match (face.plane, self.laid[f]) {
+                (Some(p), Some(at)) => {
+                    let range = &nodes[p.axis];
+                    if at > range.start && at + 1 < range.end {
+                        flat.push((
+                            f,
+                            Flat {
+                                axis: p.axis,
+                                at: at - range.start,
+                                below: p.below,
+                            },
+                        ));
+                        None
+                    } else if (at <= range.start) == p.below {
+                        Some(Sign::Positive)
+                    } else {
+                        Some(Sign::Negative)
+                    }
+                }
+                _ => {
+                    let r = face.field.bound(b);
+                    if r.hi <= 0.0 {
+                        Some(Sign::Negative)
+                    } else if r.lo > 0.0 {
+                        Some(Sign::Positive)
+                    } else {
+                        None
+                    }
+                }
+            });
         }
-    };
-    if region || field {
-        Content::Surface { field, region }
-    } else {
-        Content::None
+        // A face may still not matter here; but a neighbouring tile may see it matter in a cell that both have.
+        let tree = self.tree.given(&|f| signs[f].unwrap_or(Sign::Varies(f)));
+        if matches!(&tree, Tree::All(of) | Tree::Any(of) if of.is_empty()) {
+            return None;
+        }
+        live.extend(
+            (0..self.faces.len())
+                .filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)),
+        );
+        let place = |f: usize| {
+            let at = live.iter().position(|&g| g == f);
+            at.or_else(|| Some(live.len() + flat.iter().position(|(g, _)| *g == f)?))
+        };
+        let tree = tree.given(&|f| place(f).map_or(Sign::Negative, Sign::Varies));
+        Some(Local {
+            tree,
+            live,
+            flat: flat.into_iter().map(|(_, p)| p).collect(),
+        })
     }
 }

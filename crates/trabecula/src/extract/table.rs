@@ -33,8 +33,10 @@ pub(super) struct Case {
     pub edges: Vec<u8>,
     /// Triangles as indices into `EDGES`, counter-clockwise seen from the void.
     pub triangles: Vec<[u8; 3]>,
-    /// The loop around the patch, where there is only one: counter-clockwise seen from the void.
-    pub ring: Option<Vec<u8>>,
+    /// Whether there is one patch, and on no face solid corners that only touch diagonally.
+    pub plain: bool,
+    /// The loop around the patch, if it is plain: counter-clockwise seen from the void.
+    pub ring: Vec<u8>,
 }
 
 /// For each pattern of solid corners, what it makes.
@@ -43,10 +45,16 @@ pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
         let loops = loops(case);
         let triangles = loops.iter().flat_map(|l| fan(l)).collect();
         let edges = loops.iter().flatten().map(|&e| e as u8).collect();
-        let ring = (loops.len() == 1).then(|| loops[0].iter().map(|&e| e as u8).collect());
+        let diagonal = |f: [usize; 4]| {
+            let s = f.map(|c| case >> c & 1);
+            s[0] == s[2] && s[1] == s[3] && s[0] != s[1]
+        };
+        let plain = loops.len() == 1 && !faces().any(diagonal);
+        let ring = loops.iter().take(1).flatten().map(|&e| e as u8).collect();
         Case {
             edges,
             triangles,
+            plain,
             ring,
         }
     })

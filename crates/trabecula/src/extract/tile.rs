@@ -1,55 +1,42 @@
 //! The surface inside one tile.
 //!
-//! Marching cubes with every vertex strictly inside its own grid edge. Then the mesh is closed, manifold, free of
-//! self-intersection and of degenerate triangles by construction (see `table`), whatever the field does; and rounding
-//! to f32 cannot undo it, because rounding is monotone: it maps the grid to a grid and edges to edges.
+//! Where a single smooth face of the solid crosses a cell, that is nearly everywhere: marching cubes, with every vertex
+//! strictly inside its own grid edge. Then the mesh is closed, manifold, free of self-intersection and of degenerate
+//! triangles by construction (see `table`), whatever the face does; and rounding to f32 cannot undo it, because
+//! rounding is monotone: it maps the grid to a grid and edges to edges.
 //!
-//! Two things move vertices, only ever along their edges:
-//! - a bracketed Newton iteration puts them on the true surface, of lattice or region, whichever ends the solid first;
+//! Two things move these vertices, only ever along their edges:
+//! - a bracketed Newton iteration puts them on the true surface;
 //! - a chord lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
 //!   first order in curvature · h². Each triangle learns from the normals at its corners how far it lies from the
 //!   surface, and its vertices share the move that cancels its volume error. What is left is of fourth order.
 //!
-//! Where a grid plane lies on a flat face of the region (signed distance exactly zero at its nodes), vertices go to
-//! the node itself, so the face and its straight edges are reproduced exactly.
-//!
-//! Where lattice and region meet inside a cell, `crease` adds a vertex on their common curve.
+//! Where faces meet, `knot` cuts the cell up. Where a flat face of the solid is a plane of the grid, `cap` closes it.
 //!
 //! A tile looks one cell beyond itself. All it computes there is a function of the grid edge or triangle alone, done
 //! in the same order, so neighbouring tiles find bit-identical vertices.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use multiversion::multiversion;
 
-use crate::field::Field;
+use crate::field::{Block, Field};
 use crate::math::{Vec3, cross, dot, norm, sub, unit};
-use crate::solid::Solid;
 
-use super::crease;
-use super::grid::{Content, Grid, TILE, content};
+use super::cap;
+use super::grid::{Grid, Local, TILE};
+use super::knot::{Extra, Key, Knots};
+use super::signs::{Signs, below, negative, within};
 use super::table::{CASES, EDGES};
-
-/// What a vertex lies on.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum On {
-    /// The lattice.
-    Lattice,
-    /// The region's surface.
-    Region,
-    /// A grid plane that is a flat face of the region.
-    Plane,
-    /// The curve where the lattice meets the region's surface.
-    Crease,
-}
 
 /// The surface in one tile, by itself.
 #[derive(Default)]
 pub(super) struct Patch {
     /// Vertex positions.
     pub vertices: Vec<Vec3>,
-    /// Global key of each vertex: grid node · 8 + axis of its edge, + 3 for the node itself, + 4 for its cell.
-    pub keys: Vec<u64>,
+    /// Global key of each vertex.
+    pub keys: Vec<u128>,
     /// Whether a neighbouring tile may use the vertex too.
     pub shared: Vec<bool>,
     /// Triangles of the tile's own cells.
@@ -61,30 +48,62 @@ pub(super) struct Patch {
 /// Buffers that one thread uses again and again.
 #[derive(Default)]
 pub(super) struct Scratch {
-    field: Vec<f32>,
-    region: Vec<f32>,
+    /// Values of the live faces at the nodes.
+    samples: Vec<Vec<f32>>,
+    signs: Signs,
+    numbers: Vec<Numbers>,
     points: Vec<Vec3>,
     values: Vec<f64>,
     gradients: Vec<Vec3>,
-    solid: Vec<u64>,
-    crossed: [Vec<u64>; 3],
-    offset: [Vec<u32>; 3],
     vertices: Vec<Vertex>,
-    triangles: Vec<[u32; 3]>,
-    own: Vec<bool>,
-    /// Cells in which lattice and region may meet.
-    rings: Vec<crease::Ring>,
-    /// Vertices inside cells; their numbers follow those of the vertices on edges.
-    centers: Vec<crease::Center>,
-    /// Places of all vertices, and what they lie on.
+    plain: Plain,
+    /// Places of all vertices: those on grid edges, then the extra ones.
     places: Vec<Vec3>,
-    on: Vec<On>,
     /// Unit normals of the vertices on edges.
     normals: Vec<Vec3>,
     /// For each vertex on an edge: the volume it is to lose, and three times what it loses per mm along its edge.
     moments: Vec<(f64, f64)>,
-    /// For each vertex on an edge, the one that stands for it; empty where all stand for themselves.
-    stands: Vec<u32>,
+    extra: Extra,
+}
+
+/// Numbers of the vertices of one face: those on x-edges, then y, then z, each in node order.
+#[derive(Default)]
+pub(super) struct Numbers {
+    crossed: [Vec<u64>; 3],
+    offset: [Vec<u32>; 3],
+}
+
+impl Numbers {
+    /// The number of the vertex on the edge along `axis` from node i of a row, if it has one.
+    #[inline]
+    pub fn get(&self, axis: usize, row: usize, i: usize) -> Option<u32> {
+        (self.crossed[axis][row] >> i & 1 == 1).then(|| self.of(axis, row, i))
+    }
+
+    #[inline(always)]
+    fn of(&self, axis: usize, row: usize, i: usize) -> u32 {
+        self.offset[axis][row] + (self.crossed[axis][row] & ((1u64 << i) - 1)).count_ones()
+    }
+}
+
+/// What plain cells make.
+#[derive(Default)]
+struct Plain {
+    triangles: Vec<[u32; 3]>,
+    kinds: Vec<Kind>,
+    /// The cells beside knotted ones: cell and face.
+    seams: Vec<([usize; 3], usize)>,
+}
+
+/// What a triangle of a plain cell is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Only to balance its neighbours: it belongs to another tile, or something finer takes its place.
+    Neighbour,
+    /// The lattice's surface.
+    Lattice,
+    /// The region's surface.
+    Cut,
 }
 
 /// A vertex on a grid edge, at `solid` + t · `reach` along `axis`.
@@ -99,9 +118,9 @@ struct Vertex {
     /// Index in the block of the lower node of the edge.
     low: u32,
     axis: u8,
-    on: On,
-    /// Whether the vertex stands on the region's surface.
-    skin: bool,
+    face: u8,
+    /// Whether a knotted cell has the edge too: then its way of placing the vertex holds.
+    fixed: bool,
 }
 
 impl Vertex {
@@ -110,11 +129,6 @@ impl Vertex {
         let mut p = self.solid;
         p[self.axis as usize] += t * self.reach;
         p
-    }
-
-    #[inline]
-    fn place(&self) -> Vec3 {
-        self.at(self.t)
     }
 
     /// Whether the solid end is the lower one.
@@ -131,7 +145,16 @@ pub(super) struct Nodes<'a> {
     pub stride: [usize; 3],
 }
 
-impl Nodes<'_> {
+impl<'a> Nodes<'a> {
+    fn new(block: &Block<'a>) -> Nodes<'a> {
+        let shape = block.shape();
+        Nodes {
+            axes: block.axes,
+            shape,
+            stride: [1, shape[0], shape[0] * shape[1]],
+        }
+    }
+
     pub fn at(&self, n: usize) -> [usize; 3] {
         [
             n % self.shape[0],
@@ -139,16 +162,26 @@ impl Nodes<'_> {
             n / self.stride[2],
         ]
     }
+
+    pub fn index(&self, at: [usize; 3]) -> usize {
+        at[0] + at[1] * self.stride[1] + at[2] * self.stride[2]
+    }
+
+    pub fn place(&self, n: usize) -> Vec3 {
+        let at = self.at(n);
+        [0, 1, 2].map(|a| self.axes[a][at[a]])
+    }
 }
 
 /// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
-pub(super) const BATCH: usize = 2048;
+const BATCH: usize = 2048;
 
 /// The surface found in a tile, in the buffers that it was found in.
 pub(super) struct View<'a> {
     s: &'a Scratch,
     nodes: Nodes<'a>,
     grid: &'a Grid,
+    local: Local,
     /// First node of the block.
     from: [usize; 3],
     /// Cells of the tile itself, in block coordinates.
@@ -157,253 +190,158 @@ pub(super) struct View<'a> {
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
 pub(super) fn extract<'a>(
-    solid: &Solid,
     grid: &'a Grid,
     tile: [usize; 3],
     s: &'a mut Scratch,
 ) -> Option<View<'a>> {
     let block = grid.block(tile);
-    let Content::Surface { field, region } = content(solid, &block.bounds()) else {
-        return None;
-    };
-    let lattice = solid.field.as_deref().filter(|_| field);
-    let shape = block.shape();
-    let nodes = Nodes {
-        axes: block.axes,
-        shape,
-        stride: [1, shape[0], shape[0] * shape[1]],
-    };
-
-    // No samples mean: solid everywhere. Every sample is written, so nothing needs clearing.
-    s.region.resize(if region { block.len() } else { 0 }, 0.0);
-    s.field.resize(if field { block.len() } else { 0 }, 0.0);
-    if region {
-        solid.region.fill(&block, &mut s.region);
-    }
-    match lattice {
-        Some(f) if region => f.fill_where(&block, &near_negative(&s.region, shape), &mut s.field),
-        Some(f) => f.fill(&block, &mut s.field),
-        None => {}
-    }
-    signs(s, shape);
-    if crossings(s, shape) == 0 {
+    let range = grid.nodes(tile);
+    let local = grid.local(&range, &block.bounds())?;
+    let nodes = Nodes::new(&block);
+    let from = range.map(|r| r.start);
+    let own = [0, 1, 2].map(|a| {
+        let first = tile[a] * TILE - from[a];
+        first..(first + TILE).min(nodes.shape[a] - 1)
+    });
+    sample(s, grid, &local, &block);
+    let crossed = s.signs.sort(&local);
+    if !crossed && local.flat.is_empty() {
         return None;
     }
     list_vertices(s, &nodes);
-    if region {
-        find_planes(s, &*solid.region, grid.margin);
-    }
-    if let Some(f) = lattice {
-        solve(s, &nodes, f, On::Lattice);
-    }
-    if region {
-        solve(s, &nodes, &*solid.region, On::Region);
+    let mut first = 0;
+    for (i, &face) in local.live.iter().enumerate() {
+        let count = s.vertices[first..]
+            .iter()
+            .take_while(|v| usize::from(v.face) == i)
+            .count();
+        solve(s, &nodes, &*grid.faces[face].field, i, first..first + count);
+        first += count;
     }
     for v in &mut s.vertices {
-        v.t = if v.on == On::Plane {
-            grid.margin
-        } else {
-            v.t.clamp(grid.margin, 1.0 - grid.margin)
-        };
+        v.t = v.t.clamp(grid.margin, 1.0 - grid.margin);
     }
-    let from = grid.nodes(tile).map(|r| r.start);
-    let own = [0, 1, 2].map(|a| {
-        let first = tile[a] * TILE - from[a];
-        first..(first + TILE).min(shape[a] - 1)
-    });
-    list_triangles(s, shape, &own);
-    if !s.own.iter().any(|&o| o) {
-        return None;
-    }
+    list_triangles(s, grid, &local, &own);
     s.places.clear();
-    s.places.extend(s.vertices.iter().map(Vertex::place));
-    s.on.clear();
-    s.on.extend(s.vertices.iter().map(|v| v.on));
-    s.centers.clear();
-    if let (Some(f), true) = (lattice, region) {
-        let draft = crease::Draft {
-            triangles: &mut s.triangles,
-            own: &mut s.own,
-            places: &s.places,
-            on: &s.on,
-        };
-        s.centers = crease::sharpen(&s.rings, draft, [f, &*solid.region], &nodes);
-        s.places.extend(s.centers.iter().map(|c| c.place));
-        s.on.extend(s.centers.iter().map(|_| On::Crease));
-    }
-    balance(s, grid.margin);
-    merge_plane_vertices(s, &nodes);
-    Some(View {
+    s.places.extend(s.vertices.iter().map(|v| v.at(v.t)));
+    balance(s, grid, &local);
+    finish(s, grid, &local, &nodes, &own);
+    let own_triangles =
+        s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
+    own_triangles.then_some(View {
         s,
         nodes,
         grid,
+        local,
         from,
         own,
     })
 }
 
-/// The word of signs of each row of nodes.
-fn signs(s: &mut Scratch, shape: [usize; 3]) {
-    let (nx, rows) = (shape[0], shape[1] * shape[2]);
-    s.solid.clear();
-    s.solid
-        .resize(rows, if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 });
-    for samples in [&s.field, &s.region] {
-        keep_negative(&mut s.solid, samples, nx);
+/// Fills the samples and signs of the live faces. The lattice's are dear, so they are asked for only where the region
+/// can hold solid.
+fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
+    s.signs.shape = block.shape();
+    let count = local.live.len();
+    if s.samples.len() < count {
+        s.samples.resize_with(count, Vec::new);
     }
-}
-
-/// For each row, the nodes whose value is at most zero and those next to them.
-fn near_negative(samples: &[f32], [nx, ny, nz]: [usize; 3]) -> Vec<u64> {
-    let mut inside = vec![if nx == 64 { u64::MAX } else { (1u64 << nx) - 1 }; ny * nz];
-    keep_negative(&mut inside, samples, nx);
-    let at = |j: usize, k: usize| {
-        if j < ny && k < nz {
-            inside[k * ny + j]
+    s.signs.negative.resize_with(count, Vec::new);
+    let mut wanted = None;
+    for (i, &f) in local.live.iter().enumerate() {
+        let face = &grid.faces[f];
+        let out = &mut s.samples[i];
+        // Every sample is written, so nothing needs clearing.
+        out.resize(block.len(), 0.0);
+        if face.cut || (i == 0 && local.flat.is_empty()) {
+            face.field.fill(block, out);
         } else {
-            0
+            let wanted = wanted.get_or_insert_with(|| {
+                let known = local.live.iter().filter(|f| grid.faces[**f].cut).count();
+                s.signs.wanted(local, known)
+            });
+            face.field.fill_where(block, wanted, out);
         }
-    };
-    let around = |row: usize| {
-        let (j, k) = (row % ny, row / ny);
-        let w = at(j, k);
-        let beside =
-            at(j.wrapping_sub(1), k) | at(j + 1, k) | at(j, k.wrapping_sub(1)) | at(j, k + 1);
-        w | w << 1 | w >> 1 | beside
-    };
-    (0..ny * nz).map(around).collect()
-}
-
-/// Keeps the bits of each word whose value in the word's row is at most zero.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn keep_negative(words: &mut [u64], samples: &[f32], nx: usize) {
-    for (word, row) in words.iter_mut().zip(samples.chunks_exact(nx)) {
-        let mut bytes = [0u8; 64];
-        for (byte, v) in bytes.iter_mut().zip(row) {
-            *byte = u8::from(*v <= 0.0);
-        }
-        let mut signs = 0u64;
-        for (i, eight) in bytes.chunks_exact(8).enumerate() {
-            let mut low = [0u8; 8];
-            low.copy_from_slice(eight);
-            // Eight bytes of 0 or 1 gathered into the top byte, the first lowest.
-            let bits = u64::from_le_bytes(low).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-            signs |= bits << (8 * i);
-        }
-        *word &= signs;
+        negative(&mut s.signs.negative[i], out, block.shape()[0]);
     }
 }
 
-/// Marks the grid edges whose ends differ and numbers them: x-edges, then y, then z, each in node order.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
-fn crossings(s: &mut Scratch, shape: [usize; 3]) -> usize {
-    let [nx, ny, nz] = shape;
-    let inner = (1u64 << (nx - 1)) - 1;
-    let mut count = 0u32;
-    for axis in 0..3 {
-        s.crossed[axis].clear();
-        s.offset[axis].clear();
-        for k in 0..nz {
-            for j in 0..ny {
-                let row = k * ny + j;
-                let w = s.solid[row];
-                let word = match axis {
-                    0 => (w ^ (w >> 1)) & inner,
-                    1 if j + 1 < ny => w ^ s.solid[row + 1],
-                    2 if k + 1 < nz => w ^ s.solid[row + ny],
-                    _ => 0,
-                };
-                s.crossed[axis].push(word);
-                s.offset[axis].push(count);
-                count += word.count_ones();
-            }
-        }
-    }
-    count as usize
-}
-
-/// The number of the vertex on an edge.
-#[inline(always)]
-fn number(s: &Scratch, axis: usize, row: usize, i: usize) -> u32 {
-    s.offset[axis][row] + (s.crossed[axis][row] & ((1u64 << i) - 1)).count_ones()
-}
-
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
+/// Lists the vertices of plain cells, face by face.
 fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
-    s.vertices.clear();
-    let [nx, ny, _] = nodes.shape;
-    for axis in 0..3 {
-        for (row, &word) in s.crossed[axis].iter().enumerate() {
-            let mut bits = word;
-            while bits != 0 {
-                let i = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let node = [i, row % ny, row / ny];
-                let mut solid = [
-                    nodes.axes[0][node[0]],
-                    nodes.axes[1][node[1]],
-                    nodes.axes[2][node[2]],
-                ];
-                let length = nodes.axes[axis][node[axis] + 1] - nodes.axes[axis][node[axis]];
-                let low = row * nx + i;
-                let high = low + nodes.stride[axis];
-                let up = s.solid[row] >> i & 1 == 1;
-                let (a, b) = if up { (low, high) } else { (high, low) };
-                if !up {
-                    solid[axis] = nodes.axes[axis][node[axis] + 1];
-                }
-                let (ra, rb) = if s.region.is_empty() {
-                    (-1.0, -1.0)
-                } else {
-                    (s.region[a], s.region[b])
-                };
-                let on = match rb > 0.0 {
-                    // Perhaps; `find_planes` looks.
-                    true if ra == 0.0 => On::Plane,
-                    // The lattice may end the solid before the region does; `solve` finds out.
-                    true => On::Region,
-                    false => On::Lattice,
-                };
-                let skin = on == On::Plane || (ra == 0.0 && rb == 0.0);
-                let reach = if up { length } else { -length };
-                s.vertices.push(Vertex {
-                    solid,
-                    reach,
-                    t: 1.0,
-                    low: low as u32,
-                    axis: axis as u8,
-                    on,
-                    skin,
-                });
-            }
-        }
-    }
-}
-
-/// Tells edges that leave the region through a flat face on their solid node from those that run within the face and
-/// leave it farther on, at the rim.
-fn find_planes(s: &mut Scratch, region: &dyn Field, margin: f64) {
     let Scratch {
-        points,
-        values,
+        signs,
+        numbers,
         vertices,
         ..
     } = s;
-    let candidates: Vec<usize> = (0..vertices.len())
-        .filter(|&i| vertices[i].on == On::Plane)
-        .collect();
-    points.clear();
-    points.extend(candidates.iter().map(|&i| vertices[i].at(margin)));
-    values.resize(points.len(), 0.0);
-    region.values(points, values);
-    for (&i, v) in candidates.iter().zip(&*values) {
-        if *v <= 0.0 {
-            vertices[i].on = On::Region;
+    vertices.clear();
+    numbers.resize_with(signs.negative.len(), Numbers::default);
+    let any_knot = signs.knotted.iter().any(|w| *w != 0);
+    for (face, numbers) in numbers.iter_mut().enumerate() {
+        list_face(signs, numbers, vertices, nodes, face, any_knot);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
+fn list_face(
+    signs: &Signs,
+    numbers: &mut Numbers,
+    vertices: &mut Vec<Vertex>,
+    nodes: &Nodes,
+    face: usize,
+    any_knot: bool,
+) {
+    let [nx, ny, nz] = nodes.shape;
+    let inner = below(nx - 1);
+    let n = &signs.negative[face];
+    for axis in 0..3 {
+        numbers.crossed[axis].clear();
+        numbers.offset[axis].clear();
+        for k in 0..nz {
+            for j in 0..ny {
+                let row = k * ny + j;
+                let w = n[row];
+                let change = match axis {
+                    0 => (w ^ (w >> 1)) & inner,
+                    1 if j + 1 < ny => w ^ n[row + 1],
+                    2 if k + 1 < nz => w ^ n[row + ny],
+                    _ => 0,
+                };
+                let used = change & signs.edges_of(&signs.plain[face], axis, j, k);
+                numbers.crossed[axis].push(used);
+                numbers.offset[axis].push(vertices.len() as u32);
+                let fixed = if any_knot {
+                    signs.edges_of(&signs.knotted, axis, j, k)
+                } else {
+                    0
+                };
+                let mut bits = used;
+                while bits != 0 {
+                    let i = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let mut solid = [nodes.axes[0][i], nodes.axes[1][j], nodes.axes[2][k]];
+                    let along = &nodes.axes[axis][[i, j, k][axis]..];
+                    let length = along[1] - along[0];
+                    let up = w >> i & 1 == 1;
+                    if !up {
+                        solid[axis] = along[1];
+                    }
+                    vertices.push(Vertex {
+                        solid,
+                        reach: if up { length } else { -length },
+                        t: 1.0,
+                        low: (row * nx + i) as u32,
+                        axis: axis as u8,
+                        face: face as u8,
+                        fixed: fixed >> i & 1 == 1,
+                    });
+                }
+            }
         }
     }
 }
 
-/// A root in hand: the nearest places known to be solid and void, with their values, and the present guess.
+/// A bracket of a root along an edge: positions and values at its solid and void end, and the next guess.
 #[derive(Clone, Copy)]
 struct Root {
     vertex: u32,
@@ -417,11 +355,10 @@ const SETTLED: f64 = 1e-3;
 /// Most rounds of the iteration.
 const ROUNDS: usize = 6;
 
-/// Finds where the function ends the solid on each edge that it crosses, and keeps the first end.
-fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
+/// Finds where a face crosses the edges of its vertices, and its normals there.
+fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, which: Range<usize>) {
     let Scratch {
-        field,
-        region,
+        samples,
         points,
         values,
         gradients,
@@ -430,39 +367,22 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
         ..
     } = s;
     normals.resize(vertices.len(), [0.0; 3]);
-    let samples = if which == On::Lattice {
-        &*field
-    } else {
-        &*region
-    };
+    let samples = &samples[face];
     let mut roots = Vec::with_capacity(BATCH);
-    let mut from = 0;
-    while from < vertices.len() {
+    for from in which.clone().step_by(BATCH) {
         roots.clear();
-        while roots.len() < BATCH && from < vertices.len() {
-            let v = &vertices[from];
-            let (low, high) = (
-                v.low as usize,
-                v.low as usize + nodes.stride[v.axis as usize],
-            );
-            let (a, b) = if v.up() {
-                (samples[low], samples[high])
-            } else {
-                (samples[high], samples[low])
-            };
-            // Vertices on flat faces are settled; on others the void end is positive if this function crosses.
-            if v.on != On::Plane && b > 0.0 {
-                let (a, b) = (f64::from(a), f64::from(b));
-                // Along a flat face the value stays zero up to the rim: come from the void.
-                let t = if a == 0.0 { 1.0 } else { -a / (b - a) };
-                roots.push(Root {
-                    vertex: from as u32,
-                    solid: (0.0, a),
-                    void: (1.0, b),
-                    t,
-                });
-            }
-            from += 1;
+        for i in from..(from + BATCH).min(which.end) {
+            let v = &vertices[i];
+            let low = v.low as usize;
+            let high = low + nodes.stride[v.axis as usize];
+            let (a, b) = if v.up() { (low, high) } else { (high, low) };
+            let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
+            roots.push(Root {
+                vertex: i as u32,
+                solid: (0.0, a),
+                void: (1.0, b),
+                t: -a / (b - a),
+            });
         }
         for round in 0..ROUNDS {
             points.clear();
@@ -487,9 +407,8 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
                 if step > SETTLED && round + 1 < ROUNDS {
                     roots[open] = r;
                     open += 1;
-                } else if r.t <= vertex.t {
-                    // Nothing ended the solid before. (The lattice is solved first; where it does not, t is still 1.)
-                    (vertex.t, vertex.on) = (r.t, which);
+                } else {
+                    vertex.t = r.t;
                     normals[r.vertex as usize] = unit(gradients[n]);
                 }
             }
@@ -501,62 +420,91 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, which: On) {
     }
 }
 
-/// Lists the triangles of all cells of the block, halo included, and which belong to the tile itself; and the cells
-/// with a single patch that meets both lattice and region, which `crease` fills in its own way.
+/// Lists the triangles of all plain cells of the block, halo included; and the plain cells beside knotted ones, which
+/// `knot` fills in its own way.
+fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &[Range<usize>; 3]) {
+    let Scratch {
+        signs,
+        numbers,
+        plain,
+        ..
+    } = s;
+    plain.triangles.clear();
+    plain.kinds.clear();
+    plain.seams.clear();
+    for (face, numbers) in numbers.iter().enumerate().take(local.live.len()) {
+        let kind = if grid.faces[local.live[face]].cut {
+            Kind::Cut
+        } else {
+            Kind::Lattice
+        };
+        list_patches(signs, numbers, face, own, kind, plain);
+    }
+}
+
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
-fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[Range<usize>; 3]) {
-    let [nx, ny, nz] = shape;
-    let inner = (1u64 << (nx - 1)) - 1;
+fn list_patches(
+    signs: &Signs,
+    numbers: &Numbers,
+    face: usize,
+    own: &[Range<usize>; 3],
+    kind: Kind,
+    out: &mut Plain,
+) {
+    let Plain {
+        triangles,
+        kinds,
+        seams,
+    } = out;
+    let [_, ny, nz] = signs.shape;
     let cases = &*CASES;
-    let mixed = !s.field.is_empty() && !s.region.is_empty();
-    let (mut triangles, mut rings) = (
-        core::mem::take(&mut s.triangles),
-        core::mem::take(&mut s.rings),
-    );
-    triangles.clear();
-    rings.clear();
-    s.own.clear();
+    let mine_x = within(&own[0]);
     for k in 0..nz - 1 {
         for j in 0..ny - 1 {
             let row = k * ny + j;
+            let mut bits = signs.plain[face][row];
+            if bits == 0 {
+                continue;
+            }
+            let mine = if own[1].contains(&j) && own[2].contains(&k) {
+                mine_x
+            } else {
+                0
+            };
+            let mut seam = 0;
+            if mine != 0 {
+                let kn = &signs.knotted;
+                let here = kn[row];
+                // The block's last row of words holds no cells, so the upper neighbours exist; the lower ones do for
+                // cells of the tile itself, except at the grid's padding.
+                let below =
+                    if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine;
+            }
             let rows = [row, row + 1, row + ny, row + ny + 1];
-            let w = rows.map(|r| s.solid[r]);
-            let any = w[0] | w[1] | w[2] | w[3];
-            let all = w[0] & w[1] & w[2] & w[3];
-            let mut bits = (any | any >> 1) & !(all & all >> 1) & inner;
-            let mine = own[1].contains(&j) && own[2].contains(&k);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                let pair = |w: u64| (w >> i & 3) as usize;
-                let corners = pair(w[0]) | pair(w[1]) << 2 | pair(w[2]) << 4 | pair(w[3]) << 6;
-                let case = &cases[corners];
-                let mine = mine && own[0].contains(&i);
+                let case = &cases[signs.corners(face, i, j, k)];
                 let mut names = [0u32; 12];
                 for &e in &case.edges {
                     let (corner, axis) = EDGES[e as usize];
-                    names[e as usize] = number(s, axis, rows[corner >> 1], i + (corner & 1));
+                    names[e as usize] = numbers.of(axis, rows[corner >> 1], i + (corner & 1));
                 }
-                let vertex = |e: u8| names[e as usize];
-                if mixed && let Some(ring) = &case.ring {
-                    let on = |w: On| ring.iter().any(|&e| s.vertices[vertex(e) as usize].on == w);
-                    if on(On::Lattice) && on(On::Region) && !on(On::Plane) {
-                        rings.push(crease::Ring {
-                            cell: (row * nx + i) as u32,
-                            corners: corners as u8,
-                            points: ring.iter().map(|&e| vertex(e)).collect(),
-                            // The fan about a vertex of the ring is kept until `crease` finds a better one.
-                            triangles: triangles.len() as u32,
-                            own: mine,
-                        });
-                    }
+                let mut kind = if mine >> i & 1 == 1 {
+                    kind
+                } else {
+                    Kind::Neighbour
+                };
+                if seam >> i & 1 == 1 {
+                    seams.push(([i, j, k], face));
+                    kind = Kind::Neighbour;
                 }
-                triangles.extend(case.triangles.iter().map(|t| t.map(&vertex)));
-                s.own.resize(triangles.len(), mine);
+                triangles.extend(case.triangles.iter().map(|t| t.map(|e| names[e as usize])));
+                kinds.resize(triangles.len(), kind);
             }
         }
     }
-    (s.triangles, s.rings) = (triangles, rings);
 }
 
 /// Moves vertices along their edges so that each triangle's chord error in volume cancels.
@@ -564,50 +512,37 @@ fn list_triangles(s: &mut Scratch, shape: [usize; 3], own: &[Range<usize>; 3]) {
 /// A surface that is locally quadratic, through the corners of a triangle, lies on average Σ II(e)/24 above it, e the
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
-/// edge: what faces its edge can move without running far along it. Vertices on creases and flat faces stay.
-fn balance(s: &mut Scratch, margin: f64) {
+/// edge: what faces its edge can move without running far along it.
+fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
     let Scratch {
         vertices,
-        triangles,
+        plain,
         places,
-        on,
         normals,
-        centers,
         moments,
         ..
     } = s;
     moments.clear();
     moments.resize(vertices.len(), (0.0, 0.0));
-    for t in triangles.iter() {
-        let kinds = t.map(|v| on[v as usize]);
-        // The surface that all corners lie on, if there is one.
-        let Some(&which) = kinds.iter().find(|k| **k != On::Crease) else {
-            continue;
-        };
-        if which == On::Plane || kinds.iter().any(|k| *k != which && *k != On::Crease) {
-            continue;
-        }
+    for t in &plain.triangles {
         let [a, b, c] = t.map(|v| places[v as usize]);
-        let [na, nb, nc] = t.map(|v| match normals.get(v as usize) {
-            Some(n) => *n,
-            None => centers[v as usize - normals.len()].normals[usize::from(which == On::Region)],
-        });
+        let [na, nb, nc] = t.map(|v| normals[v as usize]);
         let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
         // A turn of more than 45 degrees within a triangle is an edge of the region, not its curvature.
-        if which == On::Region && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+        let face = local.live[usize::from(vertices[t[0] as usize].face)];
+        if grid.faces[face].cut && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
         let n = cross(ab, sub(c, a));
         let volume = above * 0.5 * norm(n);
-        let facing = t.map(|v| vertices.get(v as usize).map_or(0.0, |v| n[v.axis as usize]));
+        let facing = t.map(|v| n[vertices[v as usize].axis as usize]);
         let sum = facing[0] * facing[0] + facing[1] * facing[1] + facing[2] * facing[2];
         if sum > 0.0 {
             for (&v, facing) in t.iter().zip(facing) {
-                if let Some(m) = moments.get_mut(v as usize) {
-                    m.0 += volume * facing * facing / sum;
-                    m.1 += 0.5 * facing;
-                }
+                let m = &mut moments[v as usize];
+                m.0 += volume * facing * facing / sum;
+                m.1 += 0.5 * facing;
             }
         }
     }
@@ -616,62 +551,42 @@ fn balance(s: &mut Scratch, margin: f64) {
         let gain = area * v.reach / 3.0;
         if gain > 0.0 {
             let step = (volume / gain).clamp(-0.25, 0.25);
-            v.t = (v.t + step).clamp(margin, 1.0 - margin);
-            *place = v.place();
+            v.t = (v.t + step).clamp(grid.margin, 1.0 - grid.margin);
+            *place = v.at(v.t);
         }
     }
 }
 
-/// Joins the vertices that a node on a flat face of the region sends out, and puts them on the node.
-///
-/// Only where the void directions of the node form one corner of space (at most one per axis, the diagonals between
-/// them void too), so that joining keeps the surface a manifold; elsewhere the vertices stay apart by the margin.
-fn merge_plane_vertices(s: &mut Scratch, nodes: &Nodes) {
-    s.stands.clear();
-    if !s.vertices.iter().any(|v| v.on == On::Plane) {
+/// Adds what plain cells do not make: knots, the seams around them, and caps.
+fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
+    s.extra.clear();
+    let knotted = s.signs.knotted.iter().any(|w| *w != 0);
+    if !knotted && local.flat.is_empty() {
         return;
     }
-    let solid = |i: [usize; 3]| s.solid[i[2] * nodes.shape[1] + i[1]] >> i[0] & 1 == 1;
-    s.stands.extend(0..s.vertices.len() as u32);
-    let mut first = std::collections::HashMap::new();
-    for i in 0..s.vertices.len() {
-        let v = s.vertices[i];
-        if v.on != On::Plane {
-            continue;
-        }
-        let axis = v.axis as usize;
-        let node = v.low as usize + if v.up() { 0 } else { nodes.stride[axis] };
-        let at = nodes.at(node);
-        if (0..3).any(|a| at[a] == 0 || at[a] + 1 >= nodes.shape[a]) {
-            continue;
-        }
-        let step = |from: [usize; 3], a: usize, up: bool| {
-            let mut to = from;
-            to[a] = if up { to[a] + 1 } else { to[a] - 1 };
-            to
-        };
-        // Directions in which a flat face on the node ends the region.
-        let leaves = |a: usize, up: bool| {
-            let low = if up { at } else { step(at, a, false) };
-            let row = low[2] * nodes.shape[1] + low[1];
-            s.crossed[a][row] >> low[0] & 1 == 1
-                && s.vertices[number(s, a, row, low[0]) as usize].on == On::Plane
-        };
-        let out: Vec<(usize, bool)> = (0..3)
-            .flat_map(|a| [(a, false), (a, true)])
-            .filter(|&(a, up)| leaves(a, up))
-            .collect();
-        let one_corner = (0..3).all(|a| out.iter().filter(|o| o.0 == a).count() < 2)
-            && out.iter().all(|&(a, up)| {
-                out.iter()
-                    .all(|&(b, vp)| a == b || !solid(step(step(at, a, up), b, vp)))
-            })
-            && (out.len() < 3 || !solid(out.iter().fold(at, |p, &(a, up)| step(p, a, up))));
-        if one_corner {
-            s.stands[i] = *first.entry(node).or_insert(i as u32);
-            s.vertices[i].t = 0.0;
-            s.places[i] = s.vertices[i].solid;
-        }
+    let mut knots = Knots {
+        nodes,
+        grid,
+        local,
+        samples: &s.samples,
+        signs: &s.signs,
+        numbers: &s.numbers,
+        places: &mut s.places,
+        extra: &mut s.extra,
+        moved: HashSet::new(),
+    };
+    if knotted {
+        knots.all(own);
+    }
+    for (i, v) in s.vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
+        let key = Key::new(v.low as usize, &[1 << v.axis], &[usize::from(v.face)]);
+        knots.places[i] = knots.place(key);
+    }
+    for &(cell, face) in &s.plain.seams {
+        knots.seam(cell, face);
+    }
+    for flat in 0..local.flat.len() {
+        cap::close(&mut knots, flat, own);
     }
 }
 
@@ -683,31 +598,11 @@ impl View<'_> {
 
     /// The triangles of the tile's own cells, and whether they lie on the region's surface.
     pub fn triangles(&self) -> impl Iterator<Item = ([u32; 3], bool)> {
-        let s = self.s;
-        let stands = |v: u32| s.stands.get(v as usize).copied().unwrap_or(v);
-        let own = s.triangles.iter().zip(&s.own).filter(|(_, own)| **own);
-        own.map(move |(t, _)| {
-            if s.stands.is_empty() {
-                *t
-            } else {
-                t.map(stands)
-            }
-        })
-        .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
-        .map(move |t| (t, self.is_cut(t)))
-    }
-
-    /// Whether a triangle lies on the region's surface: none of its corners is on the lattice alone, and where some
-    /// are on the rim of a flat face, all are in that face's plane.
-    fn is_cut(&self, t: [u32; 3]) -> bool {
-        let s = self.s;
-        let (mut rim, mut skin) = (false, true);
-        for v in t.iter().filter_map(|&v| s.vertices.get(v as usize)) {
-            rim |= v.on == On::Lattice;
-            skin &= v.on != On::Lattice || v.skin;
-        }
-        let [a, b, c] = t.map(|v| s.places[v as usize]);
-        skin && (!rim || (0..3).any(|k| a[k] == b[k] && b[k] == c[k]))
+        let plain = self.s.plain.triangles.iter().zip(&self.s.plain.kinds);
+        plain
+            .filter(|(_, k)| **k != Kind::Neighbour)
+            .map(|(t, k)| (*t, *k == Kind::Cut))
+            .chain(self.s.extra.triangles.iter().copied())
     }
 
     /// The tile's surface by itself, with what stitching needs.
@@ -732,40 +627,18 @@ impl View<'_> {
     }
 
     /// Global key of a vertex, and whether a neighbouring tile may use it as well.
-    fn name(&self, v: usize) -> (u64, bool) {
-        let View {
-            s,
-            nodes,
-            grid,
-            from,
-            own,
-        } = self;
-        let (at, kind, shared) = match s.vertices.get(v) {
-            Some(vertex) => {
-                let mut at = nodes.at(vertex.low as usize);
-                let axis = vertex.axis as usize;
-                let on_node = vertex.t == 0.0;
-                if on_node && !vertex.up() {
-                    at[axis] += 1;
-                }
-                let border = |a: usize| at[a] == own[a].start || at[a] == own[a].end;
-                let shared = (0..3).any(|a| (a != axis || on_node) && border(a));
-                (at, if on_node { 3 } else { axis as u64 }, shared)
-            }
-            None => {
-                let at = nodes.at(s.centers[v - s.vertices.len()].cell as usize);
-                (
-                    at,
-                    4,
-                    (0..3).any(|a| at[a] <= own[a].start || at[a] + 1 >= own[a].end),
-                )
-            }
+    fn name(&self, v: usize) -> (u128, bool) {
+        let key = match self.s.vertices.get(v) {
+            Some(v) => Key::new(v.low as usize, &[1 << v.axis], &[usize::from(v.face)]),
+            None => self.s.extra.keys[v - self.s.vertices.len()],
         };
-        let at = [0, 1, 2].map(|a| (at[a] + from[a]) as u64);
-        let all = grid.axes.each_ref().map(|a| a.len() as u64);
-        (
-            (at[0] + all[0] * (at[1] + all[1] * at[2])) * 8 + kind,
-            shared,
-        )
+        let at = self.nodes.at(key.node());
+        let spans = key.spans();
+        let border = |a: usize| at[a] == self.own[a].start || at[a] == self.own[a].end;
+        let shared = (0..3).any(|a| spans >> a & 1 == 0 && border(a));
+        let all = self.grid.axes.each_ref().map(|a| a.len() as u128);
+        let at = [0, 1, 2].map(|a| (at[a] + self.from[a]) as u128);
+        let node = at[0] + all[0] * (at[1] + all[1] * at[2]);
+        (key.global(node, |f| self.local.live[f]), shared)
     }
 }

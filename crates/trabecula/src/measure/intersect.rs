@@ -51,6 +51,17 @@ pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
     found.into_inner().min(limit)
 }
 
+/// Whether no two triangles of a small mesh meet elsewhere than in their common vertices or edge, and none is flat.
+pub fn is_embedded(mesh: &Mesh) -> bool {
+    let boxes: Vec<Aabb> = (0..mesh.triangles.len())
+        .map(|i| bounds(mesh.corners(i)))
+        .collect();
+    (0..boxes.len()).all(|i| {
+        let meets = |j| overlap(&boxes[i], &boxes[j]) && meet(mesh, i, j);
+        !degenerate(mesh, i) && !(0..i).any(meets)
+    })
+}
+
 fn bounds(corners: [Vec3; 3]) -> Aabb {
     corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
 }

@@ -1,6 +1,9 @@
 //! Combinations of regions.
 
+use std::sync::Arc;
+
 use super::{Region, Shape};
+use crate::face::{Face, Tree};
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3};
@@ -83,6 +86,8 @@ trait Join: Send + Sync {
     fn negated(&self, i: usize) -> bool;
     /// Whether a later value takes the place of the one held.
     fn takes(new: f64, held: f64) -> bool;
+    /// Whether all must be solid, rather than any.
+    const ALL: bool;
     fn range(a: Interval, b: Interval) -> Interval;
     fn extent(&self) -> Aabb;
 }
@@ -97,6 +102,7 @@ impl Join for Union {
     fn takes(new: f64, held: f64) -> bool {
         new < held
     }
+    const ALL: bool = false;
     fn range(a: Interval, b: Interval) -> Interval {
         a.min(b)
     }
@@ -116,6 +122,7 @@ impl Join for Intersection {
     fn takes(new: f64, held: f64) -> bool {
         new > held
     }
+    const ALL: bool = true;
     fn range(a: Interval, b: Interval) -> Interval {
         a.max(b)
     }
@@ -137,6 +144,7 @@ impl Join for Difference {
     fn takes(new: f64, held: f64) -> bool {
         new > held
     }
+    const ALL: bool = true;
     fn range(a: Interval, b: Interval) -> Interval {
         a.max(b)
     }
@@ -217,6 +225,24 @@ macro_rules! joined {
                 }
             }
 
+            fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+                let each = self.regions().iter().enumerate().map(|(i, r)| {
+                    if !self.negated(i) {
+                        return r.clone().faces(by, out);
+                    }
+                    let first = out.len();
+                    let tree = r.clone().faces(-by, out).complement();
+                    let turned = out.split_off(first);
+                    out.extend(turned.into_iter().map(Face::turned));
+                    tree
+                });
+                if Self::ALL {
+                    Tree::All(each.collect())
+                } else {
+                    Tree::Any(each.collect())
+                }
+            }
+
             fn volume(&self) -> Option<f64> {
                 match self.regions() {
                     [only] => only.volume(),
@@ -266,6 +292,10 @@ impl Shape for Offset {
         out.iter_mut()
             .filter(|v| v.abs() <= snap)
             .for_each(|v| *v = 0.0);
+    }
+
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        self.of.clone().faces(self.by + by, out)
     }
 
     fn volume(&self) -> Option<f64> {

@@ -1,6 +1,9 @@
 //! The solid inside a closed triangle mesh, as an exact signed distance.
 
-use super::Shape;
+use std::sync::Arc;
+
+use super::{Offset, Shape, one_face};
+use crate::face;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -223,6 +226,13 @@ impl Shape for MeshRegion {
             out,
         };
         fill.part([0; 3], shape, 0);
+    }
+
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
+        match Offset::new(self.clone(), by) {
+            Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
+            _ => one_face(self, out),
+        }
     }
 
     fn volume(&self) -> Option<f64> {

@@ -2,7 +2,10 @@
 
 use core::f64::consts::PI;
 
-use super::Shape;
+use std::sync::Arc;
+
+use super::{Offset, Shape, one_face};
+use crate::face::{Face, Plane, Tree};
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -216,6 +219,19 @@ impl Shape for Cuboid {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        if by > 0.0 {
+            return rounded(self, by, out);
+        }
+        let sides = (0..3).flat_map(|axis| {
+            [
+                (axis, self.min[axis] - by, false),
+                (axis, self.max[axis] + by, true),
+            ]
+        });
+        Tree::All(sides.map(|s| flat(s, out)).collect())
+    }
+
     fn volume(&self) -> Option<f64> {
         let [x, y, z] = self.bounds().size();
         Some(x * y * z)
@@ -268,10 +284,10 @@ impl Cylinder {
         joined(self.sides(p))
     }
 
-    fn gradient(&self, p: Vec3) -> Vec3 {
+    /// The direction away from the axis.
+    fn radial(&self, p: Vec3) -> Vec3 {
         let d = sub(p, self.base);
-        let h = dot(d, self.axis);
-        let mut radial = unit(sub(d, scale(self.axis, h)));
+        let radial = unit(sub(d, scale(self.axis, dot(d, self.axis))));
         if radial == [0.0; 3] {
             // On the axis every radial direction is as good: take one square to it.
             let least = (0..3).fold(0, |m, a| {
@@ -283,18 +299,28 @@ impl Cylinder {
             });
             let mut e = [0.0; 3];
             e[least] = 1.0;
-            radial = unit(cross(self.axis, e));
+            return unit(cross(self.axis, e));
         }
-        let cap = if h * 2.0 < self.height {
+        radial
+    }
+
+    fn gradient(&self, p: Vec3) -> Vec3 {
+        let cap = if dot(sub(p, self.base), self.axis) * 2.0 < self.height {
             scale(self.axis, -1.0)
         } else {
             self.axis
         };
-        joined_gradient(self.sides(p), [radial, cap])
+        joined_gradient(self.sides(p), [self.radial(p), cap])
     }
 
     /// Barrel and cap distances bounded apart; the distance grows with both.
     fn range(&self, b: &Aabb) -> Interval {
+        let [r, h] = self.ranges(b);
+        Interval::new(joined([r.lo, h.lo]), joined([r.hi, h.hi]))
+    }
+
+    /// Bounds of the distances to the barrel and to the caps.
+    fn ranges(&self, b: &Aabb) -> [Interval; 2] {
         let (r, h) = match self.aligned {
             Some((a, [lo, hi])) => {
                 let middle = ((lo + hi) / 2.0).clamp(b.min[a], b.max[a]);
@@ -322,10 +348,7 @@ impl Cylinder {
                 )
             }
         };
-        Interval::new(
-            joined([r.lo - self.radius, h.lo]),
-            joined([r.hi - self.radius, h.hi]),
-        )
+        [Interval::new(r.lo - self.radius, r.hi - self.radius), h]
     }
 }
 
@@ -356,6 +379,31 @@ impl Shape for Cylinder {
 
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
         fill_rows(block, out, |p| self.distance(p) - level);
+    }
+
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        if by > 0.0 {
+            return rounded(self, by, out);
+        }
+        if self.radius + by <= 0.0 {
+            return Tree::EMPTY;
+        }
+        let ends = [false, true].map(|top| match self.aligned {
+            Some((a, ends)) => flat(
+                (a, [ends[0] - by, ends[1] + by][usize::from(top)], top),
+                out,
+            ),
+            None => {
+                let normal = scale(self.axis, if top { 1.0 } else { -1.0 });
+                let height = if top { self.height + by } else { -by };
+                let point = add(self.base, scale(self.axis, height));
+                one_face(Arc::new(HalfSpace { point, normal }), out)
+            }
+        });
+        let [bottom, top] = ends;
+        let mut barrel = *self;
+        barrel.radius += by;
+        Tree::All(vec![bottom, top, one_face(Arc::new(Barrel(barrel)), out)])
     }
 
     fn volume(&self) -> Option<f64> {
@@ -401,6 +449,14 @@ impl Shape for Sphere {
 
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
         fill_rows(block, out, |p| self.distance(p) - level);
+    }
+
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        if self.radius + by <= 0.0 {
+            return Tree::EMPTY;
+        }
+        let radius = self.radius + by;
+        one_face(Arc::new(Sphere { radius, ..*self }), out)
     }
 
     fn volume(&self) -> Option<f64> {
@@ -455,8 +511,56 @@ impl Shape for HalfSpace {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        let point = add(self.point, scale(self.normal, by));
+        match coordinate_axis(self.normal) {
+            Some(a) => flat((a, point[a], self.normal[a] > 0.0), out),
+            None => one_face(Arc::new(HalfSpace { point, ..*self }), out),
+        }
+    }
+
     fn volume(&self) -> Option<f64> {
         None
+    }
+}
+
+/// The solid below (or above) a coordinate of an axis.
+fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Face>) -> Tree {
+    let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
+    (point[axis], normal[axis]) = (at, if below { 1.0 } else { -1.0 });
+    let mut face = Face::distance(Arc::new(HalfSpace { point, normal }));
+    face.plane = Some(Plane { axis, at, below });
+    out.push(face);
+    Tree::Face(out.len() - 1)
+}
+
+/// A convex shape grown by `by`: its edges become round, so it has one face.
+fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Face>) -> Tree {
+    match Offset::new(of, by) {
+        Ok(grown) => one_face(Arc::new(grown), out),
+        Err(_) => Tree::FULL,
+    }
+}
+
+/// The endless barrel of a cylinder.
+struct Barrel(Cylinder);
+
+impl Barrel {
+    #[inline]
+    fn distance(&self, p: Vec3) -> f64 {
+        self.0.sides(p)[0]
+    }
+
+    fn gradient(&self, p: Vec3) -> Vec3 {
+        self.0.radial(p)
+    }
+
+    fn range(&self, b: &Aabb) -> Interval {
+        self.0.ranges(b)[0]
+    }
+
+    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
+        fill_rows(block, out, |p| self.distance(p) - level);
     }
 }
 
@@ -489,7 +593,7 @@ macro_rules! field {
         }
     )*};
 }
-field!(Cuboid, Cylinder, Sphere, HalfSpace);
+field!(Cuboid, Cylinder, Sphere, HalfSpace, Barrel);
 
 #[cfg(test)]
 mod tests {
