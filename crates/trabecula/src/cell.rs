@@ -56,6 +56,11 @@ impl Cell {
         &self.series
     }
 
+    /// The series without common factors of its indices, which the cell repeats.
+    pub fn plain(&self) -> &Series {
+        &self.plain
+    }
+
     /// Least and greatest value of f on the torus: the extremes of a grid, improved by climbing from each.
     pub fn range(&self) -> Interval {
         *self.range.get_or_init(|| {
@@ -247,8 +252,14 @@ mod tests {
                 let found = cell.level(Part::Lower, 1.0 - p);
                 let error = (found - t) / cell.iso(Part::Lower, 1.0 - p).1;
                 println!("{name} {p} {error:.2e}");
-                // The diamond's saddles are at 1: near them the surface has necks that a cube does not resolve.
-                let limit = if t > 0.95 && t < 1.05 { 2e-6 } else { 2e-7 };
+                // Near a critical level (saddles of the diamond at 1, ridges of I-WP at 3) no plane fits the surface.
+                let critical = t > 0.95 && t < 1.05 || t > 2.6;
+                // Waves of index two have half as many cubes.
+                let limit = match (critical, cell.plain().top()) {
+                    (true, _) => 2e-6,
+                    (_, 1) => 1e-7,
+                    _ => 5e-7,
+                };
                 assert!(error.abs() < limit, "{name} at porosity {p}: {error:.2e}");
             }
             let twice = cell.level(Part::Upper, 0.3);

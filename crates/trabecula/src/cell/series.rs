@@ -24,6 +24,8 @@ pub struct Series {
     terms: Vec<Term>,
     /// The same, prepared for evaluation.
     waves: Vec<Wave>,
+    /// The largest |h|, |k| or |l|.
+    top: usize,
 }
 
 /// Largest |h|, |k| or |l|: beyond it a "cell" is no longer one and the tables of powers grow.
@@ -108,7 +110,9 @@ impl Series {
 
     fn of(terms: Vec<Term>) -> Series {
         let waves = terms.iter().map(Wave::new).collect();
-        Series { terms, waves }
+        let all = terms.iter().flat_map(|t| t.hkl);
+        let top = all.map(i32::unsigned_abs).max().unwrap_or(0) as usize;
+        Series { terms, waves, top }
     }
 
     /// The terms.
@@ -145,8 +149,7 @@ impl Series {
 
     /// The largest |h|, |k| or |l|.
     pub fn top(&self) -> usize {
-        let all = self.terms.iter().flat_map(|t| t.hkl);
-        all.map(i32::unsigned_abs).max().unwrap_or(0) as usize
+        self.top
     }
 
     /// The series with the greatest common factor of its indices taken out along each axis, and the factors. The
@@ -174,23 +177,23 @@ impl Series {
     ///
     /// Every point gets the same arithmetic wherever it stands in the batch, so equal points give equal bits.
     pub fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        evaluate(&self.waves, self.top(), u, values, gradients);
+        evaluate(&self.waves, self.top, u, values, gradients);
     }
 
     /// Values and gradients (per turn) on a row: x (turns) varies, y and z are the same. Waves of equal |h| are added
     /// up first, so that a node costs as much as there are different |h|, however many terms.
     pub fn row(&self, x: &[f64], [y, z]: [f64; 2], values: &mut [f64], gradients: &mut [Vec3]) {
         let powers = |v: f64| -> Vec<Complex> {
-            let top = self.top() as i32;
+            let top = self.top as i32;
             (-top..=top)
                 .map(|n| sin_cos_turns(f64::from(n) * v))
                 .map(|(s, c)| (c, s))
                 .collect()
         };
         let (along_y, along_z) = (powers(y), powers(z));
-        let at = |table: &[Complex], n: i32| table[(n + self.top() as i32) as usize];
+        let at = |table: &[Complex], n: i32| table[(n + self.top as i32) as usize];
         // For each |h|: Σ c, Σ k c, Σ l c with c = amplitude · e^{2πi(k y + l z + phase)}, h made positive.
-        let mut sums = vec![[(0.0, 0.0); 3]; self.top() + 1];
+        let mut sums = vec![[(0.0, 0.0); 3]; self.top + 1];
         for w in &self.waves {
             let s = if w.hkl[0] < 0 { -1 } else { 1 };
             let [h, k, l] = w.hkl.map(|n| n * s);

@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use super::Shape;
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -44,7 +44,10 @@ fn finite(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     match v.iter().find(|x| !x.is_finite()) {
         Some(x) => Err(Fault::new(
             at,
-            format!("{x} is not a position: give three finite numbers, mm"),
+            format!(
+                "{} is not a position: give three finite numbers, mm",
+                number(*x)
+            ),
         )),
         None => Ok(v),
     }
@@ -57,7 +60,10 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
     } else {
         Err(Fault::new(
             at,
-            format!("{v} mm is not a length: give a finite number above zero"),
+            format!(
+                "{} mm is not a length: give a finite number above zero",
+                number(v)
+            ),
         ))
     }
 }
@@ -153,7 +159,11 @@ impl Cuboid {
         finite("max", max)?;
         for (a, name) in ["x", "y", "z"].iter().enumerate() {
             if min[a] >= max[a] {
-                let found = format!("{name} runs from {} to {} mm", min[a], max[a]);
+                let found = format!(
+                    "{name} runs from {} to {} mm",
+                    number(min[a]),
+                    number(max[a])
+                );
                 return Err(Fault::new(
                     "max",
                     format!("{found}: each side of a box must have a length above zero"),
