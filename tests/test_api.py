@@ -7,7 +7,6 @@ import pytest
 import trabecula as lt
 from conftest import CUBE
 
-
 CORNER = "v 0 0 0\nv 20 0 0\nv 0 20 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
