@@ -7,6 +7,8 @@ import pytest
 import trabecula as lt
 from conftest import CUBE
 
+CORNER = "v 0 0 0\nv 20 0 0\nv 0 20 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
 
 def cube(part="sheet", level=None, size=8, cell="gyroid", **map_settings):
     """A small design."""
@@ -53,10 +55,10 @@ def test_mesh_paths_follow_the_file(tmp_path):
     """A design saved elsewhere still finds its mesh."""
     (tmp_path / "parts").mkdir()
     (tmp_path / "designs").mkdir()
-    cube(level=lt.level.fraction(0.5)).build().mesh(edge=1)
-    block = lt.Design(region=lt.region.mesh("parts/a.stl"), lattice=cube().lattice, folder=str(tmp_path))
+    (tmp_path / "parts" / "a.obj").write_text(CORNER)
+    block = lt.Design(region=lt.region.mesh("parts/a.obj"), lattice=cube().lattice, folder=str(tmp_path))
     block.save(tmp_path / "designs" / "a.toml")
-    assert lt.load(tmp_path / "designs" / "a.toml").region["mesh"]["path"] == "../parts/a.stl"
+    assert lt.load(tmp_path / "designs" / "a.toml").region["mesh"]["path"] == "../parts/a.obj"
 
 
 def test_the_field_is_negative_in_the_solid():
@@ -248,3 +250,193 @@ def test_designs_are_data():
     assert design == cube()
     assert "wavelength" in design.to_toml()
     assert lt._core.Design.from_text(CUBE).to_json() == lt._core.Design.from_text(CUBE).to_json()
+
+
+def test_a_design_that_cannot_be_built_is_not_saved(tmp_path):
+    """Nothing is written."""
+    bad = [
+        cube(level=lt.level.fraction(1.5)),
+        cube(wavelength=-1),
+        cube(cell="gyriod"),
+        lt.Design(region=lt.region.mesh("none.stl"), lattice=cube().lattice),
+    ]
+    for design in bad:
+        with pytest.raises(lt.DesignError):
+            design.save(tmp_path / "a.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_saved_design_is_equal(tmp_path):
+    """Also where defaults were written out, numbers are of another kind, and paths start elsewhere."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "part.obj").write_text(CORNER)
+    level = lt.level.fraction(lt.grade.linear((0, 0, 1), {-4: 0.2, 4: np.float32(0.375)}), of="cell")
+    waves = lt.cell.series([lt.cell.term(np.array(h), 1.0, component="im") for h in np.eye(3, dtype=int)])
+    designs = [
+        cube(level=level, rotate=(0, 0, 0), offset=np.zeros(3)),
+        lt.Design(region=lt.region.box((8, 8, 8), center=[0, 0, 0]), lattice=cube(cell=waves).lattice["core"]),
+        lt.Design(region=lt.region.mesh("part.obj", scale=1), lattice=cube().lattice, folder=str(tmp_path)),
+        lt.spartan("diamond"),
+    ]
+    for design in designs:
+        for name in ("a.toml", "sub/b.json"):
+            design.save(tmp_path / name)
+            again = lt.load(tmp_path / name)
+            assert again == design and hash(again) == hash(design)
+        assert design != cube("upper")
+
+
+def test_sines_and_cosines():
+    """component = "im" is the sine: the same surface as the cosine a quarter turn on."""
+    axes = np.eye(3, dtype=int)
+    sine = cube("lower", cell=lt.cell.series([lt.cell.term(h, component="im") for h in axes]))
+    shifted = cube("lower", cell=lt.cell.series([lt.cell.term(h, phase=-0.25) for h in axes]))
+    points = np.random.default_rng(1).uniform(-4, 4, (100, 3))
+    assert np.array_equal(sine.build().field(points), shifted.build().field(points))
+    assert sine != shifted
+    with pytest.raises(lt.DesignError, match=r'component "img"; did you mean "im"'):
+        cube(cell=lt.cell.series([lt.cell.term([1, 0, 0], component="img")])).build()
+
+
+def nested(depth):
+    """A region in a region in a region."""
+    region = lt.region.box([8, 8, 8])
+    for _ in range(depth):
+        region = lt.region.union(region)
+    return region
+
+
+def holds_itself():
+    """A region that holds itself."""
+    region = lt.region.union()
+    region["union"].append(region)
+    return region
+
+
+SOLID = cube(level=lt.level.fraction(0.6)).build()
+MESH = SOLID.mesh(edge=0.25)
+
+
+@pytest.mark.parametrize(
+    ("call", "error"),
+    [
+        (lambda: lt.Design(nested(5000), cube().lattice).build(), "64 levels deep"),
+        (lambda: lt.Design(holds_itself(), cube().lattice).build(), "hold itself"),
+        (lambda: lt.Design(holds_itself(), cube().lattice).save("a.toml"), "hold itself"),
+        (lambda: lt.Design(3, cube().lattice).build(), "region"),
+        (lambda: lt.Design(lt.region.box([8, 8, 10**400]), cube().lattice).build(), "beyond 1e308"),
+        (lambda: lt.Design(lt.region.box([1e300] * 3), cube().lattice).build(), "reaches to 5e299 mm"),
+        (lambda: lt.Design(lt.region.box([8, 8, 8], center=[1e30, 0, 0]), cube().lattice).build(), "1e30 to 1e30 mm"),
+        (lambda: cube(cell="\udcff").build(), "unknown cell"),
+        (lambda: cube(cell=lt.cell.series([lt.cell.term([float("inf"), 0, 0])])).build(), "whole numbers"),
+        (lambda: cube(cell=lt.cell.series([lt.cell.term("abc")])).build(), "whole numbers"),
+        (lambda: cube(level=lt.level.fraction(lt.grade.linear([0, 0, 1], [1, 2]))).build(), "stops"),
+        (lambda: MESH.within(3), "within takes a Solid, found 3"),
+        (lambda: MESH.within(MESH), "within takes a Solid"),
+        (lambda: MESH.png((10**30, 10)), "size is out of range"),
+        (lambda: MESH.png((80.5, 60)), "size must be a whole number"),
+        (lambda: MESH.png((80, 60), azimuth=float("nan")), "must be finite"),
+        (lambda: SOLID.mesh(edge="0.5"), "edge must be a number, found '0.5'"),
+        (lambda: SOLID.mesh(edge=10**400), "edge is beyond"),
+        (lambda: SOLID.mesh(edge=np.array([1, 2])), "edge must be one number"),
+        (lambda: SOLID.mesh(edge=0.5, threads=10**9), "threads is 1000000000; it must be from 1 to 4096"),
+        (lambda: SOLID.mesh(edge=0.5, threads=10**30), "threads is out of range"),
+        (lambda: SOLID.mesh(edge=0.5, threads=0), "threads is 0"),
+        (lambda: SOLID.mesh(edge=0.5, threads=-1), "threads is -1"),
+        (lambda: SOLID.mesh(edge=0.5, threads=2.0), "threads must be a whole number"),
+        (lambda: SOLID.mesh(edge=0.5, threads=True), "threads must be a whole number"),
+        (lambda: SOLID.field("abc"), "could not convert"),
+        (lambda: lt.iso("gyroid", None), "must be a number"),
+        (lambda: lt.iso("gyroid", 10**400), "beyond 1e308"),
+        (lambda: lt.spartan("diamond", wavelength=[1, 2]), "one number or three, found 2"),
+        (lambda: lt.spartan("diamond", wavelength="4"), "must be a number"),
+    ],
+)
+def test_wrong_arguments(call, error):
+    """A TypeError or ValueError that says what was wrong, whatever was given."""
+    with pytest.raises((TypeError, ValueError), match=error):
+        call()
+
+
+def test_numbers_of_any_kind():
+    """NumPy's numbers are numbers."""
+    assert lt.spartan("diamond", wavelength=np.float32(4)) == lt.spartan("diamond", wavelength=4)
+    assert lt.spartan("diamond", wavelength=np.array([4, 4, 4])) == lt.spartan("diamond")
+    assert SOLID.mesh(edge=np.float32(0.25), threads=np.int64(2)).counts == MESH.counts
+    assert lt.iso("gyroid", np.float64(0.3)) == lt.iso("gyroid", 0.3)
+
+
+def test_the_edge_is_told_where_the_grid_is_too_coarse():
+    """And it is right: with it the fraction is the design's."""
+    solid = cube(level=lt.level.fraction(0.5)).build()
+    with pytest.warns(lt.DesignWarning, match="too coarse") as told:
+        solid.mesh(edge=1)
+    (text,) = [str(w.message) for w in told if "too coarse" in str(w.message)]
+    edge = float(text.split("edge of ")[1].split()[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert abs(solid.mesh(edge=edge).solid_fraction - 0.5) < 0.02
+
+
+def test_uniform_levels_are_exact():
+    """The realised fraction of whole cells is the asked one to the mesh's own error, which falls quickly."""
+    for part, cell in (("lower", "gyroid"), ("sheet", "primitive")):
+        solid = cube(part, lt.level.fraction(0.3), cell=cell).build()
+        # Exact levels of the closed form, to 1e-9.
+        exact = {"lower": -0.616271908, "sheet": None}[part]
+        found = solid.report()["lattices"]["core"]["iso"]
+        assert exact is None or abs(found - exact) < 5e-7
+        assert abs(solid.mesh(edge=0.04).solid_fraction - 0.3) < 2e-6
+
+
+def test_memory_of_control_groups(tmp_path):
+    """Version 1 and 2, every group above counted, caches given back; without files nothing is told."""
+    free = lt._core.free_memory
+
+    def put(name, text):
+        file = tmp_path / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+
+    assert free(tmp_path) is None
+    put("proc/meminfo", "MemTotal: 9 kB\nMemAvailable:  8000 kB\n")
+    assert free(tmp_path) == 8000 * 1024
+    put("proc/self/cgroup", "0::/a/b\n")
+    put("sys/fs/cgroup/a/memory.max", "5000000\n")
+    put("sys/fs/cgroup/a/memory.current", "2000000\n")
+    put("sys/fs/cgroup/a/memory.stat", "anon 1\ninactive_file 500000\n")
+    put("sys/fs/cgroup/a/b/memory.max", "max\n")
+    put("sys/fs/cgroup/a/b/memory.current", "2000000\n")
+    assert free(tmp_path) == 3500000
+    put("proc/self/cgroup", "5:cpu:/a\n4:memory:/x/y\n0::/none\n")
+    put("sys/fs/cgroup/memory/memory.limit_in_bytes", "3000000\n")
+    put("sys/fs/cgroup/memory/memory.usage_in_bytes", "1000000\n")
+    assert free(tmp_path) == 2000000
+    put("proc/self/limits", "Limit  Soft  Hard  Units\nMax address space         1500000  unlimited  bytes\n")
+    put("proc/self/status", "VmPeak: 99 kB\nVmSize:  1000 kB\n")
+    assert free(tmp_path) == 1500000 - 1024000
+
+
+@pytest.mark.parametrize("name", ["a.stl", "a.3mf", "a.ply", "a.obj", "a.npy", "a.vti"])
+def test_a_disk_without_room(tmp_path, monkeypatch, name):
+    """Every format is refused before it is written."""
+    from trabecula import machine
+
+    monkeypatch.setattr(machine.shutil, "disk_usage", lambda path: type("Usage", (), {"free": 5000})())
+    voxels = name.endswith(("npy", "vti"))
+    made = SOLID.voxels(step=0.25) if voxels else MESH
+    with pytest.raises(ValueError, match="of disk space"):
+        made.write(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["stl", "3mf", "ply", "obj"])
+def test_sizes_of_files(tmp_path, kind):
+    """The estimate is right to a third, and seldom too small."""
+    from trabecula.machine import file_size
+
+    mesh = SOLID.mesh(edge=0.2)
+    mesh.write(tmp_path / f"a.{kind}")
+    vertices, triangles = mesh.counts
+    share = (tmp_path / f"a.{kind}").stat().st_size / file_size(kind, triangles, vertices)
+    assert 0.6 < share < 1.05, share

@@ -256,3 +256,204 @@ def test_output_can_be_closed_early(tmp_path):
     """A pipe that ends is no mistake."""
     done = subprocess.run(f"{' '.join(COMMAND)} cells | head -n 1", shell=True, cwd=tmp_path, capture_output=True, text=True)
     assert done.stdout and "Traceback" not in done.stderr and "rror" not in done.stderr
+
+
+def test_version_is_quiet_where_nobody_reads(tmp_path):
+    """`trabecula --version >&-`, and into a pipe that ends."""
+    words = " ".join(COMMAND)
+    for line in (f"{words} --version >&-", f"{words} --version | true", f"{words} --help | true"):
+        done = subprocess.run(line, shell=True, cwd=tmp_path, capture_output=True, text=True)
+        assert done.stderr == "", line
+
+
+UNIX = pytest.mark.skipif(os.name == "nt", reason="signals and links of Unix")
+
+
+@UNIX
+def test_interrupted_while_it_starts(tmp_path, cube):
+    """Ctrl-C during the imports: one line, whatever was being imported."""
+    code = (
+        "import os, signal, sys\n"
+        "which = sys.argv[1]\n"
+        "class Now:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name == which: os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Now())\n"
+        f"sys.argv[1:] = ['mesh', {str(cube)!r}, '-o', 'a.stl']\n"
+        "from trabecula.__main__ import main\n"
+        "sys.exit(main())"
+    )
+    default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+    for name in ("argparse", "numpy", "trabecula._core", "trabecula.design", "trabecula.solid"):
+        words = [sys.executable, "-c", code, name]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=default)
+        assert (done.returncode, done.stderr) == (130, "stopped; nothing was left behind\n"), name
+    assert names(tmp_path) == ["cube.toml"]
+
+
+@UNIX
+def test_interrupted_after_the_file_is_whole(tmp_path, cube):
+    """Then it is said to be there."""
+    code = (
+        "import sys, os, signal, trabecula.output as o, trabecula.cli as c\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "usual = os.replace\n"
+        "def replace(*names):\n    usual(*names); os.kill(os.getpid(), signal.SIGINT)\n"
+        "os.replace = replace\n"
+        f"sys.exit(c.main(['mesh', {str(cube)!r}, '-o', 'a.ply', '--edge', '0.2']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "stopped; a.ply is written\n")
+    assert names(tmp_path) == ["a.ply", "cube.toml"]
+
+
+@UNIX
+def test_what_a_killed_run_left_is_removed(tmp_path, cube):
+    """Its temporary file has no lock any more; that of a run which still writes has one and stays."""
+    cube.write_text(CUBE.replace("[8, 8, 8]", "[60, 60, 60]"))
+    words = [*COMMAND, "mesh", str(cube), "-o", "a.stl", "--edge", "0.1", "--progress"]
+    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    assert "meshing" in child.stderr.readline()
+    (left,) = [n for n in names(tmp_path) if n.endswith(".part")]
+    cube.write_text(CUBE)
+    run("mesh", cube, "-o", "b.stl", "--edge", "0.5", cwd=tmp_path)
+    run("mesh", cube, "-o", "a.stl", "--edge", "0.5", cwd=tmp_path)
+    assert names(tmp_path) == sorted([left, "a.stl", "b.stl", "cube.toml"])
+    child.kill()
+    child.wait()
+    run("mesh", cube, "-o", "b.stl", "--edge", "0.5", cwd=tmp_path)
+    assert left in names(tmp_path)  # it was not meant for b.stl
+    run("mesh", cube, "-o", "a.stl", "--edge", "0.5", cwd=tmp_path)
+    assert names(tmp_path) == ["a.stl", "b.stl", "cube.toml"]
+
+
+@UNIX
+def test_links_permissions_and_devices(tmp_path, cube):
+    """An output keeps being what it was."""
+    (tmp_path / "deep").mkdir()
+    target, link = tmp_path / "deep" / "real.stl", tmp_path / "a.stl"
+    target.write_text("older")
+    target.chmod(0o640)
+    link.symlink_to("deep/real.stl")
+    run("mesh", cube, "-o", "a.stl", "--edge", "0.5", cwd=tmp_path)
+    assert link.is_symlink() and target.stat().st_size > 1000 and target.stat().st_mode & 0o777 == 0o640
+    target.unlink()
+    run("mesh", cube, "-o", "a.stl", "--edge", "0.5", cwd=tmp_path)
+    assert link.is_symlink() and target.stat().st_size > 1000
+    size = target.stat().st_size
+    target.chmod(0o444)
+    assert "read-only" in run("mesh", cube, "-o", "a.stl", "--edge", "0.4", cwd=tmp_path, status=1).stderr
+    assert target.stat().st_size == size
+    link.unlink()
+    link.symlink_to("a.stl")
+    assert "leads nowhere" in run("mesh", cube, "-o", "a.stl", cwd=tmp_path, status=1).stderr
+    for device in ("null", "stdout"):
+        for kind in ("stl", "ply", "npy"):
+            name = tmp_path / f"{device}.{kind}"
+            name.symlink_to(f"/dev/{device}")
+            words = ["voxels" if kind == "npy" else "mesh", str(cube), "-o", name.name]
+            words += ["--step" if kind == "npy" else "--edge", "0.5"]
+            done = subprocess.run([*COMMAND, *words], cwd=tmp_path, capture_output=True)
+            assert done.returncode == 0 and name.is_symlink(), done.stderr
+            assert (len(done.stdout) > 1000) == (device == "stdout")
+    assert names(tmp_path / "deep") == ["real.stl"]
+
+
+@UNIX
+def test_names_that_are_no_unicode(tmp_path, cube):
+    """Bytes that are no UTF-8, in every format."""
+    for kind in (b"stl", b"3mf", b"ply", b"obj"):
+        out = os.fsencode(tmp_path) + b"/\xff\xe4." + kind
+        words = [*map(os.fsencode, COMMAND), b"mesh", os.fsencode(cube), b"-o", out, b"--edge", b"0.5"]
+        done = subprocess.run(words, capture_output=True)
+        assert done.returncode == 0 and os.path.getsize(out) > 1000, done.stderr
+
+
+@UNIX
+def test_what_has_no_end_is_not_read(tmp_path, cube):
+    """Devices, pipes, directories, as a mesh, a design and a region's file: one line, at once."""
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "zero.stl").symlink_to("/dev/zero")
+    (tmp_path / "folder.stl").mkdir()
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    with (tmp_path / "sparse.stl").open("wb") as file:
+        file.truncate(1 << 42)
+    for name in ("pipe.stl", "zero.stl", "folder.stl", "sparse.stl"):
+        cube.write_text(CUBE.replace("[region.box]\nsize = [8, 8, 8]", f"[region.mesh]\npath = '{name}'"))
+        for words in (["measure", name], ["check", cube], ["measure", name, "--region", name]):
+            done = run(*words, cwd=tmp_path, status=1)
+            assert len(done.stderr.splitlines()) == 1 and name in done.stderr
+    assert "device" in run("check", "zero.toml", cwd=tmp_path, status=1).stderr
+
+
+def test_memory_that_a_limit_leaves(tmp_path, cube):
+    """`ulimit -v`: refused with the edge to use, not killed half-way."""
+    resource = pytest.importorskip("resource")
+    if not os.path.exists("/proc/self/limits"):
+        pytest.skip("the system does not tell")
+    cube.write_text(CUBE.replace("[8, 8, 8]", "[60, 60, 60]"))
+    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))  # noqa: E731
+    words = [*COMMAND, "mesh", str(cube), "-o", "a.ply", "--edge", "0.04", "--threads", "1"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=limit)
+    assert done.returncode == 1 and "of memory" in done.stderr and "try edge" in done.stderr, done.stderr
+
+
+def test_measures_of_odd_meshes(tmp_path):
+    """Inside out, touching in a vertex or an edge, open: said in words."""
+    corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    quads = ((1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6))
+
+    def cube_at(shift=(0, 0, 0), first=0, turn=1, faces=6):
+        points = "".join(f"v {x + shift[0]} {y + shift[1]} {z + shift[2]}\n" for x, y, z in corners)
+        return points + "".join(f"f {' '.join(str(v + first) for v in q[::turn])}\n" for q in quads[:faces])
+
+    def measured(text):
+        (tmp_path / "a.obj").write_text(text)
+        done = run("measure", "a.obj", "--json", cwd=tmp_path)
+        return json.loads(done.stdout), done.stderr
+
+    made, words = measured(cube_at(turn=-1))
+    assert (made["volume"], made["closed"], made["pieces"], made["cavities"]) == (-1, True, 0, 1)
+    assert "inside out" in words
+    assert "inside out" in run("measure", "a.obj", cwd=tmp_path).stdout
+    made, words = measured(cube_at() + cube_at((1, 1, 1), 8))
+    assert (made["volume"], made["closed"], made["pieces"], made["euler"], words) == (2, True, 2, 3, "")
+    made, words = measured(cube_at() + cube_at((1, 1, 0), 8))
+    assert (made["volume"], made["closed"], made["pieces"]) == (2, False, 2)
+    assert "1 edge with more than two" in words
+    made, words = measured(cube_at(faces=5))
+    assert not made["closed"] and "4 edges with one triangle" in words
+    for name, content in {"e.obj": "", "e.off": "OFF\n0 0 0\n", "e.ply": "", "e.toml": "", "e.obj ": "v 0 0 0\n"}.items():
+        (tmp_path / name.strip()).write_text(content)
+        run("measure", name.strip(), cwd=tmp_path, status=1)
+
+
+def test_voxels_and_meshes_that_are_too_coarse(tmp_path, cube):
+    """Thin walls, and a result that has little to do with the design, are told with the step to use."""
+    cube.write_text(CUBE.replace("0.3", "0.05"))
+    done = run("voxels", cube, "-o", "a.npy", "--step", "0.5", cwd=tmp_path)
+    assert "thinnest wall" in done.stderr and "use a step of" in done.stderr
+    cube.write_text(CUBE.replace("0.3", "0.5"))
+    for words in (["a.stl", "--edge", "1"], ["a.ply", "--edge", "1"]):
+        done = run("mesh", cube, "-o", *words, cwd=tmp_path)
+        assert "the grid is too coarse" in done.stderr and "use an edge of" in done.stderr
+    assert "warning" not in run("mesh", cube, "-o", "a.stl", "--edge", "0.2", cwd=tmp_path).stderr
+
+
+@pytest.mark.parametrize("kind", ["many", "fine"])
+def test_long_series_are_checked_in_seconds(tmp_path, kind):
+    """A thousand terms, or indices up to 64."""
+    import random
+
+    pick = random.Random(3)
+    top = {"many": 6, "fine": 64}[kind]
+    hkl = [[pick.randint(-top, top) or 1 for _ in range(3)] for _ in range({"many": 1000, "fine": 12}[kind])]
+    terms = [{"hkl": h, "amplitude": pick.uniform(-1, 1), "phase": pick.random()} for h in hkl]
+    lattice = {"cell": {"series": {"terms": terms}}, "part": "sheet", "map": {"affine": {"wavelength": 4}}}
+    design = {"schema": 1, "region": {"box": {"size": [8, 8, 8]}}, "lattice": {"a": {**lattice, "level": {"fraction": 0.3}}}}
+    (tmp_path / "a.json").write_text(json.dumps(design))
+    start = time.perf_counter()
+    report = json.loads(run("check", "a.json", "--json", cwd=tmp_path).stdout)
+    assert time.perf_counter() - start < 20  # a few seconds on a machine that does nothing else
+    told = [w["message"] for w in report["warnings"] if "rough" in w["message"]]
+    assert bool(told) == (kind == "fine")

@@ -192,3 +192,83 @@ def test_errors_travel(tmp_path):
     error = lt.DesignError("a.toml:3: x: wrong", "x", 3, "wrong", "y", "z")
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.path, again.line, again.nearest) == (str(error), "x", 3, "z")
+
+
+def test_keys_given_twice(tmp_path):
+    """In JSON too, with the path and the line."""
+    file = tmp_path / "bad.json"
+    file.write_text('{"schema": 1,\n "region": {"box":\n  {"size": [8, 8, 8],\n   "size": [9, 9, 9]}}}')
+    with pytest.raises(lt.DesignError, match="given twice") as caught:
+        lt.load(file)
+    assert (caught.value.path, caught.value.line) == ("region.box.size", 4)
+    file = tmp_path / "bad.toml"
+    file.write_text(CUBE.replace("size = [8, 8, 8]", "size = [8, 8, 8]\nsize = [9, 9, 9]"))
+    with pytest.raises(lt.DesignError, match="duplicate") as caught:
+        lt.load(file)
+    assert caught.value.line == 5
+
+
+def test_json_has_lines(tmp_path):
+    """An error in JSON says where."""
+    file = tmp_path / "bad.json"
+    file.write_text('{"schema": 1,\n"region": {"box": {"size": [8, 8, 8]}},\n"lattice": {"a": {\n"cell": "gyriod"}}}')
+    with pytest.raises(lt.DesignError, match='unknown cell "gyriod"; did you mean "gyroid"') as caught:
+        lt.load(file)
+    assert caught.value.line == 4
+
+
+@pytest.mark.parametrize(
+    ("word", "right"),
+    [("walls", "sheet"), ("wall", "sheet"), ("shell", "sheet"), ("network", "lower"), ("struts", "lower"), ("uper", "upper")],
+)
+def test_what_others_call_the_parts(tmp_path, word, right):
+    """The right word is named."""
+    file = tmp_path / "bad.toml"
+    file.write_text(CUBE.replace("sheet", word))
+    with pytest.raises(lt.DesignError, match=f'unknown part "{word}"; did you mean "{right}"') as caught:
+        lt.load(file)
+    assert caught.value.nearest == right
+
+
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-be", "utf-8-sig"])
+def test_other_encodings(tmp_path, code):
+    """A byte order mark is passed over; UTF-16 gets a hint."""
+    for name, text in (("a.toml", CUBE), ("a.json", '{"schema": 1}')):
+        file = tmp_path / name
+        file.write_bytes((b"\xfe\xff" if code == "utf-16-be" else b"") + text.encode(code))
+        if code == "utf-8-sig" and name == "a.toml":
+            lt.load(file).build()
+            continue
+        with pytest.raises(lt.DesignError, match='"region" is missing' if code == "utf-8-sig" else "UTF-16; save it as UTF-8"):
+            lt.load(file)
+
+
+def test_counts_and_numbers_are_words(tmp_path):
+    """Plurals, and numbers with few digits."""
+    for line, instead, part in [
+        ("size = [8, 8, 8]", "size = [8]", "found 1 value"),
+        ("size = [8, 8, 8]", "size = [8, 8, -1e300]", "size is -1e300;"),
+        ("fraction = 0.3", "porosity = -0.00000012345678901234567", "porosity is -1.23457e-7;"),
+        ("[region.box]\nsize = [8, 8, 8]", "[region]\nunion = []", "at least 1 region, found 0"),
+        ("wavelength = 4.0", "wavelength = 12.000000000000002", "wavelength, 12 mm, is more than"),
+    ]:
+        file = tmp_path / "bad.toml"
+        file.write_text(CUBE.replace(line, instead))
+        if "more than" in part:
+            assert part in lt.load(file).build().warnings[0]["message"]
+            continue
+        with pytest.raises(lt.DesignError) as caught:
+            lt.load(file).build()
+        assert part in str(caught.value) + ";", caught.value
+
+
+def test_a_graded_network_says_where_it_falls_apart(tmp_path):
+    """The part of the range that is in pieces, and only where there is one."""
+    text = CUBE.replace("gyroid", "primitive").replace("sheet", "lower")
+    grade = "fraction = { linear = { along = [0, 0, 1], stops = [[-4, LOW], [4, 0.4]] } }"
+    file = tmp_path / "a.toml"
+    file.write_text(text.replace("fraction = 0.3", grade.replace("LOW", "0.1")))
+    (warning,) = lt.load(file).build().warnings
+    assert "the solid fraction is 0.1000 to 0.4000 over the region, and at 0.1000 to 0.2133 the" in warning["message"]
+    file.write_text(text.replace("fraction = 0.3", grade.replace("LOW", "0.22")))
+    assert lt.load(file).build().warnings == []

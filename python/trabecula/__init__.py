@@ -13,10 +13,10 @@ Lengths are mm, angles degrees; negative is solid; arrays are (n, 3).
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from typing import Any
+
     from . import cell, grade, level, map, region
     from .design import Design, Lattice, load
     from .errors import DesignError, DesignWarning
@@ -62,6 +62,8 @@ _MODULES = ("cell", "grade", "level", "map", "region")
 
 
 def __getattr__(name: str) -> Any:
+    import importlib
+
     if name in _MODULES:
         return importlib.import_module(f".{name}", __name__)
     if name in _HOMES:

@@ -1,8 +1,17 @@
-"""``python -m trabecula``."""
+"""The command, and ``python -m trabecula``. Interrupts are seen to before anything is imported that takes time."""
 
 import sys
 
-from .cli import main
+from . import interrupt
+
+
+def main() -> int:
+    """Runs the command; gives its exit status."""
+    interrupt.at_once()
+    from .cli import main as run
+
+    return run()
+
 
 if __name__ == "__main__":
     sys.exit(main())

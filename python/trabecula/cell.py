@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
+from .given import plain
+
 __all__ = ["names", "series", "term"]
 
 
@@ -22,13 +24,15 @@ def names() -> list[str]:
     return [c[0] for c in _core.cells()]
 
 
-def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0) -> dict:
-    """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns (-0.25 makes a sine)."""
-    made: dict = {"hkl": [int(i) if int(i) == i else i for i in hkl]}
+def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, component: str = "re") -> dict:
+    """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``."""
+    made: dict = {"hkl": plain(hkl)}
     if amplitude != 1.0:
         made["amplitude"] = amplitude
     if phase != 0.0:
         made["phase"] = phase
+    if component != "re":
+        made["component"] = component
     return made
 
 

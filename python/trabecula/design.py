@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from . import _core
 from .errors import DesignError, DesignWarning
+from .given import copied
+from .input import read_text
 from .output import extension, whole_file
 
 if TYPE_CHECKING:
@@ -58,8 +59,22 @@ class Design:
         lattices = {"core": self.lattice} if isinstance(self.lattice, Lattice) else self.lattice
         if isinstance(lattices, Mapping):
             lattices = {k: v.to_dict() if isinstance(v, Lattice) else v for k, v in lattices.items()}
-        made = {"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices}
-        return copy.deepcopy(made)
+        return copied({"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices})
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both mean the same: defaults that are written out and mesh paths from another folder do not count."""
+        return self._meaning() == other._meaning() if isinstance(other, Design) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._meaning())
+
+    def _meaning(self) -> str:
+        data, folder = self.to_dict(), self.folder or os.getcwd()
+        data["region"] = _moved(data["region"], lambda path: os.path.abspath(os.path.join(folder, path)))
+        try:
+            return _core.Design.from_data(data).to_json()
+        except DesignError:
+            return repr(data)
 
     def _checked(self) -> _core.Design:
         return self._read or _core.Design.from_data(self.to_dict())
@@ -82,12 +97,16 @@ class Design:
         return made
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the design as TOML, or as JSON if the name ends so. Relative mesh paths are kept right."""
+        """Writes the design as TOML, or as JSON if the name ends so. Relative mesh paths are kept right.
+
+        Raises DesignError for a design that cannot be built: nothing else is written.
+        """
         kind = extension(path, ("toml", "json"))
-        old, new = self.folder or os.getcwd(), os.path.dirname(os.path.abspath(path))
+        old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data["region"] = _moved(data["region"], old, new)
+        data["region"] = _moved(data["region"], lambda path: _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
+        checked.build(new)
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
         with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
             out.write(text)
@@ -98,24 +117,9 @@ def load(path: str | os.PathLike[str]) -> Design:
 
     Raises DesignError, with the line, for anything that is not a design, and OSError for a file that cannot be read.
     """
-    name = os.fspath(path)
-    if os.path.isdir(name):
-        raise IsADirectoryError(f"{name} is a directory, not a design file")
+    name = os.fsdecode(path)
     kind = extension(name, ("toml", "json"))
-    try:
-        with open(name, "rb") as file:
-            raw = file.read()
-    except FileNotFoundError:
-        raise FileNotFoundError(f"{name} does not exist") from None
-    except OSError as error:
-        raise OSError(f"{name} cannot be read: {error.strerror or error}") from error
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        message = f"not text in UTF-8 (byte {error.start})"
-        raise DesignError(f"{name}:{line}: {message}", "", line, message) from None
-    read = _core.Design.from_text(text, kind == "json", name)
+    read = _core.Design.from_text(read_text(name), kind == "json", name)
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
     folder = os.path.dirname(os.path.abspath(name))
@@ -124,18 +128,21 @@ def load(path: str | os.PathLike[str]) -> Design:
     return design
 
 
-def _moved(region: Any, old: str, new: str) -> Any:
-    """The region with relative mesh paths turned from folder ``old`` to folder ``new``."""
+def _moved(region: Any, turn: Callable[[str], str]) -> Any:
+    """The region with every relative mesh path turned."""
     if isinstance(region, list):
-        return [_moved(r, old, new) for r in region]
+        return [_moved(r, turn) for r in region]
     if not isinstance(region, dict):
         return region
     mesh = region.get("mesh")
     if isinstance(mesh, dict) and isinstance(mesh.get("path"), str) and not os.path.isabs(mesh["path"]):
-        full = os.path.join(old, mesh["path"])
-        try:
-            turned = os.path.relpath(full, new)
-        except ValueError:  # another drive
-            turned = os.path.abspath(full)
-        return {**region, "mesh": {**mesh, "path": turned.replace(os.sep, "/")}}
-    return {k: _moved(v, old, new) for k, v in region.items()}
+        return {**region, "mesh": {**mesh, "path": turn(mesh["path"])}}
+    return {k: _moved(v, turn) for k, v in region.items()}
+
+
+def _relative(path: str, folder: str) -> str:
+    try:
+        turned = os.path.relpath(path, folder)
+    except ValueError:  # another drive
+        turned = os.path.abspath(path)
+    return turned.replace(os.sep, "/")

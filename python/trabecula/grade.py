@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from .map import _plain
+from .given import copied, plain
 
 __all__ = ["depth", "formula", "linear"]
 
@@ -13,12 +13,12 @@ Stops = Mapping[float, float] | Iterable[Sequence[float]]
 
 def linear(along: Sequence[float], stops: Stops) -> dict:
     """Piecewise linear in s = along · x, constant beyond the ends; ``stops`` is {s: value} or [(s, value), ...]."""
-    return {"linear": {"along": _plain(along), "stops": _stops(stops)}}
+    return {"linear": {"along": plain(along), "stops": copied(_stops(stops))}}
 
 
 def depth(stops: Stops) -> dict:
     """Piecewise linear in the depth (mm) below the region's surface; ``stops`` is {depth: value} or pairs."""
-    return {"depth": {"stops": _stops(stops)}}
+    return {"depth": {"stops": copied(_stops(stops))}}
 
 
 def formula(text: str) -> dict:
@@ -26,6 +26,5 @@ def formula(text: str) -> dict:
     return {"formula": text}
 
 
-def _stops(stops: Stops) -> list[list[float]]:
-    pairs = sorted(stops.items()) if isinstance(stops, Mapping) else stops
-    return [_plain(p) if hasattr(p, "tolist") else list(p) for p in pairs]
+def _stops(stops: Stops) -> list:
+    return sorted(stops.items()) if isinstance(stops, Mapping) else stops if hasattr(stops, "tolist") else list(stops)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .given import settings
+
 __all__ = ["affine", "spartan"]
 
 
@@ -18,7 +20,7 @@ def affine(
     ``wavelength`` is the cell's edge in mm, one or three; ``rotate`` the angles about x, y, z in degrees (z is turned
     first); ``offset`` moves the lattice (mm); ``skew`` names shears in degrees: ``{"xz": 20}`` moves x by tan 20° · z.
     """
-    return {"affine": _given(wavelength=wavelength, rotate=rotate, offset=offset, skew=skew)}
+    return {"affine": settings(wavelength=wavelength, rotate=rotate, offset=offset, skew=skew)}
 
 
 def spartan(
@@ -30,14 +32,4 @@ def spartan(
 
     With unequal wavelengths this shears the lattice in space; ``affine`` turns it rigidly.
     """
-    return {"spartan": _given(wavelength=wavelength, rotate=rotate, offset=offset)}
-
-
-def _given(**settings) -> dict:
-    return {k: _plain(v) for k, v in settings.items() if v is not None}
-
-
-def _plain(v):
-    if hasattr(v, "tolist"):
-        return v.tolist()
-    return list(v) if isinstance(v, (tuple, range)) else v
+    return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}

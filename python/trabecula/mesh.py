@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
+from .given import number, whole
+from .machine import file_size, fits
 from .output import extension, whole_file
 
 if TYPE_CHECKING:
@@ -65,17 +68,9 @@ class Mesh(Picture):
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Mesh:
         """Reads a mesh file (stl, 3mf, ply, obj, off; any letter case)."""
-        name = os.fspath(path)
-        if os.path.isdir(name):
-            raise IsADirectoryError(f"{name} is a directory, not a mesh file")
+        name = os.fsdecode(path)
         kind = extension(name, READS)
-        try:
-            with open(name, "rb") as file:
-                data = file.read()
-        except FileNotFoundError:
-            raise FileNotFoundError(f"{name} does not exist") from None
-        except OSError as error:
-            raise OSError(f"{name} cannot be read: {error.strerror or error}") from error
+        data = _core.read_file(name)
         try:
             return Mesh(_core.Mesh.read(data, kind))
         except ValueError as error:
@@ -84,6 +79,11 @@ class Mesh(Picture):
     def __repr__(self) -> str:
         vertices, triangles = self._core.counts
         return f"<trabecula.Mesh {triangles} triangles, {vertices} vertices>"
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of vertices and triangles."""
+        return self._core.counts
 
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
@@ -162,22 +162,28 @@ class Mesh(Picture):
 
     def within(self, solid_or_region) -> Mesh:
         """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
-        region = solid_or_region if isinstance(solid_or_region, _core.Region) else solid_or_region._core.region
+        region = getattr(solid_or_region, "_core", solid_or_region)
+        region = region.region if isinstance(region, _core.Solid) else region
+        if not isinstance(region, _core.Region):
+            raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
         return Mesh(self._core.split_by(region), region, self._edge)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""
         kind = extension(path, WRITES)
+        vertices, triangles = self._core.counts
+        fits(file_size(kind, triangles, vertices), f"{triangles:.3g} triangles", path)
         title = "Lattice part"  # not the file's name: the same solid is the same bytes
         with whole_file(path) as temporary:
             self._core.write(temporary, kind, title)
 
     def png(self, size: tuple[int, int] = (1600, 1200), azimuth: float = 30, elevation: float = 25) -> bytes:
         """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees."""
-        width, height = size
-        if not (1 <= width <= 16384 and 1 <= height <= 16384):
-            raise ValueError(f"size is {width} x {height}; each must be from 1 to 16384")
-        return self._core.png(width, height, azimuth, elevation)
+        width, height = (whole("size", v, 1, 16384) for v in size)
+        angles = number("azimuth", azimuth), number("elevation", elevation)
+        if not all(map(math.isfinite, angles)):
+            raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
+        return self._core.png(width, height, *angles)
 
     def render(
         self,

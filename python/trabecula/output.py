@@ -1,19 +1,31 @@
-"""Files that appear whole or not at all, and requests that fit the machine."""
+"""Files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-import shutil
+import re
+import stat
 import tempfile
+import zlib
 from collections.abc import Iterator
 
-__all__ = ["extension", "fits", "whole_file"]
+from . import interrupt
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+__all__ = ["check_place", "extension", "special", "whole_file"]
+
+#: Names of what is open already.
+OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
 
 
 def extension(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
     """The file name's extension in small letters; one that is not in ``known`` is refused."""
-    name = os.fspath(path)
+    name = os.fsdecode(path)
     ext = os.path.splitext(name)[1].lower().lstrip(".")
     if ext not in known:
         found = f"found .{ext}" if ext else "found none"
@@ -21,82 +33,122 @@ def extension(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
     return ext
 
 
-def check_place(path: str | os.PathLike[str]) -> None:
-    """Refuses an output that cannot be written, before any work is done."""
-    name = os.fspath(path)
-    folder = os.path.dirname(os.path.abspath(name))
-    if os.path.isdir(name):
+def special(name: str) -> bool:
+    """Whether this is a device, a pipe or what is open already, or a link to one: it is written as it is."""
+    if os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
+        return True
+    for _ in range(40):
+        if OPEN.fullmatch(os.path.abspath(name)):
+            return True
+        if not os.path.islink(name):
+            return False
+        name = os.path.join(os.path.dirname(name), os.readlink(name))
+    return False
+
+
+def check_place(path: str | os.PathLike[str]) -> str:
+    """Refuses an output that cannot be written, before any work is done. Gives its name with links followed."""
+    name = os.fsdecode(path)
+    if special(name):
+        return name
+    real = os.path.realpath(name)
+    folder = os.path.dirname(real)
+    if os.path.isdir(real):
         raise OSError(f"{name} is a directory; name a file in it")
+    if os.path.islink(real):
+        raise OSError(f"{name} is a link that leads nowhere")
     if not os.path.isdir(folder):
         raise OSError(f"{name}: the directory {folder} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OSError(f"{name}: the directory {folder} cannot be written to")
+    # The administrator may write to it all the same, but that is not what was meant.
+    if os.path.exists(real) and not (os.access(real, os.W_OK) and os.stat(real).st_mode & 0o222):
+        raise OSError(f"{name} is read-only; make it writable, or name another output")
+    return real
 
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
-    """Gives a temporary name beside ``path``; what is written there becomes ``path`` at the end, or vanishes on any error."""
-    check_place(path)
-    name = os.path.abspath(os.fspath(path))
-    if not os.path.isfile(name) and os.path.exists(name):  # a device or a pipe is written as it is
-        yield name
+    """Gives a temporary name beside ``path``; what is written there becomes ``path`` at the end, or vanishes on any error.
+
+    A link stays and its target is replaced; permissions stay as they were. A device or a pipe is written as it is.
+    """
+    shown = os.fsdecode(path)
+    real = check_place(path)
+    if special(shown):
+        try:
+            yield shown
+        except BaseException:
+            interrupt.left.append(f"{shown} was written in part")
+            raise
+        interrupt.left.append(f"{shown} is written")
         return
-    handle, temporary = tempfile.mkstemp(dir=os.path.dirname(name), prefix=".trabecula-", suffix=".part")
-    os.close(handle)
+    temporary, lock = _temporary(real)
     try:
         yield temporary
+        _permissions(temporary, real)
+        if fcntl is None:  # Windows moves no open file
+            lock = _closed(lock)
+        os.replace(temporary, real)
+        interrupt.left.append(f"{shown} is written")
+    except BaseException as error:
+        try:
+            os.unlink(temporary)
+        except FileNotFoundError:  # it has its own name already
+            interrupt.left.append(f"{shown} is written")
+        except OSError:
+            pass
+        if isinstance(error, OSError) and error.filename in (None, temporary):
+            reason = error.strerror or str(error)
+            raise OSError(f"{shown} cannot be written: {reason}") from error
+        raise
+    finally:
+        _closed(lock)
+
+
+def _temporary(real: str) -> tuple[str, int | None]:
+    """A new file beside ``real``, locked for as long as it is written; those that nobody writes any more are removed."""
+    folder, name = os.path.split(real)
+    prefix, suffix = f".trabecula-{zlib.crc32(os.fsencode(name)):08x}-", ".part"
+    if fcntl is not None:
+        for other in os.listdir(folder):
+            if other.startswith(prefix) and other.endswith(suffix):
+                with contextlib.suppress(OSError):
+                    _remove_stale(os.path.join(folder, other))
+    while True:
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix=prefix, suffix=suffix)
+        if fcntl is not None:
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(handle, fcntl.LOCK_EX)
+        if os.path.exists(temporary):  # nobody took it for stale before it was locked
+            return temporary, handle
+        os.close(handle)
+
+
+def _remove_stale(name: str) -> None:
+    """Removes the temporary file of a run that was killed: no process holds its lock."""
+    handle = os.open(name, os.O_RDWR)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.unlink(name)
+    finally:
+        os.close(handle)
+
+
+def _permissions(temporary: str, real: str) -> None:
+    """Gives the new file the owner and permissions of the old one, or those of any new file."""
+    try:
+        old = os.stat(real)
+    except FileNotFoundError:
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, name)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        if isinstance(error, OSError) and error.filename in (None, temporary):
-            reason = error.strerror or str(error)
-            raise OSError(f"{os.fspath(path)} cannot be written: {reason}") from error
-        raise
-
-
-def free_memory() -> float | None:
-    """Bytes that a program may take without swapping, where the system tells."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return float(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return None
-
-
-def fits(need: float, what: str, edge: float, power: int, path: str | None = None, word: str = "edge") -> None:
-    """Refuses a request for ``need`` bytes of memory, or of disk at ``path``, that the machine does not have.
-
-    The need grows as edge to the minus ``power``, which gives the edge to suggest.
-    """
-    have = free_memory() if path is None else float(shutil.disk_usage(os.path.dirname(os.path.abspath(path))).free)
-    if have is None or need <= 0.9 * have:
         return
-    better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
-    kind = "memory" if path is None else "disk space"
-    raise ValueError(
-        f"{word} {edge:g} mm needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free; "
-        f"try {word} {_up(better):g} mm"
-    )
+    with contextlib.suppress(OSError, AttributeError):
+        os.chown(temporary, old.st_uid, old.st_gid)
+    os.chmod(temporary, stat.S_IMODE(old.st_mode))
 
 
-def _bytes(n: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if n < 1000 or unit == "TB":
-            return f"{n:.3g} {unit}"
-        n /= 1000
-    return ""
-
-
-def _up(v: float) -> float:
-    """v, rounded up to two digits."""
-    import math
-
-    unit = 10.0 ** (math.floor(math.log10(v)) - 1)
-    return round(math.ceil(v / unit) * unit, 12)
+def _closed(handle: int | None) -> None:
+    if handle is not None:
+        os.close(handle)

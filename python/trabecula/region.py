@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from .map import _given
+from .given import settings
 
 __all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "union"]
 
@@ -20,22 +20,22 @@ def box(
     max: Point | None = None,
 ) -> dict:
     """An axis-aligned box, by ``size`` and ``center`` (the origin unless given) or by the corners ``min`` and ``max``."""
-    return {"box": _given(size=size, center=center, min=min, max=max)}
+    return {"box": settings(size=size, center=center, min=min, max=max)}
 
 
 def cylinder(base: Point, radius: float, height: float, axis: Point | None = None) -> dict:
     """A straight round cylinder from the middle of its lower face, ``base``, along ``axis`` (+z unless given)."""
-    return {"cylinder": _given(base=base, axis=axis, radius=radius, height=height)}
+    return {"cylinder": settings(base=base, axis=axis, radius=radius, height=height)}
 
 
 def sphere(radius: float, center: Point | None = None) -> dict:
     """A ball about ``center`` (the origin unless given)."""
-    return {"sphere": _given(center=center, radius=radius)}
+    return {"sphere": settings(center=center, radius=radius)}
 
 
 def halfspace(point: Point, normal: Point) -> dict:
     """One side of the plane through ``point``; ``normal`` points out of the solid."""
-    return {"halfspace": _given(point=point, normal=normal)}
+    return {"halfspace": settings(point=point, normal=normal)}
 
 
 def mesh(path: str | os.PathLike[str], unit: str | None = None, scale: float | None = None) -> dict:
@@ -44,7 +44,7 @@ def mesh(path: str | os.PathLike[str], unit: str | None = None, scale: float | N
     ``unit`` is that of the file (mm unless given; a 3MF names its own), ``scale`` a factor on top. A relative path
     starts at the design file, or at the working directory for a design made in Python.
     """
-    return {"mesh": _given(path=os.fspath(path), unit=unit, scale=scale)}
+    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale)}
 
 
 def union(*regions: dict) -> dict:

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _core
 from .design import Design, Lattice
 from .errors import DesignWarning
-from .mesh import Mesh, Picture
-from .output import check_place, extension, fits, whole_file
+from .given import number, positive, three, whole
+from .machine import file_size, fits
+from .mesh import WRITES, Mesh, Picture
+from .output import check_place, extension, special, whole_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,8 +79,8 @@ class Solid(Picture):
         if edge is not None and per_cell is not None:
             raise ValueError("give edge or per_cell, not both")
         if edge is None:
-            edge = self.wavelength / _positive("per_cell", PER_CELL if per_cell is None else per_cell)
-        edge = _positive("edge", edge)
+            edge = self.wavelength / positive("per_cell", PER_CELL if per_cell is None else per_cell)
+        edge = positive("edge", edge)
         if edge > self.wavelength / 2:
             raise ValueError(
                 f"a grid step of {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm, and shows "
@@ -90,20 +92,42 @@ class Solid(Picture):
         """What a surface will take: grid cells, triangles, bytes of memory, bytes of a binary STL."""
         return self._need(self.spacing(edge, per_cell))
 
-    def _warn_thin(self, spacing: float) -> None:
+    @cached_property
+    def _thinnest(self) -> dict[str, float]:
+        """The thinnest wall or neck of each lattice, mm, where there is one."""
+        all_ = {name: it["thickness"] for name, it in self.report()["lattices"].items()}
+        ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
+        return {name: t for name, t in ends.items() if t}
+
+    def _is_fine(self, spacing: float) -> bool:
+        """Whether only fractions of a hundredth or two can be lost at this spacing; `report` tells of them."""
+        return self.wavelength / spacing >= 64
+
+    def _warn_thin(self, spacing: float, word: str = "edge") -> None:
         """Warns of walls and necks that the grid cannot carry."""
-        if self.wavelength / spacing >= 64:
-            return  # only fractions of a hundredth or two are that thin, and `report` tells
-        for name, lattice in self.report()["lattices"].items():
-            thin = lattice["thickness"]
-            thin = thin[0] if isinstance(thin, list) else thin
-            if thin is not None and 0 < thin < 1.5 * spacing:
+        for name, thin in {} if self._is_fine(spacing) else self._thinnest.items():
+            if thin < 1.5 * spacing:
                 warnings.warn(
                     f"lattice.{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
-                    f"{spacing:g} mm and may break up in the mesh; use an edge of {thin / 2:.2g} mm or less",
+                    f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
                     DesignWarning,
                     stacklevel=3,
                 )
+
+    def _warn_coarse(self, volume: float, spacing: float, word: str = "edge") -> None:
+        """Warns of a result whose solid fraction has little to do with the design's, for want of grid steps."""
+        if self._is_fine(spacing):
+            return
+        share, region = self._core.expected()
+        found = volume / region
+        if abs(found - share) > min(0.05, share / 3):
+            better = min([spacing / 2, self.wavelength / 20, *(thin / 2 for thin in self._thinnest.values())])
+            warnings.warn(
+                f"the grid is too coarse: the result has a solid fraction of {found:.3g}, the design {share:.3g}; use "
+                f"{_a(word)} of {better:.2g} mm or less",
+                DesignWarning,
+                stacklevel=3,
+            )
 
     def _need(self, spacing: float) -> dict:
         """The estimate, at fine spacings scaled from a coarser one: triangles grow as spacing to the −2."""
@@ -127,10 +151,17 @@ class Solid(Picture):
         """
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
-        fits(need["memory"], f"{need['triangles']:.3g} triangles", spacing, 2)
+        # Measuring and writing take as much again.
+        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
         self._warn_thin(spacing)
         core = self._core.mesh(spacing, _threads(threads), progress)
+        self._warn_coarse(core.volume(), spacing)
         return Mesh(core, self._core.region, spacing)
+
+    def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
+        """Refuses a mesh file that the disk has no room for."""
+        need = self._need(spacing)["triangles"]
+        fits(file_size(extension(path, WRITES), need), f"{need:.3g} triangles", path, spacing)
 
     def save_stl(
         self,
@@ -144,11 +175,17 @@ class Solid(Picture):
         extension(path, ("stl",))
         check_place(path)
         spacing = self.spacing(edge, per_cell)
-        need = self._need(spacing)
-        fits(need["stl"], f"{need['triangles']:.3g} triangles", spacing, 2, os.fspath(path))
+        if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
+            made = self.mesh(spacing, None, threads, progress)
+            made.write(path)
+            keys = ("volume", "area", "area_lattice", "area_cut")
+            return {"triangles": made.counts[1], **{k: made.measure()[k] for k in keys}}
+        self._room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
-            return self._core.stream_stl(temporary, spacing, _threads(threads), progress)
+            summary = self._core.stream_stl(temporary, spacing, _threads(threads), progress)
+        self._warn_coarse(summary["volume"], spacing)
+        return summary
 
     def voxels(
         self,
@@ -161,8 +198,11 @@ class Solid(Picture):
         spacing = self.spacing(step, per_cell)
         low, high = self.bounds
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
-        fits(2.0 * count, f"{count:.3g} voxels", spacing, 3, word="step")
-        return Voxels(self._core.voxels(spacing, _threads(threads), progress))
+        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step")
+        self._warn_thin(spacing, "step")
+        made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
+        self._warn_coarse(made.volume, spacing, "step")
+        return made
 
     def _picture(self) -> Mesh:
         low, high = self.bounds
@@ -207,6 +247,8 @@ class Voxels:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the voxels: .npy (indexed [x, y, z]) or .vti (an image for ParaView, with origin and step)."""
         kind = extension(path, VOXEL_FORMATS)
+        count = math.prod(self.shape)
+        fits(1000.0 + count, f"{count:.3g} voxels", path, self.step, 3, "step")
         with whole_file(path) as temporary:
             self._core.write(temporary, kind)
 
@@ -232,14 +274,14 @@ def spartan(
     cells = {"diamond": "diamond", "gyroid": "gyroid_mirrored", "gyroid_mirrored": "gyroid_mirrored"}
     if name not in cells:
         raise ValueError(f'spartan: the note has "gyroid" and "diamond", found {name!r}')
-    three = [wavelength] * 3 if isinstance(wavelength, (int, float)) else [float(w) for w in wavelength]
+    waves = three("wavelength", wavelength)
     lattice = Lattice(
         cell=cells[name],
         part="lower",
-        map=map.spartan(wavelength=three, rotate=rotate),
+        map=map.spartan(wavelength=waves, rotate=rotate),
         level=level.porosity(porosity, fit=fit),
     )
-    box = {"box": {"size": [4 * w for w in three]}} if region is None else region
+    box = {"box": {"size": [4 * w for w in waves]}} if region is None else region
     return Design(region=box, lattice={name: lattice})
 
 
@@ -262,24 +304,17 @@ def fraction(cell, iso, part="sheet"):
 
 
 def _levels(cell, values, part, to_iso):
-    if isinstance(values, (int, float)):
-        return _core.levels(cell, part, [values], to_iso)[0]
+    if not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
+        return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
     import numpy as np
 
     given = np.asarray(values, dtype=np.float64)
     return np.array(_core.levels(cell, part, given.ravel().tolist(), to_iso)).reshape(given.shape)
 
 
-def _positive(name: str, value: float) -> float:
-    if not (isinstance(value, (int, float)) or hasattr(value, "__float__")) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a number, found {value!r}")
-    number = float(value)
-    if not (math.isfinite(number) and number > 0):
-        raise ValueError(f"{name} is {value}; it must be a finite number greater than 0")
-    return number
+def _a(word: str) -> str:
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
 
 
 def _threads(threads: int | None) -> int | None:
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
-        raise ValueError(f"threads is {threads}; it must be a whole number of at least 1")
-    return threads
+    return None if threads is None else whole("threads", threads, 1, 4096)

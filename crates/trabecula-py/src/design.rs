@@ -22,14 +22,7 @@ pub struct Folder(pub PathBuf);
 
 impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-        let full = self.0.join(Path::new(path));
-        if full.is_dir() {
-            return Err(format!("{} is a directory, not a file", full.display()));
-        }
-        std::fs::read(&full).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => format!("{} does not exist", full.display()),
-            _ => format!("{} cannot be read: {e}", full.display()),
-        })
+        crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
     }
 }
 
@@ -112,9 +105,12 @@ pub fn node(data: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
     let value = if data.is_instance_of::<PyBool>() {
         Value::Bool(data.extract()?)
     } else if data.is_instance_of::<PyFloat>() || data.is_instance_of::<PyInt>() {
-        Value::Number(data.extract()?)
-    } else if data.is_instance_of::<PyString>() {
-        Value::Text(data.extract()?)
+        match data.extract() {
+            Ok(number) => Value::Number(number),
+            Err(_) => Value::Other("a whole number beyond 1e308".into()),
+        }
+    } else if let Ok(text) = data.cast::<PyString>() {
+        Value::Text(text.to_string_lossy().into_owned())
     } else if let Ok(list) = data.cast::<PyList>() {
         items(&mut list.iter())?
     } else if let Ok(tuple) = data.cast::<PyTuple>() {

@@ -4,6 +4,8 @@ use pyo3::prelude::*;
 
 mod design;
 mod error;
+mod file;
+mod machine;
 mod mesh;
 mod run;
 mod solid;
@@ -30,6 +32,23 @@ mod _core {
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
     const __version__: &str = env!("CARGO_PKG_VERSION");
+
+    /// The bytes of a file; what is no regular file, or more than memory can hold, is refused.
+    #[pyfunction]
+    fn read_file(
+        py: Python<'_>,
+        path: std::path::PathBuf,
+    ) -> PyResult<Bound<'_, pyo3::types::PyBytes>> {
+        let bytes = py.detach(|| crate::file::read(&path))?;
+        Ok(pyo3::types::PyBytes::new(py, &bytes))
+    }
+
+    /// Bytes of memory that may yet be taken, or None where the system does not tell; `root` is that of its files.
+    #[pyfunction]
+    #[pyo3(signature = (root=std::path::PathBuf::from("/")))]
+    fn free_memory(root: std::path::PathBuf) -> Option<f64> {
+        crate::machine::free_memory(&root)
+    }
 
     /// The JSON Schema of a design, as JSON text.
     #[pyfunction]

@@ -130,6 +130,19 @@ impl Mesh {
         Ok(d)
     }
 
+    /// Enclosed volume, mm³.
+    fn volume(&self, py: Python<'_>) -> PyResult<f64> {
+        run(py, None, None, |_| self.surface.mesh.volume())
+    }
+
+    /// What keeps it from being closed: edges with one triangle, with more than two, with two of the same direction.
+    fn flaws(&self, py: Python<'_>) -> PyResult<(usize, usize, usize)> {
+        run(py, None, None, |_| {
+            let d = measure::defects(&self.surface.mesh);
+            (d.open_edges, d.crowded_edges, d.flipped_edges)
+        })
+    }
+
     /// Writes the mesh to `path` in the format `extension`.
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
         let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));

@@ -55,13 +55,14 @@ pub fn run<T: Send>(
     py.detach(|| {
         std::thread::scope(|scope| {
             let (finished, waiting) = channel::<()>();
-            let worker = scope.spawn(move || {
+            let work = move || {
                 let _finished = finished; // dropped, and so told, even if the work panics
                 match pool {
                     Some(pool) => pool.install(|| work(shared)),
                     None => work(shared),
                 }
-            });
+            };
+            let worker = std::thread::Builder::new().spawn_scoped(scope, work)?;
             let mut raised = None;
             let mut told = 0;
             while let Err(RecvTimeoutError::Timeout) = waiting.recv_timeout(TICK) {

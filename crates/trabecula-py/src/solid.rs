@@ -112,6 +112,11 @@ impl Solid {
         run(py, None, None, |_| self.built.report().to_string())
     }
 
+    /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
+    fn expected(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
+        run(py, None, None, |_| self.built.expected())
+    }
+
     /// Values at points (n, 3): negative in the solid.
     fn field<'py>(
         &self,

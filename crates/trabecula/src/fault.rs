@@ -29,6 +29,30 @@ impl Fault {
     }
 }
 
+/// A number as text for a message: as it was written where that is short, else its first six digits (%g).
+pub fn number(v: f64) -> String {
+    if v == 0.0 || !v.is_finite() {
+        return v.to_string();
+    }
+    let written = format!("{v:e}");
+    let mantissa = written.split('e').next().unwrap_or_default();
+    let long = mantissa.bytes().filter(u8::is_ascii_digit).count() > 12;
+    let v = match format!("{v:.5e}").parse() {
+        Ok(rounded) if long => rounded,
+        _ => v,
+    };
+    if (1e-5..1e15).contains(&v.abs()) {
+        v.to_string()
+    } else {
+        format!("{v:e}")
+    }
+}
+
+/// "1 value", "2 values".
+pub fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         if self.at.is_empty() {
@@ -40,3 +64,30 @@ impl core::fmt::Display for Fault {
 }
 
 impl std::error::Error for Fault {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (v, text) in [
+            (0.3, "0.3"),
+            (0.1 + 0.2, "0.3"),
+            (-70.0, "-70"),
+            (1e300, "1e300"),
+            (-1.5e-9, "-1.5e-9"),
+            (1.000_000_1, "1.0000001"),
+            (2.0 / 3.0, "0.666667"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(number(v), text);
+        }
+        assert_eq!(
+            (counted(1, "value"), counted(0, "value")),
+            ("1 value".into(), "0 values".into())
+        );
+    }
+}

@@ -67,7 +67,12 @@ pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
         "ply" => ply::read(text),
         "off" => off::read(text),
         _ => threemf::read(bytes),
-    }?;
+    };
+    let wide = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
+    let mesh = mesh.map_err(|f| match wide {
+        true => Fault::new("", "the file is text in UTF-16; save it as UTF-8"),
+        false => f,
+    })?;
     if mesh.triangles.is_empty() {
         return Err(Fault::new("", "the file holds no triangle"));
     }
@@ -234,6 +239,14 @@ mod tests {
     fn a_byte_order_mark_is_passed_over() {
         let text = b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert_eq!(read_mesh(text, "obj").unwrap().mesh.area(), 0.5);
+        let wide: Vec<u8> = "\u{feff}v 0 0 0\n"
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        for kind in ["obj", "ply", "off", "stl"] {
+            let message = read_mesh(&wide, kind).unwrap_err().message;
+            assert!(message.contains("UTF-16"), "{message}");
+        }
     }
 
     #[test]

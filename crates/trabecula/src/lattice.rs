@@ -53,7 +53,7 @@ impl Lattice {
         let steepness = cell.steepness(&map.jacobian([0.0; 3]));
         let uniform = match &level {
             Level::Iso(g) => g.constant(),
-            Level::Fraction(g) => g.constant().map(|p| cell.iso(part, p).0),
+            Level::Fraction(g) => g.constant().map(|p| cell.level(part, p)),
         };
         Lattice {
             cell,

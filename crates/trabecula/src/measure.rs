@@ -27,7 +27,7 @@ pub struct Size {
     pub area: f64,
     /// V − E + F, over the vertices that triangles use.
     pub euler: i64,
-    /// Solids: bodies (joined by shared vertices) of positive signed volume.
+    /// Solids: bodies (joined across edges; those that touch in a point or an edge are apart) of positive volume.
     pub pieces: usize,
     /// Closed voids inside solids: bodies of negative signed volume.
     pub cavities: usize,
@@ -43,7 +43,10 @@ pub struct Size {
 pub fn size(mesh: &Mesh) -> Size {
     let edges = Edges::count(mesh);
     let bodies = Bodies::of(mesh);
-    let signed = bodies.volumes(mesh);
+    let signed = match adjacency::apart(mesh) {
+        Some(apart) => Bodies::of(&apart).volumes(&apart),
+        None => bodies.volumes(mesh),
+    };
     Size {
         volume: signed.iter().sum(),
         area: area(mesh),
@@ -260,7 +263,7 @@ mod tests {
             .filter(|v| **v == 8)
             .for_each(|v| *v = 7);
         let s = size(&joined);
-        assert_eq!((s.pieces, s.closed, s.euler), (1, true, 3));
+        assert_eq!((s.pieces, s.closed, s.euler), (2, true, 3));
         assert_eq!(non_manifold_vertices(&joined), 1);
     }
 
@@ -306,6 +309,34 @@ mod tests {
         thin.vertices.push([0.5, 0.5, 0.0]);
         thin.triangles.extend([[0, 8, 3], [1, 1, 2]]);
         assert_eq!(defects(&thin).degenerate_triangles, 2);
+    }
+
+    #[test]
+    fn cubes_that_touch_are_two() {
+        // In a vertex, in an edge: the second cube's corners on the first's are joined.
+        for (shift, vertices, crowded) in [([1.0; 3], 15, 0), ([1.0, 1.0, 0.0], 14, 1)] {
+            let mut two = join(&[cube([0.0; 3], 1.0), cube(shift, 1.0)]);
+            for i in 8..16 {
+                if let Some(j) = (0..8).find(|j| two.vertices[*j] == two.vertices[i]) {
+                    let corners = two.triangles.iter_mut().flatten();
+                    corners
+                        .filter(|c| **c == i as u32)
+                        .for_each(|c| *c = j as u32);
+                }
+            }
+            let s = size(&two);
+            assert_eq!((s.pieces, s.cavities, s.volume), (2, 0, 2.0));
+            assert_eq!(
+                (s.closed, defects(&two).crowded_edges),
+                (crowded == 0, crowded)
+            );
+            assert_eq!(s.euler, vertices - (36 - crowded as i64) + 24);
+            let inverted = size(&flipped(two));
+            assert_eq!(
+                (inverted.pieces, inverted.cavities, inverted.volume),
+                (0, 2, -2.0)
+            );
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Fourier series on the torus: f(u) = Σ amplitude · cos 2π(h·u + phase).
 
+use std::collections::HashMap;
+
 use multiversion::multiversion;
 
 use crate::fault::Fault;
@@ -20,6 +22,10 @@ pub struct Term {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     terms: Vec<Term>,
+    /// The same, prepared for evaluation.
+    waves: Vec<Wave>,
+    /// The largest |h|, |k| or |l|.
+    top: usize,
 }
 
 /// Largest |h|, |k| or |l|: beyond it a "cell" is no longer one and the tables of powers grow.
@@ -35,6 +41,7 @@ impl Series {
     /// Non-finite numbers, indices beyond ±64, or a sum that is constant (it has no surface).
     pub fn new(terms: Vec<Term>) -> Result<Series, Fault> {
         let mut sums: Vec<([i32; 3], f64, f64)> = Vec::new();
+        let mut places = HashMap::new();
         let mut largest: f64 = 0.0;
         for (i, t) in terms.iter().enumerate() {
             let at = |key: &str| format!("terms[{i}].{key}");
@@ -66,7 +73,8 @@ impl Series {
             let hkl = t.hkl.map(|h| h * s);
             let (im, re) = sin_cos_turns(t.phase * f64::from(s));
             let (re, im) = (t.amplitude * re, t.amplitude * im);
-            match sums.iter_mut().find(|e| e.0 == hkl) {
+            let place = *places.entry(hkl).or_insert(sums.len());
+            match sums.get_mut(place) {
                 Some(e) => (e.1, e.2) = (e.1 + re, e.2 + im),
                 None => sums.push((hkl, re, im)),
             }
@@ -97,7 +105,14 @@ impl Series {
                 "the sum is constant, so it has no surface; give at least one term with hkl other than [0, 0, 0]",
             ));
         }
-        Ok(Series { terms })
+        Ok(Series::of(terms))
+    }
+
+    fn of(terms: Vec<Term>) -> Series {
+        let waves = terms.iter().map(Wave::new).collect();
+        let all = terms.iter().flat_map(|t| t.hkl);
+        let top = all.map(i32::unsigned_abs).max().unwrap_or(0) as usize;
+        Series { terms, waves, top }
     }
 
     /// The terms.
@@ -129,29 +144,95 @@ impl Series {
             amplitude: t.amplitude * t.hkl.iter().map(|&k| sinc(k)).product::<f64>(),
             ..*t
         };
-        Series {
-            terms: self.terms.iter().map(mean).collect(),
-        }
+        Series::of(self.terms.iter().map(mean).collect())
+    }
+
+    /// The largest |h|, |k| or |l|.
+    pub fn top(&self) -> usize {
+        self.top
+    }
+
+    /// The series with the greatest common factor of its indices taken out along each axis, and the factors. The
+    /// function repeats that often within the cell, so what does not depend on lengths is the same for both.
+    pub fn reduced(&self) -> (Series, [i32; 3]) {
+        let gcd = |mut a: i32, mut b: i32| {
+            while b != 0 {
+                (a, b) = (b, a % b);
+            }
+            a.abs()
+        };
+        let factor = |a: usize| self.terms.iter().fold(0, |g, t| gcd(g, t.hkl[a])).max(1);
+        let factors = [0, 1, 2].map(factor);
+        let divided = |t: &Term| Term {
+            hkl: [0, 1, 2].map(|a| t.hkl[a] / factors[a]),
+            ..*t
+        };
+        (
+            Series::of(self.terms.iter().map(divided).collect()),
+            factors,
+        )
     }
 
     /// Values and gradients (per turn) at phases `u` (turns). The three slices have equal length.
     ///
     /// Every point gets the same arithmetic wherever it stands in the batch, so equal points give equal bits.
     pub fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let waves: Vec<Wave> = self.terms.iter().map(Wave::new).collect();
-        let top = self
-            .terms
-            .iter()
-            .flat_map(|t| t.hkl)
-            .map(i32::unsigned_abs)
-            .max()
-            .unwrap_or(0) as usize;
-        evaluate(&waves, top, u, values, gradients);
+        evaluate(&self.waves, self.top, u, values, gradients);
+    }
+
+    /// Values and gradients (per turn) on a row: x (turns) varies, y and z are the same. Waves of equal |h| are added
+    /// up first, so that a node costs as much as there are different |h|, however many terms.
+    pub fn row(&self, x: &[f64], [y, z]: [f64; 2], values: &mut [f64], gradients: &mut [Vec3]) {
+        let powers = |v: f64| -> Vec<Complex> {
+            let top = self.top as i32;
+            (-top..=top)
+                .map(|n| sin_cos_turns(f64::from(n) * v))
+                .map(|(s, c)| (c, s))
+                .collect()
+        };
+        let (along_y, along_z) = (powers(y), powers(z));
+        let at = |table: &[Complex], n: i32| table[(n + self.top as i32) as usize];
+        // For each |h|: Σ c, Σ k c, Σ l c with c = amplitude · e^{2πi(k y + l z + phase)}, h made positive.
+        let mut sums = vec![[(0.0, 0.0); 3]; self.top + 1];
+        for w in &self.waves {
+            let s = if w.hkl[0] < 0 { -1 } else { 1 };
+            let [h, k, l] = w.hkl.map(|n| n * s);
+            let phase = (w.re, w.im * f64::from(s));
+            let c = product(product(phase, at(&along_y, k)), at(&along_z, l));
+            for (sum, factor) in sums[h as usize].iter_mut().zip([1, k, l]) {
+                let factor = f64::from(factor);
+                *sum = (sum.0 + factor * c.0, sum.1 + factor * c.1);
+            }
+        }
+        values.fill(0.0);
+        gradients.fill([0.0; 3]);
+        for (h, sum) in sums.iter().enumerate() {
+            if sum.iter().all(|c| *c == (0.0, 0.0)) {
+                continue;
+            }
+            let h = h as f64;
+            for ((x, v), g) in x.iter().zip(&mut *values).zip(&mut *gradients) {
+                let (s, c) = sin_cos_turns(h * x);
+                let z = sum.map(|a| product(a, (c, s)));
+                *v += z[0].0;
+                let slopes = [h * z[0].1, z[1].1, z[2].1];
+                for (g, slope) in g.iter_mut().zip(slopes) {
+                    *g -= core::f64::consts::TAU * slope;
+                }
+            }
+        }
     }
 }
 
+/// A complex number (re, im).
+type Complex = (f64, f64);
+
+fn product(a: Complex, b: Complex) -> Complex {
+    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+}
+
 /// A term prepared for evaluation.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Wave {
     hkl: [i32; 3],
     re: f64,
@@ -263,6 +344,36 @@ mod tests {
         assert!(Series::new(vec![term([1, 0, 0], 1.0, 0.0), term([1, 0, 0], 1.0, 0.5)]).is_err());
         assert!(Series::new(vec![term([65, 0, 0], 1.0, 0.0)]).is_err());
         assert!(Series::new(vec![term([1, 0, 0], f64::NAN, 0.0)]).is_err());
+    }
+
+    #[test]
+    fn rows_are_points_and_common_factors_only_repeat() {
+        let s = Series::new(vec![
+            term([2, -6, 0], 0.7, 0.13),
+            term([-2, 3, 64], -0.4, 0.0),
+            term([0, 0, 8], 0.5, 0.0),
+            term([0, 0, 0], 0.5, 0.0),
+        ])
+        .expect("valid");
+        let x: Vec<f64> = (0..37).map(|i| 0.037 * f64::from(i) - 0.2).collect();
+        let (mut v, mut g) = (vec![0.0; 37], vec![[0.0; 3]; 37]);
+        let (mut w, mut h) = (v.clone(), g.clone());
+        let (small, factors) = s.reduced();
+        assert_eq!(factors, [2, 3, 8]);
+        s.row(&x, [0.31, -0.77], &mut v, &mut g);
+        let u: Vec<Vec3> = x.iter().map(|x| [*x, 0.31, -0.77]).collect();
+        s.gradients(&u, &mut w, &mut h);
+        for i in 0..37 {
+            assert!((v[i] - w[i]).abs() < 1e-13);
+            // Slopes reach 2π · 64; products of 64 powers each lose a bit.
+            assert!((0..3).all(|a| (g[i][a] - h[i][a]).abs() < 1e-11));
+        }
+        let folded: Vec<Vec3> = u
+            .iter()
+            .map(|u| [0, 1, 2].map(|a| u[a] * f64::from(factors[a])))
+            .collect();
+        small.gradients(&folded, &mut v, &mut g);
+        assert!((0..37).all(|i| (v[i] - w[i]).abs() < 1e-12));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::error::DesignError;
 use super::report::Varied;
 use super::{Built, Design, Loader, Warning, level, region, sample};
 use crate::cell::{Cell, Part, Series, Term, named};
+use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
 use crate::map::{Affine, Map};
@@ -15,6 +16,12 @@ use crate::solid::Solid;
 
 /// Points at which a design is looked at.
 pub(super) const LOOKS: usize = 8_000;
+
+/// How far from the origin a region may reach, mm: a thousand kilometres.
+const FARTHEST: f64 = 1e9;
+
+/// Index of a series beyond which the grids on which a cell is analysed have less than four nodes on a wave.
+const FINEST: usize = 24;
 
 /// Where a part of a lattice stands, and the region it is to fill.
 pub(super) struct Place<'a> {
@@ -39,10 +46,11 @@ pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
     if v.is_finite() {
         Ok(v)
     } else {
-        Err(
-            DesignError::new(path, format!("expected a finite number, found {v}"))
-                .found(v.to_string()),
+        Err(DesignError::new(
+            path,
+            format!("expected a finite number, found {}", number(v)),
         )
+        .found(number(v)))
     }
 }
 
@@ -57,9 +65,19 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let message = "the region has no end; intersect it with a box or another bounded region";
         return Err(DesignError::new("region", message));
     }
+    let farthest = bounds.min.iter().chain(&bounds.max);
+    let farthest = farthest.fold(0.0f64, |m, v| m.max(v.abs()));
+    if farthest > FARTHEST {
+        let message = format!(
+            "the region reaches to {} mm; at most {} mm from the origin is possible",
+            number(farthest),
+            number(FARTHEST)
+        );
+        return Err(DesignError::new("region", message));
+    }
     let (mut points, _) = sample::inside(&space, LOOKS);
     if points.is_empty() {
-        let [x, y, z] = bounds.size();
+        let [x, y, z] = bounds.size().map(number);
         let message = format!(
             "the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm"
         );
@@ -68,7 +86,10 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     points.extend(sample::nodes(&space));
     let largest = bounds.size().into_iter().fold(0.0, f64::max);
     if !(0.1..=2000.0).contains(&largest) {
-        let message = format!("the region is {largest:.4} mm across; is its unit right?");
+        let message = format!(
+            "the region is {} mm across; is its unit right?",
+            number(largest)
+        );
         warnings.push(Warning {
             path: "region".into(),
             message,
@@ -142,7 +163,13 @@ pub(super) fn cell<'a>(
             let term = |t: &TermSpec| Term {
                 hkl: t.hkl,
                 amplitude: t.amplitude,
-                phase: t.phase,
+                // sin a = cos(a − a quarter turn).
+                phase: t.phase
+                    - if t.component == Component::Im {
+                        0.25
+                    } else {
+                        0.0
+                    },
             };
             (None, s.terms.iter().map(term).collect(), at)
         }
@@ -164,9 +191,11 @@ fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {
                 OneOrThree::One(_) => below("wavelength"),
                 OneOrThree::Three(_) => format!("{}[{i}]", below("wavelength")),
             };
-            let message =
-                format!("wavelength is {v}; it must be a finite number of mm greater than 0");
-            return Err(DesignError::new(at, message).found(v.to_string()));
+            let message = format!(
+                "wavelength is {}; it must be a finite number of mm greater than 0",
+                number(v)
+            );
+            return Err(DesignError::new(at, message).found(number(v)));
         }
     }
     for (key, three) in [("rotate", rotate), ("offset", offset)] {
@@ -183,9 +212,11 @@ fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {
                 let at = below(&format!("skew.{name}"));
                 finite(&at, angle)?;
                 if angle.abs() >= 89.0 {
-                    let message =
-                        format!("a shear of {angle} degrees; it must be between -89 and 89");
-                    return Err(DesignError::new(at, message).found(angle.to_string()));
+                    let message = format!(
+                        "a shear of {} degrees; it must be between -89 and 89",
+                        number(angle)
+                    );
+                    return Err(DesignError::new(at, message).found(number(angle)));
                 }
                 if angle != 0.0 {
                     let n = name.as_bytes();
@@ -246,26 +277,59 @@ fn check_solid(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(
     Err(DesignError::new(path, message))
 }
 
+/// What the ascending intervals `of` leave of [min, max].
+fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut left = Vec::new();
+    let mut from = min;
+    for &[lo, hi] in of {
+        if lo > from {
+            left.push([from, lo.min(max)]);
+        }
+        if hi >= max {
+            return left;
+        }
+        from = from.max(hi);
+    }
+    left.push([from, max]);
+    left
+}
+
 fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
+    let path = &place.path;
     let fraction = Varied::of_fraction(lattice, place.points);
     let whole = lattice.cell.connected_fraction(lattice.part);
-    let holds = whole
-        .iter()
-        .any(|w| w[0] <= fraction.min && fraction.max <= w[1]);
-    if !holds {
-        let ranges: Vec<String> = whole
-            .iter()
-            .map(|w| format!("{:.4} to {:.4}", w[0], w[1]))
-            .collect();
-        let limit = match ranges.as_slice() {
-            [] => "it is in one piece at no fraction".to_string(),
-            some => format!("it is in one piece at fractions {}", some.join(" and ")),
+    let broken = gaps([fraction.min, fraction.max], &whole);
+    if !broken.is_empty() {
+        let ranges = |of: &[[f64; 2]]| {
+            let texts = of.iter().map(|&[min, max]| Varied { min, max }.to_string());
+            texts.collect::<Vec<String>>().join(" and ")
         };
+        let limit = match whole.as_slice() {
+            [] => "it is in one piece at no fraction".to_string(),
+            some => format!("it is in one piece at fractions {}", ranges(some)),
+        };
+        let place = if broken == [[fraction.min, fraction.max]] {
+            format!("at solid fraction {fraction}")
+        } else {
+            format!(
+                "the solid fraction is {fraction} over the region, and at {}",
+                ranges(&broken)
+            )
+        };
+        let message = format!("{place} the periodic solid is not one piece in space; {limit}");
+        warnings.push(Warning {
+            path: format!("{}.level.{}", path, amount_key(spec)),
+            message,
+        });
+    }
+    let top = lattice.cell.plain().top();
+    if top > FINEST {
         let message = format!(
-            "at solid fraction {fraction} the periodic solid is not one piece in space; {limit}"
+            "indices reach {top}: beyond {FINEST} waves are finer than the grids on which the fraction, the walls and \
+             the connectivity of a cell are found, and these figures are rough"
         );
         warnings.push(Warning {
-            path: format!("{}.level.{}", place.path, amount_key(spec)),
+            path: format!("{}.cell.series.terms", place.path),
             message,
         });
     }
@@ -278,8 +342,10 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
         .fold(f64::INFINITY, f64::min);
     if wavelength > least {
         let message = format!(
-            "the wavelength, {wavelength} mm, is more than the region's least extent, {least:.4} mm: the part is less than \
-             one cell thick and its fraction is not the cell's"
+            "the wavelength, {} mm, is more than the region's least extent, {} mm: the part is less than one cell thick and \
+             its fraction is not the cell's",
+            number(wavelength),
+            number(least)
         );
         let kind = if matches!(spec.map, MapSpec::Affine(_)) {
             "affine"
@@ -290,5 +356,24 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             path: format!("{}.map.{kind}.wavelength", place.path),
             message,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gaps;
+
+    #[test]
+    fn what_intervals_leave() {
+        let whole = [[0.2, 0.5], [0.7, 1.0]];
+        assert_eq!(gaps([0.3, 0.3], &whole), [[0.0; 2]; 0]);
+        assert_eq!(gaps([0.1, 0.1], &whole), [[0.1, 0.1]]);
+        assert_eq!(gaps([0.1, 0.4], &whole), [[0.1, 0.2]]);
+        assert_eq!(gaps([0.1, 0.8], &whole), [[0.1, 0.2], [0.5, 0.7]]);
+        assert_eq!(gaps([0.55, 0.6], &whole), [[0.55, 0.6]]);
+        assert_eq!(gaps([0.6, 0.6], &whole), [[0.6, 0.6]]);
+        assert_eq!(gaps([0.6, 0.6], &[]), [[0.6, 0.6]]);
+        assert_eq!(gaps([0.3, 0.9], &[[0.2, 0.6]]), [[0.6, 0.9]]);
+        assert_eq!(gaps([0.8, 0.8], &[[0.2, 0.6]]), [[0.8, 0.8]]);
     }
 }

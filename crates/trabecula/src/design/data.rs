@@ -224,7 +224,7 @@ pub struct SeriesSpec {
     pub terms: Vec<TermSpec>,
 }
 
-/// amplitude · cos 2π(h·u + phase), u in turns.
+/// amplitude · cos 2π(h·u + phase), u in turns; or the sine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermSpec {
@@ -233,9 +233,23 @@ pub struct TermSpec {
     /// Amplitude.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub amplitude: f64,
-    /// Phase in turns; −0.25 makes a sine.
+    /// Phase in turns.
     #[serde(default, skip_serializing_if = "is_default")]
     pub phase: f64,
+    /// The real part of e^{2πi(h·u + phase)} (a cosine) or its imaginary part (a sine).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub component: Component,
+}
+
+/// Which part of e^{2πi(h·u + phase)} a term is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Component {
+    /// The real part: a cosine.
+    #[default]
+    Re,
+    /// The imaginary part: a sine.
+    Im,
 }
 
 /// Which side of the level is solid.

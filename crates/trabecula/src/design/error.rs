@@ -54,11 +54,25 @@ impl DesignError {
     /// `word` is none of `allowed`. `what` names the kind of word: key, cell, region …
     pub(super) fn unknown(path: &str, what: &str, word: &str, allowed: &[&str]) -> Self {
         let nearest = nearest(word, allowed.iter().copied());
+        Self::unknown_but(path, what, word, allowed, nearest)
+    }
+
+    /// The same, the nearest right word known.
+    pub(super) fn unknown_but(
+        path: &str,
+        what: &str,
+        word: &str,
+        allowed: &[&str],
+        nearest: Option<&str>,
+    ) -> Self {
         let hint = nearest.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
         let stop = if hint.is_empty() { "." } else { "" };
         let mut e = DesignError::new(
             path,
-            format!("unknown {what}{hint}{stop} Allowed: {}", allowed.join(", ")),
+            format!(
+                "unknown {what} \"{word}\"{hint}{stop} Allowed: {}",
+                allowed.join(", ")
+            ),
         );
         e.nearest = nearest.map(str::to_string);
         e.found(word)
@@ -150,7 +164,7 @@ mod tests {
         e.line = Some(7);
         assert_eq!(
             e.to_string(),
-            "d.toml:7: lattice.a.cell: unknown cell; did you mean \"gyroid\"? Allowed: gyroid, diamond"
+            "d.toml:7: lattice.a.cell: unknown cell \"gyriod\"; did you mean \"gyroid\"? Allowed: gyroid, diamond"
         );
         assert_eq!(e.nearest.as_deref(), Some("gyroid"));
     }

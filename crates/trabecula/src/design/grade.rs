@@ -3,6 +3,7 @@
 use super::build::finite;
 use super::data::{GradeKind, GradeSpec};
 use super::error::DesignError;
+use crate::fault::number;
 use crate::grade::{Formula, Grade};
 use crate::region::Region;
 
@@ -21,10 +22,11 @@ impl Allowed {
             Allowed::Finite => finite(path, v),
             Allowed::Share(name) if !(v > 0.0 && v < 1.0) => {
                 let message = format!(
-                    "{name} is {v}{place}; it must be greater than 0 and less than 1{}",
+                    "{name} is {}{place}; it must be greater than 0 and less than 1{}",
+                    number(v),
                     hint(name, v)
                 );
-                Err(DesignError::new(path, message).found(v.to_string()))
+                Err(DesignError::new(path, message).found(number(v)))
             }
             Allowed::Share(_) => Ok(v),
         }
@@ -35,7 +37,9 @@ fn hint(name: &str, v: f64) -> String {
     match (name, v) {
         ("fraction", 0.0) | ("porosity", 1.0) => " (nothing would be solid)".into(),
         ("fraction", 1.0) | ("porosity", 0.0) => " (all would be solid)".into(),
-        (_, v) if v > 1.0 && v <= 100.0 => format!(" (for {v} per cent write {})", v / 100.0),
+        (_, v) if v > 1.0 && v <= 100.0 => {
+            format!(" (for {} per cent write {})", number(v), number(v / 100.0))
+        }
         _ => String::new(),
     }
 }
@@ -67,14 +71,17 @@ pub(super) fn grade(
             let path = format!("{path}[{i}]");
             finite(&path, at)?;
             if at <= last {
-                let message =
-                    format!("positions must rise from stop to stop, found {at} after {last}");
-                return Err(DesignError::new(path, message).found(at.to_string()));
+                let message = format!(
+                    "positions must rise from stop to stop, found {} after {}",
+                    number(at),
+                    number(last)
+                );
+                return Err(DesignError::new(path, message).found(number(at)));
             }
             last = at;
             out.push([
                 at,
-                turn(allowed.check(&path, value, &format!(" at position {at}"))?),
+                turn(allowed.check(&path, value, &format!(" at position {}", number(at)))?),
             ]);
         }
         Ok(out)

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::DesignError;
+use crate::fault::{counted, number};
 
 /// A value with the line it stands on.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,11 +63,7 @@ impl Node {
 
     /// Reads JSON.
     pub fn from_json(text: &str) -> Result<Node, DesignError> {
-        let value: serde_json::Value = serde_json::from_str(text).map_err(|e| DesignError {
-            line: Some(e.line()),
-            ..DesignError::new("", format!("not readable as JSON: {e}"))
-        })?;
-        Ok(json(value))
+        super::json::read(text)
     }
 
     /// The line of every path in the tree.
@@ -163,18 +160,6 @@ fn toml_value(v: &toml::Spanned<toml::de::DeValue<'_>>, line: &dyn Fn(usize) -> 
         value,
         line: Some(at),
     }
-}
-
-fn json(v: serde_json::Value) -> Node {
-    use serde_json::Value as J;
-    Node::from(match v {
-        J::Null => Value::Other("null".into()),
-        J::Bool(b) => Value::Bool(b),
-        J::Number(n) => Value::Number(n.as_f64().unwrap_or(f64::NAN)),
-        J::String(s) => Value::Text(s),
-        J::Array(items) => Value::List(items.into_iter().map(json).collect()),
-        J::Object(o) => Value::Table(o.into_iter().map(|(k, v)| (k, None, json(v))).collect()),
-    })
 }
 
 /// A node and the path that leads to it.
@@ -317,11 +302,30 @@ impl<'a> At<'a> {
 
     /// One of the words.
     pub fn word<T: Copy>(&self, what: &str, words: &[(&str, T)]) -> Result<T, DesignError> {
+        self.word_or(what, words, &[])
+    }
+
+    /// One of the words; `meant` are words that others use, each with the one to use here.
+    pub fn word_or<T: Copy>(
+        &self,
+        what: &str,
+        words: &[(&str, T)],
+        meant: &[(&str, &'static str)],
+    ) -> Result<T, DesignError> {
         let names: Vec<&str> = words.iter().map(|w| w.0).collect();
         let word = self.text(&format!("one of {}", names.join(", ")))?;
-        let hit = words.iter().find(|w| w.0 == word);
-        hit.map(|w| w.1)
-            .ok_or_else(|| self.unknown(what, word, &names, &[]))
+        if let Some(hit) = words.iter().find(|w| w.0 == word) {
+            return Ok(hit.1);
+        }
+        let near = super::nearest(word, meant.iter().map(|m| m.0));
+        let near = near.and_then(|n| meant.iter().find(|m| m.0 == n));
+        Err(match (near, super::nearest(word, names.iter().copied())) {
+            (Some((_, right)), None) => DesignError {
+                line: self.line.or(self.node.line),
+                ..DesignError::unknown_but(&self.path, what, word, &names, Some(*right))
+            },
+            _ => self.unknown(what, word, &names, &[]),
+        })
     }
 
     pub fn number(&self) -> Result<f64, DesignError> {
@@ -349,7 +353,8 @@ impl<'a> At<'a> {
     pub fn numbers<const N: usize>(&self, what: &str) -> Result<[f64; N], DesignError> {
         let items = self.list(what)?;
         if items.len() != N {
-            return Err(self.error(format!("expected {what}, found {} values", items.len())));
+            let found = counted(items.len(), "value");
+            return Err(self.error(format!("expected {what}, found {found}")));
         }
         let mut out = [0.0; N];
         for (o, item) in out.iter_mut().zip(&items) {
@@ -406,7 +411,7 @@ impl<'a> Fields<'a> {
 fn describe(node: &Node) -> String {
     match &node.value {
         Value::Bool(b) => b.to_string(),
-        Value::Number(v) => v.to_string(),
+        Value::Number(v) => number(*v),
         Value::Text(s) if s.chars().count() <= 60 => format!("\"{s}\""),
         Value::Text(s) => format!("\"{}…\"", s.chars().take(57).collect::<String>()),
         Value::List(items) => format!("a list of {}", items.len()),

@@ -5,6 +5,7 @@ use super::data::*;
 use super::error::DesignError;
 use super::node::{At, Fields, GRADES, Later, Node};
 use crate::cell::catalogue;
+use crate::fault::{self, counted};
 
 type Read<T> = Result<T, DesignError>;
 
@@ -60,7 +61,10 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     let schema = f.need("schema", "write schema = 1 at the top")?;
     let number = schema.number()?;
     if number != 1.0 {
-        return Err(schema.error(format!("this version reads schema 1, found {number}")));
+        return Err(schema.error(format!(
+            "this version reads schema 1, found {}",
+            fault::number(number)
+        )));
     }
     if let Some(units) = f.get("units") {
         let word = units.text("\"mm\"")?;
@@ -163,7 +167,8 @@ fn region(at: &At) -> Read<RegionSpec> {
             let least = if kind == "difference" { 2 } else { 1 };
             if items.len() < least {
                 return Err(at.error(format!(
-                    "{kind} needs at least {least} regions, found {}",
+                    "{kind} needs at least {}, found {}",
+                    counted(least, "region"),
                     items.len()
                 )));
             }
@@ -212,6 +217,24 @@ fn mesh(at: &At) -> Read<RegionSpec> {
     }))
 }
 
+/// What others call the parts.
+const PARTS: [(&str, &str); 14] = [
+    ("wall", "sheet"),
+    ("shell", "sheet"),
+    ("surface", "sheet"),
+    ("double", "sheet"),
+    ("network", "lower"),
+    ("skeletal", "lower"),
+    ("skeleton", "lower"),
+    ("strut", "lower"),
+    ("solid", "lower"),
+    ("below", "lower"),
+    ("negative", "lower"),
+    ("above", "upper"),
+    ("positive", "upper"),
+    ("over", "upper"),
+];
+
 /// Keys that stand one level deeper, where beginners look for them: the key and its table.
 const DEEPER: [(&str, &str); 6] = [
     ("iso", "level"),
@@ -238,7 +261,7 @@ fn lattice(at: &At) -> Read<LatticeSpec> {
         cell: cell(f.need("cell", "such as cell = \"gyroid\"")?)?,
         part: f
             .need("part", "sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)")?
-            .word("part", &parts)?,
+            .word_or("part", &parts, &PARTS)?,
         map: map(f.need("map", "such as map.affine with wavelength = 4")?)?,
         level: level(f.need("level", "exactly one of iso, fraction, porosity")?)?,
     })
@@ -272,8 +295,8 @@ fn cell(at: &At) -> Read<CellSpec> {
 }
 
 fn term(at: &At) -> Read<TermSpec> {
-    let later = [("component", "use phase: 0 for a cosine, -0.25 for a sine")];
-    let f = at.fields("a term", &["hkl", "amplitude", "phase"], &later)?;
+    let f = at.fields("a term", &["hkl", "amplitude", "phase", "component"], &[])?;
+    let components = [("re", Component::Re), ("im", Component::Im)];
     let hkl = f.need("hkl", "three whole numbers")?;
     let numbers: [f64; 3] = hkl.numbers("three whole numbers [h, k, l]")?;
     if numbers.iter().any(|v| v.fract() != 0.0 || v.abs() > 1e6) {
@@ -283,6 +306,9 @@ fn term(at: &At) -> Read<TermSpec> {
         hkl: numbers.map(|v| v as i32),
         amplitude: f.read("amplitude", 1.0, At::number)?,
         phase: f.read("phase", 0.0, At::number)?,
+        component: f.read("component", Component::Re, |at| {
+            at.word("component", &components)
+        })?,
     })
 }
 

@@ -6,7 +6,7 @@ use super::Loader;
 use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::io;
 use crate::math::{add, scale, sub};
 use crate::region::{
@@ -89,8 +89,11 @@ fn positive(path: &str, key: &str, v: f64) -> Result<(), DesignError> {
     if v.is_finite() && v > 0.0 {
         return Ok(());
     }
-    let message = format!("{key} is {v}; it must be a finite number of mm greater than 0");
-    Err(DesignError::new(format!("{path}.{key}"), message).found(v.to_string()))
+    let message = format!(
+        "{key} is {}; it must be a finite number of mm greater than 0",
+        number(v)
+    );
+    Err(DesignError::new(format!("{path}.{key}"), message).found(number(v)))
 }
 
 fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
@@ -108,10 +111,12 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
                 if c.min[a] >= c.max[a] {
                     let message = format!(
                         "along {axis}, max is {} and min is {}; max must be the greater",
-                        c.max[a], c.min[a]
+                        number(c.max[a]),
+                        number(c.min[a])
                     );
-                    return Err(DesignError::new(format!("{path}.max"), message)
-                        .found(c.max[a].to_string()));
+                    return Err(
+                        DesignError::new(format!("{path}.max"), message).found(number(c.max[a]))
+                    );
                 }
             }
             (c.min, c.max)

@@ -4,6 +4,7 @@ use serde_json::{Value as Json, json};
 
 use super::{Built, build::LOOKS, sample};
 use crate::cell::Part;
+use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 
 /// The least and the greatest of a number over a region.
@@ -80,6 +81,18 @@ impl core::fmt::Display for Varied {
             write!(f, "{:.4} to {:.4}", self.min, self.max)
         }
     }
+}
+
+/// The solid share of the region and the region's volume.
+pub(super) fn expected(built: &Built) -> (f64, f64) {
+    let region = &built.solid.region;
+    let (points, share) = sample::inside(region, 2 * LOOKS);
+    let mut values = vec![0.0; points.len()];
+    built.solid.values(&points, &mut values);
+    let solid = values.iter().filter(|v| **v <= 0.0).count();
+    let sampled = || share * region.bounds().size().iter().product::<f64>();
+    let volume = region.volume().unwrap_or_else(sampled);
+    (solid as f64 / points.len().max(1) as f64, volume)
 }
 
 pub(super) fn report(built: &Built) -> Json {

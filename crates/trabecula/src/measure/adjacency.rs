@@ -191,8 +191,44 @@ fn find(root: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-/// The number of vertices whose triangles form more than one fan (bodies or surfaces that touch in a point).
+/// The number of vertices whose triangles form more than one fan (bodies or surfaces that touch in a point or edge).
 pub fn non_manifold_vertices(mesh: &Mesh) -> usize {
+    pinched(mesh).len()
+}
+
+/// The mesh with a vertex of its own for every fan, so that bodies which touch in a point or an edge are apart; `None`
+/// where nothing does.
+pub(super) fn apart(mesh: &Mesh) -> Option<Mesh> {
+    let pinched = pinched(mesh);
+    if pinched.is_empty() {
+        return None;
+    }
+    let mut apart = mesh.clone();
+    let mut scratch = Default::default();
+    for (v, triangles) in pinched {
+        fans(mesh, v, &triangles, &mut scratch);
+        let root = &scratch.1;
+        // The first fan keeps the vertex.
+        let mut names = vec![u32::MAX; root.len()];
+        names[root[0] as usize] = v;
+        for (&t, &fan) in triangles.iter().zip(root) {
+            let name = &mut names[fan as usize];
+            if *name == u32::MAX {
+                *name = apart.vertices.len() as u32;
+                apart.vertices.push(mesh.vertices[v as usize]);
+            }
+            let corners = &mut apart.triangles[t as usize];
+            corners
+                .iter_mut()
+                .filter(|c| **c == v)
+                .for_each(|c| *c = *name);
+        }
+    }
+    Some(apart)
+}
+
+/// The vertices whose triangles form more than one fan, with their triangles.
+fn pinched(mesh: &Mesh) -> Vec<(u32, Vec<u32>)> {
     let n = mesh.vertices.len();
     let mut start = vec![0usize; n + 1];
     for &v in mesh.triangles.iter().flatten() {
@@ -213,13 +249,15 @@ pub fn non_manifold_vertices(mesh: &Mesh) -> usize {
     (0..n)
         .into_par_iter()
         .map_init(Default::default, |scratch, v| {
-            fans(mesh, v as u32, &around[start[v]..start[v + 1]], scratch)
+            let triangles = &around[start[v]..start[v + 1]];
+            (fans(mesh, v as u32, triangles, scratch) > 1).then(|| (v as u32, triangles.to_vec()))
         })
-        .filter(|fans| *fans > 1)
-        .count()
+        .flatten_iter()
+        .collect()
 }
 
-/// The number of fans that `triangles` form about vertex `v`: classes joined through common neighbours of `v`.
+/// The number of fans that `triangles` form about vertex `v`: classes joined across edges at `v` that two of them share.
+/// Leaves the fan of each triangle, as the first of its class, in the second scratch.
 fn fans(
     mesh: &Mesh,
     v: u32,
@@ -239,12 +277,16 @@ fn fans(
     }
     sides.sort_unstable();
     let mut count = triangles.len();
-    for pair in sides.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        let (a, b) = (find(root, pair[0].1), find(root, pair[1].1));
+    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+        let &[(_, a), (_, b)] = edge else { continue };
+        let (a, b) = (find(root, a), find(root, b));
         if a != b {
             root[a.max(b) as usize] = a.min(b);
             count -= 1;
         }
+    }
+    for i in 0..root.len() as u32 {
+        root[i as usize] = find(root, i);
     }
     count
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{Offset, Shape, one_face};
 use crate::face::{Face, Plane, Tree};
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -47,7 +47,10 @@ fn finite(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     match v.iter().find(|x| !x.is_finite()) {
         Some(x) => Err(Fault::new(
             at,
-            format!("{x} is not a position: give three finite numbers, mm"),
+            format!(
+                "{} is not a position: give three finite numbers, mm",
+                number(*x)
+            ),
         )),
         None => Ok(v),
     }
@@ -60,7 +63,10 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
     } else {
         Err(Fault::new(
             at,
-            format!("{v} mm is not a length: give a finite number above zero"),
+            format!(
+                "{} mm is not a length: give a finite number above zero",
+                number(v)
+            ),
         ))
     }
 }
@@ -156,7 +162,11 @@ impl Cuboid {
         finite("max", max)?;
         for (a, name) in ["x", "y", "z"].iter().enumerate() {
             if min[a] >= max[a] {
-                let found = format!("{name} runs from {} to {} mm", min[a], max[a]);
+                let found = format!(
+                    "{name} runs from {} to {} mm",
+                    number(min[a]),
+                    number(max[a])
+                );
                 return Err(Fault::new(
                     "max",
                     format!("{found}: each side of a box must have a length above zero"),

@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use super::MODEL;
 use super::xml::{Event, Scanner, attribute, required};
 use super::zip::Archive;
-use crate::fault::Fault;
+use crate::fault::{Fault, counted};
 use crate::io::join::Joiner;
 use crate::io::text::{parse, shown};
 use crate::math::{Mat3, Vec3, add, apply, determinant, scale};
@@ -79,8 +79,8 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         return Err(Fault::new(
             "",
             format!(
-                "{} objects, but the build places none of them",
-                main.objects.len()
+                "{}, but the build places none of them",
+                counted(main.objects.len(), "object")
             ),
         ));
     }

@@ -2,6 +2,7 @@
 //!
 //! Source: PKWARE, APPNOTE.TXT 6.3; RFC 1951 (deflate).
 
+use std::cell::Cell;
 use std::io::{self, Write};
 
 use flate2::{Compress, Compression, Crc, Decompress, FlushCompress, FlushDecompress, Status};
@@ -193,7 +194,12 @@ pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result
 pub struct Archive<'a> {
     bytes: &'a [u8],
     entries: Vec<Found>,
+    /// Bytes that may yet be inflated.
+    left: Cell<u64>,
 }
+
+/// What all files of an archive may inflate to: so many times the archive, and some bytes. Meshes come to ten times.
+const MOST: (u64, u64) = (100, 1 << 24);
 
 struct Found {
     name: String,
@@ -273,7 +279,12 @@ impl<'a> Archive<'a> {
             entries.push(e);
             at += 46 + name + extra + comment;
         }
-        Ok(Archive { bytes, entries })
+        let left = Cell::new(MOST.0 * bytes.len() as u64 + MOST.1);
+        Ok(Archive {
+            bytes,
+            entries,
+            left,
+        })
     }
 
     /// Names of the files.
@@ -309,6 +320,15 @@ impl<'a> Archive<'a> {
                 e.size, e.packed
             )));
         }
+        let Some(left) = self.left.get().checked_sub(e.size) else {
+            return Err(fault(format!(
+                "\"{name}\" inflates to {} bytes, from an archive of {}: more than {} times as much is no mesh",
+                e.size,
+                self.bytes.len(),
+                MOST.0
+            )));
+        };
+        self.left.set(left);
         let content = match e.method {
             0 => data.to_vec(),
             8 => inflate(data, e.size as usize).ok_or_else(|| {
@@ -401,6 +421,35 @@ mod tests {
             assert_eq!(archive.file("empty").unwrap(), b"");
             assert!(archive.file("none").is_err());
         }
+    }
+
+    #[test]
+    fn blanks_without_end_are_refused_before_they_are_made() {
+        let mut long = Entry::new("blanks");
+        let piece = || {
+            let text = vec![b' '; 1 << 20];
+            let (mut crc, mut bytes) = (Crc::new(), Vec::with_capacity(1 << 16));
+            crc.update(&text);
+            let mut state = Compress::new(Compression::best(), false);
+            state
+                .compress_vec(&text, &mut bytes, FlushCompress::Sync)
+                .unwrap();
+            Piece {
+                bytes,
+                crc,
+                size: 1 << 20,
+            }
+        };
+        (0..300).for_each(|_| long.push(piece()));
+        let mut short = Entry::new("some");
+        (0..9).for_each(|_| short.push(piece()));
+        let mut bytes = Vec::new();
+        write(&[long, short], LIMIT, &mut bytes).unwrap();
+        let archive = Archive::new(&bytes).unwrap();
+        let message = archive.file("blanks").map(|c| c.len()).unwrap_err().message;
+        assert!(message.contains("314572800") && message.contains("100 times"));
+        // What is inflated twice counts twice.
+        assert!((0..99).any(|_| archive.file("some").is_err()));
     }
 
     #[test]

@@ -1,0 +1,273 @@
+"""The commands. This module brings all that they need, so that nothing is imported once the work has begun."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import warnings
+from difflib import get_close_matches
+
+import numpy  # noqa: F401  voxels and figures want it later
+
+from . import _core, cell
+from .design import load
+from .errors import DesignError, DesignWarning
+from .input import read_text
+from .mesh import READS, Mesh
+from .output import check_place, whole_file
+from .solid import Solid
+from .starter import STARTER
+from .words import Progress, figure, say, span
+
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "voxels"]
+
+DESIGNS = ("toml", "json")
+
+
+class Refused(Exception):
+    """A file or a request that cannot be served: one line, exit status 1."""
+
+
+def new(args) -> None:
+    """``trabecula new``."""
+    known_cell(args.cell, cell.names())
+    if os.path.exists(args.file) and not args.force and not os.path.isdir(args.file):
+        raise Refused(f"{args.file} exists; choose another name, or replace it with --force")
+    check_place(args.file)
+    with whole_file(args.file) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+        out.write(STARTER.format(cell=args.cell, file=os.path.basename(args.file)))
+    say(f"{args.file} written; next: trabecula check {args.file}")
+
+
+def check(args) -> None:
+    """``trabecula check``."""
+    solid = build(args.design, tell=not args.json)
+    report = solid.report()
+    if args.json:
+        return print(json.dumps(report, indent=2))
+    low, high = report["region"]["bounds"]
+    about = "" if report["region"]["volume_exact"] else "about "
+    extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
+    print(f"region  {extent} mm, {about}{figure(report['region']['volume'])} mm³")
+    for name, it in report["lattices"].items():
+        neck = "thinnest wall" if it["part"] == "sheet" else "narrowest neck"
+        print(f"lattice {name}: {it['part']}, wavelength {figure(it['wavelength'])} mm")
+        print(f"  iso        {span(it['iso'])}")
+        print(f"  fraction   {span(it['fraction'])}")
+        print(f"  porosity   {span(it['porosity'])}")
+        print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
+        whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
+        print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+
+
+def mesh(args) -> None:
+    """``trabecula mesh``."""
+    check_place(args.output)
+    start = time.perf_counter()
+    solid = build(args.design)
+    keep_inputs(args.design, args.output)
+    options = resolved(args)
+    with Progress("meshing", args.progress) as progress:
+        if kind_of(args.output) == "stl":
+            made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
+        else:
+            solid._room(args.output, solid.spacing(**options))
+            surface = solid.mesh(threads=args.threads, progress=progress, **options)
+            figures = surface.measure()
+            keys = ("volume", "area", "area_lattice", "area_cut")
+            made = {"triangles": surface.counts[1], **{k: figures[k] for k in keys}}
+            progress.clear()
+            surface.write(args.output)
+    edge = solid.spacing(**options)
+    made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
+    made["edge"] = edge
+    made["bytes"] = os.path.getsize(args.output)
+    made["seconds"] = round(time.perf_counter() - start, 3)
+    if args.json:
+        return print(json.dumps(made, indent=2))
+    say(
+        f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm²; edge {edge:g} mm, {made['seconds']:.2f} s"
+    )
+
+
+def voxels(args) -> None:
+    """``trabecula voxels``."""
+    check_place(args.output)
+    start = time.perf_counter()
+    solid = build(args.design)
+    options = {"step" if k == "edge" else k: v for k, v in resolved(args).items()}
+    with Progress("sampling", args.progress) as progress:
+        grid = solid.voxels(threads=args.threads, progress=progress, **options)
+    grid.write(args.output)
+    made = {"shape": list(grid.shape), "step": grid.step, "origin": grid.origin, "volume": grid.volume}
+    made["solid_fraction"] = made["volume"] / region_volume(solid, grid.step)
+    made["seconds"] = round(time.perf_counter() - start, 3)
+    if args.json:
+        return print(json.dumps(made, indent=2))
+    shape = " × ".join(map(str, grid.shape))
+    say(
+        f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
+        f"{made['solid_fraction']:.4f}, {made['seconds']:.2f} s"
+    )
+
+
+def measure(args) -> None:
+    """``trabecula measure``."""
+    made = surface(args)
+    if args.region:
+        made = made.within(region(args.region))
+    figures = made.measure()
+    if (figures["solid_fraction"] or 0) > 1.01:
+        say(f"warning: {args.file} holds more than the region does; they may not be in the same place or unit")
+    inverted = figures["closed"] and figures["volume"] < 0
+    if inverted:
+        say(
+            f"warning: {args.file} is closed but inside out (its triangles run clockwise seen from outside), so its volume "
+            "is negative and its solids count as cavities"
+        )
+    if not figures["closed"]:
+        say(f"warning: {args.file} is not closed ({flaws(made)}), so its volume and what follows from it mean little")
+    if args.json:
+        return print(json.dumps(figures, indent=2))
+    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²"}
+    for key, value in figures.items():
+        if key == "bounds":
+            text = " to ".join("(" + ", ".join(figure(v) for v in corner) + ")" for corner in value) + " mm"
+        elif value is None:
+            text = "needs a region (--region)"
+        elif isinstance(value, bool):
+            text = "yes, but inside out" if value and inverted else "yes" if value else "no"
+        else:
+            text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
+        print(f"{key:15} {text}")
+
+
+def flaws(mesh: Mesh) -> str:
+    """What keeps a mesh from being closed."""
+    kinds = ("with one triangle", "with more than two", "with two of the same direction")
+    found = [f"{n} edge{'s' if n > 1 else ''} {kind}" for n, kind in zip(mesh._core.flaws(), kinds, strict=True) if n]
+    return ", ".join(found) or "triangles with a corner twice"
+
+
+def cells(args) -> None:
+    """``trabecula cells``."""
+    listed = _core.cells()
+    if args.name:
+        known_cell(args.name, [c[0] for c in listed])
+        listed = [c for c in listed if c[0] == args.name]
+    facts = []
+    for name, title, formula, group, source in listed:
+        span_, parts = _core.cell_facts(name)
+        facts.append(
+            {
+                "name": name,
+                "title": title,
+                "formula": formula,
+                "group": group,
+                "range": list(span_),
+                "connected_fraction": {part: [list(w) for w in whole] for part, whole in parts},
+                "source": source,
+            }
+        )
+    if args.json:
+        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+    for it in facts:
+        print(f"{it['name']}  ({it['title']})")
+        print(f"  f       {it['formula']}")
+        print(f"  group   {it['group']}")
+        print(f"  range   {it['range'][0]:.6g} to {it['range'][1]:.6g}")
+        for part, whole in it["connected_fraction"].items():
+            text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
+            print(f"  {part:7} in one piece at fractions {text}")
+        print(f"  source  {it['source']}")
+
+
+def render(args) -> None:
+    """``trabecula render``."""
+    check_place(args.output)
+    surface(args).render(args.output, args.size, args.azimuth, args.elevation)
+    say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels")
+
+
+# --- what they share -------------------------------------------------------------------------------------------------
+
+
+def known_cell(name: str, known: list[str]) -> None:
+    """Refuses the name of no cell."""
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f'; did you mean "{near[0]}"?' if near else "."
+        raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
+
+
+def kind_of(path: str) -> str:
+    """The extension in small letters."""
+    return os.path.splitext(path)[1].lower().lstrip(".")
+
+
+def files_of(tree) -> list[str]:
+    """The files that a region names."""
+    if isinstance(tree, dict):
+        own = [tree["path"]] if isinstance(tree.get("path"), str) else []
+        return own + [name for branch in tree.values() for name in files_of(branch)]
+    return [name for branch in tree for name in files_of(branch)] if isinstance(tree, list) else []
+
+
+def keep_inputs(design: str, output: str) -> None:
+    """Refuses an output that is the design, or a file that the design reads."""
+    folder = os.path.dirname(os.path.abspath(design))
+    for name in [design, *(os.path.join(folder, f) for f in files_of(load(design).to_dict().get("region")))]:
+        if os.path.exists(name) and os.path.exists(output) and os.path.samefile(name, output):
+            raise Refused(f"{output} is read by this design; name another output")
+
+
+def build(path: str, tell: bool = True) -> Solid:
+    """The solid of a design file; its warnings go to stderr."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DesignWarning)
+        try:
+            solid = load(path).build()
+        except DesignError as error:
+            raise Refused(str(error)) from None
+    if tell:
+        for warning in solid.warnings:
+            say(f"warning: {warning['path']}: {warning['message']}")
+    return solid
+
+
+def resolved(args) -> dict:
+    """The resolution that was asked for."""
+    if args.edge is not None:
+        return {"edge": args.edge}
+    return {"per_cell": 32 if args.per_cell is None else args.per_cell}
+
+
+def surface(args):
+    """The mesh of a design or a mesh file."""
+    if kind_of(args.file) in DESIGNS:
+        solid = build(args.file)
+        with Progress("meshing", args.progress) as progress:
+            return solid.mesh(threads=args.threads, progress=progress, **resolved(args))
+    if args.edge is not None or args.per_cell is not None:
+        raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
+    return Mesh.read(args.file)
+
+
+def region(path: str):
+    """The region of a design, of a file with a region alone, or of a mesh file."""
+    folder = os.path.dirname(os.path.abspath(path))
+    try:
+        if kind_of(path) in READS:
+            made = {"region": {"mesh": {"path": os.path.abspath(path)}}}
+            return _core.Region.from_data(made, folder)
+        return _core.Region.from_text(read_text(path), kind_of(path) == "json", path, folder)
+    except DesignError as error:
+        raise Refused(str(error)) from None
+
+
+def region_volume(solid: Solid, edge: float) -> float:
+    """The region's volume for a summary: exact, or of a surface that is quick to make."""
+    low, high = solid.bounds
+    return solid._core.region.volume(max(edge, max(b - a for a, b in zip(low, high, strict=True)) / 200))

@@ -1,0 +1,79 @@
+"""What Python callers give: numbers of any kind, and plain data. What is no such thing gets a TypeError or ValueError."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["copied", "number", "plain", "positive", "settings", "three", "whole"]
+
+#: How deep a design may nest; the core has the same limit.
+DEPTH = 64
+
+
+def number(name: str, value: Any) -> float:
+    """A number of any kind (Python's, NumPy's) as a float."""
+    if isinstance(value, (bool, str, bytes)) or not hasattr(type(value), "__float__"):
+        raise TypeError(f"{name} must be a number, found {value!r}")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name} is beyond 1e308") from None
+    except TypeError:
+        raise TypeError(f"{name} must be one number, found {value!r}") from None
+
+
+def positive(name: str, value: Any) -> float:
+    """A finite number greater than 0."""
+    found = number(name, value)
+    if not (math.isfinite(found) and found > 0):
+        raise ValueError(f"{name} is {found:g}; it must be a finite number greater than 0")
+    return found
+
+
+def whole(name: str, value: Any, least: int, most: int) -> int:
+    """A whole number of any kind, from ``least`` to ``most``."""
+    try:
+        found = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be a whole number, found {value!r}") from None
+    if isinstance(value, bool):
+        raise TypeError(f"{name} must be a whole number, found {value!r}")
+    if not least <= found <= most:
+        raise ValueError(f"{name} is {found if abs(found) < 10**15 else 'out of range'}; it must be from {least} to {most}")
+    return found
+
+
+def three(name: str, value: Any) -> list[float]:
+    """Three numbers, given as three or as one for all."""
+    try:
+        items = [value] * 3 if isinstance(value, (str, bytes)) else list(value)
+    except TypeError:
+        items = [value] * 3
+    if len(items) != 3:
+        raise ValueError(f"{name} must be one number or three, found {len(items)}")
+    return [number(name, v) for v in items]
+
+
+def plain(value: Any) -> Any:
+    """Arrays, tuples and ranges as lists."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return list(value) if isinstance(value, (tuple, range)) else value
+
+
+def settings(**given: Any) -> dict:
+    """The settings that were given."""
+    return {k: plain(v) for k, v in given.items() if v is not None}
+
+
+def copied(data: Any, depth: int = 0) -> Any:
+    """A copy of data in lists and dictionaries."""
+    if depth > DEPTH:
+        raise ValueError(f"a design is at most {DEPTH} levels deep; does it hold itself?")
+    data = plain(data)
+    if isinstance(data, Mapping):
+        return {k: copied(v, depth + 1) for k, v in data.items()}
+    return [copied(v, depth + 1) for v in data] if isinstance(data, list) else data

@@ -1,0 +1,63 @@
+"""Requests that fit the machine: memory, room on the disk."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+
+from . import _core
+from .output import check_place, special
+
+__all__ = ["file_size", "fits"]
+
+#: Bytes of a file for each triangle and each vertex; those of text as they come out for parts of some hundred mm.
+SIZES = {"stl": (50, 0), "ply": (13, 24), "obj": (27, 50), "3mf": (7, 9)}
+
+
+def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
+    """Bytes of a mesh file. A closed surface has half as many vertices as triangles."""
+    per_triangle, per_vertex = SIZES[kind]
+    return 1000 + per_triangle * triangles + per_vertex * (triangles / 2 if vertices is None else vertices)
+
+
+def fits(
+    need: float,
+    what: str,
+    path: str | os.PathLike[str] | None = None,
+    edge: float | None = None,
+    power: int = 2,
+    word: str = "edge",
+) -> None:
+    """Refuses a request for ``need`` bytes of memory, or of disk for the file ``path``, that the machine does not have.
+
+    The need grows as the grid's ``edge`` to the minus ``power``, which gives the edge to suggest.
+    """
+    if path is None:
+        have = _core.free_memory()
+    elif special(os.fsdecode(path)):
+        return
+    else:
+        have = float(shutil.disk_usage(os.path.dirname(check_place(path))).free)
+    if have is None or need <= 0.9 * have:
+        return
+    kind = "memory" if path is None else "disk space"
+    request, advice = "this", ""
+    if edge is not None:
+        better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
+        request, advice = f"{word} {edge:g} mm", f"; try {word} {_up(better):g} mm"
+    raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
+
+
+def _bytes(n: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if n < 1000 or unit == "TB":
+            return f"{n:.3g} {unit}"
+        n /= 1000
+    return ""
+
+
+def _up(v: float) -> float:
+    """v, rounded up to two digits."""
+    unit = 10.0 ** (math.floor(math.log10(v)) - 1)
+    return round(math.ceil(v / unit) * unit, 12)
