@@ -136,26 +136,26 @@ impl Field for Lattice {
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         self.cell_gradients(points, values, gradients);
+        let ((s, c), folded) = (self.signs(), self.folded());
+        let cut = |f: &mut f64, g: &mut Vec3, t: f64, dt: Vec3| {
+            let s = if folded && *f < 0.0 { -s } else { s };
+            (*f, *g) = (s * *f + c * t, add(scale(*g, s), scale(dt, c)));
+        };
+        let both = values.iter_mut().zip(gradients);
+        if let Some(t) = self.uniform {
+            return both.for_each(|(f, g)| cut(f, g, t, [0.0; 3]));
+        }
         let n = points.len();
         let (mut t, mut dt) = (vec![0.0; n], vec![[0.0; 3]; n]);
-        match self.uniform {
-            Some(iso) => t.fill(iso),
-            None => {
-                self.level.grade().gradients(points, &mut t, &mut dt);
-                if let Level::Fraction(_) = self.level {
-                    for (t, dt) in t.iter_mut().zip(&mut dt) {
-                        let (iso, slope) = self.cell.iso(self.part, *t);
-                        (*t, *dt) = (iso, scale(*dt, slope));
-                    }
-                }
+        self.level.grade().gradients(points, &mut t, &mut dt);
+        if let Level::Fraction(_) = self.level {
+            for (t, dt) in t.iter_mut().zip(&mut dt) {
+                let (iso, slope) = self.cell.iso(self.part, *t);
+                (*t, *dt) = (iso, scale(*dt, slope));
             }
         }
-        let (s, c) = self.signs();
-        let folded = self.folded();
-        for i in 0..n {
-            let s = if folded && values[i] < 0.0 { -s } else { s };
-            values[i] = s * values[i] + c * t[i];
-            gradients[i] = add(scale(gradients[i], s), scale(dt[i], c));
+        for ((f, g), (t, dt)) in both.zip(t.into_iter().zip(dt)) {
+            cut(f, g, t, dt);
         }
     }
 
@@ -215,24 +215,24 @@ impl Lattice {
     /// node by node, and only where it is wanted.
     fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
         let Map::Affine(map) = &self.map;
-        let waves = RowWaves::new(self.cell.series().terms(), map, block);
+        let mut waves = RowWaves::new(self.cell.series().terms(), map, block);
         let [xs, ys, zs] = block.axes;
-        let mut isos = vec![self.uniform.unwrap_or(0.0); xs.len()];
+        let mut isos = vec![self.uniform.unwrap_or(0.0) as f32; xs.len()];
         let mut points: Vec<Vec3> = Vec::new();
         let mut found: Vec<f64> = Vec::new();
-        let mut coefficients = Vec::with_capacity(waves.groups.len());
-        let (s, c) = self.signs();
-        let (s, c) = (s as f32, c as f32);
+        let signs = self.signs();
+        let signs = (signs.0 as f32, signs.1 as f32);
         for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
             let (j, k) = (n % ys.len(), n / ys.len());
+            if j == 0 {
+                waves.enter_layer(k);
+            }
             let word = wanted.map_or(u64::MAX, |w| w[n]);
             let here = |i: usize| wanted.is_none() || word >> i & 1 == 1;
             if word == 0 {
                 row.fill(1.0);
                 continue;
             }
-            waves.coefficients(j, k, &mut coefficients);
-            sum_waves(&waves.along_x, &coefficients, row);
             if self.uniform.is_none() {
                 points.clear();
                 points.extend(
@@ -243,15 +243,10 @@ impl Lattice {
                 found.resize(points.len(), 0.0);
                 self.isos(&points, &mut found);
                 for (i, t) in (0..xs.len()).filter(|&i| here(i)).zip(&found) {
-                    isos[i] = *t;
+                    isos[i] = *t as f32;
                 }
             }
-            if self.folded() {
-                row.iter_mut().for_each(|f| *f = f.abs());
-            }
-            for (f, &t) in row.iter_mut().zip(&isos) {
-                *f = s * *f + c * t as f32;
-            }
+            fill_row(&waves, j, signs, self.folded(), &isos, row);
         }
     }
 }
@@ -274,6 +269,8 @@ struct RowWaves {
     along_y: Vec<Vec<Complex>>,
     /// For each term: e^{2πi kz z} at the nodes along z.
     along_z: Vec<Vec<Complex>>,
+    /// For each distinct wave number along x: the complex amplitude in the rows of the present layer.
+    rows: Vec<Vec<Complex>>,
 }
 
 impl RowWaves {
@@ -319,36 +316,57 @@ impl RowWaves {
                     .unzip()
             })
             .collect();
+        let rows = vec![vec![(0.0, 0.0); block.axes[1].len()]; groups.len()];
         RowWaves {
             along_x,
             groups,
             along_y,
             along_z,
+            rows,
         }
     }
 
-    /// The complex amplitude of each wave along the row (j, k).
-    fn coefficients(&self, j: usize, k: usize, out: &mut Vec<(f32, f32)>) {
-        out.clear();
-        for group in &self.groups {
-            let mut sum = (0.0, 0.0);
+    /// Finds the complex amplitudes of the rows in layer k.
+    fn enter_layer(&mut self, k: usize) {
+        for (group, rows) in self.groups.iter().zip(&mut self.rows) {
+            rows.fill((0.0, 0.0));
             for &(i, flip) in group {
-                let c = times(self.along_y[i][j], self.along_z[i][k]);
+                let z = self.along_z[i][k];
                 // Re(c e^{−ia}) = Re(conj(c) e^{ia}).
-                sum = (sum.0 + c.0, if flip { sum.1 - c.1 } else { sum.1 + c.1 });
+                let sign = if flip { -1.0 } else { 1.0 };
+                for (sum, &y) in rows.iter_mut().zip(&self.along_y[i]) {
+                    let c = times(y, z);
+                    *sum = (sum.0 + c.0, sum.1 + sign * c.1);
+                }
             }
-            out.push((sum.0 as f32, sum.1 as f32));
         }
     }
 }
 
+/// Sums the waves along row j of the present layer and cuts them at the levels.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn sum_waves(tables: &[(Vec<f32>, Vec<f32>)], coefficients: &[(f32, f32)], row: &mut [f32]) {
-    row.fill(0.0);
-    for ((cos, sin), &(re, im)) in tables.iter().zip(coefficients) {
-        for ((o, c), s) in row.iter_mut().zip(cos).zip(sin) {
-            *o += re * c - im * s;
+fn fill_row(
+    waves: &RowWaves,
+    j: usize,
+    (sign, of_level): (f32, f32),
+    folded: bool,
+    isos: &[f32],
+    row: &mut [f32],
+) {
+    for (n, ((cos, sin), amplitudes)) in waves.along_x.iter().zip(&waves.rows).enumerate() {
+        let (re, im) = (amplitudes[j].0 as f32, amplitudes[j].1 as f32);
+        let terms = row.iter_mut().zip(cos).zip(sin);
+        if n == 0 {
+            terms.for_each(|((o, c), s)| *o = re * c - im * s);
+        } else {
+            terms.for_each(|((o, c), s)| *o += re * c - im * s);
         }
+    }
+    let levels = row.iter_mut().zip(isos);
+    if folded {
+        levels.for_each(|(f, t)| *f = sign * f.abs() + of_level * t);
+    } else {
+        levels.for_each(|(f, t)| *f = sign * *f + of_level * t);
     }
 }
 

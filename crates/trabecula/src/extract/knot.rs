@@ -415,9 +415,11 @@ impl Knots<'_> {
                     .position(|r| *r == e)
                     .map_or(0, |at| names[at])
             };
-            self.extra
-                .triangles
-                .extend(case.triangles.iter().map(|t| (t.map(name), cut)));
+            self.extra.triangles.extend(
+                case.triangles[..case.count]
+                    .iter()
+                    .map(|t| (t.map(name), cut)),
+            );
             return;
         }
         self.cone(Key::center(node, 7), &names, cut);

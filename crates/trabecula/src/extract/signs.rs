@@ -216,17 +216,15 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 pub(super) fn negative(words: &mut Vec<u64>, samples: &[f32], nx: usize) {
     words.clear();
     for row in samples.chunks_exact(nx) {
-        let mut bytes = [0u8; 64];
-        for (byte, v) in bytes.iter_mut().zip(row) {
-            *byte = u8::from(*v <= 0.0);
-        }
         let mut signs = 0u64;
-        for (i, eight) in bytes.chunks_exact(8).enumerate() {
-            let mut low = [0u8; 8];
-            low.copy_from_slice(eight);
-            // Eight bytes of 0 or 1 gathered into the top byte, the first lowest.
-            let bits = u64::from_le_bytes(low).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-            signs |= bits << (8 * i);
+        let (whole, rest) = row.as_chunks::<32>();
+        for (k, values) in whole.iter().enumerate() {
+            // Thirty-two values, so that a lane of the vector is as wide as a value.
+            let lanes: [u32; 32] = core::array::from_fn(|i| u32::from(values[i] <= 0.0) << i);
+            signs |= u64::from(lanes.iter().fold(0, |w, b| w | b)) << (32 * k);
+        }
+        for (i, v) in rest.iter().enumerate() {
+            signs |= u64::from(*v <= 0.0) << (32 * whole.len() + i);
         }
         words.push(signs);
     }

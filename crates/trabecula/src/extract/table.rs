@@ -27,12 +27,15 @@ pub(super) const EDGES: [(usize, usize); 12] = [
     (6, 0),
 ];
 
+/// Most triangles in a cell.
+pub(super) const MOST: usize = 5;
+
 /// What a pattern of solid corners makes.
 pub(super) struct Case {
-    /// The edges that triangles use, each once.
-    pub edges: Vec<u8>,
-    /// Triangles as indices into `EDGES`, counter-clockwise seen from the void.
-    pub triangles: Vec<[u8; 3]>,
+    /// Triangles as indices into `EDGES`, counter-clockwise seen from the void; only the first `count` are meant.
+    pub triangles: [[u8; 3]; MOST],
+    /// Number of triangles.
+    pub count: usize,
     /// Whether there is one patch, and on no face solid corners that only touch diagonally.
     pub plain: bool,
     /// The loop around the patch, if it is plain: counter-clockwise seen from the void.
@@ -43,8 +46,11 @@ pub(super) struct Case {
 pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
     core::array::from_fn(|case| {
         let loops = loops(case);
-        let triangles = loops.iter().flat_map(|l| fan(l)).collect();
-        let edges = loops.iter().flatten().map(|&e| e as u8).collect();
+        let (mut triangles, mut count) = ([[0; 3]; MOST], 0);
+        for t in loops.iter().flat_map(|l| fan(l)) {
+            triangles[count] = t;
+            count += 1;
+        }
         let diagonal = |f: [usize; 4]| {
             let s = f.map(|c| case >> c & 1);
             s[0] == s[2] && s[1] == s[3] && s[0] != s[1]
@@ -52,8 +58,8 @@ pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
         let plain = loops.len() == 1 && !faces().any(diagonal);
         let ring = loops.iter().take(1).flatten().map(|&e| e as u8).collect();
         Case {
-            edges,
             triangles,
+            count,
             plain,
             ring,
         }
@@ -156,7 +162,7 @@ mod tests {
     fn every_pattern_is_closed_against_its_faces_and_faces_outwards() {
         for case in 1..255usize {
             let mut count = std::collections::HashMap::new();
-            for t in &CASES[case].triangles {
+            for t in &CASES[case].triangles[..CASES[case].count] {
                 for k in 0..3 {
                     *count.entry((t[k], t[(k + 1) % 3])).or_insert(0) += 1;
                 }
@@ -201,8 +207,8 @@ mod tests {
                     }
                 });
                 let p = |e: u8| point(e as usize, at[e as usize]);
-                for s in &CASES[case].triangles {
-                    for t in &CASES[case].triangles {
+                for s in &CASES[case].triangles[..CASES[case].count] {
+                    for t in &CASES[case].triangles[..CASES[case].count] {
                         for k in 0..3 {
                             let (a, b) = (s[k], s[(k + 1) % 3]);
                             if !t.contains(&a) && !t.contains(&b) {

@@ -28,7 +28,7 @@ use super::cap;
 use super::grid::{Grid, Local, TILE};
 use super::knot::{Extra, Key, Knots};
 use super::signs::{Signs, below, negative, within};
-use super::table::{CASES, EDGES};
+use super::table::{CASES, EDGES, MOST};
 
 /// The surface in one tile, by itself.
 #[derive(Default)]
@@ -89,7 +89,10 @@ impl Numbers {
 /// What plain cells make.
 #[derive(Default)]
 struct Plain {
+    /// Face by face.
     triangles: Vec<[u32; 3]>,
+    /// Number of triangles of each face.
+    counts: Vec<usize>,
     kinds: Vec<Kind>,
     /// The cells beside knotted ones: cell and face.
     seams: Vec<([usize; 3], usize)>,
@@ -126,9 +129,15 @@ struct Vertex {
 impl Vertex {
     #[inline]
     fn at(&self, t: f64) -> Vec3 {
-        let mut p = self.solid;
-        p[self.axis as usize] += t * self.reach;
-        p
+        // Chosen, not indexed: a number stored by index is not there yet when the whole is loaded.
+        let moved = self.solid.map(|x| x + t * self.reach);
+        core::array::from_fn(|a| {
+            if a == self.axis as usize {
+                moved[a]
+            } else {
+                self.solid[a]
+            }
+        })
     }
 
     /// Whether the solid end is the lower one.
@@ -319,13 +328,12 @@ fn list_face(
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
-                    let mut solid = [nodes.axes[0][i], nodes.axes[1][j], nodes.axes[2][k]];
-                    let along = &nodes.axes[axis][[i, j, k][axis]..];
-                    let length = along[1] - along[0];
+                    let node = [i, j, k];
                     let up = w >> i & 1 == 1;
-                    if !up {
-                        solid[axis] = along[1];
-                    }
+                    let solid = core::array::from_fn(|a| {
+                        nodes.axes[a][node[a] + usize::from(a == axis && !up)]
+                    });
+                    let length = nodes.axes[axis][node[axis] + 1] - nodes.axes[axis][node[axis]];
                     vertices.push(Vertex {
                         solid,
                         reach: if up { length } else { -length },
@@ -430,6 +438,7 @@ fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &[Range<usiz
         ..
     } = s;
     plain.triangles.clear();
+    plain.counts.clear();
     plain.kinds.clear();
     plain.seams.clear();
     for (face, numbers) in numbers.iter().enumerate().take(local.live.len()) {
@@ -438,7 +447,9 @@ fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &[Range<usiz
         } else {
             Kind::Lattice
         };
+        let before = plain.triangles.len();
         list_patches(signs, numbers, face, own, kind, plain);
+        plain.counts.push(plain.triangles.len() - before);
     }
 }
 
@@ -455,6 +466,7 @@ fn list_patches(
         triangles,
         kinds,
         seams,
+        ..
     } = out;
     let [_, ny, nz] = signs.shape;
     let cases = &*CASES;
@@ -481,15 +493,26 @@ fn list_patches(
                     if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
                 seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine;
             }
+            // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
+            let crossed = EDGES.map(|(corner, axis)| numbers.crossed[axis][rows[corner >> 1]]);
+            let first = EDGES.map(|(corner, axis)| numbers.offset[axis][rows[corner >> 1]]);
+            let signs = rows.map(|r| signs.negative[face][r]);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                let case = &cases[signs.corners(face, i, j, k)];
-                let mut names = [0u32; 12];
-                for &e in &case.edges {
-                    let (corner, axis) = EDGES[e as usize];
-                    names[e as usize] = numbers.of(axis, rows[corner >> 1], i + (corner & 1));
+                let pair = |w: u64| (w >> i & 3) as usize;
+                let corners = pair(signs[0])
+                    | pair(signs[1]) << 2
+                    | pair(signs[2]) << 4
+                    | pair(signs[3]) << 6;
+                let case = &cases[corners];
+                // All edges, crossed or not, and room for the most triangles: to count them takes longer. Sixteen
+                // names, so that four bits never lead outside.
+                let below = [(1u64 << i) - 1, (2u64 << i) - 1];
+                let mut names = [0u32; 16];
+                for (e, &(corner, _)) in EDGES.iter().enumerate() {
+                    names[e] = first[e] + (crossed[e] & below[corner & 1]).count_ones();
                 }
                 let mut kind = if mine >> i & 1 == 1 {
                     kind
@@ -500,8 +523,12 @@ fn list_patches(
                     seams.push(([i, j, k], face));
                     kind = Kind::Neighbour;
                 }
-                triangles.extend(case.triangles.iter().map(|t| t.map(|e| names[e as usize])));
-                kinds.resize(triangles.len(), kind);
+                let count = triangles.len() + case.count;
+                triangles
+                    .extend_from_slice(&case.triangles.map(|t| t.map(|e| names[e as usize & 15])));
+                triangles.truncate(count);
+                kinds.extend_from_slice(&[kind; MOST]);
+                kinds.truncate(count);
             }
         }
     }
@@ -514,29 +541,61 @@ fn list_patches(
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what faces its edge can move without running far along it.
 fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
-    let Scratch {
-        vertices,
-        plain,
-        places,
-        normals,
-        moments,
-        ..
-    } = s;
-    moments.clear();
-    moments.resize(vertices.len(), (0.0, 0.0));
-    for t in &plain.triangles {
+    s.moments.clear();
+    s.moments.resize(s.vertices.len(), (0.0, 0.0));
+    let mut rest = &s.plain.triangles[..];
+    for (face, numbers) in s.numbers.iter().enumerate().take(local.live.len()) {
+        let (triangles, others) = rest.split_at(s.plain.counts[face]);
+        rest = others;
+        // The face's vertices on edges along x come first, then y, then z.
+        let starts = [numbers.offset[1][0], numbers.offset[2][0]];
+        let edged = grid.faces[local.live[face]].cut;
+        share_out(
+            triangles,
+            starts,
+            edged,
+            &s.places,
+            &s.normals,
+            &mut s.moments,
+        );
+    }
+    for ((v, place), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.places).zip(&s.moments) {
+        // Volume gained per unit of t: a third of the ring's area as seen along the edge.
+        let gain = area * v.reach / 3.0;
+        if gain > 0.0 {
+            let step = (volume / gain).clamp(-0.25, 0.25);
+            v.t = (v.t + step).clamp(grid.margin, 1.0 - grid.margin);
+            *place = v.at(v.t);
+        }
+    }
+}
+
+/// Gives the corners of a face's triangles their shares. `edged`: the face may have edges of its own.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn share_out(
+    triangles: &[[u32; 3]],
+    starts: [u32; 2],
+    edged: bool,
+    places: &[Vec3],
+    normals: &[Vec3],
+    moments: &mut [(f64, f64)],
+) {
+    for t in triangles {
         let [a, b, c] = t.map(|v| places[v as usize]);
         let [na, nb, nc] = t.map(|v| normals[v as usize]);
         let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
         // A turn of more than 45 degrees within a triangle is an edge of the region, not its curvature.
-        let face = local.live[usize::from(vertices[t[0] as usize].face)];
-        if grid.faces[face].cut && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+        if edged && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
         let n = cross(ab, sub(c, a));
         let volume = above * 0.5 * norm(n);
-        let facing = t.map(|v| n[vertices[v as usize].axis as usize]);
+        let facing = t.map(|v| match v {
+            v if v < starts[0] => n[0],
+            v if v < starts[1] => n[1],
+            _ => n[2],
+        });
         let sum = facing[0] * facing[0] + facing[1] * facing[1] + facing[2] * facing[2];
         if sum > 0.0 {
             for (&v, facing) in t.iter().zip(facing) {
@@ -544,15 +603,6 @@ fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
                 m.0 += volume * facing * facing / sum;
                 m.1 += 0.5 * facing;
             }
-        }
-    }
-    for ((v, place), &(volume, area)) in vertices.iter_mut().zip(places).zip(&*moments) {
-        // Volume gained per unit of t: a third of the ring's area as seen along the edge.
-        let gain = area * v.reach / 3.0;
-        if gain > 0.0 {
-            let step = (volume / gain).clamp(-0.25, 0.25);
-            v.t = (v.t + step).clamp(grid.margin, 1.0 - grid.margin);
-            *place = v.at(v.t);
         }
     }
 }
