@@ -1,4 +1,4 @@
-//! Fraction ↔ iso: the distribution of a cell's values on the torus.
+//! Fraction ↔ iso: the distribution of a cell's values, or of distances to its mid-surface, on the torus.
 //!
 //! V(t) = vol{f < t}. The torus is cut into N³ cubes. In each, f is replaced by a ramp with the exact mean of f over
 //! the cube (each plane wave times its sinc factors) and the variance that its slope gives, so the error of a cube is
@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::Part;
+use super::connect::Function;
 use super::series::Series;
 
 /// Cubes along an axis for a wave of index one; finer waves get proportionally more.
@@ -35,9 +36,15 @@ impl Quantile {
             .max()
             .unwrap_or(1) as usize;
         let n = (CUBES * top.div_ceil(2)).clamp(CUBES, 192);
+        let mean = series.averaged(1.0 / n as f64);
+        Self::of(&|u, v, g| mean.gradients(u, v, g), n, series.amplitude())
+    }
+
+    /// The distribution of a function on the torus of at most `most` either way. `mean` gives its means over cubes of
+    /// edge 1/n about phases, and their gradients.
+    pub(super) fn of(mean: Function, n: usize, most: f64) -> Quantile {
         let h = 1.0 / n as f64;
-        let mean = series.averaged(h);
-        let most = series.amplitude() * (1.0 + 1e-9);
+        let most = most * (1.0 + 1e-9);
         let (start, step) = (-most, 2.0 * most / (LEVELS - 1) as f64);
         // Second differences of V at the levels: ramps start and stop. Layers are added in order: same sums always.
         let layers: Vec<Vec<(f64, f64)>> = (0..n)
@@ -59,7 +66,7 @@ impl Quantile {
                     })
                     .collect();
                 let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
-                mean.gradients(&u, &mut v, &mut g);
+                mean(&u, &mut v, &mut g);
                 // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
                 let width = |g: &[f64; 3]| (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h;
                 v.iter()
