@@ -4,6 +4,7 @@ mod connect;
 mod curvature;
 mod distance;
 mod named;
+mod nearest;
 mod quantile;
 mod series;
 mod spline;

@@ -123,7 +123,7 @@ fn judged(series: &Series, map: Affine, thickness: Grade, edge: f64) -> [f64; 2]
     let mut half = vec![0.0; faces.len()];
     lattice.isos(&faces, &mut half);
     let mut found = [f64::INFINITY, 0.0f64];
-    for i in (0..faces.len()).step_by(faces.len() / 150) {
+    for i in (0..faces.len()).step_by(faces.len() / 80) {
         let d = search.distance(faces[i], 2.0 * half[i] + 0.05 * longest) / half[i];
         found = [found[0].min(d), found[1].max(d)];
     }
@@ -261,17 +261,16 @@ fn fractions_are_those_of_the_field() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(10))]
 
-    /// No value in a box lies outside its bound, and no difference quotient above the steepness it comes from.
+    /// No value in a box lies outside its bound, and points and gradients give the same values.
     #[test]
     fn bounds_hold(
         which in 0..catalogue().len(),
         wavelength in prop::array::uniform3(2.0..6.0f64),
         rotate in prop::array::uniform3(-90.0..90.0f64),
-        corner in prop::array::uniform3(-20.0..20.0f64),
-        size in 0.01..3.0f64,
-        places in prop::collection::vec(prop::array::uniform3(0.0..1.0f64), 200),
+        boxes in prop::collection::vec((prop::array::uniform3(-20.0..20.0f64), 0.01..3.0f64), 60),
+        places in prop::collection::vec(prop::array::uniform3(0.0..1.0f64), 60),
         graded in any::<bool>(),
     ) {
         let name = catalogue()[which].name;
@@ -281,70 +280,19 @@ proptest! {
             Grade::Constant(0.5)
         };
         let lattice = wall(series(name), Level::Thickness(grade), rigid(wavelength, rotate));
-        let b = Aabb { min: corner, max: corner.map(|c| c + size) };
-        let bound = lattice.bound(&b);
-        let points: Vec<Vec3> = places
-            .iter()
-            .map(|p| core::array::from_fn(|a| corner[a] + size * p[a]))
-            .collect();
-        let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-        let mut w = v.clone();
-        lattice.gradients(&points, &mut v, &mut g);
-        lattice.values(&points, &mut w);
-        prop_assert_eq!(&v, &w);
-        for v in &v {
-            prop_assert!(bound.lo <= *v && *v <= bound.hi, "{} {:?} {}", name, bound, v);
-        }
-    }
-}
-
-#[test]
-fn speed() {
-    for (name, degrees) in [
-        ("gyroid", [0.0; 3]),
-        ("gyroid", [20.0, 35.0, 50.0]),
-        ("iwp", [20.0, 35.0, 50.0]),
-    ] {
-        let axis: Vec<f64> = (0..64).map(|i| 5.0 / 32.0 * f64::from(i)).collect();
-        let block = Block {
-            axes: [&axis, &axis, &axis],
-        };
-        for level in [
-            Level::Thickness(Grade::Constant(0.5)),
-            Level::Iso(Grade::Constant(0.5)),
-        ] {
-            let lattice = wall(series(name), level, rigid([5.0; 3], degrees));
-            let mut out = vec![0f32; block.len()];
-            let least = |n: usize, f: &mut dyn FnMut()| {
-                (0..n)
-                    .map(|_| {
-                        let t = std::time::Instant::now();
-                        f();
-                        t.elapsed().as_secs_f64()
-                    })
-                    .fold(f64::INFINITY, f64::min)
-            };
-            println!(
-                "{name} {degrees:?}: fills {:.1} M/s",
-                block.len() as f64 / least(100, &mut || lattice.fill(&block, &mut out)) / 1e6
-            );
-            let points: Vec<Vec3> = (0..64 * 64)
-                .map(|i| [axis[i % 64], axis[i / 64], 0.3])
+        for (corner, size) in boxes {
+            let bound = lattice.bound(&Aabb { min: corner, max: corner.map(|c| c + size) });
+            let points: Vec<Vec3> = places
+                .iter()
+                .map(|p| core::array::from_fn(|a| corner[a] + size * p[a]))
                 .collect();
             let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-            println!(
-                "gradients {:.1} M/s",
-                points.len() as f64
-                    / least(1000, &mut || lattice.gradients(&points, &mut v, &mut g))
-                    / 1e6
-            );
-            if let Level::Thickness(_) = lattice.level {
-                println!(
-                    "made in {}",
-                    least(5, &mut || {
-                        Distance::new(lattice.cell.series(), &lattice.map.jacobian([0.0; 3]));
-                    })
-                );
+            let mut w = v.clone();
+            lattice.gradients(&points, &mut v, &mut g);
+            lattice.values(&points, &mut w);
+            prop_assert_eq!(&v, &w);
+            for v in &v {
+                prop_assert!(bound.lo <= *v && *v <= bound.hi, "{} {:?} {}", name, bound, v);
             }
         }
     }

@@ -3,7 +3,7 @@
 use serde_json::{Value as Json, json};
 
 use super::{Built, build::LOOKS, sample};
-use crate::cell::Part;
+use crate::cell::{Distance, Part};
 use crate::lattice::{Lattice, Level};
 
 /// The least and the greatest of a number over a region.
@@ -102,6 +102,7 @@ pub(super) fn report(built: &Built) -> Json {
                 "fraction": fraction.json(),
                 "porosity": fraction.map(|f| 1.0 - f).json(),
                 "thickness": thickness(lattice, iso),
+                "folding": lattice.distance().and_then(Distance::folding),
                 "connected_fraction": lattice.connected_fraction(),
             }),
         );
