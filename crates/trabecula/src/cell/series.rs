@@ -147,6 +147,17 @@ impl Series {
         Series::new(self.terms.iter().copied().chain([constant]).collect())
     }
 
+    /// The series times a factor.
+    pub fn scaled(&self, by: f64) -> Series {
+        let times = |t: &Term| Term {
+            amplitude: t.amplitude * by,
+            ..*t
+        };
+        Series {
+            terms: self.terms.iter().map(times).collect(),
+        }
+    }
+
     /// Value, gradient (per turn) and second derivatives at one phase.
     pub fn second(&self, u: Vec3) -> (f64, Vec3, Mat3) {
         let (mut f, mut g, mut h) = (0.0, [0.0; 3], [[0.0; 3]; 3]);

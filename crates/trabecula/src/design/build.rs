@@ -259,6 +259,15 @@ fn check_solid(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(
     Err(DesignError::new(path, message))
 }
 
+/// A length in a sentence.
+fn figure(v: f64) -> String {
+    if (1e-2..1e6).contains(&v) {
+        format!("{v:.4}")
+    } else {
+        format!("{v:.2e}")
+    }
+}
+
 fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
     let fraction = Varied::of_fraction(lattice, place.points);
     let whole = lattice.connected_fraction();
@@ -282,13 +291,29 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             message,
         });
     }
+    if let Some(error) = lattice.distance().map(Distance::error) {
+        let half = Varied::of_iso(lattice, place.points);
+        if error > 0.025 * half.min {
+            let message = format!(
+                "the mid-surface bends too sharply for its table of distances: a thickness of {} mm is met only within {} mm; \
+                 give a fraction, or a cell of fewer waves or less stretch",
+                figure(2.0 * half.min),
+                figure(2.0 * error)
+            );
+            warnings.push(Warning {
+                path: format!("{}.level.{}", place.path, amount_key(spec)),
+                message,
+            });
+        }
+    }
     if let Some(limit) = lattice.distance().and_then(Distance::folding) {
         let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
         if thickness.max > limit {
+            let most = figure(thickness.max);
             let message = format!(
-                "a thickness of {thickness} mm is above the folding limit, {limit:.4} mm, twice the least radius of \
-                 curvature of the mid-surface: there the wall's faces meet in creases and it is not {:.4} mm thick",
-                thickness.max
+                "a thickness of {most} mm is above the folding limit, {} mm, twice the least radius of curvature of the \
+                 mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
+                figure(limit)
             );
             warnings.push(Warning {
                 path: format!("{}.level.{}", place.path, amount_key(spec)),
