@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
-__all__ = ["fraction", "iso", "porosity"]
+__all__ = ["fraction", "iso", "porosity", "thickness"]
 
 Amount = float | dict
 
 
-def iso(value: Amount) -> dict:
-    """The field value t: sheet |f| ≤ t, lower f ≤ t, upper f ≥ t."""
-    return {"iso": value}
+def iso(value: Amount, mid: float = 0.0) -> dict:
+    """The field value t: sheet |f| ≤ t, lower f ≤ t, upper f ≥ t.
+
+    ``mid`` moves a sheet off its centre: |f - mid| ≤ t.
+    """
+    return _level("iso", value, mid=mid)
 
 
-def fraction(value: Amount, of: str = "cell", fit: str = "table") -> dict:
+def thickness(value: Amount, mid: float = 0.0) -> dict:
+    """The thickness w of a sheet's wall in mm: solid is what lies within w/2 of the mid-surface f = ``mid``.
+
+    It is the distance in space that counts, also with unequal wavelengths and shears. Above twice the least radius of
+    curvature of the mid-surface a wall folds; building then warns with the limit.
+    """
+    return _level("thickness", value, mid=mid)
+
+
+def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
     """The solid volume fraction, between 0 and 1, of the periodic cell (``of="cell"``) or of the finished part
     (``of="part"``, solved for).
 
     ``fit="spartan"`` uses the SPARTAN polynomial instead of the cell's own distribution (part ``lower``; diamond,
-    gyroid).
+    gyroid). ``mid`` moves a sheet off its centre: |f - mid| ≤ t.
     """
-    return _level("fraction", value, of, fit)
+    return _level("fraction", value, of, fit, mid)
 
 
-def porosity(value: Amount, of: str = "cell", fit: str = "table") -> dict:
+def porosity(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
     """One minus the solid fraction; see ``fraction``."""
-    return _level("porosity", value, of, fit)
+    return _level("porosity", value, of, fit, mid)
 
 
-def _level(key: str, value: Amount, of: str, fit: str) -> dict:
-    made: dict = {key: value}
-    if of != "cell":
-        made["of"] = of
-    if fit != "table":
-        made["fit"] = fit
-    return made
+def _level(key: str, value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
+    given = {"of": (of, "cell"), "fit": (fit, "table"), "mid": (mid, 0.0)}
+    return {key: value} | {k: v for k, (v, usual) in given.items() if v != usual}

@@ -60,7 +60,8 @@ class Solid(Picture):
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``.
 
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
-        and the warnings.
+        and the warnings. Where the level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which
+        the wall folds.
         """
         return json.loads(self._core.report())
 

@@ -1,12 +1,17 @@
 //! Cells: functions on the torus R³/Z³, positions in turns.
 
 mod connect;
+mod curvature;
+mod distance;
 mod named;
+mod nearest;
 mod quantile;
 mod series;
+mod spline;
 mod thickness;
 
 pub use connect::{Connectivity, connectivity};
+pub use distance::Distance;
 pub use named::{Named, catalogue, named};
 pub use series::{Series, Term};
 

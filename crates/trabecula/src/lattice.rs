@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use multiversion::multiversion;
 
-use crate::cell::{Cell, Part, Term};
+use crate::cell::{Cell, Distance, Part, Term};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::{Affine, Map};
@@ -17,18 +17,23 @@ pub enum Level {
     Iso(Grade),
     /// Solid volume fraction of the cell on the torus.
     Fraction(Grade),
+    /// Thickness w of the wall in mm: solid is what lies within w/2 of the mid-surface f = 0. For sheets.
+    Thickness(Grade),
 }
 
 impl Level {
     /// The number that was given.
     pub fn grade(&self) -> &Grade {
         match self {
-            Level::Iso(g) | Level::Fraction(g) => g,
+            Level::Iso(g) | Level::Fraction(g) | Level::Thickness(g) => g,
         }
     }
 }
 
-/// A lattice as a field: sheet |f| − t, lower f − t, upper t − f, with f = cell ∘ map.
+/// A lattice as a field: sheet |f| − t, lower f − t, upper t − f.
+///
+/// f is the core: cell ∘ map, or, where the level is a thickness w, the signed distance (mm) to the mid-surface
+/// cell ∘ map = 0; t is the level of the core: the iso, the one of the fraction, or w/2.
 #[derive(Clone)]
 pub struct Lattice {
     /// The cell.
@@ -39,6 +44,8 @@ pub struct Lattice {
     pub part: Part,
     /// The level.
     pub level: Level,
+    /// The core, where it is a distance.
+    distance: Option<Arc<Distance>>,
     /// A bound of |∇f|, per mm.
     steepness: f64,
     /// t, where it does not vary.
@@ -50,16 +57,26 @@ pub struct Lattice {
 impl Lattice {
     /// Joins the pieces.
     pub fn new(cell: Arc<Cell>, map: Map, part: Part, level: Level) -> Lattice {
-        let steepness = cell.steepness(&map.jacobian([0.0; 3]));
+        let to_phase = map.jacobian([0.0; 3]);
+        let distance = match &level {
+            Level::Thickness(_) => Some(Arc::new(Distance::new(cell.series(), &to_phase))),
+            _ => None,
+        };
+        let steepness = match &distance {
+            Some(d) => d.steepness(),
+            None => cell.steepness(&to_phase),
+        };
         let uniform = match &level {
             Level::Iso(g) => g.constant(),
             Level::Fraction(g) => g.constant().map(|p| cell.level(part, p)),
+            Level::Thickness(g) => g.constant().map(|w| 0.5 * w),
         };
         Lattice {
             cell,
             map,
             part,
             level,
+            distance,
             steepness,
             uniform,
             side: None,
@@ -80,62 +97,140 @@ impl Lattice {
         self.part == Part::Sheet && self.side.is_none()
     }
 
-    /// Fills the level t at points (mm).
-    pub fn isos(&self, points: &[Vec3], out: &mut [f64]) {
-        if let Some(t) = self.uniform {
-            return out.fill(t);
-        }
-        self.level.grade().values(points, out);
-        if let Level::Fraction(_) = self.level {
-            for t in out.iter_mut() {
-                *t = self.cell.iso(self.part, *t).0;
-            }
-        }
+    /// The signed distance to the mid-surface, where the level is a thickness.
+    pub fn distance(&self) -> Option<&Distance> {
+        self.distance.as_deref()
     }
 
-    /// Fills the solid fraction of the cell at points (mm).
-    pub fn fractions(&self, points: &[Vec3], out: &mut [f64]) {
-        match &self.level {
-            Level::Fraction(g) => g.values(points, out),
-            Level::Iso(_) => {
-                self.isos(points, out);
-                for t in out.iter_mut() {
-                    *t = self.cell.fraction(self.part, *t);
-                }
-            }
-        }
-    }
-
-    /// f and ∇f (per mm) at points.
-    fn cell_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    /// Fills the core f at points (mm).
+    pub fn cores(&self, points: &[Vec3], out: &mut [f64]) {
         let mut u = vec![[0.0; 3]; points.len()];
         self.map.phases(points, &mut u);
-        self.cell.gradients(&u, values, gradients);
+        match &self.distance {
+            Some(d) => d.values(&u, out),
+            None => self
+                .cell
+                .gradients(&u, out, &mut vec![[0.0; 3]; points.len()]),
+        }
+    }
+
+    /// Fills the core f and ∇f (per mm) at points (mm).
+    pub fn core_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let mut u = vec![[0.0; 3]; points.len()];
+        self.map.phases(points, &mut u);
+        match &self.distance {
+            Some(d) => d.gradients(&u, values, gradients),
+            None => self.cell.gradients(&u, values, gradients),
+        }
         let Map::Affine(a) = &self.map;
         let back = transpose(&a.matrix);
         for g in gradients.iter_mut() {
             *g = apply(&back, *g);
         }
     }
+
+    /// An interval that contains the core's values in the box.
+    fn core_bound(&self, b: &Aabb) -> Interval {
+        let mut v = [0.0];
+        self.cores(&[b.center()], &mut v);
+        let reach = self.steepness * norm(b.size()) / 2.0;
+        let all = match &self.distance {
+            Some(d) => d.range(),
+            None => {
+                let most = self.cell.series().amplitude();
+                Interval::new(-most, most)
+            }
+        };
+        Interval::new((v[0] - reach).max(all.lo), (v[0] + reach).min(all.hi))
+    }
+
+    /// The level t of the core where the level's number is `v`, and its slope.
+    fn iso(&self, v: f64) -> (f64, f64) {
+        match self.level {
+            Level::Iso(_) => (v, 1.0),
+            Level::Fraction(_) => self.cell.iso(self.part, v),
+            Level::Thickness(_) => (0.5 * v, 0.5),
+        }
+    }
+
+    /// Fills the core's level t at points (mm).
+    pub fn isos(&self, points: &[Vec3], out: &mut [f64]) {
+        if let Some(t) = self.uniform {
+            return out.fill(t);
+        }
+        self.level.grade().values(points, out);
+        for t in out.iter_mut() {
+            *t = self.iso(*t).0;
+        }
+    }
+
+    /// Fills the core's level t and its gradient (per mm) at points (mm).
+    pub fn iso_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        if let Some(t) = self.uniform {
+            values.fill(t);
+            return gradients.fill([0.0; 3]);
+        }
+        self.level.grade().gradients(points, values, gradients);
+        for (t, dt) in values.iter_mut().zip(gradients) {
+            let (iso, slope) = self.iso(*t);
+            (*t, *dt) = (iso, scale(*dt, slope));
+        }
+    }
+
+    /// An interval that contains the core's levels in the box.
+    fn iso_bound(&self, b: &Aabb) -> Interval {
+        if let Some(t) = self.uniform {
+            return Interval::new(t, t);
+        }
+        let mut v = self.level.grade().bound(b);
+        if let Level::Fraction(_) = self.level {
+            v = Interval::new(v.lo.clamp(0.0, 1.0), v.hi.clamp(0.0, 1.0));
+        }
+        let ends = [v.lo, v.hi].map(|v| self.iso(v).0);
+        Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
+    }
+
+    /// Fills the solid fraction of the cell at points (mm).
+    pub fn fractions(&self, points: &[Vec3], out: &mut [f64]) {
+        if let Level::Fraction(g) = &self.level {
+            return g.values(points, out);
+        }
+        self.isos(points, out);
+        for t in out.iter_mut() {
+            *t = self.fraction(*t);
+        }
+    }
+
+    /// The solid fraction of the cell where the core's level is t.
+    pub fn fraction(&self, t: f64) -> f64 {
+        match &self.distance {
+            Some(d) => d.fraction(self.part, t),
+            None => self.cell.fraction(self.part, t),
+        }
+    }
+
+    /// The intervals of solid fraction in which the periodic solid is one piece in R³.
+    pub fn connected_fraction(&self) -> Vec<[f64; 2]> {
+        match &self.distance {
+            Some(d) => d.connected_fraction(self.part),
+            None => self.cell.connected_fraction(self.part),
+        }
+    }
 }
 
 impl Field for Lattice {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let mut scratch = vec![[0.0; 3]; points.len()];
-        let mut u = vec![[0.0; 3]; points.len()];
-        self.map.phases(points, &mut u);
-        self.cell.gradients(&u, out, &mut scratch);
+        self.cores(points, out);
         let mut t = vec![0.0; points.len()];
         self.isos(points, &mut t);
-        let (s, c) = self.signs();
-        let folded = self.folded();
+        let ((s, c), folded) = (self.signs(), self.folded());
         for (f, t) in out.iter_mut().zip(t) {
             *f = s * if folded { f.abs() } else { *f } + c * t;
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        self.cell_gradients(points, values, gradients);
+        self.core_gradients(points, values, gradients);
         let ((s, c), folded) = (self.signs(), self.folded());
         let cut = |f: &mut f64, g: &mut Vec3, t: f64, dt: Vec3| {
             let s = if folded && *f < 0.0 { -s } else { s };
@@ -147,33 +242,14 @@ impl Field for Lattice {
         }
         let n = points.len();
         let (mut t, mut dt) = (vec![0.0; n], vec![[0.0; 3]; n]);
-        self.level.grade().gradients(points, &mut t, &mut dt);
-        if let Level::Fraction(_) = self.level {
-            for (t, dt) in t.iter_mut().zip(&mut dt) {
-                let (iso, slope) = self.cell.iso(self.part, *t);
-                (*t, *dt) = (iso, scale(*dt, slope));
-            }
-        }
+        self.iso_gradients(points, &mut t, &mut dt);
         for ((f, g), (t, dt)) in both.zip(t.into_iter().zip(dt)) {
             cut(f, g, t, dt);
         }
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        let (mut v, mut g) = ([0.0], [[0.0; 3]]);
-        self.cell_gradients(&[b.center()], &mut v, &mut g);
-        let reach = self.steepness * norm(b.size()) / 2.0;
-        let most = self.cell.series().amplitude();
-        let f = Interval::new((v[0] - reach).max(-most), (v[0] + reach).min(most));
-        let t = match (self.uniform, &self.level) {
-            (Some(t), _) => Interval::new(t, t),
-            (None, Level::Iso(g)) => g.bound(b),
-            (None, Level::Fraction(g)) => {
-                let p = g.bound(b);
-                let ends = [p.lo, p.hi].map(|p| self.cell.iso(self.part, p.clamp(0.0, 1.0)).0);
-                Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
-            }
-        };
+        let (f, t) = (self.core_bound(b), self.iso_bound(b));
         match (self.part, self.side) {
             (Part::Sheet, Some(Part::Upper)) => -f - t,
             (Part::Sheet, None) => f.abs() - t,
@@ -210,29 +286,27 @@ impl Field for Lattice {
 }
 
 impl Lattice {
-    /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
-    /// multiplications per distinct wave number along x and no trigonometry. Only a level that varies is looked up
-    /// node by node, and only where it is wanted.
+    /// Only a level that varies is looked up node by node, and only where it is wanted.
     fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
-        let Map::Affine(map) = &self.map;
-        let mut waves = RowWaves::new(self.cell.series().terms(), map, block);
+        let mut cores = Rows::new(self, block);
         let [xs, ys, zs] = block.axes;
         let mut isos = vec![self.uniform.unwrap_or(0.0) as f32; xs.len()];
         let mut points: Vec<Vec3> = Vec::new();
         let mut found: Vec<f64> = Vec::new();
-        let signs = self.signs();
-        let signs = (signs.0 as f32, signs.1 as f32);
+        let (sign, of_level) = self.signs();
+        let (sign, of_level, folded) = (sign as f32, of_level as f32, self.folded());
         for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
             let (j, k) = (n % ys.len(), n / ys.len());
-            if j == 0 {
-                waves.enter_layer(k);
-            }
             let word = wanted.map_or(u64::MAX, |w| w[n]);
             let here = |i: usize| wanted.is_none() || word >> i & 1 == 1;
+            if j == 0 {
+                cores.enter_layer(k);
+            }
             if word == 0 {
                 row.fill(1.0);
                 continue;
             }
+            cores.fill(j, k, row);
             if self.uniform.is_none() {
                 points.clear();
                 points.extend(
@@ -246,7 +320,50 @@ impl Lattice {
                     isos[i] = *t as f32;
                 }
             }
-            fill_row(&waves, j, signs, self.folded(), &isos, row);
+            let levels = row.iter_mut().zip(&isos);
+            if folded {
+                levels.for_each(|(f, t)| *f = sign * f.abs() + of_level * t);
+            } else {
+                levels.for_each(|(f, t)| *f = sign * *f + of_level * t);
+            }
+        }
+    }
+}
+
+/// The core on the rows of a block.
+///
+/// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
+/// multiplications per distinct wave number along x and no trigonometry; a distance is looked up in its table.
+enum Rows<'a> {
+    Waves(RowWaves),
+    Distance(&'a Distance, &'a Affine, Block<'a>),
+}
+
+impl<'a> Rows<'a> {
+    fn new(lattice: &'a Lattice, block: &Block<'a>) -> Rows<'a> {
+        let Map::Affine(map) = &lattice.map;
+        match &lattice.distance {
+            Some(d) => Rows::Distance(d, map, *block),
+            None => Rows::Waves(RowWaves::new(lattice.cell.series().terms(), map, block)),
+        }
+    }
+
+    /// Makes ready for the rows of layer k.
+    fn enter_layer(&mut self, k: usize) {
+        if let Rows::Waves(waves) = self {
+            waves.enter_layer(k);
+        }
+    }
+
+    /// Fills the row (j, k) of the layer entered last.
+    fn fill(&mut self, j: usize, k: usize, row: &mut [f32]) {
+        match self {
+            Rows::Waves(waves) => sum_waves(waves, j, row),
+            Rows::Distance(d, map, block) => {
+                let [xs, ys, zs] = block.axes;
+                let base = add(apply(&map.matrix, [0.0, ys[j], zs[k]]), map.shift);
+                d.fill_row(base, map.matrix.map(|r| r[0]), xs, row);
+            }
         }
     }
 }
@@ -343,16 +460,9 @@ impl RowWaves {
     }
 }
 
-/// Sums the waves along row j of the present layer and cuts them at the levels.
+/// Sums the waves along row j of the present layer.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn fill_row(
-    waves: &RowWaves,
-    j: usize,
-    (sign, of_level): (f32, f32),
-    folded: bool,
-    isos: &[f32],
-    row: &mut [f32],
-) {
+fn sum_waves(waves: &RowWaves, j: usize, row: &mut [f32]) {
     for (n, ((cos, sin), amplitudes)) in waves.along_x.iter().zip(&waves.rows).enumerate() {
         let (re, im) = (amplitudes[j].0 as f32, amplitudes[j].1 as f32);
         let terms = row.iter_mut().zip(cos).zip(sin);
@@ -361,12 +471,6 @@ fn fill_row(
         } else {
             terms.for_each(|((o, c), s)| *o += re * c - im * s);
         }
-    }
-    let levels = row.iter_mut().zip(isos);
-    if folded {
-        levels.for_each(|(f, t)| *f = sign * f.abs() + of_level * t);
-    } else {
-        levels.for_each(|(f, t)| *f = sign * *f + of_level * t);
     }
 }
 

@@ -17,7 +17,7 @@ mod forest;
 mod grid;
 mod sublattice;
 
-pub(super) use critical::{Critical, Function, critical, sample};
+pub(super) use critical::{Critical, Function, critical, eigen, sample};
 use forest::{Forest, Joined};
 use grid::{DIRECTIONS, Grid};
 use sublattice::{Int3, Sublattice};

@@ -1,4 +1,4 @@
-//! Fraction ↔ iso: the distribution of a cell's values on the torus.
+//! Fraction ↔ iso: the distribution of a cell's values, or of distances to its mid-surface, on the torus.
 //!
 //! V(t) = vol{f < t}. The torus is cut into N³ cubes. In each, f is replaced by a ramp with the exact mean of f over
 //! the cube (each plane wave times its sinc factors) and the variance that its slope gives, so the error of a cube is
@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::Part;
 use super::series::Series;
+use crate::math::Vec3;
 
 /// Cubes along an axis for a wave of index one; finer waves get proportionally more.
 const CUBES: usize = 96;
@@ -25,12 +26,21 @@ pub(super) struct Quantile {
     sheet: Vec<f64>,
 }
 
+/// A function on rows: phases along x, phases along y and z, values, gradients.
+pub(super) type Rows<'a> = &'a (dyn Fn(&[f64], [f64; 2], &mut [f64], &mut [Vec3]) + Sync);
+
 impl Quantile {
     pub(super) fn new(series: &Series) -> Quantile {
         let n = (CUBES * series.top().div_ceil(2)).clamp(CUBES, 192);
+        let mean = series.averaged(1.0 / n as f64);
+        Self::of(&|x, yz, v, g| mean.row(x, yz, v, g), n, series.amplitude())
+    }
+
+    /// The distribution of a function on the torus of at most `most` either way. `mean` gives, for rows along x at
+    /// some y and z, its means over cubes of edge 1/n about phases, and their gradients.
+    pub(super) fn of(mean: Rows, n: usize, most: f64) -> Quantile {
         let h = 1.0 / n as f64;
-        let mean = series.averaged(h);
-        let most = series.amplitude() * (1.0 + 1e-9);
+        let most = most * (1.0 + 1e-9);
         let (start, step) = (-most, 2.0 * most / (LEVELS - 1) as f64);
         // Second differences of V at the levels: ramps start and stop. Layers are added in order: same sums always.
         let layers: Vec<Vec<(f64, f64)>> = (0..n)
@@ -45,7 +55,7 @@ impl Quantile {
                 for (j, (v, g)) in v.chunks_mut(n).zip(g.chunks_mut(n)).enumerate() {
                     let x: Vec<f64> = (0..n).map(|i| (i as f64 + shift(j)) * h).collect();
                     let at = [(j as f64 + 0.397) * h, (k as f64 + 0.633) * h];
-                    mean.row(&x, at, v, g);
+                    mean(&x, at, v, g);
                 }
                 // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
                 let width = |g: &[f64; 3]| (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use multiversion::multiversion;
 
 use crate::fault::Fault;
-use crate::math::{Vec3, sin_cos_turns};
+use crate::math::{Mat3, Vec3, dot, scale, sin_cos_turns};
 
 /// One plane wave: amplitude · cos 2π(h·u + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,6 +171,47 @@ impl Series {
             Series::of(self.terms.iter().map(divided).collect()),
             factors,
         )
+    }
+
+    /// The same series less a constant: its surface f = 0 is this one's f = `level`.
+    ///
+    /// # Errors
+    /// A level that is not finite.
+    pub fn about(&self, level: f64) -> Result<Series, Fault> {
+        let constant = Term {
+            hkl: [0; 3],
+            amplitude: -level,
+            phase: 0.0,
+        };
+        Series::new(self.terms.iter().copied().chain([constant]).collect())
+    }
+
+    /// The series times a factor.
+    pub fn scaled(&self, by: f64) -> Series {
+        let times = |t: &Term| Term {
+            amplitude: t.amplitude * by,
+            ..*t
+        };
+        Series::of(self.terms.iter().map(times).collect())
+    }
+
+    /// Value, gradient (per turn) and second derivatives at one phase.
+    pub fn second(&self, u: Vec3) -> (f64, Vec3, Mat3) {
+        let (mut f, mut g, mut h) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
+        for t in &self.terms {
+            let k = t.hkl.map(f64::from);
+            let (s, c) = sin_cos_turns(dot(k, u) + t.phase);
+            let (s, c) = (t.amplitude * s, t.amplitude * c);
+            f += c;
+            let k = scale(k, core::f64::consts::TAU);
+            for i in 0..3 {
+                g[i] -= s * k[i];
+                for j in 0..3 {
+                    h[i][j] -= c * k[i] * k[j];
+                }
+            }
+        }
+        (f, g, h)
     }
 
     /// Values and gradients (per turn) at phases `u` (turns). The three slices have equal length.

@@ -25,18 +25,24 @@ pub fn wall(f: Function, iso: f64, to_phase: &Mat3) -> Option<f64> {
     let back = transpose(to_phase);
     // Along a unit vector of space the phase moves by at most this.
     let speed = spectral_norm(to_phase);
+    least(f, &|at| thickness_at(f, at, iso, to_phase, &back, speed))
+}
+
+/// The least of a measure on the mid-surface f = 0: samples, the least few refined by ever smaller steps along the
+/// surface. `None` where there is no surface, or nothing to measure on it.
+pub(super) fn least(f: Function, measure: &(dyn Fn(Vec3) -> Option<f64> + Sync)) -> Option<f64> {
     let n = SAMPLES;
-    let mut walls: Vec<(f64, Vec3)> = (0..n * n * n)
+    let mut found: Vec<(f64, Vec3)> = (0..n * n * n)
         .into_par_iter()
         .filter_map(|i| {
             let u = [i % n, i / n % n, i / (n * n)].map(|c| (c as f64 + 0.5) / n as f64);
             let at = onto_surface(f, u, 1.0 / n as f64)?;
-            Some((thickness_at(f, at, iso, to_phase, &back, speed)?, at))
+            Some((measure(at)?, at))
         })
         .collect();
-    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // The thinnest few, by a search on the surface round each.
-    let refined = walls.iter().take(8).map(|&(mut least, mut at)| {
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The least few, by a search on the surface round each.
+    let refined = found.iter().take(8).map(|&(mut least, mut at)| {
         let mut step = 0.5 / n as f64;
         while step > 1e-5 {
             let (_, g) = sample(f, at);
@@ -45,7 +51,7 @@ pub fn wall(f: Function, iso: f64, to_phase: &Mat3) -> Option<f64> {
                 .into_iter()
                 .find_map(|d| {
                     let p = onto_surface(f, add(at, scale(d, step)), step)?;
-                    let t = thickness_at(f, p, iso, to_phase, &back, speed)?;
+                    let t = measure(p)?;
                     (t < least).then_some((t, p))
                 });
             match next {

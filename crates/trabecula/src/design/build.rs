@@ -6,7 +6,7 @@ use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
 use super::{Built, Design, Loader, Warning, level, region, sample};
-use crate::cell::{Cell, Part, Series, Term, named};
+use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
@@ -130,6 +130,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let (name, cell) = cell(&spec.cell, &below("cell"))?;
+    let cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
     let cell = Arc::new(cell);
     let map = map(&spec.map, &below("map"))?;
     let here = Place {
@@ -237,6 +238,7 @@ fn amount_key(spec: &LatticeSpec) -> &'static str {
         AmountSpec::Iso(_) => "iso",
         AmountSpec::Fraction(_) => "fraction",
         AmountSpec::Porosity(_) => "porosity",
+        AmountSpec::Thickness(_) => "thickness",
     }
 }
 
@@ -263,17 +265,28 @@ fn check_solid(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(
     if solid > 0 && solid < values.len() {
         return Ok(());
     }
-    let range = lattice.cell.range();
     let what = if solid == 0 {
         "empty: nothing is solid"
     } else {
         "solid everywhere: nothing is open"
     };
     let iso = Varied::of_iso(lattice, place.points);
-    let message = format!(
-        "the lattice leaves the region {what}; the level t is {iso}, the cell's values run from {:.4} to {:.4}",
-        range.lo, range.hi
-    );
+    let why = if lattice.distance().is_some() {
+        lattice.cores(&points, &mut values);
+        let (near, far) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), d| {
+            (a.min(d.abs()), b.max(d.abs()))
+        });
+        format!(
+            "half the thickness is {iso} mm, the mid-surface is between {near:.4} and {far:.4} mm away in the region"
+        )
+    } else {
+        let range = lattice.cell.range();
+        format!(
+            "the level t is {iso}, the cell's values run from {:.4} to {:.4}",
+            range.lo, range.hi
+        )
+    };
+    let message = format!("the lattice leaves the region {what}; {why}");
     Err(DesignError::new(path, message))
 }
 
@@ -294,10 +307,19 @@ fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
     left
 }
 
+/// A length in a sentence.
+fn figure(v: f64) -> String {
+    if (1e-2..1e6).contains(&v) {
+        format!("{v:.4}")
+    } else {
+        format!("{v:.2e}")
+    }
+}
+
 fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
     let path = &place.path;
     let fraction = Varied::of_fraction(lattice, place.points);
-    let whole = lattice.cell.connected_fraction(lattice.part);
+    let whole = lattice.connected_fraction();
     let broken = gaps([fraction.min, fraction.max], &whole);
     if !broken.is_empty() {
         let ranges = |of: &[[f64; 2]]| {
@@ -332,6 +354,36 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             path: format!("{}.cell.series.terms", place.path),
             message,
         });
+    }
+    if let Some(error) = lattice.distance().map(Distance::error) {
+        let half = Varied::of_iso(lattice, place.points);
+        if error > 0.025 * half.min {
+            let message = format!(
+                "the mid-surface bends too sharply for its table of distances: a thickness of {} mm is met only within {} mm; \
+                 give a fraction, or a cell of fewer waves or less stretch",
+                figure(2.0 * half.min),
+                figure(2.0 * error)
+            );
+            warnings.push(Warning {
+                path: format!("{}.level.{}", place.path, amount_key(spec)),
+                message,
+            });
+        }
+    }
+    if let Some(limit) = lattice.distance().and_then(Distance::folding) {
+        let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
+        if thickness.max > limit {
+            let most = figure(thickness.max);
+            let message = format!(
+                "a thickness of {most} mm is above the folding limit, {} mm, twice the least radius of curvature of the \
+                 mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
+                figure(limit)
+            );
+            warnings.push(Warning {
+                path: format!("{}.level.{}", place.path, amount_key(spec)),
+                message,
+            });
+        }
     }
     let wavelength = lattice.map.wavelength();
     let least = place

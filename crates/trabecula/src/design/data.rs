@@ -357,6 +357,9 @@ pub struct LevelSpec {
     /// How a fraction or porosity becomes a level.
     #[serde(default, skip_serializing_if = "is_default")]
     pub fit: Fit,
+    /// The sheet's mid-surface is f = mid: an off-centre sheet, |f − mid| ≤ t or the wall about it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub mid: f64,
 }
 
 /// An amount of solid.
@@ -369,6 +372,8 @@ pub enum AmountSpec {
     Fraction(GradeSpec),
     /// One minus the solid volume fraction, between 0 and 1.
     Porosity(GradeSpec),
+    /// Thickness of a sheet's wall (mm): solid is what lies within half of it of the mid-surface.
+    Thickness(GradeSpec),
 }
 
 /// What a fraction is of.

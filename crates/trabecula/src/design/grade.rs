@@ -14,6 +14,8 @@ pub(super) enum Allowed {
     Finite,
     /// Greater than 0 and less than 1.
     Share(&'static str),
+    /// Greater than 0 and at most the greatest wavelength (mm).
+    Length(&'static str, f64),
 }
 
 impl Allowed {
@@ -28,7 +30,13 @@ impl Allowed {
                 );
                 Err(DesignError::new(path, message).found(number(v)))
             }
-            Allowed::Share(_) => Ok(v),
+            Allowed::Length(name, most) if !(v > 0.0 && v <= most) => {
+                let message = format!(
+                    "{name} is {v} mm{place}; it must be greater than 0 and at most the wavelength, {most} mm"
+                );
+                Err(DesignError::new(path, message).found(v.to_string()))
+            }
+            Allowed::Share(_) | Allowed::Length(..) => Ok(v),
         }
     }
 }

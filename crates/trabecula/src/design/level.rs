@@ -1,6 +1,6 @@
 //! How much is solid: data to [`Level`].
 
-use super::build::Place;
+use super::build::{Place, finite};
 use super::data::{AmountSpec, Fit, LevelSpec, Of, PartSpec};
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
@@ -64,20 +64,41 @@ pub(super) fn level(
         AmountSpec::Iso(v) => ("iso", v, Allowed::Finite),
         AmountSpec::Fraction(v) => ("fraction", v, Allowed::Share("fraction")),
         AmountSpec::Porosity(v) => ("porosity", v, Allowed::Share("porosity")),
+        AmountSpec::Thickness(v) => {
+            check_sheet(part, "thickness", &path("thickness"))?;
+            let Map::Affine(a) = map;
+            let longest = a.wavelength.into_iter().fold(0.0, f64::max);
+            ("thickness", v, Allowed::Length("thickness", longest))
+        }
     };
     let amount = grade(value, &path(key), place.region, allowed, key == "porosity")?;
-    if key == "iso" {
+    if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
-                let message =
-                    format!("\"{option}\" goes with fraction or porosity, found iso; leave it out");
+                let message = format!(
+                    "\"{option}\" goes with fraction or porosity, found {key}; leave it out"
+                );
                 return Err(DesignError::new(path(option), message));
             }
         }
+    }
+    if key == "iso" {
         return Ok(Level::Iso(amount));
     }
     if let Grade::Formula(_) = &amount {
-        check_formula(&amount, &path(&format!("{key}.formula")), key, place)?;
+        let at = path(&format!("{key}.formula"));
+        check_formula(&amount, &at, allowed, key == "porosity", place)?;
+    }
+    if key == "thickness" {
+        let range = cell.range();
+        if range.lo >= 0.0 || range.hi <= 0.0 {
+            let message = format!(
+                "the cell has no mid-surface f = 0: its values run from {:.4} to {:.4}; give mid between them",
+                range.lo, range.hi
+            );
+            return Err(DesignError::new(path(key), message));
+        }
+        return Ok(Level::Thickness(amount));
     }
     match (spec.of, spec.fit) {
         (Of::Cell, Fit::Table) => Ok(Level::Fraction(amount)),
@@ -120,11 +141,50 @@ pub(super) fn level(
     }
 }
 
-/// Refuses a formula that leaves (0, 1) at any of some thousands of points in the region.
-fn check_formula(
-    fraction: &Grade,
+/// Refuses a part that has no mid-surface.
+fn check_sheet(part: PartSpec, key: &str, path: &str) -> Result<(), DesignError> {
+    let found = match part {
+        PartSpec::Sheet => return Ok(()),
+        PartSpec::Lower => "lower",
+        PartSpec::Upper => "upper",
+    };
+    let message = format!(
+        "{key} goes with part = \"sheet\", found part = \"{found}\": a network has no wall; give its fraction"
+    );
+    Err(DesignError::new(path, message))
+}
+
+/// The cell of a lattice whose mid-surface is f = mid: the same series less a constant.
+pub(super) fn about_mid(
+    cell: Cell,
+    spec: &LevelSpec,
+    part: PartSpec,
     path: &str,
-    key: &'static str,
+) -> Result<Cell, DesignError> {
+    let path = format!("{path}.mid");
+    let mid = finite(&path, spec.mid)?;
+    if mid == 0.0 {
+        return Ok(cell);
+    }
+    check_sheet(part, "mid", &path)?;
+    let range = cell.range();
+    if !(range.lo < mid && mid < range.hi) {
+        let message = format!(
+            "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
+            range.lo, range.hi
+        );
+        return Err(DesignError::new(path, message).found(mid.to_string()));
+    }
+    let series = cell.series().about(mid);
+    Ok(Cell::new(series.map_err(|f| DesignError::fault(&path, f))?))
+}
+
+/// Refuses a formula that leaves what is allowed at any of some thousands of points in the region.
+fn check_formula(
+    amount: &Grade,
+    path: &str,
+    allowed: Allowed,
+    complement: bool,
     place: &Place,
 ) -> Result<(), DesignError> {
     let bounds = place.region.bounds();
@@ -147,22 +207,21 @@ fn check_formula(
         .map(|(c, _)| *c);
     let points: Vec<[f64; 3]> = place.points.iter().copied().chain(in_corners).collect();
     let mut values = vec![0.0; points.len()];
-    fraction.values(&points, &mut values);
-    let far = |v: f64| {
-        if v.is_nan() {
-            f64::INFINITY
-        } else {
-            (v - 0.5).abs()
-        }
-    };
-    let worst = values
-        .iter()
-        .enumerate()
-        .max_by(|a, b| far(*a.1).total_cmp(&far(*b.1)));
-    if let Some((i, v)) = worst {
-        let own = if key == "porosity" { 1.0 - v } else { *v };
+    amount.values(&points, &mut values);
+    let own = |v: f64| if complement { 1.0 - v } else { v };
+    let order = |a: &usize, b: &usize| own(values[*a]).total_cmp(&own(values[*b]));
+    // Not a number comes first or last in this order.
+    let ends = [
+        (0..values.len()).min_by(order),
+        (0..values.len()).max_by(order),
+    ];
+    for i in ends.into_iter().flatten() {
         let [x, y, z] = points[i];
-        Allowed::Share(key).check(path, own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
+        allowed.check(
+            path,
+            own(values[i]),
+            &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"),
+        )?;
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ use crate::fault::{self, counted};
 type Read<T> = Result<T, DesignError>;
 
 const THREE: &str = "three numbers [x, y, z]";
+const AMOUNTS: &str = "exactly one of iso, fraction, porosity, thickness";
 const REGIONS: [&str; 9] = [
     "box",
     "cylinder",
@@ -236,10 +237,12 @@ const PARTS: [(&str, &str); 14] = [
 ];
 
 /// Keys that stand one level deeper, where beginners look for them: the key and its table.
-const DEEPER: [(&str, &str); 6] = [
+const DEEPER: [(&str, &str); 8] = [
     ("iso", "level"),
     ("fraction", "level"),
     ("porosity", "level"),
+    ("thickness", "level"),
+    ("mid", "level"),
     ("wavelength", "map.affine"),
     ("rotate", "map.affine"),
     ("offset", "map.affine"),
@@ -263,7 +266,7 @@ fn lattice(at: &At) -> Read<LatticeSpec> {
             .need("part", "sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)")?
             .word_or("part", &parts, &PARTS)?,
         map: map(f.need("map", "such as map.affine with wavelength = 4")?)?,
-        level: level(f.need("level", "exactly one of iso, fraction, porosity")?)?,
+        level: level(f.need("level", AMOUNTS)?)?,
     })
 }
 
@@ -369,39 +372,39 @@ fn skew(at: &At) -> Read<SkewSpec> {
 }
 
 fn level(at: &At) -> Read<LevelSpec> {
-    let later = [(
-        "thickness",
-        "give fraction or iso; the wall thickness that follows is reported by check",
-    )];
     let f = at.fields(
         "a level",
-        &["iso", "fraction", "porosity", "of", "fit"],
-        &later,
+        &[
+            "iso",
+            "fraction",
+            "porosity",
+            "thickness",
+            "of",
+            "fit",
+            "mid",
+        ],
+        &[],
     )?;
-    let given: Vec<_> = ["iso", "fraction", "porosity"]
+    let given: Vec<_> = ["iso", "fraction", "porosity", "thickness"]
         .into_iter()
         .filter_map(|k| Some((k, f.get(k)?)))
         .collect();
     let amount = match given.as_slice() {
         [] => {
-            return Err(f
-                .at
-                .error("no amount given; give exactly one of iso, fraction, porosity"));
+            return Err(f.at.error(format!("no amount given; give {AMOUNTS}")));
         }
         [(key, value)] => {
             let value = grade(value)?;
             match *key {
                 "iso" => AmountSpec::Iso(value),
                 "fraction" => AmountSpec::Fraction(value),
-                _ => AmountSpec::Porosity(value),
+                "porosity" => AmountSpec::Porosity(value),
+                _ => AmountSpec::Thickness(value),
             }
         }
         several => {
             let names: Vec<&str> = several.iter().map(|g| g.0).collect();
-            let message = format!(
-                "{} at once; give exactly one of iso, fraction, porosity",
-                names.join(" and ")
-            );
+            let message = format!("{} at once; give {AMOUNTS}", names.join(" and "));
             return Err(several[1].1.error(message));
         }
     };
@@ -411,7 +414,13 @@ fn level(at: &At) -> Read<LevelSpec> {
     let fit = f.read("fit", Fit::Table, |at| {
         at.word("fit", &[("table", Fit::Table), ("spartan", Fit::Spartan)])
     })?;
-    Ok(LevelSpec { amount, of, fit })
+    let mid = f.read("mid", 0.0, At::number)?;
+    Ok(LevelSpec {
+        amount,
+        of,
+        fit,
+        mid,
+    })
 }
 
 fn grade(at: &At) -> Read<GradeSpec> {

@@ -3,7 +3,7 @@
 use serde_json::{Value as Json, json};
 
 use super::{Built, build::LOOKS, sample};
-use crate::cell::Part;
+use crate::cell::{Distance, Part};
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 
@@ -24,7 +24,7 @@ impl Varied {
         Varied { min, max }
     }
 
-    fn map(self, f: impl Fn(f64) -> f64) -> Varied {
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Varied {
         if self.min == self.max {
             Varied::of(&[f(self.min)])
         } else {
@@ -32,11 +32,9 @@ impl Varied {
         }
     }
 
-    /// The level t at the points.
+    /// The level t of the core at the points; half the thickness, where that is the level.
     pub fn of_iso(lattice: &Lattice, points: &[[f64; 3]]) -> Varied {
-        if let Level::Iso(g) | Level::Fraction(g) = &lattice.level
-            && g.constant().is_some()
-        {
+        if lattice.level.grade().constant().is_some() {
             let mut t = [0.0];
             lattice.isos(&points[..1], &mut t);
             return Varied::of(&t);
@@ -58,8 +56,8 @@ impl Varied {
                 }
             },
             // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
-            Level::Iso(_) => {
-                Varied::of_iso(lattice, points).map(|t| lattice.cell.fraction(lattice.part, t))
+            Level::Iso(_) | Level::Thickness(_) => {
+                Varied::of_iso(lattice, points).map(|t| lattice.fraction(t))
             }
         }
     }
@@ -112,11 +110,13 @@ pub(super) fn report(built: &Built) -> Json {
             json!({
                 "part": match lattice.part { Part::Sheet => "sheet", Part::Lower => "lower", Part::Upper => "upper" },
                 "wavelength": lattice.map.wavelength(),
-                "iso": iso.json(),
+                // A wall of even thickness is not bounded by levels of f.
+                "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
                 "fraction": fraction.json(),
                 "porosity": fraction.map(|f| 1.0 - f).json(),
                 "thickness": thickness(lattice, iso),
-                "connected_fraction": lattice.cell.connected_fraction(lattice.part),
+                "folding": lattice.distance().and_then(Distance::folding),
+                "connected_fraction": lattice.connected_fraction(),
             }),
         );
     }
@@ -133,6 +133,9 @@ pub(super) fn report(built: &Built) -> Json {
 
 /// The thinnest wall or narrowest neck (mm), at five levels where the level varies; null where there is none.
 fn thickness(lattice: &Lattice, iso: Varied) -> Json {
+    if lattice.distance().is_some() {
+        return iso.map(|t| 2.0 * t).json();
+    }
     let to_phase = lattice.map.jacobian([0.0; 3]);
     let steps = if iso.min == iso.max { 1 } else { 5 };
     let level = |i: usize| iso.min + (iso.max - iso.min) * i as f64 / (steps - 1).max(1) as f64;

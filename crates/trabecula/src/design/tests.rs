@@ -60,6 +60,8 @@ fn every_kind_of_region_and_grade_survives() {
             "fraction = { formula = \"0.3 + 0.1*sin(x/5)\" }",
             "porosity = 0.7\nof = \"part\"",
             "porosity = 0.7\nfit = \"spartan\"",
+            "thickness = 0.6\nmid = 0.2",
+            "thickness = { linear = { along = [0, 0, 1], stops = [[0, 0.2], [1, 0.3]] } }",
         ] {
             let text = format!(
                 "schema = 1\n[region]\n{region}\n[lattice.a]\npart = \"upper\"\n[[lattice.a.cell.series.terms]]\nhkl = \
@@ -141,11 +143,6 @@ fn words_of_later_versions_are_not_slips() {
             "blend = { between = [\"a\", \"b\"] }",
             "blend",
         ),
-        (
-            "porosity = {",
-            "thickness = {",
-            "lattice.core.level.thickness",
-        ),
         ("map.affine", "map.phase", "lattice.core.map.phase"),
         ("linear =", "radial =", "lattice.core.level.porosity.radial"),
     ] {
@@ -171,7 +168,8 @@ fn exactly_one_amount() {
     );
     let e = refused(GOOD.split("porosity").next().unwrap_or_default());
     assert!(
-        e.message.contains("exactly one of iso, fraction, porosity"),
+        e.message
+            .contains("exactly one of iso, fraction, porosity, thickness"),
         "{e}"
     );
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));

@@ -1,0 +1,310 @@
+//! The nearest points of the mid-surface f = 0, in space, to the nodes of a grid on the torus.
+//!
+//! Nodes beside the surface find theirs from where the grid's edges cross it. They hand them on to their neighbours, these
+//! to theirs, as long as that is nearer than what they have (Danielsson, Euclidean distance mapping, Computer Graphics and
+//! Image Processing 14, 1980). Then each node sharpens its own: a foot, where the way to the node stands upright on the
+//! surface, by Newton's method. The way is kept as a vector from the node, so a period is crossed like any other step.
+
+use rayon::prelude::*;
+
+use super::series::Series;
+use crate::math::{
+    Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit,
+};
+
+/// The nearest points of the surface to the nodes of a grid.
+pub(super) struct Search<'a> {
+    series: &'a Series,
+    shape: [usize; 3],
+    to_phase: Mat3,
+    back: Mat3,
+    /// From a node to its 26 neighbours: steps in the grid and in space.
+    around: Vec<([i32; 3], Vec3)>,
+    /// Longest edge of the cell and longest diagonal of a grid cell, mm.
+    sizes: [f64; 2],
+}
+
+/// Nothing found yet.
+const NONE: Vec3 = [f64::INFINITY; 3];
+
+impl<'a> Search<'a> {
+    pub(super) fn new(series: &'a Series, to_phase: &Mat3, shape: [usize; 3]) -> Search<'a> {
+        let to_space = inverse(to_phase);
+        let around: Vec<([i32; 3], Vec3)> = (0..27)
+            .map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1])
+            .filter(|d| *d != [0; 3])
+            .map(|d| {
+                let turns = core::array::from_fn(|a| f64::from(d[a]) / shape[a] as f64);
+                (d, apply(&to_space, turns))
+            })
+            .collect();
+        let edge = transpose(&to_space)
+            .map(norm)
+            .into_iter()
+            .fold(0.0, f64::max);
+        let diagonal = around.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
+        Search {
+            series,
+            shape,
+            to_phase: *to_phase,
+            back: transpose(to_phase),
+            around,
+            sizes: [edge, diagonal],
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    fn index(&self, node: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.shape;
+        [node % nx, node / nx % ny, node / nx / ny]
+    }
+
+    /// The phase of a node.
+    fn place(&self, node: usize) -> Vec3 {
+        let i = self.index(node);
+        core::array::from_fn(|a| i[a] as f64 / self.shape[a] as f64)
+    }
+
+    fn neighbour(&self, [i, j, k]: [usize; 3], d: [i32; 3]) -> usize {
+        let [nx, ny, nz] = self.shape;
+        let go = |at: usize, step: i32, n: usize| match step {
+            1 if at + 1 == n => 0,
+            -1 if at == 0 => n - 1,
+            1 => at + 1,
+            -1 => at - 1,
+            _ => at,
+        };
+        (go(k, d[2], nz) * ny + go(j, d[1], ny)) * nx + go(i, d[0], nx)
+    }
+
+    /// Signed distances at the nodes.
+    pub(super) fn distances(&self) -> Vec<f64> {
+        let (f, feet) = self.feet();
+        f.iter()
+            .zip(&feet)
+            .map(|(f, foot)| norm(*foot).min(self.sizes[0]).copysign(*f))
+            .collect()
+    }
+
+    /// Values of f at the nodes, and from each the way (mm) to the nearest point of the surface.
+    fn feet(&self) -> (Vec<f64>, Vec<Vec3>) {
+        let u: Vec<Vec3> = (0..self.count()).map(|i| self.place(i)).collect();
+        let (mut f, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
+        f.par_chunks_mut(4096)
+            .zip(g.par_chunks_mut(4096))
+            .zip(u.par_chunks(4096))
+            .for_each(|((f, g), u)| self.series.gradients(u, f, g));
+        drop(g);
+        let mut feet = self.beside(&f);
+        let mut changed: Vec<usize> = (0..feet.len())
+            .filter(|i| feet[*i][0].is_finite())
+            .collect();
+        self.hand_on(&mut feet, changed);
+        // Handed on, a foot belongs to a neighbour; sharpened feet may serve their neighbours better than their own.
+        changed = (0..feet.len()).collect();
+        for _ in 0..6 {
+            let sharp: Vec<Vec3> = changed
+                .par_iter()
+                .map(|&i| self.nearest(u[i], feet[i]))
+                .collect();
+            for (i, foot) in changed.iter().zip(sharp) {
+                feet[*i] = foot;
+            }
+            changed = self.hand_on(&mut feet, changed);
+            if changed.is_empty() {
+                break;
+            }
+        }
+        (f, feet)
+    }
+
+    /// Feet (from the node, mm) of nodes beside the surface, found from where the grid's edges cross it.
+    fn beside(&self, f: &[f64]) -> Vec<Vec3> {
+        (0..f.len())
+            .into_par_iter()
+            .map(|node| {
+                let (at, u) = (self.index(node), self.place(node));
+                let mut best = NONE;
+                for (d, step) in &self.around {
+                    let other = f[self.neighbour(at, *d)];
+                    let faces = d.iter().filter(|c| **c != 0).count() == 1;
+                    if !faces || (f[node] < 0.0) == (other < 0.0) {
+                        continue;
+                    }
+                    let share = f[node] / (f[node] - other);
+                    let Some(on) = self.onto(u, scale(*step, share)) else {
+                        continue;
+                    };
+                    let foot = self.nearest(u, on);
+                    if dot(foot, foot) < dot(best, best) {
+                        best = foot;
+                    }
+                }
+                best
+            })
+            .collect()
+    }
+
+    /// Hands feet on from the nodes `from` to neighbours they serve better, as far as that goes. The nodes served.
+    fn hand_on(&self, feet: &mut [Vec3], from: Vec<usize>) -> Vec<usize> {
+        let mut served = vec![false; feet.len()];
+        let mut asked = vec![0u32; feet.len()];
+        let mut from = from;
+        for round in 1.. {
+            let mut nodes = Vec::new();
+            for &node in &from {
+                let at = self.index(node);
+                for (d, _) in &self.around {
+                    let n = self.neighbour(at, *d);
+                    if asked[n] != round {
+                        asked[n] = round;
+                        nodes.push(n);
+                    }
+                }
+            }
+            // All look at the feet as they were: the result does not depend on the order of the work.
+            let better: Vec<(usize, Vec3)> = nodes
+                .par_iter()
+                .filter_map(|&node| {
+                    let at = self.index(node);
+                    let own = dot(feet[node], feet[node]) * (1.0 - 1e-9);
+                    let mut best = (own, NONE);
+                    for (d, step) in &self.around {
+                        let foot = add(feet[self.neighbour(at, *d)], *step);
+                        let length = dot(foot, foot);
+                        if length < best.0 {
+                            best = (length, foot);
+                        }
+                    }
+                    best.1[0].is_finite().then_some((node, best.1))
+                })
+                .collect();
+            if better.is_empty() {
+                break;
+            }
+            from = better.iter().map(|b| b.0).collect();
+            for (node, foot) in better {
+                feet[node] = foot;
+                served[node] = true;
+            }
+        }
+        (0..feet.len()).filter(|i| served[*i]).collect()
+    }
+
+    /// f, ∇ₓf and second derivatives in space at `from` (mm) from the phase u.
+    fn second(&self, u: Vec3, from: Vec3) -> (f64, Vec3, Mat3) {
+        let (f, g, h) = self.series.second(add(u, apply(&self.to_phase, from)));
+        let h = product(&self.back, &product(&h, &self.to_phase));
+        (f, apply(&self.back, g), h)
+    }
+
+    /// The point of the surface near `from`, by Newton's method along the gradient.
+    fn onto(&self, u: Vec3, from: Vec3) -> Option<Vec3> {
+        let mut at = from;
+        for _ in 0..12 {
+            let (f, g, _) = self.second(u, at);
+            let step = scale(g, -f / dot(g, g));
+            at = add(at, step);
+            let moved = norm(sub(at, from));
+            if moved.is_nan() || moved > 3.0 * self.sizes[1] {
+                return None;
+            }
+            if norm(step) <= 1e-12 * self.sizes[0] {
+                return Some(at);
+            }
+        }
+        None
+    }
+
+    /// The nearest point of the surface to the phase u, from a point of the surface near it; never farther than that.
+    fn nearest(&self, u: Vec3, from: Vec3) -> Vec3 {
+        if !from[0].is_finite() {
+            return from;
+        }
+        match self.lagrange(u, from) {
+            Some(foot) if dot(foot, foot) <= dot(from, from) * (1.0 + 1e-12) => foot,
+            _ => self.descend(u, from),
+        }
+    }
+
+    /// Newton's method on p + λ∇f = 0, f(p) = 0: where p, from u, stands upright on the surface.
+    fn lagrange(&self, u: Vec3, from: Vec3) -> Option<Vec3> {
+        let mut p = from;
+        let mut multiplier = None;
+        for _ in 0..10 {
+            let (f, g, h) = self.second(u, p);
+            let l = multiplier.unwrap_or(-dot(p, g) / dot(g, g));
+            let mut a = h.map(|r| scale(r, l));
+            (0..3).for_each(|i| a[i][i] += 1.0);
+            let solve = inverse(&a);
+            let (along, rest) = (apply(&solve, g), apply(&solve, add(p, scale(g, l))));
+            let dl = (f - dot(g, rest)) / dot(g, along);
+            let step = sub(scale(rest, -1.0), scale(along, dl));
+            p = add(p, step);
+            multiplier = Some(l + dl);
+            let length = norm(step);
+            if length.is_nan() || length > self.sizes[0] {
+                return None;
+            }
+            // The next step would be its square, and the distance is stationary at the foot.
+            if length <= 1e-5 * self.sizes[0] {
+                return Some(p);
+            }
+        }
+        None
+    }
+
+    /// Towards the nearest point by going to the foot on the tangent plane and back to the surface, as far as that
+    /// shortens the way.
+    fn descend(&self, u: Vec3, from: Vec3) -> Vec3 {
+        let (mut p, mut pace) = (from, 1.0);
+        for _ in 0..40 {
+            let n = unit(self.second(u, p).1);
+            let step = sub(scale(n, dot(n, p)), p);
+            if norm(step) <= 1e-7 * self.sizes[0] || pace < 1e-3 {
+                break;
+            }
+            match self.onto(u, add(p, scale(step, pace))) {
+                Some(q) if dot(q, q) < dot(p, p) => p = q,
+                _ => pace *= 0.5,
+            }
+        }
+        p
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::distance::tests::{series, stretched, surface};
+    use super::*;
+
+    /// Feet stand on the surface, and no point of it is nearer, in whatever period.
+    #[test]
+    fn feet_are_the_nearest_points_of_the_surface() {
+        for name in ["iwp", "lidinoid", "frd"] {
+            let (s, m) = (series(name), stretched([1.0, 1.5, 2.5], [0.0; 3]));
+            let search = Search::new(&s, &m, [24; 3]);
+            let (_, feet) = search.feet();
+            let points = surface(&s, &m, 3000);
+            let to_space = inverse(&m);
+            for i in (0..feet.len()).step_by(97) {
+                let u = search.place(i);
+                let (f, g, _) = search.second(u, feet[i]);
+                assert!(f.abs() < 1e-6 * norm(g), "{name} {u:?}: {f}");
+                let way = |p: &(Vec3, Vec3)| {
+                    (0..27)
+                        .map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1].map(f64::from))
+                        .map(|k| add(sub(p.0, u).map(|c| c - c.round()), k))
+                        .map(|d| norm(apply(&to_space, d)))
+                        .fold(f64::INFINITY, f64::min)
+                };
+                let nearest = points.iter().map(way).fold(f64::INFINITY, f64::min);
+                let found = norm(feet[i]);
+                assert!(found <= nearest + 1e-9, "{name} {u:?}: {found} {nearest}");
+            }
+        }
+    }
+}
