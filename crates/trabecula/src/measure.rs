@@ -7,13 +7,14 @@ use crate::mesh::Mesh;
 
 mod adjacency;
 mod cut;
-mod exact;
+pub(crate) mod exact;
 mod intersect;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
 pub use cut::cut_triangles;
 pub use intersect::self_intersections;
+pub(crate) use intersect::{Tree as BoxTree, near_pairs};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;

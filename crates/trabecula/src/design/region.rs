@@ -158,7 +158,7 @@ fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, Desi
             *v = scale(*v, factor);
         }
     }
-    MeshRegion::new(loaded.mesh)
+    MeshRegion::new(loaded.mesh, crate::region::Repair::Auto)
         .map(|m| Arc::new(m) as Region)
         .map_err(of_file)
 }
