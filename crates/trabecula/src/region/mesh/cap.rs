@@ -6,7 +6,7 @@
 //! area, is least: G. Barequet and M. Sharir, Filling gaps in the boundary of a polyhedron, Comput. Aided Geom. Des. 12
 //! (1995) 207; P. Liepa, Filling holes in meshes, Symp. Geometry Processing (2003) 200.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::edges::{halves, rises};
 use super::fair;
@@ -51,6 +51,7 @@ pub fn close(mesh: &mut Mesh) -> Caps {
             rim,
             patch,
             &rims.slopes(rim),
+            &rims.about,
         ));
         caps.area += (first..mesh.triangles.len())
             .map(|i| {
@@ -86,7 +87,7 @@ pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     let mut found = Vec::new();
     for start in missing.iter().map(|e| e.0) {
         let mut path = vec![start];
-        let mut on_path: std::collections::HashMap<u32, usize> = [(start, 0)].into();
+        let mut on_path: HashMap<u32, usize> = [(start, 0)].into();
         while let Some(v) = path.last().and_then(|v| next(*v, &mut used)) {
             match on_path.get(&v) {
                 // Here a loop is whole: it is taken off, and the walk goes on from its corner.
@@ -114,7 +115,9 @@ struct Rims {
     /// Edges between corners of rims, low to high.
     edges: HashSet<(u32, u32)>,
     /// For open edges, as the cap runs along them, the normal of the triangle beyond.
-    beyond: std::collections::HashMap<(u32, u32), Vec3>,
+    beyond: HashMap<(u32, u32), Vec3>,
+    /// What the corners are joined to.
+    about: fair::About,
 }
 
 impl Rims {
@@ -122,11 +125,16 @@ impl Rims {
         let corners: HashSet<u32> = loops.iter().flatten().copied().collect();
         let mut rims = Rims {
             edges: HashSet::new(),
-            beyond: std::collections::HashMap::new(),
+            beyond: HashMap::new(),
+            about: fair::About::default(),
         };
         for (i, t) in mesh.triangles.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (t[k], t[(k + 1) % 3]);
+                if corners.contains(&a) {
+                    let joined = rims.about.joined.entry(a).or_default();
+                    joined.extend([b, t[(k + 2) % 3]]);
+                }
                 if corners.contains(&a) && corners.contains(&b) {
                     rims.edges.insert((a.min(b), a.max(b)));
                     rims.beyond

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::clean::flat;
-use super::edges::{components, halves, rises};
+use super::edges::{Sets, components, halves, rises};
 use super::winding::turn;
 use crate::fault::Fault;
 use crate::math::{cross, dot, norm, sub};
@@ -116,9 +116,8 @@ fn degenerate(mesh: &Mesh) -> usize {
         .count()
 }
 
-/// Signed volume and area of each body (joined by edges), and the body of each triangle.
-fn bodies(mesh: &Mesh) -> (Vec<(f64, f64)>, Vec<u32>) {
-    let (number, count) = components(mesh);
+/// Signed volume and area of each body, `number` being the body of each triangle.
+fn bodies(mesh: &Mesh, number: &[u32], count: usize) -> Vec<(f64, f64)> {
     let center = mesh.bounds().center();
     let mut sums = vec![(0.0, 0.0); count];
     for (i, body) in number.iter().enumerate() {
@@ -127,7 +126,7 @@ fn bodies(mesh: &Mesh) -> (Vec<(f64, f64)>, Vec<u32>) {
         s.0 += dot(a, cross(b, c)) / 6.0;
         s.1 += norm(cross(sub(b, a), sub(c, a))) / 2.0;
     }
-    (sums, number)
+    sums
 }
 
 /// A mean thickness that the rounding of the coordinates could make.
@@ -138,7 +137,8 @@ fn thin(mesh: &Mesh) -> f64 {
 /// Refuses a closed mesh none of whose bodies has volume.
 pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
     let thin = thin(mesh);
-    let (sums, _) = bodies(mesh);
+    let (number, count) = components(mesh);
+    let sums = bodies(mesh, &number, count);
     if sums.iter().any(|(v, area)| v.abs() > thin * area) {
         return Ok(());
     }
@@ -148,10 +148,15 @@ pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
     )))
 }
 
-/// Whether a closed mesh that does not cross itself is one body with cavities inside it.
-pub fn plain(mesh: &Mesh) -> bool {
+/// Whether a closed mesh (edges `pairs`) that does not cross itself is one body with cavities inside it.
+pub fn plain(mesh: &Mesh, pairs: &Pairs) -> bool {
     let thin = thin(mesh);
-    let (sums, number) = bodies(mesh);
+    let mut sets = Sets::new(mesh.triangles.len());
+    for [a, b] in pairs {
+        sets.join(a / 3, b / 3);
+    }
+    let (number, count) = sets.numbers();
+    let sums = bodies(mesh, &number, count);
     let mut solids = sums.iter().enumerate().filter(|(_, s)| s.0 > 0.0);
     let (Some((outer, _)), None) = (solids.next(), solids.next()) else {
         return false;

@@ -68,6 +68,22 @@ impl Sets {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b) as usize] = a.min(b);
     }
+
+    /// The number of each member's set, in the order of their lowest members, and how many sets there are.
+    pub fn numbers(&mut self) -> (Vec<u32>, usize) {
+        let mut number = vec![u32::MAX; self.0.len()];
+        let mut count = 0;
+        for i in 0..number.len() {
+            let r = self.root(i as u32) as usize;
+            if r == i {
+                number[i] = count;
+                count += 1;
+            } else {
+                number[i] = number[r];
+            }
+        }
+        (number, count as usize)
+    }
 }
 
 /// Components: for each triangle the number of the set that edges (of however many triangles) join, and how many
@@ -77,16 +93,5 @@ pub fn components(mesh: &Mesh) -> (Vec<u32>, usize) {
     for pair in halves(mesh).windows(2).filter(|p| p[0].0 == p[1].0) {
         sets.join(pair[0].1 / 3, pair[1].1 / 3);
     }
-    let mut number = vec![u32::MAX; mesh.triangles.len()];
-    let mut count = 0;
-    for i in 0..number.len() {
-        let r = sets.root(i as u32) as usize;
-        if r == i {
-            number[i] = count;
-            count += 1;
-        } else {
-            number[i] = number[r];
-        }
-    }
-    (number, count as usize)
+    sets.numbers()
 }

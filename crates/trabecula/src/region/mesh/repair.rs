@@ -1,7 +1,7 @@
 //! From any triangles to one boundary: the order of the repairs, what they did, and when they are refused.
 
 use super::check::{self, Pairs};
-use super::{cap, clean, cut, edges, orient};
+use super::{cap, clean, cut, orient};
 use crate::fault::Fault;
 use crate::math::{add, cross, norm, scale, sub};
 use crate::measure::self_intersections;
@@ -142,15 +142,16 @@ fn refuse(message: impl Into<String>) -> Fault {
 pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     check::numbers(&mesh)?;
     let given = mesh.triangles.len();
-    if !edges::open(&mesh).is_empty() {
+    let mut edges = check::edges(&mesh);
+    if edges.as_ref().is_err_and(|found| found.contains("open")) {
         mesh = mesh.joined(mesh.single_rounding());
+        edges = check::edges(&mesh);
     }
-    let found = match check::edges(&mesh) {
+    let found = match edges {
         Ok(pairs) => {
             let crossing = self_intersections(&mesh, MANY);
             if crossing == 0 {
-                check::thick(&mesh)?;
-                if check::plain(&mesh) {
+                if check::plain(&mesh, &pairs) {
                     let done = Repaired::default();
                     return Ok(Boundary {
                         mesh,
