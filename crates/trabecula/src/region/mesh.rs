@@ -33,23 +33,18 @@ const REACH: f64 = 2.0;
 /// The solid inside a triangle mesh, which is repaired if it is not clean: bodies, perhaps with cavities.
 ///
 /// Distances to the (repaired) boundary are exact to rounding. Their sign comes from the normals of the nearest face,
-/// edge or vertex where the boundary is one clean surface, else from its winding number.
+/// edge or vertex where the boundary is one clean sheet there, else from its winding number.
 #[derive(Debug)]
 pub struct MeshRegion {
     tree: Tree,
-    side: Side,
+    normals: Normals,
+    /// Asked where the boundary is not one clean sheet; none where it is everywhere.
+    winding: Option<Winding>,
     bounds: Aabb,
     volume: f64,
     planes: [Vec<f64>; 3],
     mesh: Mesh,
     repaired: Repaired,
-}
-
-/// How inside is told from outside.
-#[derive(Debug)]
-enum Side {
-    Normals(Normals),
-    Winding(Winding),
 }
 
 impl MeshRegion {
@@ -66,12 +61,16 @@ impl MeshRegion {
             .map(|i| Face::new(mesh.corners(i)))
             .collect();
         let (tree, order) = Tree::new(&faces);
-        let side = match pairs {
-            Some(pairs) => Side::Normals(Normals::new(&mesh, &faces, &pairs, &order)),
-            None => Side::Winding(Winding::new(&tree)),
+        let (normals, winding) = match pairs {
+            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
+            None => (
+                Normals::of_pieces(&mesh, &faces, &order),
+                Some(Winding::new(&tree)),
+            ),
         };
         Ok(MeshRegion {
-            side,
+            normals,
+            winding,
             bounds: mesh.bounds(),
             volume: mesh.volume(),
             planes: [0, 1, 2].map(|axis| planes(&faces, &mesh.bounds(), axis)),
@@ -91,44 +90,41 @@ impl MeshRegion {
         &self.repaired
     }
 
-    /// Whether `p`, off the surface, is inside.
-    fn inside(&self, hit: &Hit, p: Vec3) -> bool {
-        match &self.side {
-            Side::Normals(n) => dot(hit.away, n.outward(&self.tree, hit)) < 0.0,
-            Side::Winding(w) => w.at(&self.tree, p, REACH, |_| false) > 0.5,
-        }
-    }
-
     /// Signed distance; zero where rounding hides it, so that points of flat faces are exactly on them.
     ///
     /// `known` is a place and its signed distance: where the two balls that hold no surface overlap, the sign is the
     /// same, and winding numbers need not be asked for.
     fn signed(&self, hit: &Hit, p: Vec3, known: (Vec3, f64)) -> f64 {
         let d = hit.square.sqrt();
-        if d <= self.tree.rounding() {
+        let rounding = self.tree.rounding();
+        if d <= rounding {
             return 0.0;
         }
-        let inside = match &self.side {
-            Side::Winding(_)
-                if (d + known.1.abs()) * (1.0 - 1e-9)
-                    > norm(sub(p, known.0)) + self.tree.rounding() =>
-            {
-                known.1 < 0.0
+        let height = dot(hit.away, self.normals.outward(&self.tree, hit));
+        let inside = match &self.winding {
+            Some(winding) if height.is_nan() => {
+                if (d + known.1.abs()) * (1.0 - 1e-9) > norm(sub(p, known.0)) + rounding {
+                    known.1 < 0.0
+                } else {
+                    winding.at(&self.tree, p, REACH, |_| false) > 0.5
+                }
             }
-            _ => self.inside(hit, p),
+            _ => height < 0.0,
         };
         if inside { -d } else { d }
     }
 
     fn gradient(&self, hit: &Hit, d: f64) -> Vec3 {
-        match (&self.side, hit.feature) {
-            (Side::Normals(_), Feature::Face) => self.tree.faces()[hit.triangle as usize].normal,
-            (Side::Normals(n), _) if d == 0.0 => unit(n.outward(&self.tree, hit)),
-            (Side::Winding(_), _) if d == 0.0 => self.tree.faces()[hit.triangle as usize].normal,
+        let outward = self.normals.outward(&self.tree, hit);
+        match hit.feature {
+            Feature::Face if !outward[0].is_nan() => outward,
+            _ if d == 0.0 && outward[0].is_nan() => self.tree.faces()[hit.triangle as usize].normal,
+            _ if d == 0.0 => unit(outward),
             _ => scale(hit.away, 1.0 / d),
         }
     }
 }
+
 /// Coordinates at which flat faces normal to `axis` make up a hundredth of the bounds' largest side.
 ///
 /// Distances there are zero by `signed`, whichever triangle, edge or corner is found nearest.

@@ -104,7 +104,8 @@ fn holes_are_closed_and_nothing_jumps_across() {
     let done = region.repaired();
     assert!(done.holes == 3 && done.hole_share < 0.05, "{done:?}");
     let got = region.volume().unwrap();
-    assert!((got / volume - 1.0).abs() < 3e-3, "{got} for {volume}");
+    // Flat caps would lose 5 ‰.
+    assert!((got / volume - 1.0).abs() < 3e-4, "{got} for {volume}");
     agrees(
         "hole",
         &region,
@@ -374,7 +375,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     mesh.triangles.push([8, 2, 3]);
     let region = auto(mesh);
     assert_eq!((region.volume(), region.repaired().split), (Some(1.0), 1));
-    assert!(matches!(region.side, Side::Normals(_)));
+    assert!(region.winding.is_none());
 
     // The same a hair off: a hole as thin as the hair.
     let mut mesh = cuboid([0.0; 3], [1.0; 3]);
@@ -567,9 +568,9 @@ proptest! {
         if turned {
             mesh = moved(mesh, &rotation(angles), [0.1, 0.2, 0.3]);
         }
-        match MeshRegion::new(mesh.clone(), Repair::Auto) {
-            Ok(region) => continuous("anything", &region, [0.0; 3], 3.5),
-            Err(_) => {} // with its reason; what is refused never jumps
+        // What cannot be repaired is refused with its reason.
+        if let Ok(region) = MeshRegion::new(mesh.clone(), Repair::Auto) {
+            continuous("anything", &region, [0.0; 3], 3.5);
         }
         let _ = MeshRegion::new(mesh, Repair::Refuse);
     }

@@ -280,52 +280,78 @@ fn corners_written_with_two_roundings_are_one() {
     );
 }
 
-/// Not a test of right or wrong: prints the rates that the documentation cites.
+/// Not a test of right or wrong: prints the rates that the documentation cites, of a clean mesh and of two that cross.
 #[test]
 #[ignore = "a measurement: run by name in release"]
 fn rates() {
     use rayon::prelude::*;
     use std::time::Instant;
-    let mesh = ball(6, 100.0, 0.1);
-    let t = Instant::now();
-    let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
-    println!(
-        "{} triangles: built in {:?}",
-        mesh.triangles.len(),
-        t.elapsed()
-    );
-    let mut seed = 1;
-    let points: Vec<Vec3> = (0..200_000)
-        .map(|_| {
-            let i = ((random(&mut seed) + 1.0) / 2.0 * mesh.vertices.len() as f64) as usize;
-            add(mesh.vertices[i], [0; 3].map(|_| random(&mut seed)))
-        })
-        .collect();
-    let mut out = vec![0.0; points.len()];
-    let t = Instant::now();
-    region.values(&points, &mut out);
-    println!(
-        "{:.0} ns per random query near the surface",
-        t.elapsed().as_nanos() as f64 / points.len() as f64
-    );
-    let n = 256;
-    let axis: Vec<f64> = (0..n)
-        .map(|i| -115.0 + 230.0 * i as f64 / (n - 1) as f64)
-        .collect();
-    let t = Instant::now();
-    let tiles: Vec<(usize, usize, usize)> = (0..512)
-        .map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32))
-        .collect();
-    let inside: usize = tiles
-        .par_iter()
-        .map(|&(x, y, z)| {
-            let block = Block {
-                axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]],
-            };
-            let mut out = vec![0f32; block.len()];
-            region.fill(&block, &mut out);
-            out.iter().filter(|v| **v < 0.0).count()
-        })
-        .sum();
-    println!("{n}³ filled in {:?}, {inside} inside", t.elapsed());
+    let clean = ball(6, 100.0, 0.1);
+    let mut other = ball(6, 70.0, 0.1);
+    for v in &mut other.vertices {
+        *v = add(*v, [60.0, 10.0, 5.0]);
+    }
+    let mut open = clean.clone();
+    open.triangles
+        .retain(|t| t.iter().any(|v| clean.vertices[*v as usize][0] < 98.0));
+    for (name, mesh) in [
+        ("clean", clean.clone()),
+        ("with a hole", open),
+        ("two that cross", with(clean.clone(), other, false)),
+    ] {
+        let t = Instant::now();
+        let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
+        println!(
+            "{name}: {} triangles: built in {:?}; {:?}",
+            mesh.triangles.len(),
+            t.elapsed(),
+            region.repaired().sentence()
+        );
+        let mut seed = 1;
+        let points: Vec<Vec3> = (0..200_000)
+            .map(|_| {
+                let i = ((random(&mut seed) + 1.0) / 2.0 * mesh.vertices.len() as f64) as usize;
+                add(mesh.vertices[i], [0; 3].map(|_| random(&mut seed)))
+            })
+            .collect();
+        let mut out = vec![0.0; points.len()];
+        let t = Instant::now();
+        region.values(&points, &mut out);
+        println!(
+            "  {:.0} ns per random query near the surface",
+            t.elapsed().as_nanos() as f64 / points.len() as f64
+        );
+        let t = Instant::now();
+        let winding = Winding::new(&region.tree);
+        let made = t.elapsed();
+        let t = Instant::now();
+        let inside = points
+            .iter()
+            .filter(|p| winding.at(&region.tree, **p, REACH, |_| false) > 0.5)
+            .count();
+        println!(
+            "  moments in {made:?}, {:.0} ns per winding number, {inside} inside",
+            t.elapsed().as_nanos() as f64 / points.len() as f64
+        );
+        let n = 256;
+        let axis: Vec<f64> = (0..n)
+            .map(|i| -115.0 + 260.0 * i as f64 / (n - 1) as f64)
+            .collect();
+        let t = Instant::now();
+        let tiles: Vec<(usize, usize, usize)> = (0..512)
+            .map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32))
+            .collect();
+        let inside: usize = tiles
+            .par_iter()
+            .map(|&(x, y, z)| {
+                let block = Block {
+                    axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]],
+                };
+                let mut out = vec![0f32; block.len()];
+                region.fill(&block, &mut out);
+                out.iter().filter(|v| **v < 0.0).count()
+            })
+            .sum();
+        println!("  {n}³ filled in {:?}, {inside} inside", t.elapsed());
+    }
 }

@@ -31,7 +31,7 @@ fn trial() {
                     vol,
                     r.mesh.triangles.len(),
                     r.volume,
-                    matches!(r.side, Side::Normals(_)),
+                    r.winding.is_none(),
                     t.elapsed(),
                     r.repaired.sentence()
                 );
