@@ -33,7 +33,7 @@ const REACH: f64 = 2.0;
 /// The solid inside a triangle mesh, which is repaired if it is not clean: bodies, perhaps with cavities.
 ///
 /// Distances to the (repaired) boundary are exact to rounding. Their sign comes from the normals of the nearest face,
-/// edge or vertex where the boundary is one clean sheet there, else from its winding number.
+/// edge or vertex where the boundary is one clean surface, else from that of the face or the winding number.
 #[derive(Debug)]
 pub struct MeshRegion {
     tree: Tree,
@@ -64,7 +64,7 @@ impl MeshRegion {
         let (normals, winding) = match pairs {
             Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
             None => (
-                Normals::of_pieces(&mesh, &faces, &order),
+                Normals::of_pieces(&faces, &order),
                 Some(Winding::new(&tree)),
             ),
         };
@@ -277,5 +277,3 @@ impl Fill<'_> {
 mod laws;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod trial;

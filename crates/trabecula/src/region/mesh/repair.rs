@@ -211,8 +211,9 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     let clean = check::edges(&mesh).ok();
     let crosses = clean.is_none() || found.is_some() && self_intersections(&mesh, 1) > 0;
     let mut pairs = clean.filter(|_| !crosses);
-    let cut = cut::boundary(&mesh);
-    if !cut.untouched {
+    let plain = pairs.as_ref().is_some_and(|p| check::plain(&mesh, p));
+    let cut = (!plain).then(|| cut::boundary(&mesh));
+    if let Some(cut) = cut.filter(|c| !c.untouched) {
         let eta = cut::tolerance(&mesh);
         done.crossings = cut.pairs;
         done.inner = cut.inner;
