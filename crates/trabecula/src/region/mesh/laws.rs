@@ -523,7 +523,7 @@ fn degenerate_and_stray_triangles_go() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Boxes on a coarse grid are often flush or equal; turned, they are so but for rounding.
     #[test]
