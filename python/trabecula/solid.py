@@ -56,6 +56,16 @@ class Solid(Picture):
         """What may not be meant, as {path, message}."""
         return [{"path": p, "message": m} for p, m in self._core.warnings]
 
+    @property
+    def repairs(self) -> dict[str, dict[str, int | float]]:
+        """What was repaired in each mesh of the region, by the path of its table (``"region.mesh"``).
+
+        Counts of corners ``joined``, edges ``split``, ``degenerate`` triangles and ``duplicates`` left out, triangles
+        ``turned``, ``bodies_turned``, ``holes`` (with ``hole_length`` in mm, ``hole_area`` in mm² and ``hole_share`` of
+        the surface), ``crossings`` cut and ``inner`` triangles left out. All zero for a clean mesh.
+        """
+        return dict(self._core.repairs)
+
     def report(self) -> dict:
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``.
 

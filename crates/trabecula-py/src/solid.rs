@@ -13,6 +13,7 @@ use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
 use trabecula::io;
+use trabecula::region::Repaired;
 
 use crate::design::Folder;
 use crate::error;
@@ -78,6 +79,32 @@ impl Solid {
     #[getter]
     fn warnings(&self) -> Vec<(String, String)> {
         self.warnings.clone()
+    }
+
+    /// What was repaired in each mesh of the region, by the path of its table.
+    #[getter]
+    fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyDict>)>> {
+        let dict = |(path, done): &(String, Repaired)| {
+            let d = PyDict::new(py);
+            for (key, count) in [
+                ("joined", done.joined),
+                ("split", done.split),
+                ("degenerate", done.degenerate),
+                ("duplicates", done.duplicates),
+                ("turned", done.turned),
+                ("bodies_turned", done.bodies_turned),
+                ("holes", done.holes),
+                ("crossings", done.crossings),
+                ("inner", done.inner),
+            ] {
+                d.set_item(key, count)?;
+            }
+            d.set_item("hole_length", done.hole_length)?;
+            d.set_item("hole_area", done.hole_area)?;
+            d.set_item("hole_share", done.hole_share)?;
+            Ok((path.clone(), d))
+        };
+        self.built.repairs.iter().map(dict).collect()
     }
 
     /// The design as TOML text.

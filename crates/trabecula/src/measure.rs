@@ -7,12 +7,13 @@ use crate::mesh::Mesh;
 
 mod adjacency;
 mod cut;
-mod exact;
+pub(crate) mod exact;
 mod intersect;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
 pub use cut::cut_triangles;
+pub(crate) use intersect::{Tree as BoxTree, near_pairs};
 pub use intersect::{is_embedded, self_intersections};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
