@@ -485,8 +485,14 @@ fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
     }
 }
 
+/// Random designs in one run: `make campaign` asks for more.
+fn cases() -> u32 {
+    let asked = std::env::var("TRABECULA_CASES").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(48)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any cell, part, fraction, orientation and region, however coarse the grid.
     #[test]
@@ -510,82 +516,4 @@ proptest! {
         check(&format!("full {text} edge {edge}"), &full);
         prop_assert!(s.mesh.volume() <= full.mesh.volume() * (1.0 + 0.5 * edge) + 1e-9);
     }
-}
-
-#[test]
-#[ignore]
-fn campaign() {
-    let e = |n: &str, d: f64| std::env::var(n).map_or(d, |e| e.parse().unwrap());
-    let (from, n) = (e("FROM", 0.0) as u64, e("N", 300.0) as u64);
-    let mut bad = [0; 6];
-    for seed in from..from + n {
-        let mut state = seed.wrapping_mul(0x9E3779B97F4A7C15) ^ 0x1234567;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            let x = state ^ (state >> 33);
-            (x.wrapping_mul(0xff51afd7ed558ccd) >> 11) as f64 / (1u64 << 53) as f64
-        };
-        for _ in 0..4 {
-            random();
-        }
-        let kind = (random() * 7.0) as usize;
-        let region = region(
-            kind,
-            0.5 + random(),
-            random() * 0.8 - 0.4,
-            0.2 + 0.8 * random(),
-        );
-        let name = catalogue()[(random() * 10.0) as usize].name;
-        let part = [Part::Sheet, Part::Lower, Part::Upper][(random() * 3.0) as usize];
-        let fraction = 0.03 + 0.94 * random();
-        let rotate = [0; 3].map(|_| random() * 360.0 - 180.0);
-        let wavelength = [0; 3].map(|_| 0.5 + random());
-        let edge = 0.04 + 0.26 * random();
-        let field = lattice(
-            name,
-            part,
-            Level::Fraction(Grade::Constant(fraction)),
-            wavelength,
-            rotate,
-        );
-        let Ok(s) = surface(&solid(region.clone(), Some(field)), edge, &Silent) else {
-            continue;
-        };
-        let m = rounded(&s.mesh);
-        let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-        let flat = (0..m.triangles.len())
-            .filter(|&i| {
-                let [a, b, c] = m.corners(i);
-                a == b || b == c || c == a
-            })
-            .count();
-        let found = [
-            m.vertices.len() - places.len(),
-            usize::from(!size(&m).closed),
-            non_manifold_vertices(&m) as usize,
-            self_intersections(&m, 50),
-            flat,
-        ];
-        if found.iter().any(|f| *f > 0) {
-            println!(
-                "seed {seed}: kind {kind} {name} {part:?} {fraction:.2} edge {edge:.3} tris {}: dup {} open {} fans {} cross {} flat {}",
-                m.triangles.len(),
-                found[0],
-                found[1],
-                found[2],
-                found[3],
-                found[4]
-            );
-            for (b, f) in bad.iter_mut().zip(found) {
-                *b += usize::from(f > 0);
-            }
-            bad[5] += 1;
-        }
-    }
-    println!(
-        "of {n}: dup {} open {} fans {} cross {} flat {}: bad {}",
-        bad[0], bad[1], bad[2], bad[3], bad[4], bad[5]
-    );
 }
