@@ -197,9 +197,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--step", type=length, metavar="MM", help="voxels for the thickness, mm (default: an eighth of the mean wall)"
     )
-    p.add_argument(
-        "--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)"
-    )
+    p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
     p.add_argument("--json", action="store_true", help="print the measures as JSON")
 
     p = command(

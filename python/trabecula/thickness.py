@@ -35,8 +35,8 @@ class Thickness:
         return self.wall["step"]
 
     def measure(self) -> dict:
-        """``wall_thickness`` and ``pore_size``, each {min, p05, mean, sd, max, step, histogram: {edges, share}}, mm;
-        ``pore_size`` is None without a region.
+        """``wall_thickness`` and ``pore_size``, each {min, p05, mean, sd, max, step, accuracy, histogram: {edges,
+        share}}, mm; ``pore_size`` is None without a region.
         """
         return {"wall_thickness": self.wall, "pore_size": self.pore}
 

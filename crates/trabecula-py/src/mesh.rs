@@ -179,8 +179,7 @@ impl Mesh {
     ) -> PyResult<(f64, [usize; 3], f64)> {
         let region = region.map(|r| r.region.clone());
         run(py, None, None, |_| {
-            let step =
-                step.unwrap_or_else(|| measure::usual_step(&self.surface, region.as_ref()));
+            let step = step.unwrap_or_else(|| measure::usual_step(&self.surface, region.as_ref()));
             let shape = measure::voxels_for(&self.surface, region.as_ref(), step)?;
             let count = shape.iter().map(|n| *n as f64).product::<f64>();
             Ok((step, shape, count * measure::BYTES_PER_VOXEL))
@@ -211,6 +210,7 @@ impl Mesh {
             d.set_item("sd", s.sd)?;
             d.set_item("max", s.max)?;
             d.set_item("step", step)?;
+            d.set_item("accuracy", found.accuracy)?;
             let histogram = PyDict::new(py);
             histogram.set_item("edges", &s.edges)?;
             histogram.set_item("share", &s.share)?;

@@ -30,6 +30,8 @@ use lines::{Lines, Shape};
 
 /// Bytes of memory that a voxel takes at most, sites of the surface included.
 pub const BYTES_PER_VOXEL: f64 = 16.0;
+/// The error of a mean, in steps, where walls are two and a half steps or more; it falls faster than the step does.
+const ACCURACY: f64 = 0.15;
 /// The most voxels.
 const MOST: f64 = (1u64 << 33) as f64;
 /// Steps in the mean wall, 2 V / A, if nothing is asked for.
@@ -37,7 +39,7 @@ const STEPS: f64 = 8.0;
 /// The most voxels if nothing is asked for.
 const USUAL: f64 = (1u64 << 24) as f64;
 /// Bars of a histogram, about.
-const BARS: f64 = 30.0;
+const BARS: f64 = 50.0;
 
 /// How thickness is distributed over a volume. Lengths are mm.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,6 +69,8 @@ pub struct Spread {
 pub struct Thickness {
     /// Edge of a voxel, mm.
     pub step: f64,
+    /// Means are right to about this, mm: `ACCURACY` steps.
+    pub accuracy: f64,
     /// The solid.
     pub wall: Spread,
     /// The region without the solid; `None` without a region, or where nothing is left of it.
@@ -153,15 +157,21 @@ pub fn voxels_for(
 ) -> Result<[usize; 3], Fault> {
     let refuse = |message: String| Err(Fault::new("step", message));
     if !(step.is_finite() && step > 0.0) {
-        return refuse(format!("is {step}; it must be a finite number greater than 0, mm"));
+        return refuse(format!(
+            "is {step}; it must be a finite number greater than 0, mm"
+        ));
     }
     let b = bounds(surface, region);
     if b.is_empty() || !b.is_finite() {
-        let message = "the mesh is empty, or the region has no end; there is nothing to lay voxels over";
+        let message =
+            "the mesh is empty, or the region has no end; there is nothing to lay voxels over";
         return Err(Fault::new("", message));
     }
     let size = b.size();
-    let count = size.iter().map(|s| (s / step).ceil().max(1.0)).product::<f64>();
+    let count = size
+        .iter()
+        .map(|s| (s / step).ceil().max(1.0))
+        .product::<f64>();
     if count > MOST {
         let better = step * (count / (0.9 * MOST)).cbrt();
         return refuse(format!(
@@ -174,7 +184,7 @@ pub fn voxels_for(
 /// Local thickness of the solid that a closed mesh bounds and, if a region is given, of the pores: what the solid leaves
 /// of the region. `cut` of the surface tells which triangles are the region's; voxels have edge `step` (mm).
 ///
-/// The error of a ball's diameter is of second order in the step; `docs/concepts/measures.md` has the rates. Memory is
+/// For planes, cylinders and spheres the balls are exact up to the mesh; `docs/concepts/measures.md` has the rates. Memory is
 /// `BYTES_PER_VOXEL` at most; the same figures for any number of threads.
 ///
 /// # Errors
@@ -203,14 +213,23 @@ pub fn thickness(
     let nz = shape[2];
     let middle = bounds(surface, region).center();
     let first = [0, 1, 2].map(|a| middle[a] - (shape[a] - 1) as f64 * step / 2.0);
-    let steps = nearest::PASSES.iter().zip(shape).map(|(p, n)| p * n).sum::<usize>();
+    let steps = nearest::PASSES
+        .iter()
+        .zip(shape)
+        .map(|(p, n)| p * n)
+        .sum::<usize>();
     let painted = nz * if region.is_some() { 4 } else { 2 };
     let watch = Watch::new(progress, (steps + painted) as u64);
 
     let scaled = Shape::new(mesh, first, step);
     let (x, (y, z)) = rayon::join(
         || Lines::new(&scaled, shape, 0),
-        || rayon::join(|| Lines::new(&scaled, shape, 1), || Lines::new(&scaled, shape, 2)),
+        || {
+            rayon::join(
+                || Lines::new(&scaled, shape, 1),
+                || Lines::new(&scaled, shape, 2),
+            )
+        },
     );
     let mut lines = [x, y, z];
     let mut sites = Vec::new();
@@ -256,7 +275,12 @@ pub fn thickness(
             pore = Some(spread(&space, &watch)?);
         }
     }
-    Ok(Thickness { step, wall, pore })
+    Ok(Thickness {
+        step,
+        accuracy: ACCURACY * step,
+        wall,
+        pore,
+    })
 }
 
 /// The voxels whose centres are in the solid.
@@ -314,8 +338,11 @@ fn pores(grid: &Grid, region: &Region) -> Bits {
 /// The distribution over a space.
 fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
     let balls = space.balls(watch)?;
-    // The largest ball comes first, the least last.
-    let least = balls.iter().rev().find(|b| b.wall).map(|b| b.radius);
+    let least = balls
+        .iter()
+        .filter_map(|b| b.wall)
+        .reduce(f32::min)
+        .map(|d| d / 2.0);
     let balls = space.needed(&balls);
     let mut radii = space.paint(&balls, watch)?;
     drop(balls);
@@ -330,7 +357,11 @@ fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
     let low = radii.iter().fold(f32::INFINITY, |m, r| m.min(*r));
     let high = radii.iter().fold(0f32, |m, r| m.max(*r));
     let mean = radii.iter().map(|r| diameter(*r)).sum::<f64>() / n as f64;
-    let square = radii.iter().map(|r| (diameter(*r) - mean).powi(2)).sum::<f64>() / n as f64;
+    let square = radii
+        .iter()
+        .map(|r| (diameter(*r) - mean).powi(2))
+        .sum::<f64>()
+        / n as f64;
     let width = round_up(diameter(high) / BARS);
     let bars = (diameter(high) / width).floor() as usize + 1;
     let mut counts = vec![0u64; bars];
@@ -352,6 +383,8 @@ fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
 /// The next of 1, 2, 5, 10 … with any power of ten.
 fn round_up(v: f64) -> f64 {
     let unit = 10f64.powf(v.log10().floor());
-    let of = [1.0, 2.0, 5.0].into_iter().find(|k| k * unit >= v * (1.0 - 1e-12));
+    let of = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|k| k * unit >= v * (1.0 - 1e-12));
     of.unwrap_or(10.0) * unit
 }

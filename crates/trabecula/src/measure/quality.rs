@@ -72,7 +72,9 @@ mod tests {
     #[test]
     fn meshes() {
         let q = quality(&cube([1.0; 3], 2.0)).expect("triangles");
-        assert!((q.smallest_angle - 45.0).abs() < 1e-12 && (q.smallest_angle_p05 - 45.0).abs() < 1e-12);
+        assert!(
+            (q.smallest_angle - 45.0).abs() < 1e-12 && (q.smallest_angle_p05 - 45.0).abs() < 1e-12
+        );
         // Legs 1: the inscribed circle has radius 1 − 1/√2.
         let aspect = 2f64.sqrt() / (12f64.sqrt() * (1.0 - 0.5f64.sqrt()));
         assert!((q.largest_aspect - aspect).abs() < 1e-12);

@@ -43,8 +43,8 @@ const LAYERS: usize = 4;
 pub(super) struct Ball {
     pub center: [f32; 3],
     pub radius: f32,
-    /// Whether it touches the lattice on opposite sides: across a wall or a neck.
-    pub wall: bool,
+    /// Where it touches the lattice on opposite sides, across a wall or a neck: the way from one to the other.
+    pub wall: Option<f32>,
 }
 
 /// Where a ball may be.
@@ -127,7 +127,9 @@ impl Space<'_> {
             let slack = (ball.radius * SLACK).min(0.5);
             let covered = self.cube(v).any(|w| {
                 kept.get(at[self.grid.index(w)] as usize).is_some_and(|k| {
-                    let apart = (0..3).map(|a| (k.center[a] - ball.center[a]).powi(2)).sum::<f32>();
+                    let apart = (0..3)
+                        .map(|a| (k.center[a] - ball.center[a]).powi(2))
+                        .sum::<f32>();
                     apart.sqrt() + ball.radius <= k.radius + slack
                 })
             });
@@ -141,7 +143,10 @@ impl Space<'_> {
 
     /// The ball of a voxel, if one ends its growth there.
     fn ball(&self, v: [usize; 3], around: &mut Vec<u32>) -> Option<Ball> {
-        let edge = self.open.filter(|_| self.at_end(v)).map(|room| room(v).max(0.0));
+        let edge = self
+            .open
+            .filter(|_| self.at_end(v))
+            .map(|room| room(v).max(0.0));
         if edge.is_none() && !self.between(v) {
             return None;
         }
@@ -167,10 +172,13 @@ impl Space<'_> {
         let least = feet.iter().fold(f64::INFINITY, |m, f| m.min(f.distance));
         let lattice = |t: u32| !self.cut.get(t as usize).copied().unwrap_or(false);
         let touching = |f: &&Foot| f.distance <= least + WALL && lattice(f.triangle);
-        let wall = feet.iter().filter(touching).any(|a| {
-            let mut others = feet.iter().filter(touching);
-            others.any(|b| dot(a.away, b.away) < OPPOSITE)
+        let across = feet.iter().filter(touching).flat_map(|a| {
+            let others = feet.iter().filter(touching);
+            others
+                .filter(|b| dot(a.away, b.away) < OPPOSITE)
+                .map(|b| a.distance + b.distance)
         });
+        let wall = across.reduce(f64::min).map(|d| d as f32);
         (least > 0.0 && least.is_finite()).then(|| Ball {
             center: center.map(|c| c as f32),
             radius: least as f32,
@@ -198,7 +206,11 @@ impl Space<'_> {
             let way = scale(way, 1.0 / rate);
             let to_side = |k: usize| {
                 let off = at[k] - v[k] as f64;
-                if way[k] == 0.0 { f64::INFINITY } else { (NEAR - off * way[k].signum()) / way[k].abs() }
+                if way[k] == 0.0 {
+                    f64::INFINITY
+                } else {
+                    (NEAR - off * way[k].signum()) / way[k].abs()
+                }
             };
             let mut far = to_side(0).min(to_side(1)).min(to_side(2)).max(0.0);
             for f in feet.iter().filter(|f| f.distance > least + TOUCH) {
@@ -231,7 +243,9 @@ impl Space<'_> {
             }
             let m = normals[site.triangle as usize];
             let turn = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
-            let gap = (0..3).map(|k| (site.point[k] - own.point[k]).powi(2)).sum::<f32>();
+            let gap = (0..3)
+                .map(|k| (site.point[k] - own.point[k]).powi(2))
+                .sum::<f32>();
             turn < SMOOTH as f32 || gap > APART
         })
     }
@@ -283,7 +297,8 @@ impl Space<'_> {
         let (xs, ys, zs) = (span(0), span(1), span(2));
         zs.flat_map(move |z| {
             let xs = xs.clone();
-            ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
+            ys.clone()
+                .flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
         })
     }
 
@@ -385,7 +400,9 @@ impl Space<'_> {
                 break;
             }
             // Where the surface is nearer than the ball allows, its end lies behind.
-            let away = self.site(w).map_or(0.0, |s| apart(w.map(|c| c as f32), s).sqrt());
+            let away = self
+                .site(w)
+                .map_or(0.0, |s| apart(w.map(|c| c as f32), s).sqrt());
             if k > 0 && away < own.distance + f64::from(k) - 1.0 {
                 break;
             }
@@ -499,7 +516,11 @@ fn closest(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     let on_side = |u: Vec3, v: Vec3| {
         let uv = sub(v, u);
         let square = dot(uv, uv);
-        let t = if square > 0.0 { dot(sub(p, u), uv) / square } else { 0.0 };
+        let t = if square > 0.0 {
+            dot(sub(p, u), uv) / square
+        } else {
+            0.0
+        };
         add(u, scale(uv, t.clamp(0.0, 1.0)))
     };
     let off = |q: &Vec3| dot(sub(p, *q), sub(p, *q));

@@ -64,7 +64,15 @@ mod tests {
 
     #[test]
     fn spans_as_words() {
-        for (a, b) in [(0, 0), (0, 1), (3, 64), (3, 65), (63, 64), (64, 130), (10, 200)] {
+        for (a, b) in [
+            (0, 0),
+            (0, 1),
+            (3, 64),
+            (3, 65),
+            (63, 64),
+            (64, 130),
+            (10, 200),
+        ] {
             let found: Vec<usize> = masks(a..b)
                 .flat_map(|(w, m)| ones(m).map(move |i| w * 64 + i))
                 .collect();

@@ -40,7 +40,13 @@ impl<'a> Shape<'a> {
             let [a, b, c] = t.map(|v| vertices[v as usize]);
             let n = cross(sub(b, a), sub(c, a));
             let length = norm(n);
-            n.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 })
+            n.map(|x| {
+                if length > 0.0 {
+                    (x / length) as f32
+                } else {
+                    0.0
+                }
+            })
         });
         Shape {
             normals: normals.collect(),

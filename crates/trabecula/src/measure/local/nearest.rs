@@ -26,9 +26,9 @@ pub(super) fn nearest(
 
     // In layers of z.
     let mut flat = vec![NONE; all];
-    flat.par_chunks_mut(nx * ny)
-        .enumerate()
-        .for_each_init(Envelope::default, |envelope, (z, layer)| {
+    flat.par_chunks_mut(nx * ny).enumerate().for_each_init(
+        Envelope::default,
+        |envelope, (z, layer)| {
             if !watch.tick() {
                 return;
             }
@@ -37,7 +37,12 @@ pub(super) fn nearest(
             }
             for x in 0..nx {
                 envelope.clear();
-                envelope.add_column(ny, |y| layer[y * nx + x], |p| square(p[0] - x as f32), sites);
+                envelope.add_column(
+                    ny,
+                    |y| layer[y * nx + x],
+                    |p| square(p[0] - x as f32),
+                    sites,
+                );
                 envelope.each(ny, |y, id| layer[y * nx + x] = id);
             }
             // The y lines of this layer, spread along x, and the nearer of the two kept.
@@ -52,21 +57,26 @@ pub(super) fn nearest(
             for y in 0..ny {
                 let row = &mut layer[y * nx..(y + 1) * nx];
                 envelope.clear();
-                envelope.add_column(nx, |x| other[y * nx + x], |p| square(p[1] - y as f32), sites);
+                envelope.add_column(
+                    nx,
+                    |x| other[y * nx + x],
+                    |p| square(p[1] - y as f32),
+                    sites,
+                );
                 envelope.each(nx, |x, id| {
                     let here = [x as f32, y as f32, z as f32];
                     row[x] = nearer(sites, here, row[x], id);
                 });
             }
-        });
+        },
+    );
     watch.check()?;
 
     // Spread along z, into layers of y.
     let mut spread = vec![NONE; all];
-    spread
-        .par_chunks_mut(nx * nz)
-        .enumerate()
-        .for_each_init(Envelope::default, |envelope, (y, layer)| {
+    spread.par_chunks_mut(nx * nz).enumerate().for_each_init(
+        Envelope::default,
+        |envelope, (y, layer)| {
             if !watch.tick() {
                 return;
             }
@@ -76,16 +86,16 @@ pub(super) fn nearest(
                 envelope.add_column(nz, |z| flat[(z * ny + y) * nx + x], off, sites);
                 envelope.each(nz, |z, id| layer[z * nx + x] = id);
             }
-        });
+        },
+    );
     drop(flat);
     watch.check()?;
 
     // The z lines, in layers of y.
     let mut upright = vec![NONE; all];
-    upright
-        .par_chunks_mut(nx * nz)
-        .enumerate()
-        .for_each_init(Envelope::default, |envelope, (y, layer)| {
+    upright.par_chunks_mut(nx * nz).enumerate().for_each_init(
+        Envelope::default,
+        |envelope, (y, layer)| {
             if !watch.tick() {
                 return;
             }
@@ -103,15 +113,15 @@ pub(super) fn nearest(
                 envelope.add_column(nx, |x| row[x], |p| square(p[2] - z as f32), sites);
                 envelope.each(nx, |x, id| out[x] = id);
             }
-        });
+        },
+    );
     watch.check()?;
 
     // Spread along y, and the nearer of the two kept.
     let mut found = vec![NONE; all];
-    found
-        .par_chunks_mut(nx * ny)
-        .enumerate()
-        .for_each_init(Envelope::default, |envelope, (z, layer)| {
+    found.par_chunks_mut(nx * ny).enumerate().for_each_init(
+        Envelope::default,
+        |envelope, (z, layer)| {
             if !watch.tick() {
                 return;
             }
@@ -124,7 +134,8 @@ pub(super) fn nearest(
                     layer[y * nx + x] = nearer(sites, here, spread[(y * nz + z) * nx + x], id);
                 });
             }
-        });
+        },
+    );
     watch.check()?;
     Ok(found)
 }
@@ -241,9 +252,15 @@ mod tests {
         let found = nearest(size, &sites, &lines, &Watch::new(&Silent, 1)).expect("found");
         for (i, id) in found.iter().enumerate() {
             let here = [i % 22, i / 22 % 19, i / (22 * 19)].map(|c| c as f32);
-            let least = sites.iter().map(|s| apart(here, s)).fold(f64::INFINITY, f64::min);
+            let least = sites
+                .iter()
+                .map(|s| apart(here, s))
+                .fold(f64::INFINITY, f64::min);
             let is = apart(here, &sites[*id as usize]);
-            assert!((is - least).abs() < 1e-5 * (1.0 + least), "{here:?}: {is} {least}");
+            assert!(
+                (is - least).abs() < 1e-5 * (1.0 + least),
+                "{here:?}: {is} {least}"
+            );
         }
     }
 }
