@@ -178,10 +178,12 @@ def parser() -> argparse.ArgumentParser:
 
     p = command(
         "measure",
-        "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness.",
-        "A design is meshed in memory first. A mesh file has a solid fraction only against a region.\n\n"
+        "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
+        "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
+        "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
-        "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json",
+        "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
+        "  trabecula measure part.toml --thickness --step 0.05 --histogram part.png",
     )
     p.add_argument("file", type=ending((*DESIGNS, *MESH_IN)), metavar="FILE", help="a design or a mesh file")
     p.add_argument(
@@ -191,6 +193,11 @@ def parser() -> argparse.ArgumentParser:
         help="what the solid fraction is of: a design, a file with a [region] alone, or a closed mesh in mm",
     )
     resolution(p)
+    p.add_argument("--thickness", action="store_true", help="also distributions of wall thickness and pore size")
+    p.add_argument(
+        "--step", type=length, metavar="MM", help="voxels for the thickness, mm (default: an eighth of the mean wall)"
+    )
+    p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
     p.add_argument("--json", action="store_true", help="print the measures as JSON")
 
     p = command(

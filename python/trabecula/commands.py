@@ -115,6 +115,11 @@ def voxels(args) -> None:
 
 def measure(args) -> None:
     """``trabecula measure``."""
+    if not args.thickness and (args.step is not None or args.histogram is not None):
+        raise Refused("--step and --histogram belong to --thickness; add it")
+    if args.histogram is not None:
+        check_place(args.histogram)
+        keep_measured(args)
     made = surface(args)
     if args.region:
         made = made.within(region(args.region))
@@ -129,19 +134,50 @@ def measure(args) -> None:
         )
     if not figures["closed"]:
         say(f"warning: {args.file} is not closed ({flaws(made)}), so its volume and what follows from it mean little")
+    figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
+    if args.thickness:
+        with Progress("fitting balls", args.progress) as progress:
+            balls = made.thickness(args.step, args.threads, progress)
+        figures |= balls.measure()
+        if args.histogram is not None:
+            balls.render(args.histogram)
     if args.json:
         return print(json.dumps(figures, indent=2))
-    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²"}
-    for key, value in figures.items():
+    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
+    lines = listed(figures)
+    width = max(15, *(len(key) for key, _ in lines))
+    for key, value in lines:
         if key == "bounds":
             text = " to ".join("(" + ", ".join(figure(v) for v in corner) + ")" for corner in value) + " mm"
         elif value is None:
-            text = "needs a region (--region)"
+            text = ABSENT.get(key, "needs a region (--region)")
+        elif isinstance(value, list):
+            text = ", ".join(value) or "none"
         elif isinstance(value, bool):
             text = "yes, but inside out" if value and inverted else "yes" if value else "no"
         else:
             text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
-        print(f"{key:15} {text}")
+        print(f"{key:{width}} {text}")
+
+
+#: What is said where a figure is missing for another reason than that there is no region.
+ABSENT = {"quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
+
+
+def listed(figures: dict) -> list[tuple]:
+    """The figures line by line: those of a group under its name, without histograms."""
+    lines: list[tuple] = []
+    for key, value in figures.items():
+        group = value.items() if isinstance(value, dict) else None
+        lines += [(f"{key}.{k}", v) for k, v in group if k != "histogram"] if group else [(key, value)]
+    return lines
+
+
+def keep_measured(args) -> None:
+    """Refuses a histogram that would replace what is measured."""
+    for name in filter(None, (args.file, args.region)):
+        if os.path.exists(name) and os.path.exists(args.histogram) and os.path.samefile(name, args.histogram):
+            raise Refused(f"{args.histogram} is read by this command; name another picture")
 
 
 def flaws(mesh: Mesh) -> str:

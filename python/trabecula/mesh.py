@@ -8,11 +8,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
-from .given import number, whole
+from .given import number, positive, whole
 from .machine import file_size, fits
 from .output import extension, whole_file
+from .thickness import Thickness
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -31,7 +35,11 @@ FIGURES = (
     "cavities",
     "closed",
     "bounds",
+    "specific_surface",
+    "hydraulic_diameter",
 )
+#: Pairs of triangles after which self-intersections are counted no further.
+MANY = 1_000_000
 READS = ("stl", "3mf", "ply", "obj", "off")
 
 
@@ -106,11 +114,12 @@ class Mesh(Picture):
 
     def measure(self) -> dict:
         """Every figure: volume, area, area_lattice, area_cut, solid_fraction, porosity, euler, pieces, cavities,
-        closed, bounds. Those that need a region are None for a mesh without one.
+        closed, bounds, specific_surface, hydraulic_diameter. Those that need a region are None for a mesh without one.
         """
         figures = dict(self._figures)
         share = self.solid_fraction
         figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share}
+        figures |= {"specific_surface": self.specific_surface, "hydraulic_diameter": self.hydraulic_diameter}
         return {k: figures[k] for k in FIGURES}
 
     @cached_property
@@ -118,7 +127,90 @@ class Mesh(Picture):
         """Volume of the solid over volume of its region; None for a mesh without a region."""
         if self._region is None:
             return None
-        return self.volume / self._region.volume(self._edge or self._spacing())
+        return self.volume / self._region_volume
+
+    @cached_property
+    def _region_volume(self) -> float:
+        return self._region.volume(self._edge or self._spacing())
+
+    @property
+    def specific_surface(self) -> dict[str, float | None]:
+        """Area over volume, 1/mm: ``area_of_solid`` is all area over the solid's volume, ``area_of_region`` all area and
+        ``lattice_of_region`` the lattice's area, without cuts, over the region's volume.
+        """
+        area, lattice = self.area, self._figures["area_lattice"]
+        whole = None if self._region is None else self._region_volume
+        return {
+            "area_of_solid": area / self.volume if self.volume else None,
+            "area_of_region": area / whole if whole else None,
+            "lattice_of_region": lattice / whole if whole and lattice is not None else None,
+        }
+
+    @property
+    def hydraulic_diameter(self) -> float | None:
+        """4 · pore volume / wetted area, mm: the region's volume without the solid's, and the lattice's area without
+        cuts. None without a region or a lattice.
+        """
+        lattice = self._figures["area_lattice"]
+        if self._region is None or not lattice:
+            return None
+        return 4 * (self._region_volume - self.volume) / lattice
+
+    @cached_property
+    def self_intersections(self) -> int:
+        """Pairs of triangles that meet elsewhere than in common corners or edges, decided exactly; a million stands for
+        that many or more.
+        """
+        return self._core.self_intersections(MANY)
+
+    @cached_property
+    def quality(self) -> dict[str, float] | None:
+        """How well shaped the triangles are: ``smallest_angle`` and its 5th percentile ``smallest_angle_p05``, degrees (60
+        at best), and ``largest_aspect``, the longest edge over 2√3 times the inscribed circle's radius (1 at best; None
+        for a triangle without area). None without triangles.
+        """
+        found = self._core.quality()
+        if found is None:
+            return None
+        least, p05, aspect = found
+        return {
+            "smallest_angle": least,
+            "smallest_angle_p05": p05,
+            "largest_aspect": aspect if math.isfinite(aspect) else None,
+        }
+
+    @cached_property
+    def defects(self) -> list[str]:
+        """What is wrong with the mesh as the surface of a solid, in words; empty if nothing is."""
+        words = (
+            ("edge with one triangle", "edges with one triangle"),
+            ("edge with more than two triangles", "edges with more than two triangles"),
+            ("edge whose two triangles face opposite ways", "edges whose two triangles face opposite ways"),
+            ("triangle given twice", "triangles given twice"),
+            ("triangle without area", "triangles without area"),
+            ("vertex where surfaces touch", "vertices where surfaces touch"),
+            ("pair of triangles that cross or touch", "pairs of triangles that cross or touch"),
+        )
+        counts = (*self._core.flaws(), *self._core.oddities(), self.self_intersections)
+        found = [f"{n} {two if n > 1 else one}" for n, (one, two) in zip(counts, words, strict=True) if n]
+        return [*found, "inside out"] if self.closed and self.volume < 0 else found
+
+    def thickness(
+        self,
+        step: float | None = None,
+        threads: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> Thickness:
+        """Local thickness of the solid and, if the mesh has a region, of its pores, on voxels of edge ``step`` (mm).
+
+        Unless given, the step is an eighth of the mean wall 2 V / A, or such that there are 2²⁴ voxels. The mesh must be
+        closed.
+        """
+        wanted = None if step is None else positive("step", step)
+        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        spacing, shape, need = self._core.thickness_needs(self._region, wanted)
+        fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
+        return Thickness(*self._core.thickness(self._region, spacing, workers, progress))
 
     @property
     def porosity(self) -> float | None:

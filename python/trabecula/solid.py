@@ -17,6 +17,7 @@ from .given import number, positive, three, whole
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
+from .thickness import Thickness
 
 if TYPE_CHECKING:
     import numpy as np
@@ -214,6 +215,20 @@ class Solid(Picture):
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
+
+    def thickness(
+        self,
+        step: float | None = None,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> Thickness:
+        """Local thickness of walls and pores on voxels of edge ``step`` (mm), as ``Mesh.thickness`` of the surface at grid
+        spacing ``edge``, or ``per_cell`` samples on the smallest wavelength (32 unless given).
+        """
+        wanted = None if step is None else positive("step", step)
+        return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
 
     def _picture(self) -> Mesh:
         low, high = self.bounds

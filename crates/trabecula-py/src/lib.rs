@@ -50,6 +50,32 @@ mod _core {
         crate::machine::free_memory(&root)
     }
 
+    /// Histograms one above the other as PNG bytes: (title, edges, shares, marks).
+    #[pyfunction]
+    #[allow(clippy::type_complexity)]
+    fn charts<'py>(
+        py: Python<'py>,
+        charts: Vec<(String, Vec<f64>, Vec<f64>, Vec<(String, f64)>)>,
+        width: usize,
+        height: usize,
+    ) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {
+        use trabecula::render::{self, Chart};
+        let bytes = crate::run::run(py, None, None, |_| {
+            let charts: Vec<Chart> = charts
+                .into_iter()
+                .map(|(title, edges, share, marks)| Chart {
+                    title,
+                    edges,
+                    share,
+                    marks,
+                })
+                .collect();
+            let size = [width, height];
+            render::png(&render::charts(&charts, size), size)
+        })?;
+        Ok(pyo3::types::PyBytes::new(py, &bytes))
+    }
+
     /// The JSON Schema of a design, as JSON text.
     #[pyfunction]
     fn schema() -> String {
