@@ -263,11 +263,7 @@ impl Region {
         if let Some(v) = self.region.volume() {
             return Ok(v);
         }
-        let full = trabecula::solid::Solid {
-            region: self.region.clone(),
-            field: None,
-            wavelength: edge,
-        };
+        let full = trabecula::solid::Solid::new(self.region.clone(), None, edge);
         let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
         Ok(surface.map_err(error::stopped)?.mesh.volume())
     }

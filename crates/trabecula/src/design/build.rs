@@ -5,8 +5,9 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, region, sample};
+use super::{Built, Design, Loader, Warning, level, region, sample, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
+use crate::face::Body;
 use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
@@ -29,6 +30,8 @@ pub(super) struct Place<'a> {
     pub region: &'a Region,
     /// Points inside the region.
     pub points: &'a [[f64; 3]],
+    /// What is solid in the region whatever the lattice says.
+    pub filled: &'a [Body],
 }
 
 impl From<PartSpec> for Part {
@@ -95,6 +98,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             message,
         });
     }
+    let (filled, thinnest) = skin::filled(d, &space, &points, loader)?;
     let mut lattices = Vec::new();
     for (name, spec) in &d.lattice {
         let path = format!("lattice.{name}");
@@ -102,6 +106,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             path: path.clone(),
             region: &space,
             points: &points,
+            filled: &filled,
         };
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
@@ -118,11 +123,13 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let solid = Solid {
         region: space.clone(),
         field: Some(first.clone()),
+        filled,
         wavelength: first.map.wavelength(),
     };
     Ok(Built {
         solid,
         lattices,
+        skin: thinnest,
         warnings,
     })
 }
@@ -135,8 +142,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let map = map(&spec.map, &below("map"))?;
     let here = Place {
         path: below("level"),
-        region: place.region,
-        points: place.points,
+        ..*place
     };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
