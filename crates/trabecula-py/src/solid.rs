@@ -92,6 +92,12 @@ impl Solid {
         self.built.solid.wavelength
     }
 
+    /// The least thickness of the skin, mm, if there is one.
+    #[getter]
+    fn skin(&self) -> Option<f64> {
+        self.built.skin
+    }
+
     /// Lower and upper corner of the region's bounds, mm.
     #[getter]
     fn bounds(&self) -> ([f64; 3], [f64; 3]) {

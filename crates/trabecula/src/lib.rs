@@ -10,6 +10,7 @@ pub mod extract;
 pub mod face;
 pub mod fault;
 pub mod field;
+mod flush;
 pub mod grade;
 pub mod io;
 pub mod lattice;

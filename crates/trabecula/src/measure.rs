@@ -6,12 +6,14 @@ use crate::math::{Aabb, cross, norm, sub};
 use crate::mesh::Mesh;
 
 mod adjacency;
+mod cavity;
 mod cut;
 mod exact;
 mod intersect;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
+pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
 pub use intersect::{is_embedded, self_intersections};
 

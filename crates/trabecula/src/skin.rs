@@ -9,12 +9,15 @@ use std::sync::Arc;
 use crate::face::{Body, Face, Sign, Tree};
 use crate::fault::{Fault, number};
 use crate::field::Field;
+use crate::flush;
 use crate::grade::Grade;
 use crate::math::{Aabb, Interval, Vec3, add, cross, norm, scale, sub, unit};
 use crate::region::{HalfSpace, Region};
 
 /// The least thickness (mm) that faces are moved by at once; the rest of a thickness that varies is added point by point.
 const LEAST: f64 = 1e-6;
+/// How far faces are moved from where they might lie badly in a grid, as a share of the region's size.
+const HAIR: f64 = 1e-6;
 /// A face is on a plane if it keeps to it this closely, as a share of the region's size.
 const ON: f64 = 1e-9;
 
@@ -47,7 +50,12 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<Bo
             }
             kept.push(match thickness.constant() {
                 Some(_) => face.turned(),
-                None => thickened(face.turned(), thickness, least, &bounds),
+                // Each by its own hair's breadth: the hollow's edges could lie in the diagonal planes of the grid.
+                None => {
+                    let hair = HAIR * norm(bounds.size()) * (kept.len() + 1) as f64;
+                    let face = thickened(face.turned(), thickness, least, &bounds);
+                    flush::outwards(face, hair)
+                }
             });
             Sign::Varies(kept.len() - 1)
         })

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::face::{Body, Face, Tree};
 use crate::field::{Block, Field};
+use crate::flush;
 use crate::math::{Aabb, Interval, Vec3};
 use crate::region::Region;
 
@@ -29,6 +30,16 @@ impl Solid {
             filled: Vec::new(),
             wavelength,
         }
+    }
+
+    /// The same solid with one more body that is solid whatever the lattice says.
+    pub fn with(mut self, mut body: Body) -> Solid {
+        let mut others = Vec::new();
+        self.region.clone().faces(0.0, &mut others);
+        others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
+        flush::apart(&mut body, &others, &self.region.bounds());
+        self.filled.push(body);
+        self
     }
 
     /// The smooth faces of the solid and how they make it. The region's come first.

@@ -82,10 +82,8 @@ fn zone(region: &Region) -> Body {
 }
 
 fn filled(region: &Region, field: Arc<dyn Field>, filled: Vec<Body>) -> Solid {
-    Solid {
-        filled,
-        ..Solid::new(region.clone(), Some(field), 1.0)
-    }
+    let solid = Solid::new(region.clone(), Some(field), 1.0);
+    filled.into_iter().fold(solid, Solid::with)
 }
 
 /// The skin alone.
@@ -231,16 +229,16 @@ fn a_thickness_that_varies_is_met() {
     let whole = |x: f64| 35.0 * x - 1.2 * x * x + 0.04 / 3.0 * x * x * x;
     let inner = whole(x1) - whole(x0);
     let v = volume(&shell(&region, &w, &[]), 0.25, "graded box");
-    close(v, 480.0 - inner, 1e-5, "graded box");
+    close(v, 480.0 - inner, 1e-4, "graded box");
     let open = [half([10.0, 0.0, 0.0], [1.0, 0.0, 0.0])];
     let v = volume(&shell(&region, &w, &open), 0.25, "graded open box");
     close(
         v,
         480.0 - (whole(10.0) - whole(x0)),
-        1e-5,
+        1e-4,
         "graded open box",
     );
-    // A constant, said as a formula.
+    // (The faces are moved by hairs of 1e-6 of the size.) A constant, said as a formula.
     let constant = Grade::Formula(Formula::parse("0.2 + 0*x").expect("formula"));
     let ball = |w: &Grade| volume(&shell(&ball(1.0), w, &[]), 0.05, "ball");
     close(
@@ -383,7 +381,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
         let solid = shell(&block, &w, &open);
         // A mesh has one face, so its edges and those of the hollow are blunt within a grid cell.
         let want = 480.0 - 8.0 * 6.0 * depth;
-        close(volume(&solid, 0.1, "mesh box"), want, 3e-3, "mesh box");
+        close(volume(&solid, 0.15, "mesh box"), want, 3e-3, "mesh box");
         // Nothing as thick as the skin is left at the open face, and its neighbours are whole.
         let p = [
             [5.0, 4.0, 5.99],
@@ -404,7 +402,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
         Arc::new(Intersection::new(vec![block, cut.clone()]).expect("intersection"));
     let solid = shell(&region, &w, &[top, *cut]);
     let want = 240.0 - 4.0 * 6.0 * 5.0;
-    close(volume(&solid, 0.1, "cut mesh"), want, 3e-3, "cut mesh");
+    close(volume(&solid, 0.15, "cut mesh"), want, 3e-3, "cut mesh");
 }
 
 #[test]

@@ -120,12 +120,9 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let message = "several lattices need a blend, which comes in a later version; keep one";
         return Err(DesignError::new(format!("lattice.{name}"), message));
     }
-    let solid = Solid {
-        region: space.clone(),
-        field: Some(first.clone()),
-        filled,
-        wavelength: first.map.wavelength(),
-    };
+    let lattice: Arc<dyn Field> = first.clone();
+    let solid = Solid::new(space.clone(), Some(lattice), first.map.wavelength());
+    let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built {
         solid,
         lattices,
