@@ -141,9 +141,7 @@ def load(path: str | os.PathLike[str]) -> Design:
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
     folder = os.path.dirname(os.path.abspath(name))
-    design = Design(
-        data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), folder=folder
-    )
+    design = Design(data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), folder=folder)
     object.__setattr__(design, "_read", read)
     return design
 

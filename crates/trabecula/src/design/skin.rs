@@ -132,7 +132,7 @@ fn check_zone(
     let corner = |v: Vec3| v.map(number).join(", ");
     let apart = distance.iter().fold(f64::INFINITY, |m, d| m.min(*d));
     let message = format!(
-        "it lies outside the region, {apart:.4} mm from it or less: it reaches from ({}) to ({}) mm, the region from ({}) \
+        "it lies outside the region, about {apart:.3} mm away: it reaches from ({}) to ({}) mm, the region from ({}) \
          to ({}) mm",
         corner(b.min),
         corner(b.max),

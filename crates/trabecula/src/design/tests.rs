@@ -95,10 +95,6 @@ fn skins_and_keep_zones_survive() {
     for (more, path, word) in [
         ("[skin]\nthicknes = 1\n", "skin.thicknes", "thickness"),
         (
-            "skin.open[0]",
-            "-z",
-        ),
-        (
             "[skin]\nthickness = 1\nopen = [\"botom\"]\n",
             "skin.open[0]",
             "-z",
