@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from . import cell, grade, level, map, region
-    from .design import Design, Lattice, load
+    from .design import Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
@@ -42,6 +42,7 @@ __all__ = [
     "load",
     "map",
     "region",
+    "skin",
     "spartan",
 ]
 
@@ -50,6 +51,7 @@ _HOMES = {
     "Design": "design",
     "Lattice": "design",
     "load": "design",
+    "skin": "design",
     "DesignError": "errors",
     "DesignWarning": "errors",
     "Mesh": "mesh",

@@ -14,6 +14,7 @@ from . import _core, cell
 from .design import load
 from .errors import DesignError, DesignWarning
 from .input import read_text
+from .machine import fits
 from .mesh import READS, Mesh
 from .output import check_place, whole_file
 from .solid import Solid
@@ -69,16 +70,17 @@ def mesh(args) -> None:
     keep_inputs(args.design, args.output)
     options = resolved(args)
     with Progress("meshing", args.progress) as progress:
-        if kind_of(args.output) == "stl":
+        if kind_of(args.output) == "stl" and not closes(solid, options):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
             solid._room(args.output, solid.spacing(**options))
             surface = solid.mesh(threads=args.threads, progress=progress, **options)
             figures = surface.measure()
-            keys = ("volume", "area", "area_lattice", "area_cut")
+            keys = ("volume", "area", "area_lattice", "area_cut", "cavities", "voids")
             made = {"triangles": surface.counts[1], **{k: figures[k] for k in keys}}
             progress.clear()
             surface.write(args.output)
+            tell_voids(figures["voids"])
     edge = solid.spacing(**options)
     made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
     made["edge"] = edge
@@ -158,6 +160,8 @@ def measure(args) -> None:
         else:
             text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
         print(f"{key:{width}} {text}")
+    if figures["closed"] and not inverted:
+        tell_voids(figures["voids"])
 
 
 #: What is said where a figure is missing for another reason than that there is no region.
@@ -168,6 +172,8 @@ def listed(figures: dict) -> list[tuple]:
     """The figures line by line: those of a group under its name, without histograms."""
     lines: list[tuple] = []
     for key, value in figures.items():
+        if key == "voids":
+            continue
         group = value.items() if isinstance(value, dict) else None
         lines += [(f"{key}.{k}", v) for k, v in group if k != "histogram"] if group else [(key, value)]
     return lines
@@ -178,6 +184,41 @@ def keep_measured(args) -> None:
     for name in filter(None, (args.file, args.region)):
         if os.path.exists(name) and os.path.exists(args.histogram) and os.path.samefile(name, args.histogram):
             raise Refused(f"{args.histogram} is read by this command; name another picture")
+
+
+def closes(solid: Solid, options: dict) -> bool:
+    """Whether the surface is to be held in memory to look for closed voids: where a skin can close them, if it fits."""
+    if solid.skin is None:
+        return False
+    try:
+        fits(2 * solid.estimate(**options)["memory"], "the surface")
+    except ValueError:
+        say("warning: the surface does not fit into memory and is streamed; closed voids are not looked for")
+        return False
+    return True
+
+
+#: Voids that are told one by one.
+LISTED = 20
+
+
+def tell_voids(voids: list[dict]) -> None:
+    """Warns of closed voids: powder and resin stay in them."""
+    if not voids:
+        return
+
+    def place(void: dict) -> str:
+        return "(" + ", ".join(figure(v) for v in void["point"]) + ") mm"
+
+    total = figure(sum(v["volume"] for v in voids))
+    if len(voids) == 1:
+        return say(f"warning: one closed void of {total} mm³ at {place(voids[0])}: powder or resin cannot drain from it")
+    listed = ", ".join(f"{figure(v['volume'])} mm³ at {place(v)}" for v in voids[:LISTED])
+    more = f", and {len(voids) - LISTED} smaller ones" if len(voids) > LISTED else ""
+    say(
+        f"warning: {len(voids)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "
+        f"Largest first: {listed}{more}"
+    )
 
 
 def flaws(mesh: Mesh) -> str:
@@ -251,10 +292,16 @@ def files_of(tree) -> list[str]:
     return [name for branch in tree for name in files_of(branch)] if isinstance(tree, list) else []
 
 
+def read_by(design: str) -> list[str]:
+    """The files that a design reads."""
+    data = load(design).to_dict()
+    return files_of([data.get("region"), *(data.get("keep") or {}).values()])
+
+
 def keep_inputs(design: str, output: str) -> None:
     """Refuses an output that is the design, or a file that the design reads."""
     folder = os.path.dirname(os.path.abspath(design))
-    for name in [design, *(os.path.join(folder, f) for f in files_of(load(design).to_dict().get("region")))]:
+    for name in [design, *(os.path.join(folder, f) for f in read_by(design))]:
         if os.path.exists(name) and os.path.exists(output) and os.path.samefile(name, output):
             raise Refused(f"{output} is read by this design; name another output")
 

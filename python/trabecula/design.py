@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from .output import extension, whole_file
 if TYPE_CHECKING:
     from .solid import Solid
 
-__all__ = ["Design", "Lattice", "load"]
+__all__ = ["Design", "Lattice", "load", "skin"]
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,25 @@ class Lattice:
         return {"cell": self.cell, "part": self.part, "map": self.map, "level": self.level}
 
 
+def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
+    """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
+
+    ``open`` names flat faces of the region that it leaves open: sides of its bounds such as "-z", or the planes of
+    half-spaces (``region.halfspace``, or {point, normal}; the normal points out of the region).
+    """
+    made: dict = {"thickness": thickness}
+    if open is not None:
+        sides = [open] if isinstance(open, (str, Mapping)) else list(open)
+        made["open"] = [s["halfspace"] if isinstance(s, Mapping) and "halfspace" in s else s for s in sides]
+    return made
+
+
 @dataclass(frozen=True)
 class Design:
     """A lattice part, as data.
 
     ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``).
+    ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid as far as the region goes.
     Nothing is checked before ``build``, the last line that can raise.
     """
 
@@ -51,6 +65,8 @@ class Design:
     lattice: Mapping[str, Lattice | dict] | Lattice
     units: str = "mm"
     schema: int = 1
+    skin: dict | None = None
+    keep: Mapping[str, dict] | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
     _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
 
@@ -59,7 +75,9 @@ class Design:
         lattices = {"core": self.lattice} if isinstance(self.lattice, Lattice) else self.lattice
         if isinstance(lattices, Mapping):
             lattices = {k: v.to_dict() if isinstance(v, Lattice) else v for k, v in lattices.items()}
-        return copied({"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices})
+        data = {"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices}
+        more = {"skin": self.skin, "keep": self.keep}
+        return copied(data | {k: v for k, v in more.items() if v is not None})
 
     def __eq__(self, other: object) -> bool:
         """Whether both mean the same: defaults that are written out and mesh paths from another folder do not count."""
@@ -70,7 +88,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data["region"] = _moved(data["region"], lambda path: os.path.abspath(os.path.join(folder, path)))
+        data = _moved_all(data, lambda path: os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -104,7 +122,7 @@ class Design:
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data["region"] = _moved(data["region"], lambda path: _relative(os.path.join(old, path), new))
+        data = _moved_all(data, lambda path: _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
@@ -123,9 +141,17 @@ def load(path: str | os.PathLike[str]) -> Design:
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
     folder = os.path.dirname(os.path.abspath(name))
-    design = Design(data["region"], lattices, data["units"], data["schema"], folder)
+    design = Design(data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), folder=folder)
     object.__setattr__(design, "_read", read)
     return design
+
+
+def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
+    """The design with every relative mesh path turned."""
+    data["region"] = _moved(data["region"], turn)
+    if isinstance(data.get("keep"), dict):
+        data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
+    return data
 
 
 def _moved(region: Any, turn: Callable[[str], str]) -> Any:

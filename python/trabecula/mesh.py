@@ -33,6 +33,7 @@ FIGURES = (
     "euler",
     "pieces",
     "cavities",
+    "voids",
     "closed",
     "bounds",
     "specific_surface",
@@ -114,12 +115,13 @@ class Mesh(Picture):
 
     def measure(self) -> dict:
         """Every figure: volume, area, area_lattice, area_cut, solid_fraction, porosity, euler, pieces, cavities,
-        closed, bounds, specific_surface, hydraulic_diameter. Those that need a region are None for a mesh without one.
+        voids, closed, bounds, specific_surface, hydraulic_diameter. Those that need a region are None for a mesh without one.
         """
         figures = dict(self._figures)
         share = self.solid_fraction
         figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share}
         figures |= {"specific_surface": self.specific_surface, "hydraulic_diameter": self.hydraulic_diameter}
+        figures["voids"] = self.voids
         return {k: figures[k] for k in FIGURES}
 
     @cached_property
@@ -241,6 +243,16 @@ class Mesh(Picture):
     def cavities(self) -> int:
         """Number of closed voids."""
         return self._figures["cavities"]
+
+    @cached_property
+    def voids(self) -> list[dict]:
+        """The closed voids, from which powder and resin cannot drain, the largest first.
+
+        Each has ``volume`` (mm³), ``point`` (mm, inside the void) and ``bounds`` (lower and upper corner, mm). There are
+        as many as ``cavities``.
+        """
+        found = self._core.voids() if self.cavities else []
+        return [{"volume": v, "point": list(p), "bounds": [list(c) for c in b]} for v, p, b in found]
 
     @property
     def closed(self) -> bool:

@@ -53,6 +53,11 @@ class Solid(Picture):
         return self._core.wavelength
 
     @property
+    def skin(self) -> float | None:
+        """The least thickness of the skin, mm; None without one."""
+        return self._core.skin
+
+    @property
     def warnings(self) -> list[dict[str, str]]:
         """What may not be meant, as {path, message}."""
         return [{"path": p, "message": m} for p, m in self._core.warnings]
@@ -117,6 +122,13 @@ class Solid(Picture):
 
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
         """Warns of walls and necks that the grid cannot carry."""
+        if self.skin is not None and self.skin < spacing:
+            warnings.warn(
+                f"skin: at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
+                f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
+                DesignWarning,
+                stacklevel=3,
+            )
         for name, thin in {} if self._is_fine(spacing) else self._thinnest.items():
             if thin < 1.5 * spacing:
                 warnings.warn(

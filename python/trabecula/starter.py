@@ -32,4 +32,13 @@ wavelength = 5.0            # the cell's edge; or three: [5, 5, 8]
 #   fraction = {{ formula = "0.3 + 0.1*sin(x/5)" }}
 [lattice.core.level]
 fraction = 0.30             # of the cell; porosity = 0.70 says the same
+
+# A skin and solid bosses, if the part wants them:
+#   [skin]
+#   thickness = 1.0
+#   open      = ["-z"]      # flat faces without skin, so that powder drains
+#   [keep.boss.cylinder]
+#   base = [0, 0, -10]
+#   radius = 3
+#   height = 20
 """

@@ -131,6 +131,14 @@ impl Mesh {
         Ok(d)
     }
 
+    /// The closed voids, the largest first: volume (mm³), a point inside, lower and upper corner of the bounds (mm).
+    #[allow(clippy::type_complexity)]
+    fn voids(&self, py: Python<'_>) -> PyResult<Vec<(f64, [f64; 3], ([f64; 3], [f64; 3]))>> {
+        let found = run(py, None, None, |_| measure::cavities(&self.surface.mesh))?;
+        let plain = |c: &measure::Cavity| (c.volume, c.point, (c.bounds.min, c.bounds.max));
+        Ok(found.iter().map(plain).collect())
+    }
+
     /// Enclosed volume, mm³.
     fn volume(&self, py: Python<'_>) -> PyResult<f64> {
         run(py, None, None, |_| self.surface.mesh.volume())

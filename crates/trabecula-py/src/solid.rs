@@ -119,6 +119,12 @@ impl Solid {
         self.built.solid.wavelength
     }
 
+    /// The least thickness of the skin, mm, if there is one.
+    #[getter]
+    fn skin(&self) -> Option<f64> {
+        self.built.skin
+    }
+
     /// Lower and upper corner of the region's bounds, mm.
     #[getter]
     fn bounds(&self) -> ([f64; 3], [f64; 3]) {
@@ -290,11 +296,7 @@ impl Region {
         if let Some(v) = self.region.volume() {
             return Ok(v);
         }
-        let full = trabecula::solid::Solid {
-            region: self.region.clone(),
-            field: None,
-            wavelength: edge,
-        };
+        let full = trabecula::solid::Solid::new(self.region.clone(), None, edge);
         let surface = run(py, None, None, |p| extract::surface(&full, edge, p))?;
         Ok(surface.map_err(error::stopped)?.mesh.volume())
     }

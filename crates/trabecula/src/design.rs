@@ -15,6 +15,7 @@ mod region;
 mod report;
 mod sample;
 mod schema;
+mod skin;
 #[cfg(test)]
 mod tests;
 
@@ -49,6 +50,12 @@ pub struct Design {
     /// What fills the region: one lattice, under a name of your own.
     #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
     pub lattice: Lattices,
+    /// What closes the region's surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SkinSpec>,
+    /// Regions kept fully solid as far as the region goes, such as bolt bosses, under names of your own.
+    #[serde(default, skip_serializing_if = "Keeps::is_empty")]
+    pub keep: Keeps,
     /// Where each key stands in the file it was read from.
     #[serde(skip)]
     pub lines: Lines,
@@ -84,6 +91,8 @@ pub struct Built {
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The least thickness of the skin (mm), if there is one.
+    pub skin: Option<f64>,
     /// What may not be meant.
     pub warnings: Vec<Warning>,
     /// What was repaired in each mesh of the region, by the path of its table; clean meshes too.
@@ -99,6 +108,8 @@ impl Design {
             units: Units::Mm,
             region,
             lattice,
+            skin: None,
+            keep: Keeps::new(),
             lines: Lines::default(),
         }
     }

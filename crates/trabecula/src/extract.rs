@@ -342,13 +342,9 @@ pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxel
                     axes: [&axes[0], &axes[1], &axes[2][z..=z]],
                 };
                 let mut samples = vec![0f32; layer.len()];
-                layer.fill(1);
-                let fields = [Some(&*solid.region as &dyn Field), solid.field.as_deref()];
-                for f in fields.into_iter().flatten() {
-                    f.fill(&block, &mut samples);
-                    for (o, v) in layer.iter_mut().zip(&samples) {
-                        *o &= u8::from(*v <= 0.0);
-                    }
+                solid.fill(&block, &mut samples);
+                for (o, v) in layer.iter_mut().zip(&samples) {
+                    *o = u8::from(*v <= 0.0);
                 }
             });
         if !progress.step((n + 1) as u64, shape[2].div_ceil(slab / layer) as u64) {

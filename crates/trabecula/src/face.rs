@@ -18,8 +18,10 @@ pub struct Face {
     pub slope: f64,
     /// Set if its zero set is a plane normal to a coordinate axis.
     pub plane: Option<Plane>,
-    /// Whether it belongs to the region rather than to the lattice.
+    /// Whether it is the region's: what lies on it is a cut, all else counts as the lattice's own surface.
     pub cut: bool,
+    /// Whether its zero set may have edges, as those of distances have; they are no curvature.
+    pub edged: bool,
 }
 
 /// A plane normal to a coordinate axis.
@@ -129,6 +131,52 @@ impl Tree {
         }
     }
 
+    /// The value of the solid as a function, and the face that has it, the faces' values being `value`: the greatest
+    /// where all must be solid, the least where any may.
+    pub fn value(&self, value: &impl Fn(usize) -> f64) -> (f64, Option<usize>) {
+        let nothing = |v| (v, None);
+        match self {
+            Tree::Face(i) => (value(*i), Some(*i)),
+            Tree::All(of) => {
+                of.iter()
+                    .map(|t| t.value(value))
+                    .fold(
+                        nothing(f64::NEG_INFINITY),
+                        |a, b| if b.0 > a.0 { b } else { a },
+                    )
+            }
+            Tree::Any(of) => of
+                .iter()
+                .map(|t| t.value(value))
+                .fold(nothing(f64::INFINITY), |a, b| if b.0 < a.0 { b } else { a }),
+        }
+    }
+
+    /// An interval that holds `value`, given one for each face.
+    pub fn bound(&self, bound: &impl Fn(usize) -> Interval) -> Interval {
+        match self {
+            Tree::Face(i) => bound(*i),
+            Tree::All(of) => of.iter().map(|t| t.bound(bound)).fold(
+                Interval::new(f64::NEG_INFINITY, f64::NEG_INFINITY),
+                Interval::max,
+            ),
+            Tree::Any(of) => of
+                .iter()
+                .map(|t| t.bound(bound))
+                .fold(Interval::new(f64::INFINITY, f64::INFINITY), Interval::min),
+        }
+    }
+
+    /// The same tree of faces that are numbered from `first` on.
+    pub fn from(self, first: usize) -> Tree {
+        let each = |of: Vec<Tree>| of.into_iter().map(|t| t.from(first)).collect();
+        match self {
+            Tree::Face(i) => Tree::Face(first + i),
+            Tree::All(of) => Tree::All(each(of)),
+            Tree::Any(of) => Tree::Any(each(of)),
+        }
+    }
+
     /// Calls `f` for every face named.
     pub fn each(&self, f: &mut impl FnMut(usize)) {
         match self {
@@ -166,6 +214,7 @@ impl Face {
             slope: 1.0,
             plane: None,
             cut: true,
+            edged: true,
         }
     }
 
@@ -209,5 +258,59 @@ impl Field for Turned {
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
         self.0.fill_where(block, wanted, out);
         out.iter_mut().for_each(|v| *v = -*v);
+    }
+}
+
+/// A solid by its faces. As a field it is negative inside, positive outside, continuous and not a distance.
+#[derive(Clone)]
+pub struct Body {
+    /// The faces.
+    pub faces: Vec<Face>,
+    /// How they make it.
+    pub tree: Tree,
+}
+
+/// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
+const BATCH: usize = 1024;
+
+impl Field for Body {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let mut each = vec![vec![0.0; points.len().min(BATCH)]; self.faces.len()];
+        for (points, out) in points.chunks(BATCH).zip(out.chunks_mut(BATCH)) {
+            for (face, values) in self.faces.iter().zip(&mut each) {
+                face.field.values(points, &mut values[..points.len()]);
+            }
+            for (i, o) in out.iter_mut().enumerate() {
+                *o = self.tree.value(&|f| each[f][i]).0;
+            }
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let n = points.len();
+        let mut each = vec![(vec![0.0; n], vec![[0.0; 3]; n]); self.faces.len()];
+        for (face, (v, g)) in self.faces.iter().zip(&mut each) {
+            face.field.gradients(points, v, g);
+        }
+        for i in 0..n {
+            let (value, face) = self.tree.value(&|f| each[f].0[i]);
+            values[i] = value;
+            gradients[i] = face.map_or([0.0; 3], |f| each[f].1[i]);
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        self.tree.bound(&|f| self.faces[f].field.bound(b))
+    }
+
+    // Rounding keeps order, so joining rounded values gives the rounded value.
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        let mut each = vec![vec![0f32; out.len()]; self.faces.len()];
+        for (face, values) in self.faces.iter().zip(&mut each) {
+            face.field.fill(block, values);
+        }
+        for (i, o) in out.iter_mut().enumerate() {
+            *o = self.tree.value(&|f| f64::from(each[f][i])).0 as f32;
+        }
     }
 }

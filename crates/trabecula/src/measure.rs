@@ -6,6 +6,7 @@ use crate::math::{Aabb, cross, norm, sub};
 use crate::mesh::Mesh;
 
 mod adjacency;
+mod cavity;
 mod cut;
 pub(crate) mod exact;
 mod intersect;
@@ -14,6 +15,7 @@ mod quality;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
+pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
 pub(crate) use intersect::{Tree as BoxTree, near_pairs};
 pub use intersect::{is_embedded, self_intersections};

@@ -56,6 +56,14 @@ pub trait Shape: Field {
     /// returns how they make it. The faces' numbers are their places in `out`.
     fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree;
 
+    /// The same region seen without the parts of its surface that lie on `cuts` and face as they do, where it can
+    /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;
+    /// `None` if at none. (Faces that are planes by themselves stay: whoever asks for `faces` can drop them.)
+    fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+        let _ = (cuts, found);
+        None
+    }
+
     /// Exact volume (mm³) where it is known in closed form.
     fn volume(&self) -> Option<f64>;
 }

@@ -1,76 +1,149 @@
-//! A solid: a field and a region.
+//! A solid: a region, and what is solid in it.
 
 use std::sync::Arc;
 
-use crate::face::{Face, Tree};
-use crate::field::Field;
+use crate::face::{Body, Face, Tree};
+use crate::field::{Block, Field};
+use crate::flush;
 use crate::math::{Aabb, Interval, Vec3};
 use crate::region::Region;
 
-/// What a design means: the part of the region in which the field is negative.
+/// What a design means: the part of the region in which the field is negative, or that is filled anyway.
 #[derive(Clone)]
 pub struct Solid {
     /// Where the part may be.
     pub region: Region,
     /// The lattice; `None` leaves the region full.
     pub field: Option<Arc<dyn Field>>,
+    /// What is solid whatever the lattice says, as far as the region goes: skin and keep zones.
+    pub filled: Vec<Body>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
 }
 
 impl Solid {
-    /// The smooth faces of the solid and how they make it.
+    /// A region and the lattice in it.
+    pub fn new(region: Region, field: Option<Arc<dyn Field>>, wavelength: f64) -> Solid {
+        Solid {
+            region,
+            field,
+            filled: Vec::new(),
+            wavelength,
+        }
+    }
+
+    /// The same solid with one more body that is solid whatever the lattice says.
+    pub fn with(mut self, mut body: Body) -> Solid {
+        let mut others = Vec::new();
+        self.region.clone().faces(0.0, &mut others);
+        others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
+        flush::apart(&mut body, &others, &self.region.bounds());
+        self.filled.push(body);
+        self
+    }
+
+    /// The smooth faces of the solid and how they make it. The region's come first.
     pub fn faces(&self) -> (Vec<Face>, Tree) {
         let mut faces = Vec::new();
         let mut all = vec![self.region.clone().faces(0.0, &mut faces)];
         if let Some(field) = &self.field {
+            let mut any = Vec::new();
+            for body in &self.filled {
+                any.push(body.tree.clone().from(faces.len()));
+                faces.extend(body.faces.iter().cloned().map(|f| Face { cut: false, ..f }));
+            }
             let mut parts = field.parts();
             if parts.is_empty() {
                 parts.push(field.clone());
             }
+            let mut lattice = Vec::new();
             for part in parts {
-                all.push(Tree::Face(faces.len()));
+                lattice.push(Tree::Face(faces.len()));
                 faces.push(Face {
                     slope: part.slope(),
                     field: part,
                     plane: None,
                     cut: false,
+                    edged: false,
                 });
+            }
+            if any.is_empty() {
+                all.extend(lattice);
+            } else {
+                any.push(Tree::All(lattice));
+                all.push(Tree::Any(any));
             }
         }
         (faces, Tree::All(all))
     }
+
+    /// All that may be solid in the region: the lattice first.
+    fn inner(&self) -> Option<(&dyn Field, impl Iterator<Item = &dyn Field>)> {
+        let filled = self.filled.iter().map(|b| b as &dyn Field);
+        self.field.as_deref().map(|f| (f, filled))
+    }
 }
 
-/// As a field, the greater of the lattice's value and the region's signed distance: negative in the finished part,
-/// positive outside, continuous, and not a distance. Extraction keeps the two apart.
+/// As a field, the greater of the region's signed distance and the least of the lattice, the skin and the keep zones:
+/// negative in the finished part, positive outside, continuous, and not a distance. Extraction keeps them apart.
 impl Field for Solid {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         self.region.values(points, out);
-        if let Some(field) = &self.field {
-            let mut f = vec![0.0; points.len()];
-            field.values(points, &mut f);
-            for (o, f) in out.iter_mut().zip(f) {
-                *o = o.max(f);
-            }
+        let Some((lattice, filled)) = self.inner() else {
+            return;
+        };
+        let (mut least, mut v) = (vec![0.0; points.len()], vec![0.0; points.len()]);
+        lattice.values(points, &mut least);
+        for body in filled {
+            body.values(points, &mut v);
+            least.iter_mut().zip(&v).for_each(|(l, v)| *l = l.min(*v));
         }
+        out.iter_mut().zip(least).for_each(|(o, l)| *o = o.max(l));
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         self.region.gradients(points, values, gradients);
-        if let Some(field) = &self.field {
-            let (mut f, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
-            field.gradients(points, &mut f, &mut g);
+        let Some((lattice, filled)) = self.inner() else {
+            return;
+        };
+        let zeros = || (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+        let ((mut least, mut slope), (mut v, mut g)) = (zeros(), zeros());
+        lattice.gradients(points, &mut least, &mut slope);
+        for body in filled {
+            body.gradients(points, &mut v, &mut g);
             for i in 0..points.len() {
-                if f[i] > values[i] {
-                    (values[i], gradients[i]) = (f[i], g[i]);
+                if v[i] < least[i] {
+                    (least[i], slope[i]) = (v[i], g[i]);
                 }
+            }
+        }
+        for i in 0..points.len() {
+            if least[i] > values[i] {
+                (values[i], gradients[i]) = (least[i], slope[i]);
             }
         }
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        let r = self.region.bound(b);
-        self.field.as_ref().map_or(r, |f| r.max(f.bound(b)))
+        let region = self.region.bound(b);
+        let Some((lattice, filled)) = self.inner() else {
+            return region;
+        };
+        region.max(filled.fold(lattice.bound(b), |least, f| least.min(f.bound(b))))
+    }
+
+    // Rounding keeps order, so joining rounded values gives the rounded value.
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.region.fill(block, out);
+        let Some((lattice, filled)) = self.inner() else {
+            return;
+        };
+        let (mut least, mut v) = (vec![0f32; out.len()], vec![0f32; out.len()]);
+        lattice.fill(block, &mut least);
+        for body in filled {
+            body.fill(block, &mut v);
+            least.iter_mut().zip(&v).for_each(|(l, v)| *l = l.min(*v));
+        }
+        out.iter_mut().zip(least).for_each(|(o, l)| *o = o.max(l));
     }
 }

@@ -33,11 +33,7 @@ fn lattice(
 }
 
 fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
-    Solid {
-        region,
-        field,
-        wavelength: 1.0,
-    }
+    Solid::new(region, field, 1.0)
 }
 
 fn cube(edge: f64) -> Region {

@@ -99,11 +99,8 @@ fn judged(series: &Series, map: Affine, thickness: Grade, edge: f64) -> [f64; 2]
     let lattice = wall(series.clone(), Level::Thickness(thickness), map);
     let longest = map.wavelength.into_iter().fold(0.0, f64::max);
     let field: Arc<dyn Field> = Arc::new(lattice.clone());
-    let solid = Solid {
-        region: Arc::new(Cuboid::new([0.0; 3], map.wavelength).expect("box")),
-        field: Some(field),
-        wavelength: 1.0,
-    };
+    let region = Arc::new(Cuboid::new([0.0; 3], map.wavelength).expect("box"));
+    let solid = Solid::new(region, Some(field), 1.0);
     let s = surface(&solid, edge, &Silent).expect("surface");
     let mut lattice_only = vec![true; s.mesh.vertices.len()];
     for (t, cut) in s.mesh.triangles.iter().zip(&s.cut) {

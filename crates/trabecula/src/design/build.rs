@@ -5,8 +5,9 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, region, sample};
+use super::{Built, Design, Loader, Warning, level, region, sample, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
+use crate::face::Body;
 use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
@@ -29,6 +30,8 @@ pub(super) struct Place<'a> {
     pub region: &'a Region,
     /// Points inside the region.
     pub points: &'a [[f64; 3]],
+    /// What is solid in the region whatever the lattice says.
+    pub filled: &'a [Body],
 }
 
 impl From<PartSpec> for Part {
@@ -57,10 +60,6 @@ pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
     let mut notes = region::Notes::default();
     let space = region::region(&d.region, "region", loader, &mut notes)?;
-    let region::Notes {
-        mut warnings,
-        repairs,
-    } = notes;
     let bounds = space.bounds();
     if bounds.is_empty() {
         return Err(DesignError::new("region", "the region is empty"));
@@ -89,16 +88,23 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     }
     points.extend(sample::nodes(&space));
     let largest = bounds.size().into_iter().fold(0.0, f64::max);
-    if !(0.1..=2000.0).contains(&largest) && !warnings.iter().any(|w| w.message.contains("unit")) {
+    if !(0.1..=2000.0).contains(&largest)
+        && !notes.warnings.iter().any(|w| w.message.contains("unit"))
+    {
         let message = format!(
             "the region is {} mm across; is its unit right?",
             number(largest)
         );
-        warnings.push(Warning {
+        notes.warnings.push(Warning {
             path: "region".into(),
             message,
         });
     }
+    let (filled, thinnest) = skin::filled(d, &space, &points, loader, &mut notes)?;
+    let region::Notes {
+        mut warnings,
+        repairs,
+    } = notes;
     let mut lattices = Vec::new();
     for (name, spec) in &d.lattice {
         let path = format!("lattice.{name}");
@@ -106,6 +112,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             path: path.clone(),
             region: &space,
             points: &points,
+            filled: &filled,
         };
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
@@ -119,14 +126,13 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let message = "several lattices need a blend, which comes in a later version; keep one";
         return Err(DesignError::new(format!("lattice.{name}"), message));
     }
-    let solid = Solid {
-        region: space.clone(),
-        field: Some(first.clone()),
-        wavelength: first.map.wavelength(),
-    };
+    let lattice: Arc<dyn Field> = first.clone();
+    let solid = Solid::new(space.clone(), Some(lattice), first.map.wavelength());
+    let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built {
         solid,
         lattices,
+        skin: thinnest,
         warnings,
         repairs,
     })
@@ -140,8 +146,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let map = map(&spec.map, &below("map"))?;
     let here = Place {
         path: below("level"),
-        region: place.region,
-        points: place.points,
+        ..*place
     };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))

@@ -455,6 +455,71 @@ pub struct DepthSpec {
 /// Named lattices.
 pub type Lattices = BTreeMap<String, LatticeSpec>;
 
+/// Named regions that are kept fully solid.
+pub type Keeps = BTreeMap<String, RegionSpec>;
+
+/// A skin: the part of the region that is at most so far below its surface.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkinSpec {
+    /// How far (mm).
+    pub thickness: GradeSpec,
+    /// Flat faces of the region that it leaves open.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub open: Vec<OpenSpec>,
+}
+
+/// A flat face of the region that stays open.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OpenSpec {
+    /// The one on a side of the region's bounds.
+    Side(SideSpec),
+    /// The one on the plane of a half-space, facing as its normal does.
+    Plane(HalfSpaceSpec),
+}
+
+/// A side of the region's bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub enum SideSpec {
+    /// Least x.
+    #[serde(rename = "-x")]
+    LowX,
+    /// Greatest x.
+    #[serde(rename = "+x")]
+    HighX,
+    /// Least y.
+    #[serde(rename = "-y")]
+    LowY,
+    /// Greatest y.
+    #[serde(rename = "+y")]
+    HighY,
+    /// Least z: the bottom.
+    #[serde(rename = "-z")]
+    LowZ,
+    /// Greatest z: the top.
+    #[serde(rename = "+z")]
+    HighZ,
+}
+
+impl SideSpec {
+    /// The words and what they mean.
+    pub const ALL: [(&'static str, SideSpec); 6] = [
+        ("-x", SideSpec::LowX),
+        ("+x", SideSpec::HighX),
+        ("-y", SideSpec::LowY),
+        ("+y", SideSpec::HighY),
+        ("-z", SideSpec::LowZ),
+        ("+z", SideSpec::HighZ),
+    ];
+
+    /// Its axis, and whether it is the upper one.
+    pub fn axis(self) -> (usize, bool) {
+        let i = Self::ALL.iter().position(|s| s.1 == self).unwrap_or(0);
+        (i / 2, i % 2 == 1)
+    }
+}
+
 fn is_default<T: Default + PartialEq>(v: &T) -> bool {
     *v == T::default()
 }

@@ -16,6 +16,8 @@ pub(super) enum Allowed {
     Share(&'static str),
     /// Greater than 0 and at most the greatest wavelength (mm).
     Length(&'static str, f64),
+    /// Greater than 0 (mm).
+    Positive(&'static str),
 }
 
 impl Allowed {
@@ -36,7 +38,14 @@ impl Allowed {
                 );
                 Err(DesignError::new(path, message).found(v.to_string()))
             }
-            Allowed::Share(_) | Allowed::Length(..) => Ok(v),
+            Allowed::Positive(name) if !(v > 0.0 && v.is_finite()) => {
+                let message = format!(
+                    "{name} is {} mm{place}; it must be a finite number greater than 0",
+                    number(v)
+                );
+                Err(DesignError::new(path, message).found(number(v)))
+            }
+            Allowed::Share(_) | Allowed::Length(..) | Allowed::Positive(_) => Ok(v),
         }
     }
 }

@@ -6,10 +6,12 @@ use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::sample;
 use crate::cell::{Cell, Part};
+use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
+use crate::region::Region;
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
@@ -87,7 +89,15 @@ pub(super) fn level(
     }
     if let Grade::Formula(_) = &amount {
         let at = path(&format!("{key}.formula"));
-        check_formula(&amount, &at, allowed, key == "porosity", place)?;
+        let complement = key == "porosity";
+        check_formula(
+            &amount,
+            &at,
+            allowed,
+            complement,
+            place.region,
+            place.points,
+        )?;
     }
     if key == "thickness" {
         let range = cell.range();
@@ -109,7 +119,8 @@ pub(super) fn level(
                 );
                 return Err(DesignError::new(path("of"), message));
             };
-            let iso = solve(target, part.into(), cell, map, place);
+            let solved = solve(target, part.into(), cell, map, place);
+            let iso = solved.map_err(|m| DesignError::new(path(key), m))?;
             Ok(Level::Iso(Grade::Constant(iso)))
         }
         (Of::Cell, Fit::Spartan) => {
@@ -180,14 +191,15 @@ pub(super) fn about_mid(
 }
 
 /// Refuses a formula that leaves what is allowed at any of some thousands of points in the region.
-fn check_formula(
+pub(super) fn check_formula(
     amount: &Grade,
     path: &str,
     allowed: Allowed,
     complement: bool,
-    place: &Place,
+    region: &Region,
+    points: &[[f64; 3]],
 ) -> Result<(), DesignError> {
-    let bounds = place.region.bounds();
+    let bounds = region.bounds();
     let corner = |i: usize| {
         core::array::from_fn(|a| {
             if i >> a & 1 == 0 {
@@ -199,13 +211,13 @@ fn check_formula(
     };
     let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
     let mut distance = [0.0; 8];
-    place.region.values(&corners, &mut distance);
+    region.values(&corners, &mut distance);
     let in_corners = corners
         .iter()
         .zip(distance)
         .filter(|(_, d)| *d <= 1e-9)
         .map(|(c, _)| *c);
-    let points: Vec<[f64; 3]> = place.points.iter().copied().chain(in_corners).collect();
+    let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
     let mut values = vec![0.0; points.len()];
     amount.values(&points, &mut values);
     let own = |v: f64| if complement { 1.0 - v } else { v };
@@ -227,8 +239,15 @@ fn check_formula(
 }
 
 /// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's
-/// values at a million points inside. Error about 1e-4 in the fraction.
-fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) -> f64 {
+/// values at a million points inside, those that are filled anyway coming first. Error about 1e-4 in the fraction.
+/// Refuses, in a sentence, less than what is filled.
+fn solve(
+    target: f64,
+    part: Part,
+    cell: &Arc<Cell>,
+    map: &Map,
+    place: &Place,
+) -> Result<f64, String> {
     let (points, _) = sample::inside(place.region, 1_000_000);
     // At level zero the field is |f|, f or −f; the part at level t is where that is at most t, t or −t.
     let at_zero = Lattice::new(
@@ -239,9 +258,25 @@ fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) ->
     );
     let mut values = vec![0.0; points.len()];
     at_zero.values(&points, &mut values);
+    let mut filled = vec![0.0; points.len()];
+    let mut count = 0;
+    for body in place.filled {
+        body.values(&points, &mut filled);
+        for (v, _) in values.iter_mut().zip(&filled).filter(|(_, f)| **f <= 0.0) {
+            count += usize::from(*v != f64::NEG_INFINITY);
+            *v = f64::NEG_INFINITY;
+        }
+    }
     let k = ((target * values.len() as f64) as usize).min(values.len() - 1);
+    if k <= count && count > 0 {
+        return Err(format!(
+            "the skin and what is kept solid make up {:.4} of the part already; ask for more than that, {} is too little",
+            count as f64 / values.len() as f64,
+            number(target)
+        ));
+    }
     let (_, v, _) = values.select_nth_unstable_by(k, f64::total_cmp);
-    if part == Part::Upper { -*v } else { *v }
+    Ok(if part == Part::Upper { -*v } else { *v })
 }
 
 #[cfg(test)]

@@ -22,13 +22,11 @@ const REGIONS: [&str; 9] = [
     "difference",
     "offset",
 ];
-const LATER_TOP: [Later; 4] = [
+const LATER_TOP: [Later; 2] = [
     (
         "blend",
         "one lattice fills the whole region; leave the blend out and keep one lattice",
     ),
-    ("skin", "leave it out"),
-    ("keep", "leave it out"),
     ("beams", "use a lattice"),
 ];
 const LATER_CELL: [Later; 3] = [
@@ -56,7 +54,7 @@ const LATER_GRADE: [Later; 4] = [
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
         "a design",
-        &["schema", "units", "region", "lattice"],
+        &["schema", "units", "region", "lattice", "skin", "keep"],
         &LATER_TOP,
     )?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
@@ -102,6 +100,8 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         units: super::Units::Mm,
         region: spec,
         lattice: lattices,
+        skin: f.read("skin", None, |at| skin(at).map(Some))?,
+        keep: f.read("keep", Keeps::new(), keeps)?,
         lines: node.lines(),
     })
 }
@@ -148,13 +148,7 @@ fn region(at: &At) -> Read<RegionSpec> {
                 radius: f.need("radius", "mm")?.number()?,
             })
         }
-        "halfspace" => {
-            let f = at.fields("a half-space", &["point", "normal"], &[])?;
-            RegionSpec::HalfSpace(HalfSpaceSpec {
-                point: three(f.need("point", "a point on the plane, mm")?)?,
-                normal: three(f.need("normal", "the direction out of the solid")?)?,
-            })
-        }
+        "halfspace" => RegionSpec::HalfSpace(halfspace(at)?),
         "mesh" => mesh(at)?,
         "offset" => {
             let f = at.fields("an offset", &["of", "by"], &[])?;
@@ -180,6 +174,70 @@ fn region(at: &At) -> Read<RegionSpec> {
                 _ => RegionSpec::Difference(items),
             }
         }
+    })
+}
+
+/// What others call the sides.
+const SIDES: [(&str, &str); 14] = [
+    ("bottom", "-z"),
+    ("top", "+z"),
+    ("down", "-z"),
+    ("up", "+z"),
+    ("left", "-x"),
+    ("right", "+x"),
+    ("front", "-y"),
+    ("back", "+y"),
+    ("xmin", "-x"),
+    ("xmax", "+x"),
+    ("ymin", "-y"),
+    ("ymax", "+y"),
+    ("zmin", "-z"),
+    ("zmax", "+z"),
+];
+
+fn skin(at: &At) -> Read<SkinSpec> {
+    let f = at.fields("a skin", &["thickness", "open"], &[])?;
+    let thickness = f.need("thickness", "how far below the surface it reaches, mm")?;
+    Ok(SkinSpec {
+        thickness: grade(thickness)?,
+        open: f.read("open", Vec::new(), |at| {
+            let sides = at.list("a list of sides such as [\"-z\"], or of half-spaces")?;
+            sides.iter().map(opening).collect()
+        })?,
+    })
+}
+
+fn opening(at: &At) -> Read<OpenSpec> {
+    if at.is_text() {
+        return Ok(OpenSpec::Side(at.word_or(
+            "side",
+            &SideSpec::ALL,
+            &SIDES,
+        )?));
+    }
+    Ok(OpenSpec::Plane(halfspace(at)?))
+}
+
+fn keeps(at: &At) -> Read<Keeps> {
+    let mut keeps = Keeps::new();
+    for (name, at) in at.entries("regions by name, such as [keep.boss.cylinder]")? {
+        // A kind where a name should be.
+        if REGIONS.contains(&name) && region(&at).is_err() {
+            let message = format!(
+                "a name comes first, such as [keep.boss.{name}]: {name} is a kind of region"
+            );
+            return Err(at.error(message));
+        }
+        keeps.insert(name.to_string(), region(&at)?);
+    }
+    Ok(keeps)
+}
+
+fn halfspace(at: &At) -> Read<HalfSpaceSpec> {
+    let f = at.fields("a half-space", &["point", "normal"], &[])?;
+    Ok(HalfSpaceSpec {
+        point: three(f.need("point", "a point on the plane, mm")?)?,
+        normal: three(f.need("normal", "the direction out of the solid")?)?,
     })
 }
 

@@ -53,9 +53,7 @@ pub(super) fn region(
         }
         RegionSpec::HalfSpace(h) => {
             let path = format!("{path}.halfspace");
-            three(&path, "point", h.point)?;
-            three(&path, "normal", h.normal)?;
-            shared(&path, HalfSpace::new(h.point, h.normal))
+            Ok(Arc::new(halfspace(h, &path)?))
         }
         RegionSpec::Mesh(m) => mesh(m, &format!("{path}.mesh"), loader, notes),
         RegionSpec::Union(of) => {
@@ -79,6 +77,12 @@ pub(super) fn region(
             )
         }
     }
+}
+
+pub(super) fn halfspace(h: &HalfSpaceSpec, path: &str) -> Result<HalfSpace, DesignError> {
+    three(path, "point", h.point)?;
+    three(path, "normal", h.normal)?;
+    HalfSpace::new(h.point, h.normal).map_err(|f| DesignError::fault(path, f))
 }
 
 fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Region, DesignError> {

@@ -15,7 +15,7 @@ pub(super) struct Varied {
 }
 
 impl Varied {
-    fn of(values: &[f64]) -> Varied {
+    pub fn of(values: &[f64]) -> Varied {
         let (min, max) = values
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {

@@ -75,6 +75,70 @@ fn every_kind_of_region_and_grade_survives() {
 }
 
 #[test]
+fn skins_and_keep_zones_survive() {
+    for more in [
+        "[skin]\nthickness = 1\n",
+        "[skin]\nthickness = { formula = \"1 + 0.01*x\" }\nopen = [\"-z\", \"+x\", { point = [0, 0, 1], normal = [0, 0, 1] }]\n",
+        "[keep.boss.cylinder]\nbase = [0, 0, 0]\nradius = 2\nheight = 3\n[keep.rim]\nunion = [{ sphere = { radius = 2 } }]\n",
+    ] {
+        let text = format!("{GOOD}{more}");
+        let d = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let again = Design::from_toml(&d.to_toml().expect("writable")).expect("readable");
+        assert_eq!(again.to_json(), d.to_json(), "{text}");
+        let again = Design::from_json(&d.to_json().to_string()).expect("readable");
+        assert_eq!(again.to_json(), d.to_json(), "{text}");
+    }
+    assert_eq!(
+        Design::from_toml(GOOD).expect("good").to_json().get("keep"),
+        None
+    );
+    for (more, path, word) in [
+        ("[skin]\nthicknes = 1\n", "skin.thicknes", "thickness"),
+        (
+            "[skin]\nthickness = 1\nopen = [\"botom\"]\n",
+            "skin.open[0]",
+            "-z",
+        ),
+        (
+            "[keep.boss.cylindre]\nradius = 2\n",
+            "keep.boss.cylindre",
+            "cylinder",
+        ),
+        ("[keeps.boss.sphere]\nradius = 2\n", "keeps", "keep"),
+    ] {
+        let e = refused(&format!("{GOOD}{more}"));
+        assert_eq!(
+            (e.path.as_str(), e.nearest.as_deref()),
+            (path, Some(word)),
+            "{e}"
+        );
+        assert!(e.line > Some(13), "{e}");
+    }
+    for (more, path, part) in [
+        ("[skin]\nopen = []\n", "skin", "\"thickness\" is missing"),
+        (
+            "[keep.sphere]\nradius = 2\n",
+            "keep.sphere",
+            "a name comes first",
+        ),
+        ("[keep.boss]\n", "keep.boss", "a region is missing"),
+        (
+            "[skin]\nthickness = 1\nopen = \"-z\"\n",
+            "skin.open",
+            "a list of sides",
+        ),
+        (
+            "[keep.a.sphere]\nradius = 2\n[keep.a.sphere]\nradius = 3\n",
+            "",
+            "not readable as TOML",
+        ),
+    ] {
+        let e = refused(&format!("{GOOD}{more}"));
+        assert!(e.path == path && e.message.contains(part), "{e}");
+    }
+}
+
+#[test]
 fn slips_are_told_with_path_line_and_nearest_word() {
     for (line, instead, path, number, nearest) in [
         ("[region.box]", "[region.bxo]", "region.bxo", 3, "box"),
@@ -137,7 +201,7 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 #[test]
 fn words_of_later_versions_are_not_slips() {
     for (line, instead, path) in [
-        ("units = \"mm\"", "skin = { thickness = 1 }", "skin"),
+        ("units = \"mm\"", "beams = { a = { radius = 1 } }", "beams"),
         (
             "units = \"mm\"",
             "blend = { between = [\"a\", \"b\"] }",
@@ -267,6 +331,10 @@ fn the_schema_and_the_reader_agree() {
         keys("RegionSpec")
     );
     assert_eq!(listed(with("cell =", "zzzzzzzz =")), keys("LatticeSpec"));
+    assert_eq!(
+        listed(with("units = \"mm\"", "skin = { zzzzzzzz = 1 }")),
+        keys("SkinSpec")
+    );
     assert_eq!(
         listed(with("wavelength =", "zzzzzzzz =")),
         keys("AffineSpec")

@@ -110,6 +110,8 @@ impl Grid {
             // Other flat faces, and the points where a curved one touches its bounds, are best met half-way.
             let mut flats = vec![lo, hi];
             solid.region.planes(a, &mut flats);
+            let others = faces.iter().filter(|f| !f.cut);
+            flats.extend(others.filter_map(|f| f.plane.filter(|p| p.axis == a).map(|p| p.at)));
             flats.retain(|s| (lo..=hi).contains(s));
             for at in flats {
                 // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes.

@@ -549,7 +549,7 @@ fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
         rest = others;
         // The face's vertices on edges along x come first, then y, then z.
         let starts = [numbers.offset[1][0], numbers.offset[2][0]];
-        let edged = grid.faces[local.live[face]].cut;
+        let edged = grid.faces[local.live[face]].edged;
         share_out(
             triangles,
             starts,
@@ -584,7 +584,7 @@ fn share_out(
         let [a, b, c] = t.map(|v| places[v as usize]);
         let [na, nb, nc] = t.map(|v| normals[v as usize]);
         let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
-        // A turn of more than 45 degrees within a triangle is an edge of the region, not its curvature.
+        // A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature.
         if edged && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
             continue;
         }

@@ -163,6 +163,20 @@ impl Bodies {
         }
     }
 
+    /// For each triangle the number of its body, in the order of `volumes`.
+    pub(super) fn names(&self, mesh: &Mesh) -> Vec<usize> {
+        let mut slot = vec![usize::MAX; self.root.len()];
+        let mut count = 0;
+        let name = |t: &[u32; 3]| {
+            let s = &mut slot[self.root[t[0] as usize] as usize];
+            if *s == usize::MAX {
+                (*s, count) = (count, count + 1);
+            }
+            *s
+        };
+        mesh.triangles.iter().map(name).collect()
+    }
+
     /// Signed volume of each body (mm³), taken about a vertex of its own so that small bodies keep their digits.
     pub(super) fn volumes(&self, mesh: &Mesh) -> Vec<f64> {
         let mut slot = vec![u32::MAX; self.root.len()];

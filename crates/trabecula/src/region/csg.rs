@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Region, Shape};
+use super::{HalfSpace, Region, Shape};
 use crate::face::{Face, Tree};
 use crate::fault::Fault;
 use crate::field::{Block, Field};
@@ -243,6 +243,18 @@ macro_rules! joined {
                 }
             }
 
+            // What is taken away keeps its surface: grown, it has no flat faces of its own.
+            fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+                let mut any = false;
+                let mut open = |(i, r): (usize, &Region)| {
+                    let opened = if self.negated(i) { None } else { r.clone().opened(cuts, found) };
+                    any |= opened.is_some();
+                    opened.unwrap_or_else(|| r.clone())
+                };
+                let regions = self.regions().iter().enumerate().map(&mut open).collect();
+                any.then(|| Arc::new(Self(regions)) as Region)
+            }
+
             fn volume(&self) -> Option<f64> {
                 match self.regions() {
                     [only] => only.volume(),
@@ -311,7 +323,7 @@ impl Shape for Offset {
 mod tests {
     use super::*;
     use crate::region::tests::check_shape;
-    use crate::region::{Cuboid, Cylinder, HalfSpace, Sphere};
+    use crate::region::{Cuboid, Cylinder, Sphere};
     use std::sync::Arc;
 
     fn parts() -> [Region; 3] {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Offset, Shape, one_face};
+use super::{HalfSpace, Offset, Region, Shape, one_face};
 use crate::face;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
@@ -16,6 +16,7 @@ mod cut;
 mod edges;
 mod fair;
 mod normals;
+mod open;
 mod orient;
 mod repair;
 mod tree;
@@ -222,6 +223,10 @@ impl Shape for MeshRegion {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
             _ => one_face(self, out),
         }
+    }
+
+    fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
+        open::opened(self, cuts, found)
     }
 
     fn volume(&self) -> Option<f64> {

@@ -484,6 +484,16 @@ impl HalfSpace {
         })
     }
 
+    /// A point on the plane, mm.
+    pub fn point(&self) -> Vec3 {
+        self.point
+    }
+
+    /// The unit normal of the plane; it points out of the solid.
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
     #[inline]
     fn distance(&self, p: Vec3) -> f64 {
         dot(sub(p, self.point), self.normal)

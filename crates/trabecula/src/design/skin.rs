@@ -1,0 +1,144 @@
+//! What is solid whatever the lattice says: data to skin and keep zones.
+
+use std::sync::Arc;
+
+use super::build::LOOKS;
+use super::data::{OpenSpec, SkinSpec};
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::level::check_formula;
+use super::report::Varied;
+use super::{Design, Loader, region, sample};
+use crate::face::Body;
+use crate::fault::number;
+use crate::field::Field;
+use crate::grade::Grade;
+use crate::math::Vec3;
+use crate::region::{HalfSpace, Intersection, Region};
+use crate::skin::skin;
+
+/// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `space`.
+pub(super) fn filled(
+    d: &Design,
+    space: &Region,
+    points: &[Vec3],
+    loader: &dyn Loader,
+    notes: &mut region::Notes,
+) -> Result<(Vec<Body>, Option<f64>), DesignError> {
+    let mut filled = Vec::new();
+    let mut thinnest = None;
+    if let Some(spec) = &d.skin {
+        let (body, least) = grown(spec, space, points)?;
+        filled.push(body);
+        thinnest = Some(least);
+    }
+    for (name, spec) in &d.keep {
+        let path = format!("keep.{name}");
+        let zone = region::region(spec, &path, loader, notes)?;
+        check_zone(&zone, space, points, &path)?;
+        let mut faces = Vec::new();
+        let tree = zone.faces(0.0, &mut faces);
+        filled.push(Body { faces, tree });
+    }
+    if filled.len() > 1 && !is_open(&filled, space, points) {
+        let (path, what) = if d.skin.is_some() {
+            ("skin", "the skin and the keep zones")
+        } else {
+            ("keep", "the keep zones together")
+        };
+        let message = format!("{what} fill the whole region: the part would be solid");
+        return Err(DesignError::new(path, message));
+    }
+    Ok((filled, thinnest))
+}
+
+/// Whether any of many points in the region is left to the lattice.
+fn is_open(filled: &[Body], space: &Region, points: &[Vec3]) -> bool {
+    let open = |points: &[Vec3]| {
+        let (mut least, mut v) = (vec![f64::INFINITY; points.len()], vec![0.0; points.len()]);
+        for body in filled {
+            body.values(points, &mut v);
+            least.iter_mut().zip(&v).for_each(|(l, v)| *l = l.min(*v));
+        }
+        least.iter().any(|v| *v > 0.0)
+    };
+    // Too few looks for a small hollow: look closer before saying so.
+    open(points) || open(&sample::inside(space, 50 * LOOKS).0)
+}
+
+/// The skin and its least thickness.
+fn grown(spec: &SkinSpec, space: &Region, points: &[Vec3]) -> Result<(Body, f64), DesignError> {
+    let path = "skin.thickness";
+    let allowed = Allowed::Positive("thickness");
+    let thickness = grade(&spec.thickness, path, space, allowed, false)?;
+    if let Grade::Formula(_) = &thickness {
+        let at = format!("{path}.formula");
+        check_formula(&thickness, &at, allowed, false, space, points)?;
+    }
+    let bounds = space.bounds();
+    let open = spec.open.iter().enumerate().map(|(i, o)| match o {
+        OpenSpec::Plane(h) => region::halfspace(h, &format!("skin.open[{i}]")),
+        OpenSpec::Side(side) => {
+            let (axis, upper) = side.axis();
+            let mut normal = [0.0; 3];
+            normal[axis] = if upper { 1.0 } else { -1.0 };
+            let point = if upper { bounds.max } else { bounds.min };
+            HalfSpace::new(point, normal).map_err(|f| DesignError::fault("skin.open", f))
+        }
+    });
+    let open = open.collect::<Result<Vec<HalfSpace>, DesignError>>()?;
+    let body = skin(space, &thickness, &open).map_err(|f| DesignError::fault("skin", f))?;
+    let mut widths = vec![0.0; points.len()];
+    thickness.values(points, &mut widths);
+    let width = Varied::of(&widths);
+    if !is_open(std::slice::from_ref(&body), space, points) {
+        let mut depth = vec![0.0; points.len()];
+        space.values(points, &mut depth);
+        let deepest = depth.iter().fold(0.0f64, |m, d| m.max(-d));
+        let message = format!(
+            "a skin of {} mm is thicker than the region: the part would be solid. Its deepest point is {deepest:.4} mm \
+             below its surface; give less than that",
+            width
+        );
+        return Err(DesignError::new(path, message));
+    }
+    Ok((body, width.min))
+}
+
+/// Refuses a zone that has nothing of the region or all of it.
+fn check_zone(
+    zone: &Region,
+    space: &Region,
+    points: &[Vec3],
+    path: &str,
+) -> Result<(), DesignError> {
+    let mut distance = vec![0.0; points.len()];
+    zone.values(points, &mut distance);
+    if distance.iter().all(|d| *d <= 0.0) {
+        let message = "it holds the whole region: the part would be solid";
+        return Err(DesignError::new(path, message));
+    }
+    if distance.iter().any(|d| *d < 0.0) {
+        return Ok(());
+    }
+    let both = Intersection::new(vec![space.clone(), zone.clone()]);
+    let both: Region = Arc::new(both.map_err(|f| DesignError::fault(path, f))?);
+    let (b, r) = (zone.bounds(), space.bounds());
+    if b.is_empty() {
+        return Err(DesignError::new(path, "it is empty"));
+    }
+    if !both.bounds().is_empty() && !sample::inside(&both, LOOKS).0.is_empty() {
+        return Ok(());
+    }
+    let corner = |v: Vec3| v.map(number).join(", ");
+    let apart = distance.iter().fold(f64::INFINITY, |m, d| m.min(*d));
+    let message = format!(
+        "it lies outside the region, about {apart:.3} mm away: it reaches from ({}) to ({}) mm, the region from ({}) \
+         to ({}) mm",
+        corner(b.min),
+        corner(b.max),
+        corner(r.min),
+        corner(r.max)
+    );
+    Err(DesignError::new(path, message))
+}
