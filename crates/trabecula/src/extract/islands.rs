@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::math::{Aabb, Vec3};
 
 use super::bodies::{Bodies, LINES, NONE, Sum, find, unite};
@@ -50,6 +50,14 @@ pub struct Island {
     pub bounds: [Vec3; 2],
 }
 
+impl Island {
+    /// The middle of its bounds, mm.
+    pub fn place(&self) -> Vec3 {
+        let [low, high] = self.bounds;
+        [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0)
+    }
+}
+
 /// The pieces of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pieces {
@@ -71,6 +79,38 @@ pub struct Pieces {
     pub volume: f64,
     /// The largest of them.
     pub island: Option<Island>,
+}
+
+impl Pieces {
+    /// The largest piece's share of all the volume.
+    pub fn share(&self) -> f64 {
+        self.largest / (self.largest + self.volume)
+    }
+
+    /// What is to be said of the pieces beside the largest: how many, how large, where.
+    pub fn words(&self) -> String {
+        let Some(island) = self.island else {
+            return "one piece".into();
+        };
+        let short = |v: f64| number(format!("{v:.2e}").parse().unwrap_or(v));
+        // Rounded downwards: what is not all of it is never 100 %.
+        let share = number((1e4 * self.share()).floor() / 100.0);
+        let [x, y, z] = island.place().map(|v| number((1e3 * v).round() / 1e3));
+        let (volume, largest) = (short(self.volume), short(island.volume));
+        let place = format!("about ({x}, {y}, {z}) mm");
+        match (self.others, self.border) {
+            (1, 0) => format!(
+                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, an island {place}"
+            ),
+            (1, _) => format!(
+                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, cut off by the region's boundary {place}"
+            ),
+            (n, b) => format!(
+                "{n} pieces beside the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them cut off by the \
+                 region's boundary; the largest of them has {largest} mm³ and lies {place}"
+            ),
+        }
+    }
 }
 
 /// Names are spread well by a multiplication; nobody chooses them to collide.
@@ -207,8 +247,10 @@ impl Census {
             owner[i] = if positive {
                 i as u32
             } else {
-                let found = outside.get(&find(&mut self.solid, i as u32));
-                found.map_or_else(|| around(&whole, &roots, i), |o| *o as u32)
+                // A void that no line meets is smaller than a grid step. It has no owner, and is filled where anything
+                // is dropped: so nothing inside out can be left over.
+                let piece = find(&mut self.solid, i as u32);
+                outside.get(&piece).map_or(NONE, |o| *o as u32)
             };
             if !positive && owner[i] != NONE {
                 net[owner[i] as usize] += whole[i].volume;
@@ -234,7 +276,7 @@ impl Census {
             }
         }
         if islands == Islands::Error && told.others > 0 {
-            return Err(Fault::new("islands", in_pieces(&told)));
+            return Err(Fault::new("islands", refusal(&told)));
         }
         let drops = islands == Islands::Drop && told.others > 0;
         let stays = |i: usize| !drops || largest.is_some_and(|l| owner[i] == l as u32);
@@ -258,35 +300,10 @@ impl Census {
     }
 }
 
-/// The piece around a void that no grid line in x meets, one smaller than a grid cell: the smallest whose bounds hold it.
-fn around(whole: &[Sum], roots: &[usize], void: usize) -> u32 {
-    let b = &whole[void].bounds;
-    let holds = |o: &Aabb| (0..3).all(|a| o.min[a] <= b.min[a] && o.max[a] >= b.max[a]);
-    let pieces = roots.iter().copied();
-    let near = pieces.filter(|&i| whole[i].volume > 0.0 && holds(&whole[i].bounds));
-    let least = near.reduce(|a, b| {
-        if whole[b].volume < whole[a].volume {
-            b
-        } else {
-            a
-        }
-    });
-    least.map_or(NONE, |i| i as u32)
-}
-
-/// What is said of a solid in several pieces.
-fn in_pieces(p: &Pieces) -> String {
-    let island = p.island.unwrap_or_default();
-    let middle = [0, 1, 2].map(|a| (island.bounds[0][a] + island.bounds[1][a]) / 2.0);
-    let [x, y, z] = middle.map(|v| format!("{v:.4}"));
+/// Why a solid in several pieces is refused.
+fn refusal(p: &Pieces) -> String {
+    let words = p.words();
     format!(
-        "the solid is in {} pieces: beside the largest, of {:.6} mm³, {} of {:.3e} mm³ in all ({} at the region's boundary); \
-         the largest of these has {:.3e} mm³ and lies about ({x}, {y}, {z}) mm. Drop them, or make walls thicker",
-        p.others + 1,
-        p.largest,
-        p.others,
-        p.volume,
-        p.border,
-        island.volume,
+        "the solid is not in one piece: {words}; drop them, make walls thicker, or change what cuts them off"
     )
 }

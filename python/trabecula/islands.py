@@ -1,0 +1,26 @@
+"""Pieces beside the largest: what is to become of them, and what is said of them."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Literal, get_args
+
+from .errors import DesignWarning
+
+__all__ = ["Islands", "check_islands", "warn_islands"]
+
+Islands = Literal["keep", "drop", "error"]
+
+
+def check_islands(islands: object) -> None:
+    """Refuses what is no word for it, before any work is done."""
+    if islands not in get_args(Islands):
+        raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+
+
+def warn_islands(islands: dict, words: str) -> None:
+    """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
+    if islands["found"] > islands["dropped"]:
+        warnings.warn(
+            f'the result is not in one piece: {words}; islands = "drop" leaves them out', DesignWarning, stacklevel=3
+        )
