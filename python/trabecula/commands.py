@@ -86,14 +86,15 @@ def mesh(args) -> None:
     if left_out["dropped"]:
         place = ", ".join(figure(v) for v in left_out["largest"]["place"])
         say(
-            f"{left_out['dropped']} pieces dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} of them cut off by "
-            f"the region's boundary; the largest has {left_out['largest']['volume']:.3g} mm³ and lay about ({place}) mm"
+            f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the region's "
+            f"boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
         )
     if args.json:
         return print(json.dumps(made, indent=2))
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
-        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, {made['seconds']:.2f} s"
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
+        f"{made['seconds']:.2f} s"
     )
 
 

@@ -7,15 +7,20 @@ from typing import Literal, get_args
 
 from .errors import DesignWarning
 
-__all__ = ["Islands", "check_islands", "warn_islands"]
+__all__ = ["Islands", "check_islands", "left_out", "warn_islands"]
 
 Islands = Literal["keep", "drop", "error"]
 
 
 def check_islands(islands: object) -> None:
     """Refuses what is no word for it, before any work is done."""
-    if islands not in get_args(Islands):
+    if not (isinstance(islands, str) and islands in get_args(Islands)):
         raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+
+
+def left_out(islands: dict) -> float:
+    """Volume of what was dropped, mm³."""
+    return islands["volume"] if islands["dropped"] else 0.0
 
 
 def warn_islands(islands: dict, words: str) -> None:

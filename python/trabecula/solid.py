@@ -14,7 +14,7 @@ from . import _core
 from .design import Design, Lattice
 from .errors import DesignWarning
 from .given import number, positive, three, whole
-from .islands import Islands, check_islands, warn_islands
+from .islands import Islands, check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
@@ -172,7 +172,7 @@ class Solid(Picture):
         fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
         self._warn_thin(spacing)
         core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
-        self._warn_coarse(core.volume(), spacing)
+        self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
         warn_islands(told["islands"], words)
         return Mesh(core, self._core.region, spacing, told["islands"])
 
@@ -205,7 +205,7 @@ class Solid(Picture):
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
             summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
-        self._warn_coarse(summary["volume"], spacing)
+        self._warn_coarse(summary["volume"] + left_out(summary["islands"]), spacing)
         warn_islands(summary["islands"], words)
         return summary
 

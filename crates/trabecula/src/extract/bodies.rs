@@ -60,7 +60,7 @@ pub(super) struct Line {
 /// Lines that belong to a tile.
 pub(super) const LINES: usize = TILE * TILE;
 
-/// The bodies of a tile, in the order in which its triangles first name them.
+/// The bodies of a tile, in the order of their first vertices.
 #[derive(Debug)]
 pub(super) struct Bodies {
     pub tile: [usize; 3],
@@ -82,29 +82,17 @@ impl Bodies {
         for (t, _) in view.triangles() {
             join(&mut root, t);
         }
-        let mut names = Names {
-            root,
-            of: vec![NONE; places.len()],
-            count: 0,
-        };
-        let mut sums: Vec<Sum> = Vec::new();
-        let mut body_of = Vec::new();
+        let (body, mut sums) = number(root);
         for (t, cut) in view.triangles() {
-            let body = names.name(t[0]);
-            body_of.push(body);
-            if body as usize == sums.len() {
-                sums.push(Sum::NONE);
-            }
             let [a, b, c] = t.map(|v| places[v as usize]);
             let n = cross(sub(b, a), sub(c, a));
-            let sum = &mut sums[body as usize];
+            let sum = &mut sums[body[t[0] as usize] as usize];
             sum.triangles += 1;
             sum.volume += dot(sub(a, middle), n) / 6.0;
             sum.area[usize::from(cut)] += norm(n) / 2.0;
         }
         let mut border = Vec::new();
-        for (v, place) in places.iter().enumerate() {
-            let body = names.name(v as u32);
+        for (v, (place, &body)) in places.iter().zip(&body).enumerate() {
             if body == NONE {
                 continue;
             }
@@ -116,13 +104,13 @@ impl Bodies {
                 sum.vertices += 1;
             }
         }
-        let (lines, beside) = lines(view, &mut names);
+        let (lines, beside) = lines(view, &body);
         Bodies {
             tile: view.tile(),
             border,
             beside,
             lines,
-            order: sorted(&body_of, sums.len()),
+            order: sorted(view, &body, sums.len()),
             sums,
         }
     }
@@ -161,55 +149,58 @@ pub(super) fn unite(root: &mut [u32], a: u32, b: u32) {
     root[a.max(b) as usize] = a.min(b);
 }
 
-/// Joins the corners of a triangle; those that none has named yet are none's.
+/// Joins the corners of a triangle; a corner that none has named yet goes straight to the others' root.
 #[inline]
-fn join(root: &mut [u32], t: [u32; 3]) {
-    for v in t {
-        if root[v as usize] == NONE {
-            root[v as usize] = v;
+fn join(root: &mut [u32], [a, b, c]: [u32; 3]) {
+    let [x, y, z] = [a, b, c].map(|v| root[v as usize]);
+    if x == y && y == z && x != NONE {
+        return;
+    }
+    let known = [(x, a), (y, b), (z, c)].into_iter().find(|k| k.0 != NONE);
+    let to = known.map_or(a, |(_, v)| find(root, v));
+    root[to as usize] = to;
+    for (r, v) in [(x, a), (y, b), (z, c)] {
+        if r == NONE {
+            root[v as usize] = to;
+        } else if r != to {
+            unite(root, v, to);
         }
     }
-    unite(root, t[0], t[1]);
-    unite(root, t[0], t[2]);
 }
 
-/// The numbers of bodies, given to their roots as these are asked for.
-struct Names {
-    root: Vec<u32>,
-    of: Vec<u32>,
-    count: u32,
-}
-
-impl Names {
-    /// The body of a vertex, if a triangle of the tile has it.
-    #[inline]
-    fn name(&mut self, v: u32) -> u32 {
-        if self.root[v as usize] == NONE {
-            return NONE;
+/// The body of each vertex, and a place for the sums of each body.
+fn number(mut root: Vec<u32>) -> (Vec<u32>, Vec<Sum>) {
+    let mut body = vec![NONE; root.len()];
+    let mut sums = Vec::new();
+    for v in 0..root.len() {
+        if root[v] == NONE {
+            continue;
         }
-        let name = &mut self.of[find(&mut self.root, v) as usize];
-        if *name == NONE {
-            *name = self.count;
-            self.count += 1;
+        let top = find(&mut root, v as u32) as usize;
+        if body[top] == NONE {
+            body[top] = sums.len() as u32;
+            sums.push(Sum::NONE);
         }
-        *name
+        body[v] = body[top];
     }
+    (body, sums)
 }
 
 /// The numbers of triangles sorted by body, each body's in their order; none where there is nothing to sort.
-fn sorted(body_of: &[u32], bodies: usize) -> Vec<u32> {
+fn sorted(view: &View, body: &[u32], bodies: usize) -> Vec<u32> {
     if bodies < 2 {
         return Vec::new();
     }
+    let all: Vec<u32> = view.triangles().map(|(t, _)| body[t[0] as usize]).collect();
     let mut next = vec![0u32; bodies + 1];
-    for b in body_of {
+    for b in &all {
         next[*b as usize + 1] += 1;
     }
     for b in 0..bodies {
         next[b + 1] += next[b];
     }
-    let mut order = vec![0; body_of.len()];
-    for (i, b) in body_of.iter().enumerate() {
+    let mut order = vec![0; all.len()];
+    for (i, b) in all.iter().enumerate() {
         let at = &mut next[*b as usize];
         order[*at as usize] = i as u32;
         *at += 1;
@@ -218,11 +209,11 @@ fn sorted(body_of: &[u32], bodies: usize) -> Vec<u32> {
 }
 
 /// What the grid's lines in x meet in a tile, and which bodies have a stretch of solid between them on one.
-fn lines(view: &View, names: &mut Names) -> (Vec<Line>, Vec<(u32, u32)>) {
+fn lines(view: &View, body: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
     // Row, place, whether the solid begins there, body: in parts that are in order already.
     let mut met: Vec<(u32, f64, bool, u32)> = Vec::new();
     view.each_crossing(&mut |row, v, x, enters| {
-        let body = names.name(v);
+        let body = body[v as usize];
         if body != NONE {
             met.push((row, x, enters, body));
         }

@@ -73,7 +73,8 @@ pub struct Pieces {
     pub others: u64,
     /// Those of them that are not in the result.
     pub dropped: u64,
-    /// Those of them that touch the region's boundary: crumbs of cells that it cuts. The rest are islands inside.
+    /// Those of them that have surface on the region's boundary: mostly crumbs of walls and struts that it cuts off. The
+    /// rest are islands inside.
     pub border: u64,
     /// Volume of all of them, mm³.
     pub volume: f64,
@@ -95,18 +96,19 @@ impl Pieces {
         let short = |v: f64| number(format!("{v:.2e}").parse().unwrap_or(v));
         // Rounded downwards: what is not all of it is never 100 %.
         let share = number((1e4 * self.share()).floor() / 100.0);
-        let [x, y, z] = island.place().map(|v| number((1e3 * v).round() / 1e3));
+        // Plus zero: −0 is 0.
+        let [x, y, z] = island
+            .place()
+            .map(|v| number((1e3 * v).round() / 1e3 + 0.0));
         let (volume, largest) = (short(self.volume), short(island.volume));
         let place = format!("about ({x}, {y}, {z}) mm");
         match (self.others, self.border) {
-            (1, 0) => format!(
-                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, an island {place}"
-            ),
-            (1, _) => format!(
-                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, cut off by the region's boundary {place}"
+            (1, b) => format!(
+                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",
+                if b > 0 { "at" } else { "away from" }
             ),
             (n, b) => format!(
-                "{n} pieces beside the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them cut off by the \
+                "{n} pieces beside the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them at the \
                  region's boundary; the largest of them has {largest} mm³ and lies {place}"
             ),
         }

@@ -712,7 +712,17 @@ impl View<'_> {
     }
 
     /// Whether a neighbouring tile may use a vertex as well.
+    #[inline]
     pub fn is_shared(&self, v: usize) -> bool {
+        if let Some(vertex) = self.s.vertices.get(v) {
+            // Its other coordinates are those of its edge, to the last bit.
+            let border = |a: usize| {
+                let (axis, own) = (self.nodes.axes[a], &self.own[a]);
+                let at = vertex.solid[a];
+                a != usize::from(vertex.axis) && (at == axis[own.start] || at == axis[own.end])
+            };
+            return border(0) || border(1) || border(2);
+        }
         let key = self.key(v);
         let (at, spans) = (self.nodes.at(key.node()), key.spans());
         let border = |a: usize| at[a] == self.own[a].start || at[a] == self.own[a].end;
