@@ -163,6 +163,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json)")
     p.add_argument("-o", "--output", required=True, type=ending(MESH_OUT), metavar="OUT", help="the mesh to write")
     resolution(p)
+    p.add_argument(
+        "--islands",
+        choices=("keep", "drop", "error"),
+        default="keep",
+        help="pieces beside the largest: keep them with a warning (default), drop them, or refuse",
+    )
     p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
 
     p = command(

@@ -68,29 +68,35 @@ def mesh(args) -> None:
     start = time.perf_counter()
     solid = build(args.design)
     keep_inputs(args.design, args.output)
-    options = resolved(args)
+    options = resolved(args) | {"islands": args.islands}
     with Progress("meshing", args.progress) as progress:
-        if kind_of(args.output) == "stl" and not closes(solid, options):
+        if kind_of(args.output) == "stl" and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
-            solid._room(args.output, solid.spacing(**options))
+            solid._room(args.output, solid.spacing(**resolved(args)))
             surface = solid.mesh(threads=args.threads, progress=progress, **options)
-            figures = surface.measure()
-            keys = ("volume", "area", "area_lattice", "area_cut", "cavities", "voids")
-            made = {"triangles": surface.counts[1], **{k: figures[k] for k in keys}}
+            made = surface._summary() | {"voids": surface.voids}
             progress.clear()
             surface.write(args.output)
-            tell_voids(figures["voids"])
-    edge = solid.spacing(**options)
+            tell_voids(made["voids"])
+    edge = solid.spacing(**resolved(args))
     made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
     made["edge"] = edge
     made["bytes"] = os.path.getsize(args.output)
     made["seconds"] = round(time.perf_counter() - start, 3)
+    left_out = made["islands"]
+    if left_out["dropped"]:
+        place = ", ".join(figure(v) for v in left_out["largest"]["place"])
+        say(
+            f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the region's "
+            f"boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
+        )
     if args.json:
         return print(json.dumps(made, indent=2))
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
-        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm²; edge {edge:g} mm, {made['seconds']:.2f} s"
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
+        f"{made['seconds']:.2f} s"
     )
 
 
@@ -277,6 +283,11 @@ def known_cell(name: str, known: list[str]) -> None:
         near = get_close_matches(name, known, 1)
         hint = f'; did you mean "{near[0]}"?' if near else "."
         raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
+
+
+def counted(pieces: int) -> str:
+    """A number of pieces."""
+    return "one piece" if pieces == 1 else f"{pieces} pieces"
 
 
 def kind_of(path: str) -> str:

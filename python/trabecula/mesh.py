@@ -69,10 +69,17 @@ class Picture:
 class Mesh(Picture):
     """A triangle mesh. Made by ``Solid.mesh``, or read from a file by ``Mesh.read``."""
 
-    def __init__(self, core: _core.Mesh, region: _core.Region | None = None, edge: float | None = None):
+    def __init__(
+        self,
+        core: _core.Mesh,
+        region: _core.Region | None = None,
+        edge: float | None = None,
+        islands: dict | None = None,
+    ):
         self._core = core
         self._region = region
         self._edge = edge
+        self._islands = islands
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Mesh:
@@ -240,6 +247,16 @@ class Mesh(Picture):
         return self._figures["pieces"]
 
     @property
+    def islands(self) -> dict | None:
+        """What there was beside the largest piece when a solid was meshed; None for a mesh from a file.
+
+        ``found`` and ``dropped`` count the pieces, ``border`` those with surface on the region's boundary, mostly
+        crumbs that it cuts off; the others lie inside. ``volume`` is theirs together, mm³, and ``share`` the largest piece's share of all.
+        ``largest`` has the ``volume``, ``place`` and ``bounds`` (mm) of the largest of them, or is None.
+        """
+        return self._islands
+
+    @property
     def cavities(self) -> int:
         """Number of closed voids."""
         return self._figures["cavities"]
@@ -264,13 +281,18 @@ class Mesh(Picture):
         """Lower and upper corner, mm."""
         return [list(c) for c in self._figures["bounds"]]
 
+    def _summary(self) -> dict:
+        """The figures that a streamed surface has too."""
+        keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")
+        return {"triangles": self.counts[1], **{k: self._figures[k] for k in keys}, "islands": self._islands}
+
     def within(self, solid_or_region) -> Mesh:
         """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
         region = getattr(solid_or_region, "_core", solid_or_region)
         region = region.region if isinstance(region, _core.Solid) else region
         if not isinstance(region, _core.Region):
             raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
-        return Mesh(self._core.split_by(region), region, self._edge)
+        return Mesh(self._core.split_by(region), region, self._edge, self._islands)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""

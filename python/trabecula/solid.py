@@ -14,6 +14,7 @@ from . import _core
 from .design import Design, Lattice
 from .errors import DesignWarning
 from .given import number, positive, three, whole
+from .islands import Islands, check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
@@ -167,20 +168,26 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        islands: Islands = "keep",
     ) -> Mesh:
         """The surface as a closed mesh.
 
         ``edge`` is the grid spacing in mm, or ``per_cell`` samples on the smallest wavelength (32 unless given). The
         result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
+
+        ``islands``: what becomes of all pieces but the largest. ``"keep"`` leaves them, with a warning; ``"drop"`` leaves
+        them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
         """
+        check_islands(islands)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
         fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
         self._warn_thin(spacing)
-        core = self._core.mesh(spacing, _threads(threads), progress)
-        self._warn_coarse(core.volume(), spacing)
-        return Mesh(core, self._core.region, spacing)
+        core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
+        self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
+        warn_islands(told["islands"], words)
+        return Mesh(core, self._core.region, spacing, told["islands"])
 
     def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
         """Refuses a mesh file that the disk has no room for."""
@@ -194,21 +201,25 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        islands: Islands = "keep",
     ) -> dict:
-        """Streams the surface to a binary STL without holding it in memory; gives triangles, volume and areas."""
+        """Streams the surface to a binary STL without holding it in memory; gives its triangles, volume, areas, Euler
+        number, pieces and cavities, and what ``islands`` (as for ``mesh``) came to.
+        """
+        check_islands(islands)
         extension(path, ("stl",))
         check_place(path)
         spacing = self.spacing(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
-            made = self.mesh(spacing, None, threads, progress)
+            made = self.mesh(spacing, None, threads, progress, islands)
             made.write(path)
-            keys = ("volume", "area", "area_lattice", "area_cut")
-            return {"triangles": made.counts[1], **{k: made.measure()[k] for k in keys}}
+            return made._summary()
         self._room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
-            summary = self._core.stream_stl(temporary, spacing, _threads(threads), progress)
-        self._warn_coarse(summary["volume"], spacing)
+            summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
+        self._warn_coarse(summary["volume"] + left_out(summary["islands"]), spacing)
+        warn_islands(summary["islands"], words)
         return summary
 
     def voxels(

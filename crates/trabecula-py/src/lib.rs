@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod design;
 mod error;
 mod file;
+mod islands;
 mod machine;
 mod mesh;
 mod run;

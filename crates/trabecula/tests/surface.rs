@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::{Silent, Surface, stream_stl, surface, voxels};
+use trabecula::extract::{Islands, Silent, Surface, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
@@ -369,7 +369,7 @@ fn same_bytes_for_any_number_of_threads_and_both_roads_agree() {
             .expect("pool");
         pool.install(|| {
             let mut stl = Cursor::new(Vec::new());
-            let summary = stream_stl(&solid, 0.025, &mut stl, &Silent).expect("stl");
+            let summary = stream_stl(&solid, 0.025, Islands::Keep, &mut stl, &Silent).expect("stl");
             (
                 surface(&solid, 0.025, &Silent).expect("surface"),
                 stl.into_inner(),
