@@ -19,4 +19,5 @@ pub mod measure;
 pub mod mesh;
 pub mod region;
 pub mod render;
+pub mod simplify;
 pub mod solid;
