@@ -179,8 +179,8 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     let n = used.iter().filter(|u| **u).count();
     if places.len() < n {
         return refuse(format!(
-            "{} in one place with another",
-            counted(n - places.len(), "vertex place")
+            "{} that another vertex has too",
+            counted(n - places.len(), "place")
         ));
     }
     let links = Links::new(mesh.triangles.clone(), mesh.vertices.len());
@@ -188,7 +188,7 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     let (Some(links), 0) = (links, pinched) else {
         let d = measure::defects(mesh);
         return refuse(format!(
-            "{} with one triangle, {} with more than two, {} with two of the same direction, {} where fans touch",
+            "{} with one triangle, {} with more than two, {} with two of the same direction, {} where surfaces touch",
             counted(d.open_edges, "edge"),
             d.crowded_edges,
             d.flipped_edges,
@@ -201,8 +201,7 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     if crossings > 0 || flat > 0 {
         let or_more = if crossings == SHOWN { " or more" } else { "" };
         return refuse(format!(
-            "{}{or_more} that meet and {flat} without area",
-            counted(crossings, "pair of triangle")
+            "{crossings}{or_more} pairs of triangles that meet and {flat} triangles without area"
         ));
     }
     Ok(links)

@@ -189,17 +189,29 @@ impl Work {
             [_, 0] => Some(self.place(u)),
             [0, _] => Some(self.place(v)),
             _ if !along => return None,
-            [2, 2] => None,
+            // A vertex of the run itself: so the run stays on its curve, and faces beside it stay flat.
+            [2, 2] => Some(self.better_end(h)),
             [_, 2] => Some(self.place(u)),
             [2, _] => Some(self.place(v)),
             _ => return None,
         };
-        let q = self.quadrics[u as usize].plus(&self.quadrics[v as usize]);
+        let q = self.joint(h);
         let place = fixed.unwrap_or_else(|| q.least(self.middle(h)));
         let cost = q.at(place).max(0.0);
         // Its mean distance alone would exceed what is allowed.
         let hopeless = !along && cost > q.area * self.tolerance * self.tolerance;
         (!hopeless).then_some(Plan { fixed, cost })
+    }
+
+    fn joint(&self, h: u32) -> Quadric {
+        self.quadrics[self.links.from(h) as usize].plus(&self.quadrics[self.links.to(h) as usize])
+    }
+
+    /// The end of the edge that costs less.
+    fn better_end(&self, h: u32) -> Vec3 {
+        let q = self.joint(h);
+        let (p, r) = (self.place(self.links.from(h)), self.place(self.links.to(h)));
+        if q.at(p) <= q.at(r) { p } else { r }
     }
 
     fn middle(&self, h: u32) -> Vec3 {
@@ -286,16 +298,22 @@ impl Work {
         let y = sub(p.rim[p.turn], o);
         // The triangle u v x has x in the origin; v u y remains.
         six += dot(y, cross(v, u));
-        let q = self.quadrics[self.links.from(h) as usize]
-            .plus(&self.quadrics[self.links.to(h) as usize]);
+        let q = self.joint(h);
         let middle = self.middle(h);
         let w = q.least_on(middle, g, six + dot(o, g));
         let (edge, off) = (sub(p.v, p.u), sub(w, middle));
-        if dot(off, off) <= dot(edge, edge) {
+        let mut w = if dot(off, off) <= dot(edge, edge) {
             w
         } else {
             middle
+        };
+        // What is flat along an axis stays so to the last bit.
+        for k in 0..3 {
+            if p.u[k] == p.v[k] && p.rim.iter().all(|r| r[k] == p.u[k]) {
+                w[k] = p.u[k];
+            }
         }
+        w
     }
 
     /// How far the run of kept edges through u and v has then moved in all; `None` if too far.
