@@ -21,7 +21,7 @@ from .solid import Solid
 from .starter import STARTER
 from .words import Progress, figure, say, span
 
-__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "voxels"]
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "voxels"]
 
 DESIGNS = ("toml", "json")
 
@@ -70,12 +70,19 @@ def mesh(args) -> None:
     keep_inputs(args.design, args.output)
     options = resolved(args) | {"islands": args.islands}
     with Progress("meshing", args.progress) as progress:
-        if kind_of(args.output) == "stl" and not closes(solid, resolved(args)):
+        lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
+        if kind_of(args.output) == "stl" and not any(lighter.values()) and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
-            solid._room(args.output, solid.spacing(**resolved(args)))
+            if not any(lighter.values()):
+                solid._room(args.output, solid.spacing(**resolved(args)))
             surface = solid.mesh(threads=args.threads, progress=progress, **options)
+            if any(lighter.values()):
+                progress.clear()
+                surface = simplified(surface, args)
             made = surface._summary() | {"voids": surface.voids}
+            if surface.simplification:
+                made["simplification"] = surface.simplification
             progress.clear()
             surface.write(args.output)
             tell_voids(made["voids"])
@@ -98,6 +105,37 @@ def mesh(args) -> None:
         f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
         f"{made['seconds']:.2f} s"
     )
+
+
+def simplify(args) -> None:
+    """``trabecula simplify``."""
+    check_place(args.output)
+    start = time.perf_counter()
+    if os.path.exists(args.output) and os.path.samefile(args.file, args.output):
+        raise Refused(f"{args.output} is what is simplified; name another output")
+    made = simplified(Mesh.read(args.file), args)
+    made.write(args.output)
+    report = {**made.simplification, "seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        print(json.dumps(report, indent=2))
+
+
+def simplified(mesh: Mesh, args) -> Mesh:
+    """The lighter mesh, and words on what was done."""
+    with Progress("simplifying", args.progress) as progress:
+        made = mesh.simplified(args.tolerance, args.triangles, progress)
+    it = made.simplification
+    if args.triangles and it["triangles_before"] <= args.triangles:
+        say(f"{it['triangles']} triangles are no more than {args.triangles} already: left as they are")
+        return made
+    if args.triangles and not args.tolerance and it["triangles"] > args.triangles:
+        say(f"warning: {it['triangles']} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
+    change = 100 * (it["volume"] / it["volume_before"] - 1)
+    say(
+        f"simplified from {it['triangles_before']} to {it['triangles']} triangles, nowhere farther than "
+        f"{it['deviation']:.2g} mm from the first; volume {change:+.2g} %"
+    )
+    return made
 
 
 def voxels(args) -> None:

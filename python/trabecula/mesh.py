@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import _core
 from .given import number, positive, whole
@@ -80,6 +81,7 @@ class Mesh(Picture):
         self._region = region
         self._edge = edge
         self._islands = islands
+        self._simplification: dict | None = None
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Mesh:
@@ -285,6 +287,37 @@ class Mesh(Picture):
         """The figures that a streamed surface has too."""
         keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")
         return {"triangles": self.counts[1], **{k: self._figures[k] for k in keys}, "islands": self._islands}
+
+    def simplified(
+        self,
+        tolerance: float | None = None,
+        triangles: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> Mesh:
+        """A lighter mesh that keeps every guarantee, sharp edges, and the volume.
+
+        No point of either surface is farther than ``tolerance`` (mm) from the other one; or the mesh is brought down to
+        ``triangles``, and ``simplification`` of the result says how far it is then at most. With both, whichever is
+        reached first. A mesh that is not closed, or crosses itself, is refused. ``progress(done, total)`` is called now
+        and then.
+        """
+        if tolerance is None and triangles is None:
+            raise ValueError("give a tolerance (mm), a number of triangles, or both")
+        length = None if tolerance is None else positive("tolerance", tolerance)
+        most = None if triangles is None else whole("triangles", triangles, 4, 2**32)
+        # Links, quadrics, displacements, candidates, a tree, and the copies before and after.
+        fits(320.0 * self._core.counts[1], f"simplifying {self._core.counts[1]} triangles")
+        core, report = self._core.simplified(length, most, progress)
+        made = Mesh(core, self._region, self._edge, self._islands)
+        made._simplification = report
+        return made
+
+    @property
+    def simplification(self) -> dict | None:
+        """What ``simplified`` did: triangles, volume and area before and after, and ``deviation``, a bound of the distance
+        between the two surfaces in both directions, mm. None for a mesh that was not simplified.
+        """
+        return None if self._simplification is None else dict(self._simplification)
 
     def within(self, solid_or_region) -> Mesh:
         """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""

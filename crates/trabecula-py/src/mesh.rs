@@ -11,6 +11,7 @@ use pyo3::types::{PyBytes, PyDict};
 use trabecula::extract::Surface;
 use trabecula::math::{cross, norm, sub};
 use trabecula::render::{View, png, render};
+use trabecula::simplify::{Goal, simplify};
 use trabecula::{io, measure};
 
 use crate::error;
@@ -102,6 +103,37 @@ impl Mesh {
             self.surface.mesh.vertices.len(),
             self.surface.mesh.triangles.len(),
         )
+    }
+
+    /// A lighter mesh within `tolerance` (mm) or of at most `triangles`, and what was done.
+    #[pyo3(signature = (tolerance=None, triangles=None, progress=None))]
+    fn simplified<'py>(
+        &self,
+        py: Python<'py>,
+        tolerance: Option<f64>,
+        triangles: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Mesh, Bound<'py, PyDict>)> {
+        let goal = Goal {
+            tolerance,
+            triangles,
+        };
+        let (surface, report) = run(py, None, progress, |p| simplify(&self.surface, &goal, p))?
+            .map_err(error::stopped)?;
+        let d = PyDict::new(py);
+        d.set_item("triangles_before", report.triangles[0])?;
+        d.set_item("triangles", report.triangles[1])?;
+        d.set_item("deviation", report.deviation)?;
+        d.set_item("volume_before", report.volume[0])?;
+        d.set_item("volume", report.volume[1])?;
+        d.set_item("area_before", report.area[0])?;
+        d.set_item("area", report.area[1])?;
+        let mesh = Mesh {
+            surface,
+            split: self.split,
+            design: self.design.clone(),
+        };
+        Ok((mesh, d))
     }
 
     /// Volume, areas, Euler number, pieces, cavities, closedness, bounds.

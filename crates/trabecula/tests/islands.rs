@@ -28,6 +28,7 @@ fn lattice(name: &str, part: Part, fraction: f64, rotate: [f64; 3]) -> Arc<dyn F
 
 fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
     Solid {
+        filled: Vec::new(),
         region,
         field,
         wavelength: 1.0,
