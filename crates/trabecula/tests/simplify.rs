@@ -280,11 +280,11 @@ fn a_cylinder_keeps_its_rims() {
         })
         .sum();
     assert!((area / (2.0 * PI * r * r) - 1.0).abs() < 0.02, "{area}");
-    // The rims carry all: hardly a vertex is left inside a cap, where triangles would become needles without it.
+    // The rims carry nearly all; a few vertices stay inside a cap, where triangles would be needles without them.
     let radii = made.mesh.vertices.iter().map(|v| v[0].hypot(v[1]));
     let inside = radii.clone().filter(|q| *q < r - 0.011).count();
     assert!(
-        inside * 20 < made.mesh.vertices.len(),
+        inside * 10 < made.mesh.vertices.len(),
         "{inside} of {}",
         made.mesh.vertices.len()
     );

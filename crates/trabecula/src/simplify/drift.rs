@@ -173,7 +173,7 @@ impl Patch {
         };
         let (old, new) = (&self.old, &mut self.new);
         // Old and new triangles have a common point, and it moves by `s`.
-        let mut meet = |i: usize, j: usize, s: f64| {
+        let meet = |new: &mut [Drift], i: usize, j: usize, s: f64| {
             let shift = core::array::from_fn(|c| (s * n[c]) as f32);
             new[j].cover(&old[i], shift);
         };
@@ -181,12 +181,12 @@ impl Patch {
         for i in 0..m {
             let before = if i == 0 { m - 1 } else { i - 1 };
             for j in [before, i] {
-                meet(before, j, 0.0);
-                meet(i, j, 0.0);
+                meet(new, before, j, 0.0);
+                meet(new, i, j, 0.0);
                 if i == 0 {
-                    meet(m, j, 0.0);
+                    meet(new, m, j, 0.0);
                 } else if i == k {
-                    meet(m + 1, j, 0.0);
+                    meet(new, m + 1, j, 0.0);
                 }
             }
         }
@@ -199,7 +199,7 @@ impl Patch {
                 };
                 own.clone()
                     .chain([m, m + 1])
-                    .for_each(|i| meet(i, j, z - p[2]));
+                    .for_each(|i| meet(new, i, j, z - p[2]));
                 found = true;
             }
             if !found {
@@ -210,11 +210,15 @@ impl Patch {
         let mut found = false;
         for i in 0..m + 2 {
             if let Some(z) = height(corners(i), w) {
-                (0..m).for_each(|j| meet(i, j, -z));
+                (0..m).for_each(|j| meet(new, i, j, -z));
                 found = true;
             }
         }
         if !found {
+            return false;
+        }
+        // Boxes only grow: most of what fails does so here, before the long part.
+        if new.iter().any(|d| d.longest() > limit) {
             return false;
         }
         // Where sides of the patch cross spokes of the fan.
@@ -256,8 +260,8 @@ impl Patch {
                     continue;
                 }
                 for i in s.triangles {
-                    meet(i, before, share * r[2] - p[2]);
-                    meet(i, j, share * r[2] - p[2]);
+                    meet(new, i, before, share * r[2] - p[2]);
+                    meet(new, i, j, share * r[2] - p[2]);
                 }
             }
         }
