@@ -26,6 +26,4 @@ def left_out(islands: dict) -> float:
 def warn_islands(islands: dict, words: str) -> None:
     """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
     if islands["found"] > islands["dropped"]:
-        warnings.warn(
-            f'the result is not in one piece: {words}; islands = "drop" leaves them out', DesignWarning, stacklevel=3
-        )
+        warnings.warn(f'the result is not in one piece: {words}; islands = "drop" leaves them out', DesignWarning, stacklevel=3)

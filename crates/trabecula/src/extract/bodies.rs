@@ -83,27 +83,8 @@ impl Bodies {
             join(&mut root, t);
         }
         let (body, mut sums) = number(root);
-        for (t, cut) in view.triangles() {
-            let [a, b, c] = t.map(|v| places[v as usize]);
-            let n = cross(sub(b, a), sub(c, a));
-            let sum = &mut sums[body[t[0] as usize] as usize];
-            sum.triangles += 1;
-            sum.volume += dot(sub(a, middle), n) / 6.0;
-            sum.area[usize::from(cut)] += norm(n) / 2.0;
-        }
-        let mut border = Vec::new();
-        for (v, (place, &body)) in places.iter().zip(&body).enumerate() {
-            if body == NONE {
-                continue;
-            }
-            let sum = &mut sums[body as usize];
-            sum.bounds = sum.bounds.with(*place);
-            if view.is_shared(v) {
-                border.push((view.name(v), body));
-            } else {
-                sum.vertices += 1;
-            }
-        }
+        add_triangles(view, &body, middle, &mut sums);
+        let border = add_vertices(view, &body, &mut sums);
         let (lines, beside) = lines(view, &body);
         Bodies {
             tile: view.tile(),
@@ -184,6 +165,64 @@ fn number(mut root: Vec<u32>) -> (Vec<u32>, Vec<Sum>) {
         body[v] = body[top];
     }
     (body, sums)
+}
+
+/// Adds up the triangles. Neighbours are mostly of one body, whose sums stay at hand.
+fn add_triangles(view: &View, body: &[u32], middle: Vec3, sums: &mut [Sum]) {
+    let places = view.places();
+    let (mut at, mut count, mut volume, mut area) = (NONE, 0u64, 0.0, [0.0; 2]);
+    let mut put = |at: u32, count: u64, volume: f64, area: [f64; 2]| {
+        if let Some(sum) = sums.get_mut(at as usize) {
+            sum.triangles += count;
+            sum.volume += volume / 6.0;
+            sum.area[0] += area[0] / 2.0;
+            sum.area[1] += area[1] / 2.0;
+        }
+    };
+    for (t, cut) in view.triangles() {
+        let of = body[t[0] as usize];
+        if of != at {
+            put(at, count, volume, area);
+            (at, count, volume, area) = (of, 0, 0.0, [0.0; 2]);
+        }
+        let [a, b, c] = t.map(|v| places[v as usize]);
+        let n = cross(sub(b, a), sub(c, a));
+        let twice = norm(n);
+        count += 1;
+        volume += dot(sub(a, middle), n);
+        area[0] += if cut { 0.0 } else { twice };
+        area[1] += if cut { twice } else { 0.0 };
+    }
+    put(at, count, volume, area);
+}
+
+/// Adds up the vertices; gives those that other tiles may use, with their bodies.
+fn add_vertices(view: &View, body: &[u32], sums: &mut [Sum]) -> Vec<(u128, u32)> {
+    let mut border = Vec::new();
+    let (mut at, mut count, mut bounds) = (NONE, 0u64, Aabb::EMPTY);
+    let mut put = |at: u32, count: u64, bounds: Aabb| {
+        if let Some(sum) = sums.get_mut(at as usize) {
+            sum.vertices += count;
+            sum.bounds = sum.bounds.union(bounds);
+        }
+    };
+    for (v, (place, &of)) in view.places().iter().zip(body).enumerate() {
+        if of == NONE {
+            continue;
+        }
+        if of != at {
+            put(at, count, bounds);
+            (at, count, bounds) = (of, 0, Aabb::EMPTY);
+        }
+        bounds = bounds.with(*place);
+        if view.is_shared(v) {
+            border.push((view.name(v), of));
+        } else {
+            count += 1;
+        }
+    }
+    put(at, count, bounds);
+    border
 }
 
 /// The numbers of triangles sorted by body, each body's in their order; none where there is nothing to sort.
