@@ -149,9 +149,7 @@ CASES = [
         "blend",
         ["not in this version yet"],
     ),
-    ('units = "mm"', "skin.thickness = 1", "skin", ["not in this version yet"]),
     ('units = "mm"', "beams.a.radius = 1", "beams", ["not in this version yet"]),
-    ('units = "mm"', "keep.a.sphere.radius = 1", "keep", ["not in this version yet"]),
     ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "later version"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]

@@ -182,7 +182,7 @@ def test_a_part_fraction_below_the_skin_is_refused():
 
 def test_a_closed_skin_traps_powder(tmp_path):
     """A sheet in a closed skin: two labyrinths and the pockets of two corners, told with volume and place; an open face
-    drains them."""
+    drains all but one."""
     closed = write(tmp_path / "closed.toml", CUBE + "[skin]\nthickness = 0.5\n")
     for name in ("a.stl", "a.ply"):
         done = command("mesh", closed, "-o", tmp_path / name, "--json")
@@ -204,7 +204,8 @@ def test_a_closed_skin_traps_powder(tmp_path):
     assert "4 closed voids" in figures.stderr and figures.returncode == 0
     drained = write(tmp_path / "open.toml", CUBE + '[skin]\nthickness = 0.5\nopen = ["-z"]\n')
     done = command("mesh", drained, "-o", tmp_path / "b.stl", "--json")
-    assert json.loads(done.stdout)["voids"] == [] and "void" not in done.stderr
+    left = json.loads(done.stdout)["voids"]  # the pocket of the upper corner
+    assert len(left) == 1 and left[0]["volume"] < 0.3 and "one closed void of 0.26" in done.stderr
 
 
 def test_the_same_bytes_by_either_road(tmp_path):

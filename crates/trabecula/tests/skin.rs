@@ -244,7 +244,7 @@ fn a_thickness_that_varies_is_met() {
     close(
         ball(&constant),
         ball(&Grade::Constant(0.2)),
-        1e-6,
+        1e-4,
         "formula",
     );
 }
