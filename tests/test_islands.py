@@ -98,7 +98,7 @@ def test_keep_is_the_default_and_one_piece_says_nothing(tmp_path, balls):
     files = set()
     for islands in ("keep", "drop", "error"):
         done = run("mesh", "ball.toml", "-o", "c.stl", "--edge", 0.1, "--islands", islands, "--threads", 2, cwd=tmp_path)
-        assert "one piece" in done.stderr and "warning" not in done.stderr
+        assert "1 piece;" in done.stderr and "warning" not in done.stderr
         files.add((tmp_path / "c.stl").read_bytes())
     assert len(files) == 1
 
@@ -145,7 +145,7 @@ def test_other_words_are_refused(tmp_path, balls, islands):
     """Before any work is done."""
     solid = lt.load(balls).build()
     for make in (solid.mesh, lambda **k: solid.save_stl(tmp_path / "b.stl", **k)):
-        with pytest.raises(ValueError, match='islands is .*; it must be "keep", "drop" or "error"'):
+        with pytest.raises(ValueError, match=r'islands is .*; it must be "keep", "drop" or "error"'):
             make(edge=0.25, islands=islands)
     words = ["mesh", balls, "-o", "b.stl", "--islands", "some"]
     assert "--islands" in run(*words, cwd=tmp_path, status=2).stderr

@@ -95,8 +95,8 @@ def mesh(args) -> None:
     if left_out["dropped"]:
         place = ", ".join(figure(v) for v in left_out["largest"]["place"])
         say(
-            f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the region's "
-            f"boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
+            f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the "
+            f"region's boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
         )
     if args.json:
         return print(json.dumps(made, indent=2))
@@ -325,7 +325,7 @@ def known_cell(name: str, known: list[str]) -> None:
 
 def counted(pieces: int) -> str:
     """A number of pieces."""
-    return "one piece" if pieces == 1 else f"{pieces} pieces"
+    return "1 piece" if pieces == 1 else f"{pieces} pieces"
 
 
 def kind_of(path: str) -> str:

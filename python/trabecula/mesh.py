@@ -252,9 +252,9 @@ class Mesh(Picture):
     def islands(self) -> dict | None:
         """What there was beside the largest piece when a solid was meshed; None for a mesh from a file.
 
-        ``found`` and ``dropped`` count the pieces, ``border`` those with surface on the region's boundary, mostly
-        crumbs that it cuts off; the others lie inside. ``volume`` is theirs together, mm³, and ``share`` the largest piece's share of all.
-        ``largest`` has the ``volume``, ``place`` and ``bounds`` (mm) of the largest of them, or is None.
+        ``found`` and ``dropped`` count the pieces, ``border`` those with surface on the region's boundary, mostly crumbs
+        that it cuts off; the others lie inside. ``volume`` is theirs together, mm³, and ``share`` the largest piece's
+        share of all. ``largest`` has the ``volume``, ``place`` and ``bounds`` (mm) of the largest of them, or is None.
         """
         return self._islands
 

@@ -354,7 +354,7 @@ fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any cell, part, fraction, orientation and region, however coarse the grid.
     #[test]
