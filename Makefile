@@ -2,6 +2,7 @@
 #
 #   make demo    a part with a lattice, measured and drawn, in demo/
 #   make test    the core's tests and the Python tests
+#   make campaign  thousands of random designs instead of dozens
 #   make bench   our command beside other tools (those that are installed)
 #   make tidy    formatters and linters
 #   make docs    remakes the generated pages and figures under docs/
@@ -20,7 +21,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
     $(shell find crates python -type f -not -path '*/tests/*' -not -path '*/__pycache__/*' \
       \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \))
 
-.PHONY: all demo test core-test python-test docs-test bench smoke tidy docs clean
+.PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs clean
 .DELETE_ON_ERROR:
 
 all: $(VENV)/.installed
@@ -80,6 +81,10 @@ test: core-test python-test docs-test
 core-test: $(VENV)/.made
 	cargo test --release --locked -p trabecula
 
+CASES ?= 2000
+campaign: $(VENV)/.made
+	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test surface random
+
 python-test: $(VENV)/.test-tools
 	$(BIN)/python -m pytest -q tests --ignore tests/test_docs.py
 
@@ -104,6 +109,7 @@ bench: $(VENV)/.installed
 docs: $(VENV)/.installed
 	$(BIN)/python scripts/figure_porosity.py
 	$(BIN)/python scripts/cell_tables.py
+	$(BIN)/python scripts/thickness_accuracy.py
 	$(BIN)/python scripts/design_reference.py
 
 clean:

@@ -98,6 +98,7 @@ def test_formats_agree(tmp_path, cube, name):
     summary = json.loads(run("mesh", cube, "-o", name, "--edge", "0.4", "--json", cwd=tmp_path).stdout)
     figures = json.loads(run("measure", name, "--json", cwd=tmp_path).stdout)
     keys = "volume area area_lattice area_cut solid_fraction porosity euler pieces cavities voids closed bounds"
+    keys += " specific_surface hydraulic_diameter self_intersections quality defects"
     assert list(figures) == keys.split()
     assert figures["porosity"] is None and figures["solid_fraction"] is None
     assert figures["closed"] and figures["cavities"] == 0

@@ -124,7 +124,12 @@ CASES = [
         "region.mesh.unit",
         ['"inch"'],
     ),
-    ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.stl'\nrepair = 'auto'", "region.mesh.repair", ["yet"]),
+    (
+        "[region.box]\nsize = [8, 8, 8]",
+        "[region.mesh]\npath = 'a.stl'\nrepair = 'fix'",
+        "region.mesh.repair",
+        ["auto", "refuse"],
+    ),
     (
         "[region.box]\nsize = [8, 8, 8]",
         "[region.halfspace]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
+    from .thickness import Thickness
 
 __all__ = [
     "Design",
@@ -30,6 +31,7 @@ __all__ = [
     "Lattice",
     "Mesh",
     "Solid",
+    "Thickness",
     "Voxels",
     "__version__",
     "cell",
@@ -54,6 +56,7 @@ _HOMES = {
     "DesignWarning": "errors",
     "Mesh": "mesh",
     "Solid": "solid",
+    "Thickness": "thickness",
     "Voxels": "solid",
     "spartan": "solid",
     "iso": "solid",

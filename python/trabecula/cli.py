@@ -73,6 +73,17 @@ def count(text: str) -> int:
     return value
 
 
+def triangles(text: str) -> int:
+    """A number of triangles."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number, found {text!r}") from None
+    if not 4 <= value <= 2**32:
+        raise argparse.ArgumentTypeError(f"a closed mesh has at least 4 triangles, found {text}")
+    return value
+
+
 def angle(text: str) -> float:
     """An angle in degrees."""
     try:
@@ -129,12 +140,19 @@ def parser() -> argparse.ArgumentParser:
             "--per-cell", type=samples, metavar="N", help="grid spacing as the smallest wavelength / N (default: 32)"
         )
         p.add_argument("--threads", type=count, metavar="N", help="threads (default: all); the result is the same")
+        progress(p)
+
+    def progress(p: argparse.ArgumentParser) -> None:
         p.add_argument(
             "--progress",
             action=argparse.BooleanOptionalAction,
             default=None,
             help="show progress on stderr (default: if it is a terminal)",
         )
+
+    def lighter(p: argparse.ArgumentParser) -> None:
+        p.add_argument("--tolerance", type=length, metavar="MM", help="fewer triangles, the surface nowhere farther off")
+        p.add_argument("--triangles", type=triangles, metavar="N", help="fewer triangles, down to this number")
 
     p = command(
         "new",
@@ -156,14 +174,37 @@ def parser() -> argparse.ArgumentParser:
     p = command(
         "mesh",
         "Mesh a design: closed, oriented, free of self-intersection.",
-        "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n\n"
+        "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n"
+        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
-        "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4",
+        "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
+        "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",
     )
     p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json)")
     p.add_argument("-o", "--output", required=True, type=ending(MESH_OUT), metavar="OUT", help="the mesh to write")
     resolution(p)
+    p.add_argument(
+        "--islands",
+        choices=("keep", "drop", "error"),
+        default="keep",
+        help="pieces beside the largest: keep them with a warning (default), drop them, or refuse",
+    )
+    lighter(p)
     p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
+
+    p = command(
+        "simplify",
+        "Make a mesh file lighter: fewer triangles, every guarantee, sharp edges and the volume kept.",
+        "Nowhere are the two surfaces farther apart than the tolerance; --triangles takes what is needed and says how much\n"
+        "that was. The mesh must be closed and free of self-intersection.\n\n"
+        "examples:\n  trabecula simplify part.stl -o light.stl --tolerance 0.02\n"
+        "  trabecula simplify part.3mf -o light.3mf --triangles 200000",
+    )
+    p.add_argument("file", type=ending(MESH_IN), metavar="FILE", help="a mesh file, mm")
+    p.add_argument("-o", "--output", required=True, type=ending(MESH_OUT), metavar="OUT", help="the mesh to write")
+    lighter(p)
+    progress(p)
+    p.add_argument("--json", action="store_true", help="print what was done as JSON on stdout")
 
     p = command(
         "voxels",
@@ -178,10 +219,12 @@ def parser() -> argparse.ArgumentParser:
 
     p = command(
         "measure",
-        "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness.",
-        "A design is meshed in memory first. A mesh file has a solid fraction only against a region.\n\n"
+        "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
+        "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
+        "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
-        "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json",
+        "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
+        "  trabecula measure part.toml --thickness --step 0.05 --histogram part.png",
     )
     p.add_argument("file", type=ending((*DESIGNS, *MESH_IN)), metavar="FILE", help="a design or a mesh file")
     p.add_argument(
@@ -191,6 +234,11 @@ def parser() -> argparse.ArgumentParser:
         help="what the solid fraction is of: a design, a file with a [region] alone, or a closed mesh in mm",
     )
     resolution(p)
+    p.add_argument("--thickness", action="store_true", help="also distributions of wall thickness and pore size")
+    p.add_argument(
+        "--step", type=length, metavar="MM", help="voxels for the thickness, mm (default: an eighth of the mean wall)"
+    )
+    p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
     p.add_argument("--json", action="store_true", help="print the measures as JSON")
 
     p = command(
@@ -254,6 +302,8 @@ def serve(argv: list[str] | None) -> int:
 
         print(f"trabecula {_core.__version__}")
         return 0
+    if args.command == "simplify" and args.tolerance is None and args.triangles is None:
+        top.error("simplify needs --tolerance MM, --triangles N, or both")
     if args.command is None:
         top.print_help(sys.stderr)
         return 2

@@ -21,7 +21,7 @@ from .solid import Solid
 from .starter import STARTER
 from .words import Progress, figure, say, span
 
-__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "voxels"]
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "voxels"]
 
 DESIGNS = ("toml", "json")
 
@@ -68,30 +68,74 @@ def mesh(args) -> None:
     start = time.perf_counter()
     solid = build(args.design)
     keep_inputs(args.design, args.output)
-    options = resolved(args)
+    options = resolved(args) | {"islands": args.islands}
     with Progress("meshing", args.progress) as progress:
-        if kind_of(args.output) == "stl" and not closes(solid, options):
+        lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
+        if kind_of(args.output) == "stl" and not any(lighter.values()) and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
-            solid._room(args.output, solid.spacing(**options))
+            if not any(lighter.values()):
+                solid._room(args.output, solid.spacing(**resolved(args)))
             surface = solid.mesh(threads=args.threads, progress=progress, **options)
-            figures = surface.measure()
-            keys = ("volume", "area", "area_lattice", "area_cut", "cavities", "voids")
-            made = {"triangles": surface.counts[1], **{k: figures[k] for k in keys}}
+            if any(lighter.values()):
+                progress.clear()
+                surface = simplified(surface, args)
+            made = surface._summary() | {"voids": surface.voids}
+            if surface.simplification:
+                made["simplification"] = surface.simplification
             progress.clear()
             surface.write(args.output)
-            tell_voids(figures["voids"])
-    edge = solid.spacing(**options)
+            tell_voids(made["voids"])
+    edge = solid.spacing(**resolved(args))
     made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
     made["edge"] = edge
     made["bytes"] = os.path.getsize(args.output)
     made["seconds"] = round(time.perf_counter() - start, 3)
+    left_out = made["islands"]
+    if left_out["dropped"]:
+        place = ", ".join(figure(v) for v in left_out["largest"]["place"])
+        say(
+            f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the region's "
+            f"boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
+        )
     if args.json:
         return print(json.dumps(made, indent=2))
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
-        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm²; edge {edge:g} mm, {made['seconds']:.2f} s"
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
+        f"{made['seconds']:.2f} s"
     )
+
+
+def simplify(args) -> None:
+    """``trabecula simplify``."""
+    check_place(args.output)
+    start = time.perf_counter()
+    if os.path.exists(args.output) and os.path.samefile(args.file, args.output):
+        raise Refused(f"{args.output} is what is simplified; name another output")
+    made = simplified(Mesh.read(args.file), args)
+    made.write(args.output)
+    report = {**made.simplification, "seconds": round(time.perf_counter() - start, 3)}
+    if args.json:
+        print(json.dumps(report, indent=2))
+
+
+def simplified(mesh: Mesh, args) -> Mesh:
+    """The lighter mesh, and words on what was done."""
+    with Progress("simplifying", args.progress) as progress:
+        made = mesh.simplified(args.tolerance, args.triangles, progress)
+    it = made.simplification
+    if args.triangles and it["triangles_before"] <= args.triangles:
+        say(f"{it['triangles']} triangles are no more than {args.triangles} already: left as they are")
+        return made
+    if args.triangles and not args.tolerance and it["triangles"] > args.triangles:
+        say(f"warning: {it['triangles']} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
+    change = 100 * (it["volume"] / it["volume_before"] - 1)
+    say(
+        f"simplified from {it['triangles_before']} to {it['triangles']} triangles, nowhere farther than "
+        f"{it['deviation']:.2g} mm from the first; volume {change:+.2g} %"
+    )
+    return made
 
 
 def voxels(args) -> None:
@@ -117,6 +161,11 @@ def voxels(args) -> None:
 
 def measure(args) -> None:
     """``trabecula measure``."""
+    if not args.thickness and (args.step is not None or args.histogram is not None):
+        raise Refused("--step and --histogram belong to --thickness; add it")
+    if args.histogram is not None:
+        check_place(args.histogram)
+        keep_measured(args)
     made = surface(args)
     if args.region:
         made = made.within(region(args.region))
@@ -131,23 +180,54 @@ def measure(args) -> None:
         )
     if not figures["closed"]:
         say(f"warning: {args.file} is not closed ({flaws(made)}), so its volume and what follows from it mean little")
+    figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
+    if args.thickness:
+        with Progress("fitting balls", args.progress) as progress:
+            balls = made.thickness(args.step, args.threads, progress)
+        figures |= balls.measure()
+        if args.histogram is not None:
+            balls.render(args.histogram)
     if args.json:
         return print(json.dumps(figures, indent=2))
-    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²"}
-    for key, value in figures.items():
-        if key == "voids":
-            continue
+    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
+    lines = listed(figures)
+    width = max(15, *(len(key) for key, _ in lines))
+    for key, value in lines:
         if key == "bounds":
             text = " to ".join("(" + ", ".join(figure(v) for v in corner) + ")" for corner in value) + " mm"
         elif value is None:
-            text = "needs a region (--region)"
+            text = ABSENT.get(key, "needs a region (--region)")
+        elif isinstance(value, list):
+            text = ", ".join(value) or "none"
         elif isinstance(value, bool):
             text = "yes, but inside out" if value and inverted else "yes" if value else "no"
         else:
             text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
-        print(f"{key:15} {text}")
+        print(f"{key:{width}} {text}")
     if figures["closed"] and not inverted:
         tell_voids(figures["voids"])
+
+
+#: What is said where a figure is missing for another reason than that there is no region.
+ABSENT = {"quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
+
+
+def listed(figures: dict) -> list[tuple]:
+    """The figures line by line: those of a group under its name, without histograms."""
+    lines: list[tuple] = []
+    for key, value in figures.items():
+        if key == "voids":
+            continue
+        group = value.items() if isinstance(value, dict) else None
+        lines += [(f"{key}.{k}", v) for k, v in group if k != "histogram"] if group else [(key, value)]
+    return lines
+
+
+def keep_measured(args) -> None:
+    """Refuses a histogram that would replace what is measured."""
+    for name in filter(None, (args.file, args.region)):
+        if os.path.exists(name) and os.path.exists(args.histogram) and os.path.samefile(name, args.histogram):
+            raise Refused(f"{args.histogram} is read by this command; name another picture")
 
 
 def closes(solid: Solid, options: dict) -> bool:
@@ -241,6 +321,11 @@ def known_cell(name: str, known: list[str]) -> None:
         near = get_close_matches(name, known, 1)
         hint = f'; did you mean "{near[0]}"?' if near else "."
         raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
+
+
+def counted(pieces: int) -> str:
+    """A number of pieces."""
+    return "one piece" if pieces == 1 else f"{pieces} pieces"
 
 
 def kind_of(path: str) -> str:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import _core
-from .given import number, whole
+from .given import number, positive, whole
 from .machine import file_size, fits
 from .output import extension, whole_file
+from .thickness import Thickness
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -32,7 +37,11 @@ FIGURES = (
     "voids",
     "closed",
     "bounds",
+    "specific_surface",
+    "hydraulic_diameter",
 )
+#: Pairs of triangles after which self-intersections are counted no further.
+MANY = 1_000_000
 READS = ("stl", "3mf", "ply", "obj", "off")
 
 
@@ -61,10 +70,18 @@ class Picture:
 class Mesh(Picture):
     """A triangle mesh. Made by ``Solid.mesh``, or read from a file by ``Mesh.read``."""
 
-    def __init__(self, core: _core.Mesh, region: _core.Region | None = None, edge: float | None = None):
+    def __init__(
+        self,
+        core: _core.Mesh,
+        region: _core.Region | None = None,
+        edge: float | None = None,
+        islands: dict | None = None,
+    ):
         self._core = core
         self._region = region
         self._edge = edge
+        self._islands = islands
+        self._simplification: dict | None = None
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Mesh:
@@ -107,11 +124,13 @@ class Mesh(Picture):
 
     def measure(self) -> dict:
         """Every figure: volume, area, area_lattice, area_cut, solid_fraction, porosity, euler, pieces, cavities,
-        voids, closed, bounds. Those that need a region are None for a mesh without one.
+        voids, closed, bounds, specific_surface, hydraulic_diameter. Those that need a region are None for a mesh without one.
         """
         figures = dict(self._figures)
         share = self.solid_fraction
-        figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share, "voids": self.voids}
+        figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share}
+        figures |= {"specific_surface": self.specific_surface, "hydraulic_diameter": self.hydraulic_diameter}
+        figures["voids"] = self.voids
         return {k: figures[k] for k in FIGURES}
 
     @cached_property
@@ -119,7 +138,90 @@ class Mesh(Picture):
         """Volume of the solid over volume of its region; None for a mesh without a region."""
         if self._region is None:
             return None
-        return self.volume / self._region.volume(self._edge or self._spacing())
+        return self.volume / self._region_volume
+
+    @cached_property
+    def _region_volume(self) -> float:
+        return self._region.volume(self._edge or self._spacing())
+
+    @property
+    def specific_surface(self) -> dict[str, float | None]:
+        """Area over volume, 1/mm: ``area_of_solid`` is all area over the solid's volume, ``area_of_region`` all area and
+        ``lattice_of_region`` the lattice's area, without cuts, over the region's volume.
+        """
+        area, lattice = self.area, self._figures["area_lattice"]
+        whole = None if self._region is None else self._region_volume
+        return {
+            "area_of_solid": area / self.volume if self.volume else None,
+            "area_of_region": area / whole if whole else None,
+            "lattice_of_region": lattice / whole if whole and lattice is not None else None,
+        }
+
+    @property
+    def hydraulic_diameter(self) -> float | None:
+        """4 · pore volume / wetted area, mm: the region's volume without the solid's, and the lattice's area without
+        cuts. None without a region or a lattice.
+        """
+        lattice = self._figures["area_lattice"]
+        if self._region is None or not lattice:
+            return None
+        return 4 * (self._region_volume - self.volume) / lattice
+
+    @cached_property
+    def self_intersections(self) -> int:
+        """Pairs of triangles that meet elsewhere than in common corners or edges, decided exactly; a million stands for
+        that many or more.
+        """
+        return self._core.self_intersections(MANY)
+
+    @cached_property
+    def quality(self) -> dict[str, float] | None:
+        """How well shaped the triangles are: ``smallest_angle`` and its 5th percentile ``smallest_angle_p05``, degrees (60
+        at best), and ``largest_aspect``, the longest edge over 2√3 times the inscribed circle's radius (1 at best; None
+        for a triangle without area). None without triangles.
+        """
+        found = self._core.quality()
+        if found is None:
+            return None
+        least, p05, aspect = found
+        return {
+            "smallest_angle": least,
+            "smallest_angle_p05": p05,
+            "largest_aspect": aspect if math.isfinite(aspect) else None,
+        }
+
+    @cached_property
+    def defects(self) -> list[str]:
+        """What is wrong with the mesh as the surface of a solid, in words; empty if nothing is."""
+        words = (
+            ("edge with one triangle", "edges with one triangle"),
+            ("edge with more than two triangles", "edges with more than two triangles"),
+            ("edge whose two triangles face opposite ways", "edges whose two triangles face opposite ways"),
+            ("triangle given twice", "triangles given twice"),
+            ("triangle without area", "triangles without area"),
+            ("vertex where surfaces touch", "vertices where surfaces touch"),
+            ("pair of triangles that cross or touch", "pairs of triangles that cross or touch"),
+        )
+        counts = (*self._core.flaws(), *self._core.oddities(), self.self_intersections)
+        found = [f"{n} {two if n > 1 else one}" for n, (one, two) in zip(counts, words, strict=True) if n]
+        return [*found, "inside out"] if self.closed and self.volume < 0 else found
+
+    def thickness(
+        self,
+        step: float | None = None,
+        threads: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> Thickness:
+        """Local thickness of the solid and, if the mesh has a region, of its pores, on voxels of edge ``step`` (mm).
+
+        Unless given, the step is an eighth of the mean wall 2 V / A, or such that there are 2²⁴ voxels. The mesh must be
+        closed.
+        """
+        wanted = None if step is None else positive("step", step)
+        workers = None if threads is None else whole("threads", threads, 1, 4096)
+        spacing, shape, need = self._core.thickness_needs(self._region, wanted)
+        fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
+        return Thickness(*self._core.thickness(self._region, spacing, workers, progress))
 
     @property
     def porosity(self) -> float | None:
@@ -147,6 +249,16 @@ class Mesh(Picture):
         return self._figures["pieces"]
 
     @property
+    def islands(self) -> dict | None:
+        """What there was beside the largest piece when a solid was meshed; None for a mesh from a file.
+
+        ``found`` and ``dropped`` count the pieces, ``border`` those with surface on the region's boundary, mostly
+        crumbs that it cuts off; the others lie inside. ``volume`` is theirs together, mm³, and ``share`` the largest piece's share of all.
+        ``largest`` has the ``volume``, ``place`` and ``bounds`` (mm) of the largest of them, or is None.
+        """
+        return self._islands
+
+    @property
     def cavities(self) -> int:
         """Number of closed voids."""
         return self._figures["cavities"]
@@ -171,13 +283,49 @@ class Mesh(Picture):
         """Lower and upper corner, mm."""
         return [list(c) for c in self._figures["bounds"]]
 
+    def _summary(self) -> dict:
+        """The figures that a streamed surface has too."""
+        keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")
+        return {"triangles": self.counts[1], **{k: self._figures[k] for k in keys}, "islands": self._islands}
+
+    def simplified(
+        self,
+        tolerance: float | None = None,
+        triangles: int | None = None,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> Mesh:
+        """A lighter mesh that keeps every guarantee, sharp edges, and the volume.
+
+        No point of either surface is farther than ``tolerance`` (mm) from the other one; or the mesh is brought down to
+        ``triangles``, and ``simplification`` of the result says how far it is then at most. With both, whichever is
+        reached first. A mesh that is not closed, or crosses itself, is refused. ``progress(done, total)`` is called now
+        and then.
+        """
+        if tolerance is None and triangles is None:
+            raise ValueError("give a tolerance (mm), a number of triangles, or both")
+        length = None if tolerance is None else positive("tolerance", tolerance)
+        most = None if triangles is None else whole("triangles", triangles, 4, 2**32)
+        # Links, quadrics, displacements, candidates, a tree, and the copies before and after.
+        fits(320.0 * self._core.counts[1], f"simplifying {self._core.counts[1]} triangles")
+        core, report = self._core.simplified(length, most, progress)
+        made = Mesh(core, self._region, self._edge, self._islands)
+        made._simplification = report
+        return made
+
+    @property
+    def simplification(self) -> dict | None:
+        """What ``simplified`` did: triangles, volume and area before and after, and ``deviation``, a bound of the distance
+        between the two surfaces in both directions, mm. None for a mesh that was not simplified.
+        """
+        return None if self._simplification is None else dict(self._simplification)
+
     def within(self, solid_or_region) -> Mesh:
         """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
         region = getattr(solid_or_region, "_core", solid_or_region)
         region = region.region if isinstance(region, _core.Solid) else region
         if not isinstance(region, _core.Region):
             raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
-        return Mesh(self._core.split_by(region), region, self._edge)
+        return Mesh(self._core.split_by(region), region, self._edge, self._islands)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""

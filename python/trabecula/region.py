@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Literal
 
 from .given import settings
 
@@ -38,13 +39,19 @@ def halfspace(point: Point, normal: Point) -> dict:
     return {"halfspace": settings(point=point, normal=normal)}
 
 
-def mesh(path: str | os.PathLike[str], unit: str | None = None, scale: float | None = None) -> dict:
-    """A closed triangle mesh from a file (stl, obj, ply, off, 3mf).
+def mesh(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    scale: float | None = None,
+    repair: Literal["auto", "refuse"] | None = None,
+) -> dict:
+    """A triangle mesh from a file (stl, obj, ply, off, 3mf).
 
     ``unit`` is that of the file (mm unless given; a 3MF names its own), ``scale`` a factor on top. A relative path
-    starts at the design file, or at the working directory for a design made in Python.
+    starts at the design file, or at the working directory for a design made in Python. A mesh that does not bound a
+    solid is repaired, with a warning that says how, or with ``repair="refuse"`` it is an error with counts.
     """
-    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale)}
+    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair)}
 
 
 def union(*regions: dict) -> dict:

@@ -14,9 +14,11 @@ from . import _core
 from .design import Design, Lattice
 from .errors import DesignWarning
 from .given import number, positive, three, whole
+from .islands import Islands, check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
+from .thickness import Thickness
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,6 +62,16 @@ class Solid(Picture):
     def warnings(self) -> list[dict[str, str]]:
         """What may not be meant, as {path, message}."""
         return [{"path": p, "message": m} for p, m in self._core.warnings]
+
+    @property
+    def repairs(self) -> dict[str, dict[str, int | float]]:
+        """What was repaired in each mesh of the region, by the path of its table (``"region.mesh"``).
+
+        Counts of corners ``joined``, edges ``split``, ``degenerate`` triangles and ``duplicates`` left out, triangles
+        ``turned``, ``bodies_turned``, ``holes`` (with ``hole_length`` in mm, ``hole_area`` in mm² and ``hole_share`` of
+        the surface), ``crossings`` cut and ``inner`` triangles left out. All zero for a clean mesh.
+        """
+        return dict(self._core.repairs)
 
     def report(self) -> dict:
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``.
@@ -156,20 +168,26 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        islands: Islands = "keep",
     ) -> Mesh:
         """The surface as a closed mesh.
 
         ``edge`` is the grid spacing in mm, or ``per_cell`` samples on the smallest wavelength (32 unless given). The
         result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
+
+        ``islands``: what becomes of all pieces but the largest. ``"keep"`` leaves them, with a warning; ``"drop"`` leaves
+        them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
         """
+        check_islands(islands)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
         fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
         self._warn_thin(spacing)
-        core = self._core.mesh(spacing, _threads(threads), progress)
-        self._warn_coarse(core.volume(), spacing)
-        return Mesh(core, self._core.region, spacing)
+        core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
+        self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
+        warn_islands(told["islands"], words)
+        return Mesh(core, self._core.region, spacing, told["islands"])
 
     def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
         """Refuses a mesh file that the disk has no room for."""
@@ -183,21 +201,25 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
+        islands: Islands = "keep",
     ) -> dict:
-        """Streams the surface to a binary STL without holding it in memory; gives triangles, volume and areas."""
+        """Streams the surface to a binary STL without holding it in memory; gives its triangles, volume, areas, Euler
+        number, pieces and cavities, and what ``islands`` (as for ``mesh``) came to.
+        """
+        check_islands(islands)
         extension(path, ("stl",))
         check_place(path)
         spacing = self.spacing(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
-            made = self.mesh(spacing, None, threads, progress)
+            made = self.mesh(spacing, None, threads, progress, islands)
             made.write(path)
-            keys = ("volume", "area", "area_lattice", "area_cut")
-            return {"triangles": made.counts[1], **{k: made.measure()[k] for k in keys}}
+            return made._summary()
         self._room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
-            summary = self._core.stream_stl(temporary, spacing, _threads(threads), progress)
-        self._warn_coarse(summary["volume"], spacing)
+            summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
+        self._warn_coarse(summary["volume"] + left_out(summary["islands"]), spacing)
+        warn_islands(summary["islands"], words)
         return summary
 
     def voxels(
@@ -216,6 +238,20 @@ class Solid(Picture):
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
         return made
+
+    def thickness(
+        self,
+        step: float | None = None,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> Thickness:
+        """Local thickness of walls and pores on voxels of edge ``step`` (mm), as ``Mesh.thickness`` of the surface at grid
+        spacing ``edge``, or ``per_cell`` samples on the smallest wavelength (32 unless given).
+        """
+        wanted = None if step is None else positive("step", step)
+        return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
 
     def _picture(self) -> Mesh:
         low, high = self.bounds

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod design;
 mod error;
 mod file;
+mod islands;
 mod machine;
 mod mesh;
 mod run;
@@ -48,6 +49,32 @@ mod _core {
     #[pyo3(signature = (root=std::path::PathBuf::from("/")))]
     fn free_memory(root: std::path::PathBuf) -> Option<f64> {
         crate::machine::free_memory(&root)
+    }
+
+    /// Histograms one above the other as PNG bytes: (title, edges, shares, marks).
+    #[pyfunction]
+    #[allow(clippy::type_complexity)]
+    fn charts<'py>(
+        py: Python<'py>,
+        charts: Vec<(String, Vec<f64>, Vec<f64>, Vec<(String, f64)>)>,
+        width: usize,
+        height: usize,
+    ) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {
+        use trabecula::render::{self, Chart};
+        let bytes = crate::run::run(py, None, None, |_| {
+            let charts: Vec<Chart> = charts
+                .into_iter()
+                .map(|(title, edges, share, marks)| Chart {
+                    title,
+                    edges,
+                    share,
+                    marks,
+                })
+                .collect();
+            let size = [width, height];
+            render::png(&render::charts(&charts, size), size)
+        })?;
+        Ok(pyo3::types::PyBytes::new(py, &bytes))
     }
 
     /// The JSON Schema of a design, as JSON text.

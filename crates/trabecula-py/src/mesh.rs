@@ -11,8 +11,10 @@ use pyo3::types::{PyBytes, PyDict};
 use trabecula::extract::Surface;
 use trabecula::math::{cross, norm, sub};
 use trabecula::render::{View, png, render};
+use trabecula::simplify::{Goal, simplify};
 use trabecula::{io, measure};
 
+use crate::error;
 use crate::run::run;
 use crate::solid::Region;
 
@@ -103,6 +105,37 @@ impl Mesh {
         )
     }
 
+    /// A lighter mesh within `tolerance` (mm) or of at most `triangles`, and what was done.
+    #[pyo3(signature = (tolerance=None, triangles=None, progress=None))]
+    fn simplified<'py>(
+        &self,
+        py: Python<'py>,
+        tolerance: Option<f64>,
+        triangles: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Mesh, Bound<'py, PyDict>)> {
+        let goal = Goal {
+            tolerance,
+            triangles,
+        };
+        let (surface, report) = run(py, None, progress, |p| simplify(&self.surface, &goal, p))?
+            .map_err(error::stopped)?;
+        let d = PyDict::new(py);
+        d.set_item("triangles_before", report.triangles[0])?;
+        d.set_item("triangles", report.triangles[1])?;
+        d.set_item("deviation", report.deviation)?;
+        d.set_item("volume_before", report.volume[0])?;
+        d.set_item("volume", report.volume[1])?;
+        d.set_item("area_before", report.area[0])?;
+        d.set_item("area", report.area[1])?;
+        let mesh = Mesh {
+            surface,
+            split: self.split,
+            design: self.design.clone(),
+        };
+        Ok((mesh, d))
+    }
+
     /// Volume, areas, Euler number, pieces, cavities, closedness, bounds.
     fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let surface = &self.surface;
@@ -149,6 +182,83 @@ impl Mesh {
             let d = measure::defects(&self.surface.mesh);
             (d.open_edges, d.crowded_edges, d.flipped_edges)
         })
+    }
+
+    /// The pairs of triangles that meet elsewhere than in common corners or edges, or `limit` if there are as many.
+    fn self_intersections(&self, py: Python<'_>, limit: usize) -> PyResult<usize> {
+        run(py, None, None, |_| {
+            measure::self_intersections(&self.surface.mesh, limit)
+        })
+    }
+
+    /// Smallest angle and its 5th percentile (degrees), largest aspect ratio; None without triangles.
+    fn quality(&self, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
+        run(py, None, None, |_| {
+            measure::quality(&self.surface.mesh)
+                .map(|q| (q.smallest_angle, q.smallest_angle_p05, q.largest_aspect))
+        })
+    }
+
+    /// Duplicate triangles, triangles without area, vertices where surfaces touch.
+    fn oddities(&self, py: Python<'_>) -> PyResult<(usize, usize, usize)> {
+        run(py, None, None, |_| {
+            let mesh = &self.surface.mesh;
+            let d = measure::defects(mesh);
+            let touching = measure::non_manifold_vertices(mesh);
+            (d.duplicate_triangles, d.degenerate_triangles, touching)
+        })
+    }
+
+    /// What local thickness takes: the voxel step that is usual, or the one given; voxels along each axis; bytes.
+    #[pyo3(signature = (region, step=None))]
+    fn thickness_needs(
+        &self,
+        py: Python<'_>,
+        region: Option<&Region>,
+        step: Option<f64>,
+    ) -> PyResult<(f64, [usize; 3], f64)> {
+        let region = region.map(|r| r.region.clone());
+        run(py, None, None, |_| {
+            let step = step.unwrap_or_else(|| measure::usual_step(&self.surface, region.as_ref()));
+            let shape = measure::voxels_for(&self.surface, region.as_ref(), step)?;
+            let count = shape.iter().map(|n| *n as f64).product::<f64>();
+            Ok((step, shape, count * measure::BYTES_PER_VOXEL))
+        })?
+        .map_err(error::fault)
+    }
+
+    /// Local thickness of the solid, and of the pores if there is a region, on voxels of edge `step` (mm).
+    #[pyo3(signature = (region, step, threads=None, progress=None))]
+    fn thickness<'py>(
+        &self,
+        py: Python<'py>,
+        region: Option<&Region>,
+        step: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>)> {
+        let region = region.map(|r| r.region.clone());
+        let found = run(py, threads, progress, |p| {
+            measure::thickness(&self.surface, region.as_ref(), step, p)
+        })?
+        .map_err(error::stopped)?;
+        let dict = |s: &measure::Spread| -> PyResult<Bound<'py, PyDict>> {
+            let d = PyDict::new(py);
+            d.set_item("min", s.min)?;
+            d.set_item("p05", s.p05)?;
+            d.set_item("mean", s.mean)?;
+            d.set_item("sd", s.sd)?;
+            d.set_item("max", s.max)?;
+            d.set_item("step", step)?;
+            d.set_item("accuracy", found.accuracy)?;
+            let histogram = PyDict::new(py);
+            histogram.set_item("edges", &s.edges)?;
+            histogram.set_item("share", &s.share)?;
+            d.set_item("histogram", histogram)?;
+            Ok(d)
+        };
+        let pore = found.pore.as_ref().map(&dict).transpose()?;
+        Ok((dict(&found.wall)?, pore))
     }
 
     /// Writes the mesh to `path` in the format `extension`.

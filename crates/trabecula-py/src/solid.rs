@@ -13,9 +13,11 @@ use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
 use trabecula::io;
+use trabecula::region::Repaired;
 
 use crate::design::Folder;
 use crate::error;
+use crate::islands;
 use crate::mesh::Mesh;
 use crate::run::run;
 
@@ -78,6 +80,32 @@ impl Solid {
     #[getter]
     fn warnings(&self) -> Vec<(String, String)> {
         self.warnings.clone()
+    }
+
+    /// What was repaired in each mesh of the region, by the path of its table.
+    #[getter]
+    fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyDict>)>> {
+        let dict = |(path, done): &(String, Repaired)| {
+            let d = PyDict::new(py);
+            for (key, count) in [
+                ("joined", done.joined),
+                ("split", done.split),
+                ("degenerate", done.degenerate),
+                ("duplicates", done.duplicates),
+                ("turned", done.turned),
+                ("bodies_turned", done.bodies_turned),
+                ("holes", done.holes),
+                ("crossings", done.crossings),
+                ("inner", done.inner),
+            ] {
+                d.set_item(key, count)?;
+            }
+            d.set_item("hole_length", done.hole_length)?;
+            d.set_item("hole_area", done.hole_area)?;
+            d.set_item("hole_share", done.hole_share)?;
+            Ok((path.clone(), d))
+        };
+        self.built.repairs.iter().map(dict).collect()
     }
 
     /// The design as TOML text.
@@ -146,26 +174,29 @@ impl Solid {
         Ok(d)
     }
 
-    /// The surface at grid spacing `edge` (mm).
-    #[pyo3(signature = (edge, threads=None, progress=None))]
-    fn mesh(
+    /// The surface at grid spacing `edge` (mm), and what its pieces are, also in words.
+    #[pyo3(signature = (edge, threads=None, progress=None, islands="keep"))]
+    fn mesh<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         edge: f64,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Mesh> {
-        let surface = run(py, threads, progress, |p| {
-            extract::surface(&self.built.solid, edge, p)
+        islands: &str,
+    ) -> PyResult<(Mesh, Bound<'py, PyDict>, String)> {
+        let islands = islands::named(islands)?;
+        let made = run(py, threads, progress, |p| {
+            extract::surface_of(&self.built.solid, edge, islands, p)
         })?;
-        Ok(Mesh::new(
-            surface.map_err(error::stopped)?,
-            self.design.clone(),
-        ))
+        let (surface, pieces) = made.map_err(error::stopped)?;
+        let mesh = Mesh::new(surface, self.design.clone());
+        let (told, words) = islands::told(py, &pieces)?;
+        Ok((mesh, told, words))
     }
 
-    /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume and areas.
-    #[pyo3(signature = (path, edge, threads=None, progress=None))]
+    /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume, areas and
+    /// pieces, these also in words.
+    #[pyo3(signature = (path, edge, threads=None, progress=None, islands="keep"))]
     fn stream_stl<'py>(
         &self,
         py: Python<'py>,
@@ -173,11 +204,19 @@ impl Solid {
         edge: f64,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+        islands: &str,
+    ) -> PyResult<(Bound<'py, PyDict>, String)> {
+        let islands = islands::named(islands)?;
         let summary = run(py, threads, progress, |p| {
             // Whole tiles are written at once: a buffer would only copy them.
-            let mut out = File::create(path).map_err(Stopped::Io)?;
-            extract::stream_stl(&self.built.solid, edge, &mut out, p)
+            let open = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(true)
+                .open(path);
+            let mut out = open.map_err(Stopped::Io)?;
+            extract::stream_stl(&self.built.solid, edge, islands, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
         let d = PyDict::new(py);
@@ -186,7 +225,9 @@ impl Solid {
         d.set_item("area", s.area_lattice + s.area_cut)?;
         d.set_item("area_lattice", s.area_lattice)?;
         d.set_item("area_cut", s.area_cut)?;
-        Ok(d)
+        let (told, words) = islands::told(py, &s.pieces)?;
+        d.update(told.as_mapping())?;
+        Ok((d, words))
     }
 
     /// Occupancy on cubic voxels of edge `step` (mm).

@@ -27,7 +27,7 @@ use serde_json::Value as Json;
 
 use crate::cell::Cell;
 use crate::lattice::Lattice;
-use crate::region::Region;
+use crate::region::{Region, Repaired};
 use crate::solid::Solid;
 
 pub use data::*;
@@ -95,6 +95,8 @@ pub struct Built {
     pub skin: Option<f64>,
     /// What may not be meant.
     pub warnings: Vec<Warning>,
+    /// What was repaired in each mesh of the region, by the path of its table; clean meshes too.
+    pub repairs: Vec<(String, Repaired)>,
 }
 
 impl Design {
@@ -156,7 +158,8 @@ impl Design {
 /// The region of a design, or of a tree with the key `region` alone.
 pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
-    region::region(&read::region_in(node)?, "region", loader).map_err(|mut e| {
+    let mut notes = region::Notes::default();
+    region::region(&read::region_in(node)?, "region", loader, &mut notes).map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));
         e
     })

@@ -4,7 +4,6 @@
 //! and taken in order, so the result does not depend on the number of threads and memory is bounded by the tiles in
 //! flight plus the output.
 
-use std::collections::HashMap;
 use std::io;
 use std::sync::Mutex;
 
@@ -13,18 +12,25 @@ use rayon::prelude::*;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::io::stl;
-use crate::math::{Vec3, cross, dot, norm, sub};
+use crate::math::Vec3;
 use crate::mesh::Mesh;
 use crate::solid::Solid;
 
+mod bodies;
 mod cap;
 mod grid;
+mod islands;
 mod knot;
+mod sift;
 mod signs;
 mod table;
 mod tile;
 
+use bodies::Bodies;
 use grid::Grid;
+use islands::{ByName, Census};
+pub use islands::{Island, Islands, Pieces};
+pub use sift::Store;
 use tile::{Scratch, View};
 
 /// Told how far the work is; answers whether to go on.
@@ -73,6 +79,8 @@ pub struct Summary {
     pub area_lattice: f64,
     /// Area on the region's boundary, mm².
     pub area_cut: f64,
+    /// What the solid falls into.
+    pub pieces: Pieces,
 }
 
 /// What a request will take, found by sampling the solid on a coarse grid.
@@ -189,101 +197,180 @@ fn each_tile<T: Send>(
 /// # Errors
 /// A spacing or region for which no grid can be made; an interruption; more than 2³² vertices.
 pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surface, Stopped> {
-    let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
-    let mut out = Surface::default();
-    // Vertices on the borders of tiles, by grid edge.
-    let mut border: HashMap<u128, u32> = HashMap::new();
-    each_tile(
-        &grid,
-        progress,
-        |view| view.patch(),
-        |patch| {
-            let mut names = Vec::with_capacity(patch.vertices.len());
-            for ((v, key), shared) in patch.vertices.iter().zip(&patch.keys).zip(&patch.shared) {
-                let vertices = &mut out.mesh.vertices;
-                let new = u32::try_from(vertices.len()).map_err(|_| {
-                    Stopped::Refused(Fault::new(
-                        "edge",
-                        "more than 2^32 vertices; use a larger edge, or STL",
-                    ))
-                })?;
-                let name = if *shared {
-                    *border.entry(*key).or_insert(new)
-                } else {
-                    new
-                };
-                if name == new {
-                    vertices.push(*v);
-                }
-                names.push(name);
-            }
-            out.mesh
-                .triangles
-                .extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
-            out.cut.extend_from_slice(&patch.cut);
-            Ok(())
-        },
-    )?;
-    not_empty(out.mesh.triangles.len() as u64, edge)?;
-    Ok(out)
+    Ok(surface_of(solid, edge, Islands::Keep, progress)?.0)
 }
 
-/// The surface at grid spacing `edge` (mm), streamed as binary STL; memory is bounded by the tiles in flight.
-/// The 84-byte header is rewritten at the end, so `out` must be at its start and seekable.
+/// The surface at grid spacing `edge` (mm), held in memory, with all pieces of the solid or the largest only; and what
+/// they are. Same bytes for any number of threads.
 ///
 /// # Errors
-/// As `surface`; failures of `out`; more triangles than the format can count (2³²).
-pub fn stream_stl<W: io::Write + io::Seek + Send>(
+/// As `surface`; several pieces, if `islands` says so.
+pub fn surface_of(
     solid: &Solid,
     edge: f64,
+    islands: Islands,
+    progress: &dyn Progress,
+) -> Result<(Surface, Pieces), Stopped> {
+    let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
+    let middle = solid.region.bounds().center();
+    let mut out = Surface::default();
+    let mut census = Census::default();
+    // Vertices on the borders of tiles, by name.
+    let mut border: ByName<u32> = ByName::default();
+    let cook = |view: View| {
+        let bodies = Bodies::of(&view, middle);
+        (view.patch(&bodies), bodies)
+    };
+    each_tile(&grid, progress, cook, |(patch, bodies)| {
+        let mut names = Vec::with_capacity(patch.vertices.len());
+        for (v, shared) in patch.vertices.iter().zip(&patch.shared) {
+            let vertices = &mut out.mesh.vertices;
+            let new = u32::try_from(vertices.len()).map_err(|_| {
+                Stopped::Refused(Fault::new(
+                    "edge",
+                    "more than 2^32 vertices; use a larger edge, or STL",
+                ))
+            })?;
+            let name = match shared {
+                Some(key) => *border.entry(*key).or_insert(new),
+                None => new,
+            };
+            if name == new {
+                vertices.push(*v);
+            }
+            names.push(name);
+        }
+        out.mesh
+            .triangles
+            .extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+        out.cut.extend_from_slice(&patch.cut);
+        census.add(bodies).map_err(Stopped::Refused)
+    })?;
+    not_empty(out.mesh.triangles.len() as u64, edge)?;
+    let found = census.judge(islands).map_err(Stopped::Refused)?;
+    if found.pieces.dropped > 0 {
+        out = only(&out, &sift::runs(&found.parts));
+    }
+    Ok((out, found.pieces))
+}
+
+/// The surface of some runs of the triangles, vertices in the order that they had.
+fn only(all: &Surface, runs: &[std::ops::Range<u64>]) -> Surface {
+    let runs = || runs.iter().map(|r| r.start as usize..r.end as usize);
+    let mut names = vec![u32::MAX; all.mesh.vertices.len()];
+    for v in runs().flat_map(|r| all.mesh.triangles[r].as_flattened()) {
+        names[*v as usize] = 0;
+    }
+    let mut out = Surface::default();
+    for (name, place) in names.iter_mut().zip(&all.mesh.vertices) {
+        if *name == 0 {
+            *name = out.mesh.vertices.len() as u32;
+            out.mesh.vertices.push(*place);
+        }
+    }
+    for run in runs() {
+        let triangles = all.mesh.triangles[run.clone()].iter();
+        out.mesh
+            .triangles
+            .extend(triangles.map(|t| t.map(|v| names[v as usize])));
+        out.cut.extend_from_slice(&all.cut[run]);
+    }
+    out
+}
+
+/// Steps told while records move up, for each step told while they were made: they move that much faster.
+const SIFTED: u64 = 16;
+
+/// Progress of work that has something to do after its tiles.
+struct Sifting<'a>(&'a dyn Progress);
+
+impl Sifting<'_> {
+    fn moved(&self, share: f64) -> bool {
+        const FINE: f64 = 1000.0;
+        let tiles = FINE * SIFTED as f64;
+        self.0
+            .step((tiles + share * FINE) as u64, (tiles + FINE) as u64)
+    }
+}
+
+impl Progress for Sifting<'_> {
+    fn step(&self, done: u64, total: u64) -> bool {
+        self.0.step(done * SIFTED, total * (SIFTED + 1))
+    }
+}
+
+/// The surface at grid spacing `edge` (mm), streamed as binary STL; memory is bounded by the tiles in flight and a few
+/// numbers for each body of each tile. The 84-byte header is rewritten at the end.
+///
+/// What is to be dropped is known only when all has been seen. It is written like the rest, body by body within each
+/// tile, and taken out of the file in the end: that costs the moving of some bytes, where a second extraction would cost
+/// the whole time again.
+///
+/// # Errors
+/// As `surface_of`; failures of `out`; more triangles than the format can count (2³²).
+pub fn stream_stl<W: Store>(
+    solid: &Solid,
+    edge: f64,
+    islands: Islands,
     out: &mut W,
     progress: &dyn Progress,
 ) -> Result<Summary, Stopped> {
     let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
-    let mut summary = Summary::default();
-    out.write_all(&[0; 84]).map_err(Stopped::Io)?;
+    let mut census = Census::default();
+    let mut triangles = 0;
+    out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
     let spare = Mutex::new(Vec::<Vec<u8>>::new());
     let cook = |view: View| {
-        let mut part = Summary::default();
+        let bodies = Bodies::of(&view, middle);
         let mut records = borrow(&spare);
         let places = view.places();
-        for (t, cut) in view.triangles() {
-            let [a, b, c] = t.map(|v| places[v as usize]);
-            let n = cross(sub(b, a), sub(c, a));
-            let twice = norm(n);
-            part.triangles += 1;
-            part.volume += dot(sub(a, middle), n) / 6.0;
-            *(if cut {
-                &mut part.area_cut
-            } else {
-                &mut part.area_lattice
-            }) += twice / 2.0;
-            stl::push_record(&mut records, [a, b, c].map(|p| p.map(|x| x as f32)));
-        }
-        (part, records)
+        bodies.each_triangle(&view, |t, _| {
+            let corners = t.map(|v| places[v as usize].map(|x| x as f32));
+            stl::push_record(&mut records, corners);
+        });
+        (bodies, records)
     };
-    each_tile(&grid, progress, cook, |(part, mut records)| {
-        summary.triangles += part.triangles;
-        summary.volume += part.volume;
-        summary.area_lattice += part.area_lattice;
-        summary.area_cut += part.area_cut;
-        if summary.triangles > u64::from(u32::MAX) {
+    let sifting = Sifting(progress);
+    let sifts = islands == Islands::Drop;
+    let told: &dyn Progress = if sifts { &sifting } else { progress };
+    each_tile(&grid, told, cook, |(bodies, mut records)| {
+        triangles += (records.len() / stl::RECORD) as u64;
+        if triangles > u64::from(u32::MAX) {
             let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
             return Err(Stopped::Refused(Fault::new("edge", message)));
         }
+        census.add(bodies).map_err(Stopped::Refused)?;
         out.write_all(&records).map_err(Stopped::Io)?;
         records.clear();
         give_back(&spare, records);
         Ok(())
     })?;
-    not_empty(summary.triangles, edge)?;
-    let header = stl::header(summary.triangles as u32);
+    not_empty(triangles, edge)?;
+    let found = census.judge(islands).map_err(Stopped::Refused)?;
+    if found.pieces.dropped > 0 {
+        let runs = sift::runs(&found.parts);
+        let go_on = |record: u64| sifting.moved(record as f64 / triangles as f64);
+        let (head, size) = (stl::HEADER as u64, stl::RECORD as u64);
+        if !sift::sift(out, head, size, &runs, go_on).map_err(Stopped::Io)? {
+            return Err(Stopped::Interrupted);
+        }
+    }
+    if sifts && !sifting.moved(1.0) {
+        return Err(Stopped::Interrupted);
+    }
+    let header = stl::header(found.sum.triangles as u32);
     out.seek(io::SeekFrom::Start(0))
         .and_then(|_| out.write_all(&header))
         .and_then(|()| out.flush())
         .map_err(Stopped::Io)?;
-    Ok(summary)
+    Ok(Summary {
+        triangles: found.sum.triangles,
+        volume: found.sum.volume,
+        area_lattice: found.sum.area[0],
+        area_cut: found.sum.area[1],
+        pieces: found.pieces,
+    })
 }
 
 /// Occupancy on a grid of cubic voxels.

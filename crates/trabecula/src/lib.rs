@@ -20,5 +20,6 @@ pub mod measure;
 pub mod mesh;
 pub mod region;
 pub mod render;
+pub mod simplify;
 pub mod skin;
 pub mod solid;

@@ -8,14 +8,19 @@ use crate::mesh::Mesh;
 mod adjacency;
 mod cavity;
 mod cut;
-mod exact;
+pub(crate) mod exact;
 mod intersect;
+mod local;
+mod quality;
 
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
 pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
+pub(crate) use intersect::{Tree as BoxTree, near_pairs};
 pub use intersect::{is_embedded, self_intersections};
+pub use local::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
+pub use quality::{Quality, quality};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;

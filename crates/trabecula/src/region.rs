@@ -11,7 +11,7 @@ mod mesh;
 mod primitive;
 
 pub use csg::{Difference, Intersection, Offset, Union};
-pub use mesh::MeshRegion;
+pub use mesh::{CAPPED, MeshRegion, Repair, Repaired};
 pub use primitive::{Cuboid, Cylinder, HalfSpace, Sphere};
 
 /// A signed distance function (1-Lipschitz; exact for primitives and meshes, a lower bound of the

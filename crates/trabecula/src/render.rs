@@ -5,10 +5,13 @@ use rayon::prelude::*;
 use crate::extract::Surface;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 
+mod chart;
+mod font;
 mod png;
 mod raster;
 mod shade;
 
+pub use chart::{Chart, charts};
 pub use png::png;
 use raster::Raster;
 

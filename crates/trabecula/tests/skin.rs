@@ -16,8 +16,8 @@ use trabecula::math::{Aabb, Interval, Vec3, norm, sub};
 use trabecula::measure::{non_manifold_vertices, self_intersections, size};
 use trabecula::mesh::Mesh;
 use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Sphere,
-    Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair,
+    Sphere, Union,
 };
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
@@ -372,7 +372,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
     let region = cuboid([0.0; 3], [10.0, 8.0, 6.0]);
     let mesh = |r: &Region, edge| {
         let s = surface(&Solid::new(r.clone(), None, 1.0), edge, &Silent).expect("surface");
-        Arc::new(MeshRegion::new(s.mesh).expect("mesh")) as Region
+        Arc::new(MeshRegion::new(s.mesh, Repair::Refuse).expect("mesh")) as Region
     };
     let block = mesh(&region, 2.0);
     let w = Grade::Constant(1.0);
@@ -409,7 +409,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
 fn open_meshes_keep_their_bounds_and_blocks() {
     let region = cuboid([0.0; 3], [4.0, 3.0, 2.0]);
     let s = surface(&Solid::new(region, None, 1.0), 0.9, &Silent).expect("surface");
-    let region: Region = Arc::new(MeshRegion::new(s.mesh).expect("mesh"));
+    let region: Region = Arc::new(MeshRegion::new(s.mesh, Repair::Refuse).expect("mesh"));
     let cuts = [half([0.0, 0.0, 2.0], [0.0, 0.0, 1.0])];
     let open = region.opened(&cuts, &mut [false]).expect("a flat face");
     let axes: Vec<f64> = (0..40).map(|i| -1.0 + 0.153 * f64::from(i)).collect();

@@ -58,8 +58,8 @@ pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
 }
 
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
-    let mut warnings = Vec::new();
-    let space = region::region(&d.region, "region", loader)?;
+    let mut notes = region::Notes::default();
+    let space = region::region(&d.region, "region", loader, &mut notes)?;
     let bounds = space.bounds();
     if bounds.is_empty() {
         return Err(DesignError::new("region", "the region is empty"));
@@ -88,17 +88,23 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     }
     points.extend(sample::nodes(&space));
     let largest = bounds.size().into_iter().fold(0.0, f64::max);
-    if !(0.1..=2000.0).contains(&largest) {
+    if !(0.1..=2000.0).contains(&largest)
+        && !notes.warnings.iter().any(|w| w.message.contains("unit"))
+    {
         let message = format!(
             "the region is {} mm across; is its unit right?",
             number(largest)
         );
-        warnings.push(Warning {
+        notes.warnings.push(Warning {
             path: "region".into(),
             message,
         });
     }
-    let (filled, thinnest) = skin::filled(d, &space, &points, loader)?;
+    let (filled, thinnest) = skin::filled(d, &space, &points, loader, &mut notes)?;
+    let region::Notes {
+        mut warnings,
+        repairs,
+    } = notes;
     let mut lattices = Vec::new();
     for (name, spec) in &d.lattice {
         let path = format!("lattice.{name}");
@@ -128,6 +134,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         lattices,
         skin: thinnest,
         warnings,
+        repairs,
     })
 }
 

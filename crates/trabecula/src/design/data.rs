@@ -39,7 +39,7 @@ pub enum RegionSpec {
     Sphere(SphereSpec),
     /// One side of a plane; it bounds nothing alone, so combine it.
     HalfSpace(HalfSpaceSpec),
-    /// A closed triangle mesh from a file (stl, obj, ply, off, 3mf).
+    /// A triangle mesh from a file (stl, obj, ply, off, 3mf).
     Mesh(MeshSpec),
     /// Points in any of the regions.
     Union(Vec<RegionSpec>),
@@ -118,7 +118,7 @@ pub struct HalfSpaceSpec {
     pub normal: [f64; 3],
 }
 
-/// A closed triangle mesh from a file.
+/// A triangle mesh from a file.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSpec {
@@ -130,6 +130,20 @@ pub struct MeshSpec {
     /// Factor on all coordinates, after the unit.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f64,
+    /// Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub repair: RepairSpec,
+}
+
+/// What to do with a mesh that does not bound a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RepairSpec {
+    /// Repair it, and warn of what was done.
+    #[default]
+    Auto,
+    /// Refuse it, with what is wrong in numbers.
+    Refuse,
 }
 
 /// A unit of length in a mesh file.

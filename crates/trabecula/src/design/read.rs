@@ -261,11 +261,8 @@ fn cuboid(at: &At) -> Read<BoxSpec> {
 }
 
 fn mesh(at: &At) -> Read<RegionSpec> {
-    let later = [(
-        "repair",
-        "broken meshes are refused with what is wrong with them; leave the key out",
-    )];
-    let f = at.fields("a mesh", &["path", "unit", "scale"], &later)?;
+    let f = at.fields("a mesh", &["path", "unit", "scale", "repair"], &[])?;
+    let repairs = [("auto", RepairSpec::Auto), ("refuse", RepairSpec::Refuse)];
     Ok(RegionSpec::Mesh(MeshSpec {
         path: f
             .need("path", "the mesh file, relative to the design file")?
@@ -273,6 +270,7 @@ fn mesh(at: &At) -> Read<RegionSpec> {
             .to_string(),
         unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
         scale: f.read("scale", 1.0, At::number)?,
+        repair: f.read("repair", RepairSpec::Auto, |at| at.word("repair", &repairs))?,
     }))
 }
 

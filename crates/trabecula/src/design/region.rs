@@ -2,17 +2,29 @@
 
 use std::sync::Arc;
 
-use super::Loader;
 use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
+use super::{Loader, Warning};
 use crate::fault::{Fault, number};
 use crate::io;
 use crate::math::{add, scale, sub};
 use crate::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Shape,
-    Sphere, Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair,
+    Repaired, Shape, Sphere, Union,
 };
+
+/// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
+const SMALL: f64 = 1.0;
+
+/// What building a region has to tell beside the region.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    /// What may not be meant.
+    pub warnings: Vec<Warning>,
+    /// What was repaired in each mesh, by the path of its table.
+    pub repairs: Vec<(String, Repaired)>,
+}
 
 /// Mesh formats a region may come from.
 const FORMATS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
@@ -21,6 +33,7 @@ pub(super) fn region(
     spec: &RegionSpec,
     path: &str,
     loader: &dyn Loader,
+    notes: &mut Notes,
 ) -> Result<Region, DesignError> {
     match spec {
         RegionSpec::Box(b) => cuboid(b, &format!("{path}.box")),
@@ -42,25 +55,25 @@ pub(super) fn region(
             let path = format!("{path}.halfspace");
             Ok(Arc::new(halfspace(h, &path)?))
         }
-        RegionSpec::Mesh(m) => mesh(m, &format!("{path}.mesh"), loader),
+        RegionSpec::Mesh(m) => mesh(m, &format!("{path}.mesh"), loader, notes),
         RegionSpec::Union(of) => {
             let path = format!("{path}.union");
-            shared(&path, Union::new(several(of, &path, loader)?))
+            shared(&path, Union::new(several(of, &path, loader, notes)?))
         }
         RegionSpec::Intersection(of) => {
             let path = format!("{path}.intersection");
-            shared(&path, Intersection::new(several(of, &path, loader)?))
+            shared(&path, Intersection::new(several(of, &path, loader, notes)?))
         }
         RegionSpec::Difference(of) => {
             let path = format!("{path}.difference");
-            shared(&path, Difference::new(several(of, &path, loader)?))
+            shared(&path, Difference::new(several(of, &path, loader, notes)?))
         }
         RegionSpec::Offset(o) => {
             let path = format!("{path}.offset");
             finite(&format!("{path}.by"), o.by)?;
             shared(
                 &path,
-                Offset::new(region(&o.of, &format!("{path}.of"), loader)?, o.by),
+                Offset::new(region(&o.of, &format!("{path}.of"), loader, notes)?, o.by),
             )
         }
     }
@@ -77,10 +90,15 @@ fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Regi
         .map_err(|f| DesignError::fault(path, f))
 }
 
-fn several(of: &[RegionSpec], path: &str, loader: &dyn Loader) -> Result<Vec<Region>, DesignError> {
+fn several(
+    of: &[RegionSpec],
+    path: &str,
+    loader: &dyn Loader,
+    notes: &mut Notes,
+) -> Result<Vec<Region>, DesignError> {
     of.iter()
         .enumerate()
-        .map(|(i, r)| region(r, &format!("{path}[{i}]"), loader))
+        .map(|(i, r)| region(r, &format!("{path}[{i}]"), loader, notes))
         .collect()
 }
 
@@ -129,7 +147,12 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
     shared(path, Cuboid::new(min, max))
 }
 
-fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, DesignError> {
+fn mesh(
+    spec: &MeshSpec,
+    path: &str,
+    loader: &dyn Loader,
+    notes: &mut Notes,
+) -> Result<Region, DesignError> {
     let at = format!("{path}.path");
     let extension = spec
         .path
@@ -167,7 +190,26 @@ fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader) -> Result<Region, Desi
             *v = scale(*v, factor);
         }
     }
-    MeshRegion::new(loaded.mesh)
-        .map(|m| Arc::new(m) as Region)
-        .map_err(of_file)
+    let repair = match spec.repair {
+        RepairSpec::Auto => Repair::Auto,
+        RepairSpec::Refuse => Repair::Refuse,
+    };
+    let made = MeshRegion::new(loaded.mesh, repair).map_err(of_file)?;
+    let largest = made.bounds().size().into_iter().fold(0.0, f64::max);
+    let mut warn = |message: String| {
+        notes.warnings.push(Warning {
+            path: path.into(),
+            message,
+        });
+    };
+    if spec.unit.is_none() && !loaded.in_mm && spec.scale == 1.0 && largest < SMALL {
+        warn(format!(
+            "the mesh is {largest:.4} mm across: probably its unit is the metre or the inch; say unit = \"m\" or unit = \"inch\", or unit = \"mm\" if it is that small"
+        ));
+    }
+    if let Some(done) = made.repaired().sentence() {
+        warn(done);
+    }
+    notes.repairs.push((path.into(), made.repaired().clone()));
+    Ok(Arc::new(made))
 }

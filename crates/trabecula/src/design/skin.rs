@@ -23,6 +23,7 @@ pub(super) fn filled(
     space: &Region,
     points: &[Vec3],
     loader: &dyn Loader,
+    notes: &mut region::Notes,
 ) -> Result<(Vec<Body>, Option<f64>), DesignError> {
     let mut filled = Vec::new();
     let mut thinnest = None;
@@ -33,7 +34,7 @@ pub(super) fn filled(
     }
     for (name, spec) in &d.keep {
         let path = format!("keep.{name}");
-        let zone = region::region(spec, &path, loader)?;
+        let zone = region::region(spec, &path, loader, notes)?;
         check_zone(&zone, space, points, &path)?;
         let mut faces = Vec::new();
         let tree = zone.faces(0.0, &mut faces);

@@ -59,7 +59,7 @@ impl Key {
         self.0 >> Key::NODE & 0o777
     }
 
-    fn faces(self) -> impl Iterator<Item = usize> {
+    pub fn faces(self) -> impl Iterator<Item = usize> {
         (0..3).filter_map(move |i| {
             let f = self.0 >> (Key::NODE + 9 + i * Key::FACE) & ((1 << Key::FACE) - 1);
             (f > 0).then(|| f as usize - 1)
@@ -70,6 +70,11 @@ impl Key {
     pub fn spans(self) -> u64 {
         let s = self.steps();
         (s | s >> 3 | s >> 6) & 7
+    }
+
+    /// Whether this is a point of a grid edge along an axis.
+    pub fn is_along(self, axis: usize) -> bool {
+        self.steps() == 1 << axis
     }
 
     /// The name among all tiles.

@@ -24,8 +24,9 @@ use multiversion::multiversion;
 use crate::field::{Block, Field};
 use crate::math::{Vec3, cross, dot, norm, sub, unit};
 
+use super::bodies::Bodies;
 use super::cap;
-use super::grid::{Grid, Local, TILE};
+use super::grid::{Flat, Grid, Local, TILE};
 use super::knot::{Extra, Key, Knots};
 use super::signs::{Signs, below, negative, within};
 use super::table::{CASES, EDGES, MOST};
@@ -35,10 +36,8 @@ use super::table::{CASES, EDGES, MOST};
 pub(super) struct Patch {
     /// Vertex positions.
     pub vertices: Vec<Vec3>,
-    /// Global key of each vertex.
-    pub keys: Vec<u128>,
-    /// Whether a neighbouring tile may use the vertex too.
-    pub shared: Vec<bool>,
+    /// For each vertex, its name among all tiles if a neighbouring one may use it too.
+    pub shared: Vec<Option<u128>>,
     /// Triangles of the tile's own cells.
     pub triangles: Vec<[u32; 3]>,
     /// For each triangle, whether it lies on the region's surface.
@@ -78,6 +77,11 @@ impl Numbers {
     #[inline]
     pub fn get(&self, axis: usize, row: usize, i: usize) -> Option<u32> {
         (self.crossed[axis][row] >> i & 1 == 1).then(|| self.of(axis, row, i))
+    }
+
+    /// The edges along `axis` of a row that have a vertex, and the number of the first one's.
+    pub fn row(&self, axis: usize, row: usize) -> (u64, u32) {
+        (self.crossed[axis][row], self.offset[axis][row])
     }
 
     #[inline(always)]
@@ -188,13 +192,13 @@ const BATCH: usize = 2048;
 /// The surface found in a tile, in the buffers that it was found in.
 pub(super) struct View<'a> {
     s: &'a Scratch,
-    nodes: Nodes<'a>,
+    pub nodes: Nodes<'a>,
     grid: &'a Grid,
     local: Local,
     /// First node of the block.
     from: [usize; 3],
     /// Cells of the tile itself, in block coordinates.
-    own: [Range<usize>; 3],
+    pub own: [Range<usize>; 3],
 }
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
@@ -655,40 +659,83 @@ impl View<'_> {
             .chain(self.s.extra.triangles.iter().copied())
     }
 
-    /// The tile's surface by itself, with what stitching needs.
-    pub fn patch(&self) -> Patch {
+    /// The tile's surface by itself, body by body, with what stitching needs.
+    pub fn patch(&self, bodies: &Bodies) -> Patch {
         let mut patch = Patch::default();
         let mut renamed = vec![u32::MAX; self.s.places.len()];
-        for (t, cut) in self.triangles() {
+        bodies.each_triangle(self, |t, cut| {
             patch.cut.push(cut);
             patch.triangles.push(t.map(|v| {
                 let slot = &mut renamed[v as usize];
                 if *slot == u32::MAX {
                     *slot = patch.vertices.len() as u32;
-                    let (key, shared) = self.name(v as usize);
                     patch.vertices.push(self.s.places[v as usize]);
-                    patch.keys.push(key);
-                    patch.shared.push(shared);
+                    let shared = self.is_shared(v as usize);
+                    patch.shared.push(shared.then(|| self.name(v as usize)));
                 }
                 *slot
             }));
-        }
+        });
         patch
     }
 
-    /// Global key of a vertex, and whether a neighbouring tile may use it as well.
-    fn name(&self, v: usize) -> (u128, bool) {
-        let key = match self.s.vertices.get(v) {
+    /// The tile's position among the tiles.
+    pub fn tile(&self) -> [usize; 3] {
+        [0, 1, 2].map(|a| (self.from[a] + self.own[a].start) / TILE)
+    }
+
+    /// For each live face, the numbers of its vertices on grid edges.
+    pub fn numbers(&self) -> &[Numbers] {
+        &self.s.numbers[..self.local.live.len()]
+    }
+
+    /// Where a live face is negative on a row of nodes.
+    pub fn negative(&self, face: usize, row: usize) -> u64 {
+        self.s.signs.negative[face][row]
+    }
+
+    /// The faces that are node planes.
+    pub fn flat(&self) -> &[Flat] {
+        &self.local.flat
+    }
+
+    /// The other vertices, with their names in the block.
+    pub fn extra(&self) -> impl Iterator<Item = (u32, Key)> {
+        (self.s.vertices.len() as u32..).zip(self.s.extra.keys.iter().copied())
+    }
+
+    fn key(&self, v: usize) -> Key {
+        match self.s.vertices.get(v) {
             Some(v) => Key::new(v.low as usize, &[1 << v.axis], &[usize::from(v.face)]),
             None => self.s.extra.keys[v - self.s.vertices.len()],
-        };
-        let at = self.nodes.at(key.node());
-        let spans = key.spans();
+        }
+    }
+
+    /// Whether a neighbouring tile may use a vertex as well.
+    #[inline]
+    pub fn is_shared(&self, v: usize) -> bool {
+        if let Some(vertex) = self.s.vertices.get(v) {
+            // Its other coordinates are those of its edge, to the last bit.
+            let border = |a: usize| {
+                let (axis, own) = (self.nodes.axes[a], &self.own[a]);
+                let at = vertex.solid[a];
+                a != usize::from(vertex.axis) && (at == axis[own.start] || at == axis[own.end])
+            };
+            return border(0) || border(1) || border(2);
+        }
+        let key = self.key(v);
+        let (at, spans) = (self.nodes.at(key.node()), key.spans());
         let border = |a: usize| at[a] == self.own[a].start || at[a] == self.own[a].end;
-        let shared = (0..3).any(|a| spans >> a & 1 == 0 && border(a));
+        (0..3).any(|a| spans >> a & 1 == 0 && border(a))
+    }
+
+    /// The name of a vertex among all tiles.
+    pub fn name(&self, v: usize) -> u128 {
+        let key = self.key(v);
+        let at = self.nodes.at(key.node());
         let all = self.grid.axes.each_ref().map(|a| a.len() as u128);
         let at = [0, 1, 2].map(|a| (at[a] + self.from[a]) as u128);
         let node = at[0] + all[0] * (at[1] + all[1] * at[2]);
-        (key.global(node, |f| self.local.live[f]), shared)
+        key.global(node, |f| self.local.live[f])
     }
 }

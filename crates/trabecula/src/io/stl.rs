@@ -10,8 +10,8 @@ use super::{in_order, invalid};
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
-const HEADER: usize = 84;
-const RECORD: usize = 50;
+pub(crate) const HEADER: usize = 84;
+pub(crate) const RECORD: usize = 50;
 
 /// Writes binary STL; normals are those of the rounded positions.
 pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {

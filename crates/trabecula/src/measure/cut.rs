@@ -6,44 +6,52 @@ use crate::field::Field;
 use crate::math::{add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
-/// Triangles told apart at once.
+/// Points evaluated at once.
 const BATCH: usize = 4096;
-/// This close to the surface, as a share of the mesh's mean edge, a triangle is on it whichever way it faces: slivers
-/// have no direction to speak of.
-const TOUCHING: f64 = 0.05;
-/// A triangle on a curved surface stands off it by its chord height; this share of its longest edge allows for arcs
-/// of 45 degrees, if it faces as the surface does, to 18 degrees.
-const STAND_OFF: f64 = 0.1;
-const FACING: f64 = 0.95;
+/// Corners on the surface stand off it by rounding and by what balances the volume of curved triangles: less than this
+/// share of the mesh's mean edge.
+const STAND_OFF: f64 = 0.05;
+/// Over an arc of 45 degrees a chord stands off by this share of its length. A triangle that stands off farther in its
+/// middle runs from one side of an edge of the region to the other.
+const CHORD: f64 = 0.1;
+/// A triangle on the surface faces as it does, give or take 45 degrees; if it is no higher than its corners may stand
+/// off, give or take 72.
+const FACING: [f64; 2] = [0.7, 0.3];
 
-/// For each triangle, whether it lies on the surface of `region` (a signed distance, mm) rather than inside it,
-/// judged at its middle. Triangles of the lattice within a twentieth of an edge of the surface count as cut.
+/// For each triangle, whether it lies on the surface of `region` (a signed distance, mm) rather than inside it, judged
+/// by its corners and its direction.
 pub fn cut_triangles(mesh: &Mesh, region: &dyn Field) -> Vec<bool> {
+    let mut off = vec![0.0; mesh.vertices.len()];
+    let parts = off
+        .par_chunks_mut(BATCH)
+        .zip(mesh.vertices.par_chunks(BATCH));
+    parts.for_each(|(off, points)| region.values(points, off));
+    let place = |v: u32| mesh.vertices[v as usize];
+    let edges = mesh
+        .triangles
+        .iter()
+        .map(|t| norm(sub(place(t[1]), place(t[0]))));
+    let near = STAND_OFF * edges.sum::<f64>() / mesh.triangles.len().max(1) as f64;
     let mut cut = vec![false; mesh.triangles.len()];
-    let first_edges = mesh.triangles.iter().map(|t| {
-        norm(sub(
-            mesh.vertices[t[1] as usize],
-            mesh.vertices[t[0] as usize],
-        ))
-    });
-    let touching = TOUCHING * first_edges.sum::<f64>() / mesh.triangles.len().max(1) as f64;
-    cut.par_chunks_mut(BATCH).enumerate().for_each(|(n, cut)| {
-        let corners = |i: usize| mesh.corners(n * BATCH + i);
-        let middles: Vec<_> = (0..cut.len())
-            .map(|i| {
-                let [a, b, c] = corners(i);
-                scale(add(a, add(b, c)), 1.0 / 3.0)
-            })
-            .collect();
+    let parts = cut
+        .par_chunks_mut(BATCH)
+        .zip(mesh.triangles.par_chunks(BATCH));
+    parts.for_each(|(cut, triangles)| {
+        let middle = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(place);
+            scale(add(a, add(b, c)), 1.0 / 3.0)
+        };
+        let middles: Vec<_> = triangles.iter().map(middle).collect();
         let (mut distance, mut gradient) = (vec![0.0; cut.len()], vec![[0.0; 3]; cut.len()]);
         region.gradients(&middles, &mut distance, &mut gradient);
-        for (i, cut) in cut.iter_mut().enumerate() {
-            let [a, b, c] = corners(i);
-            let (ab, ac) = (sub(b, a), sub(c, a));
-            let longest = norm(ab).max(norm(ac)).max(norm(sub(c, b)));
-            let facing = dot(unit(cross(ab, ac)), unit(gradient[i]));
-            let off = distance[i].abs();
-            *cut = off <= touching || (off <= STAND_OFF * longest && facing >= FACING);
+        for (i, (cut, t)) in cut.iter_mut().zip(triangles).enumerate() {
+            let [a, b, c] = t.map(place);
+            let normal = cross(sub(b, a), sub(c, a));
+            let longest = norm(sub(b, a)).max(norm(sub(c, a))).max(norm(sub(c, b)));
+            let sliver = norm(normal) < near * longest;
+            *cut = t.iter().all(|v| off[*v as usize].abs() <= near)
+                && distance[i].abs() <= near.max(CHORD * longest)
+                && dot(unit(normal), unit(gradient[i])) >= FACING[usize::from(sliver)];
         }
     });
     cut

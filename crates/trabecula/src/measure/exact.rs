@@ -20,7 +20,7 @@ fn sign(v: f64) -> i8 {
 
 /// The side of the plane through a, b, c on which d lies: 1 where a, b, c run clockwise seen from d (det[a−d, b−d,
 /// c−d] > 0), 0 on the plane.
-pub(super) fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
+pub(crate) fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
     let [p, q, r] = [a, b, c].map(|v| [v[0] - d[0], v[1] - d[1], v[2] - d[2]]);
     let (qr, rq) = (q[0] * r[1], r[0] * q[1]);
     let (rp, pr) = (r[0] * p[1], p[0] * r[1]);
@@ -47,7 +47,7 @@ fn exact3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
 }
 
 /// The turn a → b → c in the plane: 1 left, −1 right, 0 straight.
-pub(super) fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
+pub(crate) fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
     let left = (a[0] - c[0]) * (b[1] - c[1]);
     let right = (a[1] - c[1]) * (b[0] - c[0]);
     let det = left - right;
@@ -59,12 +59,12 @@ pub(super) fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
 }
 
 /// The point without its coordinate `axis`.
-pub(super) fn drop_axis(p: Vec3, axis: usize) -> [f64; 2] {
+pub(crate) fn drop_axis(p: Vec3, axis: usize) -> [f64; 2] {
     [p[(axis + 1) % 3], p[(axis + 2) % 3]]
 }
 
 /// An axis along which the triangle projects to one with area; `None` where it has none.
-pub(super) fn plane_axis(a: Vec3, b: Vec3, c: Vec3) -> Option<usize> {
+pub(crate) fn plane_axis(a: Vec3, b: Vec3, c: Vec3) -> Option<usize> {
     (0..3).find(|&k| orient2d(drop_axis(a, k), drop_axis(b, k), drop_axis(c, k)) != 0)
 }
 

@@ -62,6 +62,42 @@ pub fn is_embedded(mesh: &Mesh) -> bool {
     })
 }
 
+/// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
+/// same for any number of threads. Triangles without area are left out.
+pub(crate) fn near_pairs<T: Send>(
+    mesh: &Mesh,
+    margin: f64,
+    f: impl Fn(usize, usize) -> Option<T> + Sync,
+) -> Vec<T> {
+    let mut order: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .into_par_iter()
+        .filter(|&i| !degenerate(mesh, i as usize))
+        .collect();
+    let boxes: Vec<Aabb> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|i| bounds(mesh.corners(i)).grown(margin))
+        .collect();
+    let Some(tree) = Tree::build(&boxes, &mut order) else {
+        return Vec::new();
+    };
+    let found: Vec<Vec<T>> = order
+        .par_chunks(256)
+        .map(|part| {
+            let mut found = Vec::new();
+            for &i in part {
+                let b = &boxes[i as usize];
+                tree.visit(b, &mut |range| {
+                    let near = order[range].iter().filter(|j| **j > i);
+                    let touching = near.filter(|j| overlap(b, &boxes[**j as usize]));
+                    found.extend(touching.filter_map(|j| f(i as usize, *j as usize)));
+                });
+            }
+            found
+        })
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
 fn bounds(corners: [Vec3; 3]) -> Aabb {
     corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
 }
@@ -70,8 +106,8 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
 }
 
-/// A tree of boxes over a permutation of the triangles.
-struct Tree {
+/// A tree of boxes over a permutation of the triangles (or of whatever the boxes hold).
+pub(crate) struct Tree {
     bounds: Aabb,
     range: (usize, usize),
     children: Option<Box<(Tree, Tree)>>,
@@ -79,7 +115,7 @@ struct Tree {
 
 impl Tree {
     /// Builds the tree and sorts `order` into its leaves; `None` without triangles.
-    fn build(boxes: &[Aabb], order: &mut [u32]) -> Option<Tree> {
+    pub(crate) fn build(boxes: &[Aabb], order: &mut [u32]) -> Option<Tree> {
         (!order.is_empty()).then(|| Tree::split(boxes, order, 0))
     }
 
@@ -120,7 +156,7 @@ impl Tree {
     }
 
     /// Calls `leaf` with the span of every leaf whose box touches `b`.
-    fn visit(&self, b: &Aabb, leaf: &mut impl FnMut(core::ops::Range<usize>)) {
+    pub(crate) fn visit(&self, b: &Aabb, leaf: &mut impl FnMut(core::ops::Range<usize>)) {
         if !overlap(&self.bounds, b) {
             return;
         }

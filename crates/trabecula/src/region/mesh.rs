@@ -6,138 +6,124 @@ use super::{HalfSpace, Offset, Region, Shape, one_face};
 use crate::face;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
-use crate::measure::self_intersections;
+use crate::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
+mod cap;
 mod check;
+mod clean;
+mod cut;
+mod edges;
+mod fair;
+mod normals;
 mod open;
+mod orient;
+mod repair;
 mod tree;
+mod winding;
 
+use normals::Normals;
+use repair::Boundary;
+pub use repair::{CAPPED, Repair, Repaired};
 use tree::{Face, Feature, Hit, Tree};
+use winding::Winding;
 
-/// The solid inside a clean, closed triangle mesh: one body, perhaps with cavities.
+/// A place and its signed distance, where none is known: no comparison with it holds.
+const NOTHING: (Vec3, f64) = ([0.0; 3], f64::NAN);
+/// Nodes farther off than twice their radius are taken as a whole where inside is told from outside: the winding
+/// number of a closed surface is then within a few hundredths of zero or one.
+const REACH: f64 = 2.0;
+
+/// The solid inside a triangle mesh, which is repaired if it is not clean: bodies, perhaps with cavities.
 ///
-/// Distances are exact to rounding. Their sign comes from the angle-weighted normals of the nearest face, edge or
-/// vertex: J. A. Bærentzen and H. Aanæs, Signed distance computation using the angle weighted pseudonormal, IEEE
-/// Trans. Vis. Comput. Graph. 11 (2005) 243.
+/// Distances to the (repaired) boundary are exact to rounding. Their sign comes from the normals of the nearest face,
+/// edge or vertex where the boundary is one clean surface, else from that of the face or the winding number.
 #[derive(Debug)]
 pub struct MeshRegion {
     tree: Tree,
-    /// Outward normals (any length) of each triangle's edges and corners, in the tree's order.
-    edges: Vec<[Vec3; 3]>,
-    corners: Vec<[Vec3; 3]>,
+    normals: Normals,
+    /// Asked where the boundary is not one clean sheet; none where it is everywhere.
+    winding: Option<Winding>,
     bounds: Aabb,
     volume: f64,
     planes: [Vec<f64>; 3],
-}
-
-/// The unit normal of a triangle, exact along the axes.
-fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-    let n = cross(sub(b, a), sub(c, a));
-    if n.iter().filter(|x| **x != 0.0).count() == 1 {
-        return n.map(|x| if x == 0.0 { 0.0 } else { x.signum() });
-    }
-    // The longest component first, so that small triangles do not underflow.
-    let largest = n.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    unit(n.map(|x| x / largest))
+    mesh: Mesh,
+    repaired: Repaired,
 }
 
 impl MeshRegion {
-    /// The solid inside `mesh` (mm). If edges are open, vertices that single precision cannot tell apart at the
-    /// mesh's size are joined first: files often write one corner with two roundings.
+    /// The solid inside `mesh` (mm), repaired if need be.
     ///
-    /// **Errors**: numbers that are not finite; open edges, edges with more than two triangles, neighbours that
-    /// face opposite ways, duplicate or degenerate triangles (with their numbers); several bodies; a mesh that is
-    /// inside out or flat. A body inside out within the other is a cavity and allowed.
-    pub fn new(mut mesh: Mesh) -> Result<Self, Fault> {
-        check::numbers(&mesh)?;
-        if check::open(&mesh) {
-            mesh = mesh.joined(mesh.single_rounding());
-        }
-        let pairs = check::check(&mesh)?;
-        const MANY: usize = 1000;
-        let crossing = self_intersections(&mesh, MANY);
-        if crossing > 0 {
-            let found = if crossing < MANY {
-                crossing.to_string()
-            } else {
-                format!("{MANY} or more")
-            };
-            let message = format!(
-                "the mesh of {} triangles crosses itself ({found} pairs of triangles), so what is inside is not plain; unite its bodies first",
-                mesh.triangles.len()
-            );
-            return Err(Fault::new("", message));
-        }
-        let count = mesh.triangles.len();
-        let faces: Vec<Face> = (0..count)
-            .map(|i| {
-                let corners = mesh.corners(i);
-                Face {
-                    corners,
-                    normal: normal(corners),
-                }
-            })
+    /// A clean mesh is taken as it is, but for this: if edges are open, vertices that single precision cannot tell
+    /// apart at the mesh's size are joined first, as files often write one corner with two roundings.
+    ///
+    /// **Errors**: numbers that are not finite; no volume; holes whose caps would be a tenth of the surface or more
+    /// ([`CAPPED`]); with [`Repair::Refuse`] all that [`Repaired`] counts, in numbers.
+    pub fn new(mesh: Mesh, repair: Repair) -> Result<Self, Fault> {
+        let Boundary { mesh, pairs, done } = repair::boundary(mesh, repair)?;
+        let faces: Vec<Face> = (0..mesh.triangles.len())
+            .map(|i| Face::new(mesh.corners(i)))
             .collect();
-        let mut edge_normals = vec![[[0.0; 3]; 3]; count];
-        for [a, b] in pairs {
-            let [a, b] = [a as usize, b as usize];
-            let n = add(faces[a / 3].normal, faces[b / 3].normal);
-            edge_normals[a / 3][a % 3] = n;
-            edge_normals[b / 3][b % 3] = n;
-        }
-        let mut vertex_normals = vec![[0.0; 3]; mesh.vertices.len()];
-        for (t, f) in mesh.triangles.iter().zip(&faces) {
-            for k in 0..3 {
-                let [a, b, c] = [0, 1, 2].map(|i| f.corners[(k + i) % 3]);
-                let (u, v) = (sub(b, a), sub(c, a));
-                let angle = norm(cross(u, v)).atan2(dot(u, v));
-                let n = &mut vertex_normals[t[k] as usize];
-                *n = add(*n, scale(f.normal, angle));
-            }
-        }
         let (tree, order) = Tree::new(&faces);
+        let (normals, winding) = match pairs {
+            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
+            None => (
+                Normals::of_pieces(&faces, &order),
+                Some(Winding::new(&tree)),
+            ),
+        };
         Ok(MeshRegion {
-            edges: order.iter().map(|i| edge_normals[*i as usize]).collect(),
-            corners: order
-                .iter()
-                .map(|i| mesh.triangles[*i as usize].map(|v| vertex_normals[v as usize]))
-                .collect(),
+            normals,
+            winding,
             bounds: mesh.bounds(),
             volume: mesh.volume(),
             planes: [0, 1, 2].map(|axis| planes(&faces, &mesh.bounds(), axis)),
             tree,
+            mesh,
+            repaired: done,
         })
     }
 
-    /// Outward normal (any length) at the nearest point.
-    fn outward(&self, hit: &Hit) -> Vec3 {
-        let i = hit.triangle as usize;
-        match hit.feature {
-            Feature::Face => self.tree.faces()[i].normal,
-            Feature::Edge(k) => self.edges[i][usize::from(k)],
-            Feature::Corner(k) => self.corners[i][usize::from(k)],
-        }
+    /// The boundary that everything is taken from: the mesh given if it was clean, else the repaired one.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// What was repaired.
+    pub fn repaired(&self) -> &Repaired {
+        &self.repaired
     }
 
     /// Signed distance; zero where rounding hides it, so that points of flat faces are exactly on them.
-    fn signed(&self, hit: &Hit) -> f64 {
+    ///
+    /// `known` is a place and its signed distance: where the two balls that hold no surface overlap, the sign is the
+    /// same, and winding numbers need not be asked for.
+    fn signed(&self, hit: &Hit, p: Vec3, known: (Vec3, f64)) -> f64 {
         let d = hit.square.sqrt();
-        if d <= self.tree.rounding() {
-            0.0
-        } else if dot(hit.away, self.outward(hit)) < 0.0 {
-            -d
-        } else {
-            d
+        let rounding = self.tree.rounding();
+        if d <= rounding {
+            return 0.0;
         }
+        let height = dot(hit.away, self.normals.outward(&self.tree, hit));
+        let inside = match &self.winding {
+            Some(winding) if height.is_nan() => {
+                if (d + known.1.abs()) * (1.0 - 1e-9) > norm(sub(p, known.0)) + rounding {
+                    known.1 < 0.0
+                } else {
+                    winding.at(&self.tree, p, REACH, |_| false) > 0.5
+                }
+            }
+            _ => height < 0.0,
+        };
+        if inside { -d } else { d }
     }
 
-    fn gradient(&self, hit: &Hit) -> Vec3 {
-        let d = self.signed(hit);
+    fn gradient(&self, hit: &Hit, d: f64) -> Vec3 {
+        let outward = self.normals.outward(&self.tree, hit);
         match hit.feature {
-            Feature::Face => self.tree.faces()[hit.triangle as usize].normal,
-            _ if d == 0.0 => unit(self.outward(hit)),
+            Feature::Face if !outward[0].is_nan() => outward,
+            _ if d == 0.0 && outward[0].is_nan() => self.tree.faces()[hit.triangle as usize].normal,
+            _ if d == 0.0 => unit(outward),
             _ => scale(hit.away, 1.0 / d),
         }
     }
@@ -168,20 +154,23 @@ fn planes(faces: &[Face], bounds: &Aabb, axis: usize) -> Vec<f64> {
 
 impl Field for MeshRegion {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let mut seed = 0;
+        let (mut seed, mut known) = (0, NOTHING);
         for (o, p) in out.iter_mut().zip(points) {
             let hit = self.tree.nearest(*p, seed);
             seed = hit.triangle;
-            *o = self.signed(&hit);
+            *o = self.signed(&hit, *p, known);
+            known = (*p, *o);
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let mut seed = 0;
+        let (mut seed, mut known) = (0, NOTHING);
         for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
             let hit = self.tree.nearest(*p, seed);
             seed = hit.triangle;
-            (*v, *g) = (self.signed(&hit), self.gradient(&hit));
+            *v = self.signed(&hit, *p, known);
+            *g = self.gradient(&hit, *v);
+            known = (*p, *v);
         }
     }
 
@@ -226,7 +215,7 @@ impl Shape for MeshRegion {
             cell,
             out,
         };
-        fill.part([0; 3], shape, 0);
+        fill.part([0; 3], shape, 0, NOTHING);
     }
 
     fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
@@ -255,24 +244,26 @@ struct Fill<'a> {
 }
 
 impl Fill<'_> {
-    /// Fills the nodes from `lo` up to `hi`, `seed` being a triangle that may be near.
-    fn part(&mut self, lo: [usize; 3], hi: [usize; 3], seed: u32) {
+    /// Fills the nodes from `lo` up to `hi`, `seed` being a triangle that may be near and `known` a distance.
+    fn part(&mut self, lo: [usize; 3], hi: [usize; 3], seed: u32, known: (Vec3, f64)) {
         let ends = [0, 1, 2].map(|a| [self.block.axes[a][lo[a]], self.block.axes[a][hi[a] - 1]]);
         let center = ends.map(|[a, b]| a + (b - a) / 2.0);
         let size = ends.map(|[a, b]| b - a);
         let hit = self.region.tree.nearest(center, seed);
-        let d = self.region.signed(&hit) - self.level;
+        let known = (center, self.region.signed(&hit, center, known));
+        let d = known.1 - self.level;
         if d.abs() > (norm(size) / 2.0 + self.cell) * (1.0 + 1e-9) {
             self.each(lo, hi, |_, p| (d.abs() - norm(sub(p, center))).copysign(d));
             return;
         }
         let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
         if (0..3).map(|a| hi[a] - lo[a]).product::<usize>() <= 8 || hi[longest] - lo[longest] < 2 {
-            let mut seed = hit.triangle;
+            let (mut seed, mut known) = (hit.triangle, known);
             self.each(lo, hi, |fill, p| {
                 let hit = fill.region.tree.nearest(p, seed);
                 seed = hit.triangle;
-                fill.region.signed(&hit) - fill.level
+                known = (p, fill.region.signed(&hit, p, known));
+                known.1 - fill.level
             });
             return;
         }
@@ -280,8 +271,8 @@ impl Fill<'_> {
         let (mut end, mut begin) = (hi, lo);
         end[longest] = middle;
         begin[longest] = middle;
-        self.part(lo, end, hit.triangle);
-        self.part(begin, hi, hit.triangle);
+        self.part(lo, end, hit.triangle, known);
+        self.part(begin, hi, hit.triangle, known);
     }
 
     fn each(&mut self, lo: [usize; 3], hi: [usize; 3], mut value: impl FnMut(&Self, Vec3) -> f64) {
@@ -297,5 +288,7 @@ impl Fill<'_> {
     }
 }
 
+#[cfg(test)]
+mod laws;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::tree::{Face, Hit, Tree};
-use super::{MeshRegion, one_face};
+use super::{MeshRegion, NOTHING, one_face};
 use crate::face;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, dot, norm, scale};
@@ -62,7 +62,7 @@ impl OpenMesh {
         }
         let whole = self.whole.tree.nearest(p, seeds[1]);
         seeds[1] = whole.triangle;
-        let inside = self.whole.signed(&whole) <= 0.0;
+        let inside = self.whole.signed(&whole, p, NOTHING) <= 0.0;
         (hit, if inside { -1.0 } else { 1.0 })
     }
 }

@@ -1,9 +1,11 @@
+use super::tree::normal;
 use super::*;
+use crate::math::add;
 use crate::region::tests::{check_shape, random};
 use std::collections::HashMap;
 
 /// The box from `lo` to `hi` of twelve triangles.
-fn cuboid(lo: Vec3, hi: Vec3) -> Mesh {
+pub(super) fn cuboid(lo: Vec3, hi: Vec3) -> Mesh {
     let vertices = (0..8)
         .map(|i| [0, 1, 2].map(|a| if i >> a & 1 == 1 { hi[a] } else { lo[a] }))
         .collect();
@@ -26,7 +28,7 @@ fn cuboid(lo: Vec3, hi: Vec3) -> Mesh {
 }
 
 /// An icosphere of 20·4ⁿ triangles, its radius waved by `wave`.
-fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
+pub(super) fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut vertices = Vec::new();
     for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
@@ -79,7 +81,7 @@ fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
 }
 
 /// Both meshes as one, the second turned inside out if asked.
-fn with(mut a: Mesh, b: Mesh, inside_out: bool) -> Mesh {
+pub(super) fn with(mut a: Mesh, b: Mesh, inside_out: bool) -> Mesh {
     let n = a.vertices.len() as u32;
     a.vertices.extend(b.vertices);
     a.triangles.extend(b.triangles.iter().map(|t| {
@@ -92,7 +94,7 @@ fn with(mut a: Mesh, b: Mesh, inside_out: bool) -> Mesh {
 #[test]
 fn a_box_of_triangles_is_the_box() {
     let (lo, hi) = ([-1.0, -0.7, -1.1], [0.9, 1.2, 0.8]);
-    let mesh = MeshRegion::new(cuboid(lo, hi)).unwrap();
+    let mesh = MeshRegion::new(cuboid(lo, hi), Repair::Auto).unwrap();
     let exact = crate::region::Cuboid::new(lo, hi).unwrap();
     check_shape("box mesh", &mesh, 2.0, 1.0);
     let mut seed = 5;
@@ -115,7 +117,7 @@ fn flat_faces_are_exactly_zero() {
     for _ in 0..200 {
         let lo = [0; 3].map(|_| random(&mut seed) * 100.0);
         let hi = lo.map(|v| v + 1.0 + random(&mut seed).abs() * 30.0);
-        let mesh = MeshRegion::new(cuboid(lo, hi)).unwrap();
+        let mesh = MeshRegion::new(cuboid(lo, hi), Repair::Auto).unwrap();
         for axis in 0..3 {
             for plane in [lo[axis], hi[axis]] {
                 for _ in 0..50 {
@@ -140,7 +142,7 @@ fn distances_and_signs_agree_with_a_plain_search() {
     let corners: Vec<[Vec3; 3]> = (0..hollow.triangles.len())
         .map(|i| hollow.corners(i))
         .collect();
-    let region = MeshRegion::new(hollow).unwrap();
+    let region = MeshRegion::new(hollow, Repair::Auto).unwrap();
     assert_eq!(region.volume(), Some(volume));
     check_shape("hollow ball", &region, 2.5, 1.0);
     let mut seed = 77;
@@ -171,7 +173,7 @@ fn distances_and_signs_agree_with_a_plain_search() {
 
 #[test]
 fn the_seed_never_matters() {
-    let region = MeshRegion::new(ball(3, 1.0, 0.3)).unwrap();
+    let region = MeshRegion::new(ball(3, 1.0, 0.3), Repair::Auto).unwrap();
     let mut seed = 3;
     for _ in 0..500 {
         let p = [0; 3].map(|_| random(&mut seed) * 1.5);
@@ -180,7 +182,7 @@ fn the_seed_never_matters() {
         assert_eq!((a.square, a.triangle), (b.square, b.triangle));
     }
     // The centre of a regular body is equally far from every face.
-    let cube = MeshRegion::new(cuboid([-1.0; 3], [1.0; 3])).unwrap();
+    let cube = MeshRegion::new(cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
     for s in 0..12 {
         assert_eq!(
             cube.tree.nearest([0.0; 3], s).triangle,
@@ -222,13 +224,13 @@ fn nearest_points_of_a_triangle_by_sampling() {
 #[test]
 fn what_is_not_one_solid_is_refused_in_numbers() {
     let good = || cuboid([0.0; 3], [1.0; 3]);
-    let said = |mesh: Mesh| MeshRegion::new(mesh).unwrap_err().message;
+    let said = |mesh: Mesh| MeshRegion::new(mesh, Repair::Refuse).unwrap_err().message;
     let change = |f: &dyn Fn(&mut Mesh)| {
         let mut m = good();
         f(&mut m);
         said(m)
     };
-    assert!(MeshRegion::new(good()).is_ok());
+    assert!(MeshRegion::new(good(), Repair::Auto).is_ok());
     assert!(change(&|m| m.triangles.truncate(11)).contains("3 open edges"));
     assert!(
         change(&|m| m.triangles[4].swap(0, 1))
@@ -246,11 +248,12 @@ fn what_is_not_one_solid_is_refused_in_numbers() {
     assert!(change(&|m| m.vertices.iter_mut().for_each(|v| v[2] *= 1e-14)).contains("flat"));
     assert!(said(Mesh::default()).contains("at least four"));
     let apart = || cuboid([3.0; 3], [4.0; 3]);
-    assert!(said(with(good(), apart(), false)).contains("2 separate bodies"));
-    assert!(said(with(good(), apart(), true)).contains("2 separate bodies, 1 of them inside out"));
+    let two = MeshRegion::new(with(good(), apart(), false), Repair::Refuse).unwrap();
+    assert_eq!(two.volume(), Some(2.0));
+    assert!(said(with(good(), apart(), true)).contains("1 body that was inside out"));
     let inner = || cuboid([0.25; 3], [0.75; 3]);
-    assert!(said(with(good(), inner(), false)).contains("2 separate bodies"));
-    let hollow = MeshRegion::new(with(good(), inner(), true)).unwrap();
+    assert!(said(with(good(), inner(), false)).contains("12 triangles inside the solid"));
+    let hollow = MeshRegion::new(with(good(), inner(), true), Repair::Auto).unwrap();
     assert_eq!(hollow.volume(), Some(0.875));
     assert_eq!(hollow.value([0.5; 3]), 0.25);
 }
@@ -266,63 +269,89 @@ fn corners_written_with_two_roundings_are_one() {
         .map(|p| p.map(|x| x + 2e-7 * random(&mut seed)))
         .collect();
     mesh.triangles = (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let region = MeshRegion::new(mesh.clone()).unwrap();
+    let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
     assert!((region.volume().unwrap() - 1.0).abs() < 1e-5);
     mesh.vertices[0][0] += 1e-3;
     assert!(
-        MeshRegion::new(mesh)
+        MeshRegion::new(mesh, Repair::Refuse)
             .unwrap_err()
             .message
             .contains("open edges")
     );
 }
 
-/// Not a test of right or wrong: prints the rates that the documentation cites.
+/// Not a test of right or wrong: prints the rates that the documentation cites, of a clean mesh and of two that cross.
 #[test]
 #[ignore = "a measurement: run by name in release"]
 fn rates() {
     use rayon::prelude::*;
     use std::time::Instant;
-    let mesh = ball(6, 100.0, 0.1);
-    let t = Instant::now();
-    let region = MeshRegion::new(mesh.clone()).unwrap();
-    println!(
-        "{} triangles: built in {:?}",
-        mesh.triangles.len(),
-        t.elapsed()
-    );
-    let mut seed = 1;
-    let points: Vec<Vec3> = (0..200_000)
-        .map(|_| {
-            let i = ((random(&mut seed) + 1.0) / 2.0 * mesh.vertices.len() as f64) as usize;
-            add(mesh.vertices[i], [0; 3].map(|_| random(&mut seed)))
-        })
-        .collect();
-    let mut out = vec![0.0; points.len()];
-    let t = Instant::now();
-    region.values(&points, &mut out);
-    println!(
-        "{:.0} ns per random query near the surface",
-        t.elapsed().as_nanos() as f64 / points.len() as f64
-    );
-    let n = 256;
-    let axis: Vec<f64> = (0..n)
-        .map(|i| -115.0 + 230.0 * i as f64 / (n - 1) as f64)
-        .collect();
-    let t = Instant::now();
-    let tiles: Vec<(usize, usize, usize)> = (0..512)
-        .map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32))
-        .collect();
-    let inside: usize = tiles
-        .par_iter()
-        .map(|&(x, y, z)| {
-            let block = Block {
-                axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]],
-            };
-            let mut out = vec![0f32; block.len()];
-            region.fill(&block, &mut out);
-            out.iter().filter(|v| **v < 0.0).count()
-        })
-        .sum();
-    println!("{n}³ filled in {:?}, {inside} inside", t.elapsed());
+    let clean = ball(6, 100.0, 0.1);
+    let mut other = ball(6, 70.0, 0.1);
+    for v in &mut other.vertices {
+        *v = add(*v, [60.0, 10.0, 5.0]);
+    }
+    let mut open = clean.clone();
+    open.triangles
+        .retain(|t| t.iter().any(|v| clean.vertices[*v as usize][0] < 98.0));
+    for (name, mesh) in [
+        ("clean", clean.clone()),
+        ("with a hole", open),
+        ("two that cross", with(clean.clone(), other, false)),
+    ] {
+        let t = Instant::now();
+        let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
+        println!(
+            "{name}: {} triangles: built in {:?}; {:?}",
+            mesh.triangles.len(),
+            t.elapsed(),
+            region.repaired().sentence()
+        );
+        let mut seed = 1;
+        let points: Vec<Vec3> = (0..200_000)
+            .map(|_| {
+                let i = ((random(&mut seed) + 1.0) / 2.0 * mesh.vertices.len() as f64) as usize;
+                add(mesh.vertices[i], [0; 3].map(|_| random(&mut seed)))
+            })
+            .collect();
+        let mut out = vec![0.0; points.len()];
+        let t = Instant::now();
+        region.values(&points, &mut out);
+        println!(
+            "  {:.0} ns per random query near the surface",
+            t.elapsed().as_nanos() as f64 / points.len() as f64
+        );
+        let t = Instant::now();
+        let winding = Winding::new(&region.tree);
+        let made = t.elapsed();
+        let t = Instant::now();
+        let inside = points
+            .iter()
+            .filter(|p| winding.at(&region.tree, **p, REACH, |_| false) > 0.5)
+            .count();
+        println!(
+            "  moments in {made:?}, {:.0} ns per winding number, {inside} inside",
+            t.elapsed().as_nanos() as f64 / points.len() as f64
+        );
+        let n = 256;
+        let axis: Vec<f64> = (0..n)
+            .map(|i| -115.0 + 260.0 * i as f64 / (n - 1) as f64)
+            .collect();
+        let t = Instant::now();
+        let tiles: Vec<(usize, usize, usize)> = (0..512)
+            .map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32))
+            .collect();
+        let inside: usize = tiles
+            .par_iter()
+            .map(|&(x, y, z)| {
+                let block = Block {
+                    axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]],
+                };
+                let mut out = vec![0f32; block.len()];
+                region.fill(&block, &mut out);
+                out.iter().filter(|v| **v < 0.0).count()
+            })
+            .sum();
+        println!("  {n}³ filled in {:?}, {inside} inside", t.elapsed());
+    }
 }

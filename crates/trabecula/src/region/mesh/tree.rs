@@ -1,6 +1,6 @@
 //! A tree of boxes over triangles, and the nearest triangle to a point.
 
-use crate::math::{Aabb, Vec3, add, dot, scale, sub};
+use crate::math::{Aabb, Vec3, add, cross, dot, scale, sub, unit};
 
 /// The part of a triangle that is nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,26 @@ pub struct Face {
     pub normal: Vec3,
 }
 
+/// The unit normal of a triangle, exact along the axes.
+pub fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    let n = cross(sub(b, a), sub(c, a));
+    if n.iter().filter(|x| **x != 0.0).count() == 1 {
+        return n.map(|x| if x == 0.0 { 0.0 } else { x.signum() });
+    }
+    // The longest component first, so that small triangles do not underflow.
+    let largest = n.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    unit(n.map(|x| x / largest))
+}
+
 impl Face {
+    /// The triangle of these corners, which has area.
+    pub fn new(corners: [Vec3; 3]) -> Face {
+        Face {
+            corners,
+            normal: normal(corners),
+        }
+    }
+
     /// The nearest point of the triangle to `p`: squared distance, vector from it to `p`, feature.
     ///
     /// Over the inside the distance is that to the plane, which is exact for planes normal to an axis.
@@ -83,13 +102,15 @@ const BINS: usize = 16;
 /// Deeper than this the triangles are halved by number, so that the depth stays below 64 + 32.
 const DEEP: usize = 64;
 
+/// A node of the tree.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    bounds: Aabb,
+pub struct Node {
+    /// The box of its triangles.
+    pub bounds: Aabb,
     /// First triangle of a leaf, or the second child (the first is the next node).
-    at: u32,
+    pub at: u32,
     /// Triangles of a leaf, zero for a branch.
-    count: u32,
+    pub count: u32,
 }
 
 /// The tree. Triangles are reordered so that a leaf's lie together.
@@ -133,6 +154,11 @@ impl Tree {
     /// The rounding that a distance to the mesh carries, mm.
     pub fn rounding(&self) -> f64 {
         self.tie
+    }
+
+    /// The nodes, each before its children.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// The triangles in the tree's order.

@@ -1,0 +1,83 @@
+//! How well shaped the triangles of a mesh are.
+
+use rayon::prelude::*;
+
+use crate::math::{Vec3, cross, dot, norm, sub};
+use crate::mesh::Mesh;
+
+/// The shapes of a mesh's triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality {
+    /// The smallest angle of any triangle, degrees; 60 at best.
+    pub smallest_angle: f64,
+    /// A twentieth of the triangles has a smaller angle than this, degrees.
+    pub smallest_angle_p05: f64,
+    /// The largest aspect ratio: longest edge over 2√3 times the radius of the inscribed circle; 1 at best, infinite
+    /// for a triangle without area.
+    pub largest_aspect: f64,
+}
+
+/// The quality of a mesh; `None` without triangles. Exact to rounding.
+pub fn quality(mesh: &Mesh) -> Option<Quality> {
+    let shapes: Vec<(f64, f64)> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|i| shape(mesh.corners(i)))
+        .collect();
+    let largest_aspect = shapes.iter().fold(1.0, |m: f64, s| m.max(s.1));
+    let mut angles: Vec<f64> = shapes.into_iter().map(|s| s.0).collect();
+    let smallest_angle = angles.iter().copied().reduce(f64::min)?;
+    let place = angles.len() / 20;
+    let (_, p05, _) = angles.select_nth_unstable_by(place, f64::total_cmp);
+    Some(Quality {
+        smallest_angle,
+        smallest_angle_p05: *p05,
+        largest_aspect,
+    })
+}
+
+/// Smallest angle (degrees) and aspect ratio of a triangle.
+fn shape([a, b, c]: [Vec3; 3]) -> (f64, f64) {
+    let sides = [sub(b, a), sub(c, b), sub(a, c)];
+    let lengths = sides.map(norm);
+    let twice = norm(cross(sides[0], sides[1]));
+    if twice.is_nan() || twice <= 0.0 {
+        return (0.0, f64::INFINITY);
+    }
+    // The smallest angle lies opposite to the shortest side.
+    let short = (1..3).fold(0, |s, k| if lengths[k] < lengths[s] { k } else { s });
+    let (u, v) = (sides[(short + 1) % 3], sides[(short + 2) % 3]);
+    let angle = twice.atan2(-dot(u, v)).to_degrees();
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    // The inscribed circle has the radius 2 · area / perimeter.
+    let inner = twice / lengths.iter().sum::<f64>();
+    (angle, (longest / (12f64.sqrt() * inner)).max(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::tests::cube;
+
+    #[test]
+    fn known_triangles() {
+        let (angle, aspect) = shape([[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.75f64.sqrt(), 0.0]]);
+        assert!((angle - 60.0).abs() < 1e-12 && (aspect - 1.0).abs() < 1e-12);
+        // 3, 4, 5: the inscribed circle has radius 1.
+        let (angle, aspect) = shape([[0.0; 3], [0.0, 3.0, 0.0], [4.0, 0.0, 0.0]]);
+        assert!((angle - 0.75f64.atan().to_degrees()).abs() < 1e-12);
+        assert!((aspect - 5.0 / 12f64.sqrt()).abs() < 1e-12);
+        assert_eq!(shape([[0.0; 3], [1.0; 3], [2.0; 3]]), (0.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn meshes() {
+        let q = quality(&cube([1.0; 3], 2.0)).expect("triangles");
+        assert!(
+            (q.smallest_angle - 45.0).abs() < 1e-12 && (q.smallest_angle_p05 - 45.0).abs() < 1e-12
+        );
+        // Legs 1: the inscribed circle has radius 1 − 1/√2.
+        let aspect = 2f64.sqrt() / (12f64.sqrt() * (1.0 - 0.5f64.sqrt()));
+        assert!((q.largest_aspect - aspect).abs() < 1e-12);
+        assert_eq!(quality(&Mesh::default()), None);
+    }
+}

@@ -1,0 +1,259 @@
+//! First repairs: what is written twice, what has no area, corners and sides that just miss each other.
+
+use super::edges::{Sets, ends, halves, open};
+use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
+use crate::measure::BoxTree;
+use crate::mesh::Mesh;
+
+/// Corners of open edges join over at most this share of the mesh's diagonal: seams that exporters leave are far
+/// narrower, and holes that matter are wider.
+const SEAM: f64 = 1e-3;
+/// ... and over at most this share of the shortest edge at either corner, so that no triangle loses its shape.
+const OF_EDGE: f64 = 0.2;
+
+/// Whether a triangle's normal is lost in the rounding of its coordinates' differences.
+pub fn flat([a, b, c]: [Vec3; 3]) -> bool {
+    let (u, v) = (sub(b, a), sub(c, a));
+    norm(cross(u, v)) <= 4.0 * f64::EPSILON * norm(u) * norm(v)
+}
+
+/// Leaves out triangles without area; gives their number.
+pub fn drop_degenerate(mesh: &mut Mesh) -> usize {
+    let before = mesh.triangles.len();
+    let vertices = &mesh.vertices;
+    mesh.triangles.retain(|t| {
+        t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && !flat(t.map(|v| vertices[v as usize]))
+    });
+    before - mesh.triangles.len()
+}
+
+/// Leaves out triangles given more than once; gives their number.
+///
+/// Copies that face one way leave one. Copies that face both ways are either a wall drawn from both sides (one is
+/// left) or a partition between two bodies that meet there (none is left): a side of the wall has an odd number of
+/// other triangles, one of the partition an even number.
+pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
+    let sorted = |t: &[u32; 3]| {
+        let mut s = *t;
+        s.sort_unstable();
+        s
+    };
+    let even = |t: [u32; 3]| {
+        let inversions = [(0, 1), (0, 2), (1, 2)]
+            .iter()
+            .filter(|(i, j)| t[*i] > t[*j]);
+        inversions.count() % 2 == 0
+    };
+    let mut all: Vec<([u32; 3], u32)> = (0..)
+        .zip(&mesh.triangles)
+        .map(|(i, t)| (sorted(t), i))
+        .collect();
+    all.sort_unstable();
+    if all.windows(2).all(|w| w[0].0 != w[1].0) {
+        return 0;
+    }
+    // Distinct triangles at each edge.
+    let distinct = Mesh {
+        vertices: Vec::new(),
+        triangles: all.chunk_by(|a, b| a.0 == b.0).map(|g| g[0].0).collect(),
+    };
+    let edges = halves(&distinct);
+    let others = |a: u32, b: u32| {
+        let key = u64::from(a) << 32 | u64::from(b);
+        let first = edges.partition_point(|e| e.0 < key);
+        edges[first..].iter().take_while(|e| e.0 == key).count() - 1
+    };
+    let mut keep = vec![true; mesh.triangles.len()];
+    for group in all.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+        group.iter().for_each(|(_, i)| keep[*i as usize] = false);
+        let ups = group
+            .iter()
+            .filter(|(_, i)| even(mesh.triangles[*i as usize]))
+            .count();
+        let downs = group.len() - ups;
+        let [a, b, c] = group[0].0;
+        let odd = [others(a, b), others(b, c), others(a, c)]
+            .iter()
+            .filter(|n| *n % 2 == 1)
+            .count();
+        if ups == 0 || downs == 0 || group.len() % 2 == 1 || odd >= 2 {
+            let more = ups >= downs;
+            let first = group
+                .iter()
+                .find(|(_, i)| even(mesh.triangles[*i as usize]) == more);
+            if let Some((_, i)) = first {
+                keep[*i as usize] = true;
+            }
+        }
+    }
+    let before = mesh.triangles.len();
+    let mut kept = keep.iter();
+    mesh.triangles.retain(|_| *kept.next().unwrap_or(&true));
+    before - mesh.triangles.len()
+}
+
+/// Joins corners of open edges that lie close together, at their mean; gives the number of corners that went.
+pub fn join_seams(mesh: &mut Mesh) -> usize {
+    let open_before = open(mesh);
+    if open_before.is_empty() {
+        return 0;
+    }
+    let mut shortest = vec![f64::INFINITY; mesh.vertices.len()];
+    for t in &mesh.triangles {
+        for k in 0..3 {
+            let (a, b) = (t[k] as usize, t[(k + 1) % 3] as usize);
+            let d = norm(sub(mesh.vertices[a], mesh.vertices[b]));
+            shortest[a] = shortest[a].min(d);
+            shortest[b] = shortest[b].min(d);
+        }
+    }
+    let reach = SEAM * norm(mesh.bounds().size());
+    let allowed = |v: u32| reach.min(OF_EDGE * shortest[v as usize]);
+    let mut rim: Vec<u32> = open_before.iter().flat_map(|h| ends(mesh, *h)).collect();
+    rim.sort_unstable();
+    rim.dedup();
+    let boxes: Vec<Aabb> = rim
+        .iter()
+        .map(|v| {
+            Aabb::EMPTY
+                .with(mesh.vertices[*v as usize])
+                .grown(allowed(*v) / 2.0)
+        })
+        .collect();
+    let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
+    near(&boxes, &boxes, |i, j| {
+        if i < j {
+            let (a, b) = (rim[i], rim[j]);
+            let d = norm(sub(mesh.vertices[a as usize], mesh.vertices[b as usize]));
+            if d <= allowed(a).min(allowed(b)) {
+                pairs.push((d, a, b));
+            }
+        }
+    });
+    pairs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut sets = Sets::new(mesh.vertices.len());
+    for (_, a, b) in &pairs {
+        sets.join(*a, *b);
+    }
+    let mut sum = vec![([0.0; 3], 0usize); mesh.vertices.len()];
+    for &v in &rim {
+        let s = &mut sum[sets.root(v) as usize];
+        *s = (add(s.0, mesh.vertices[v as usize]), s.1 + 1);
+    }
+    let mut joined = mesh.clone();
+    for t in &mut joined.triangles {
+        *t = t.map(|v| sets.root(v));
+    }
+    for (v, (s, n)) in joined
+        .vertices
+        .iter_mut()
+        .zip(&sum)
+        .filter(|(_, s)| s.1 > 1)
+    {
+        *v = scale(*s, 1.0 / *n as f64);
+    }
+    drop_degenerate(&mut joined);
+    if open(&joined).len() >= open_before.len() {
+        return 0;
+    }
+    *mesh = joined;
+    sum.iter().map(|s| s.1.saturating_sub(1)).sum()
+}
+
+/// Calls `f` with every pair of boxes, one of each list, that touch.
+fn near(a: &[Aabb], b: &[Aabb], mut f: impl FnMut(usize, usize)) {
+    let mut order: Vec<u32> = (0..b.len() as u32).collect();
+    let Some(tree) = BoxTree::build(b, &mut order) else {
+        return;
+    };
+    for (i, box_) in a.iter().enumerate() {
+        tree.visit(box_, &mut |range| {
+            for &j in &order[range] {
+                f(i, j as usize);
+            }
+        });
+    }
+}
+
+/// Splits open edges at corners of other open edges that lie on them to within `tolerance` (mm): where a long side
+/// meets two short ones there is no hole but a corner that one of the triangles does not know. Gives their number.
+pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
+    let sides = open(mesh);
+    let mut rim: Vec<u32> = sides.iter().flat_map(|h| ends(mesh, *h)).collect();
+    rim.sort_unstable();
+    rim.dedup();
+    let at = |v: u32| mesh.vertices[v as usize];
+    let points: Vec<Aabb> = rim.iter().map(|v| Aabb::EMPTY.with(at(*v))).collect();
+    let boxes: Vec<Aabb> = sides
+        .iter()
+        .map(|h| {
+            let [a, b] = ends(mesh, *h);
+            Aabb::EMPTY.with(at(a)).with(at(b)).grown(tolerance)
+        })
+        .collect();
+    // Side, place along it, corner.
+    let mut found: Vec<(u32, f64, u32)> = Vec::new();
+    near(&boxes, &points, |i, j| {
+        let ([a, b], v) = (ends(mesh, sides[i]), rim[j]);
+        if mesh.triangles[sides[i] as usize / 3].contains(&v) {
+            return;
+        }
+        let (u, w) = (sub(at(b), at(a)), sub(at(v), at(a)));
+        let t = dot(u, w) / dot(u, u);
+        let off = norm(sub(w, scale(u, t)));
+        let length = norm(u);
+        if off <= tolerance && t * length > tolerance && (1.0 - t) * length > tolerance {
+            found.push((sides[i], t, v));
+        }
+    });
+    found.sort_unstable_by(|a, b| {
+        (a.0)
+            .cmp(&b.0)
+            .then(a.1.total_cmp(&b.1))
+            .then(a.2.cmp(&b.2))
+    });
+    let mut done = 0;
+    let mut changed: Vec<(usize, [Vec<u32>; 3])> = Vec::new();
+    for side in found.chunk_by(|a, b| a.0 == b.0) {
+        let (t, k) = (side[0].0 as usize / 3, side[0].0 as usize % 3);
+        if changed.last().is_none_or(|c| c.0 != t) {
+            changed.push((t, Default::default()));
+        }
+        if let Some(c) = changed.last_mut() {
+            c.1[k] = side.iter().map(|s| s.2).collect();
+            done += side.len();
+        }
+    }
+    for (t, lists) in changed {
+        let mut pieces = Vec::new();
+        pieces_of(mesh.triangles[t], lists, &mut pieces);
+        mesh.triangles[t] = pieces[0];
+        mesh.triangles.extend(&pieces[1..]);
+    }
+    done
+}
+
+/// The triangles of a triangle with corners on its sides.
+fn pieces_of(t: [u32; 3], lists: [Vec<u32>; 3], out: &mut Vec<[u32; 3]>) {
+    let mut work = vec![(t, lists)];
+    while let Some((t, mut lists)) = work.pop() {
+        let k = (1..3).fold(0, |m, k| {
+            if lists[k].len() > lists[m].len() {
+                k
+            } else {
+                m
+            }
+        });
+        if lists[k].is_empty() {
+            out.push(t);
+            continue;
+        }
+        let [a, b, c] = [0, 1, 2].map(|i| t[(k + i) % 3]);
+        let middle = lists[k].len() / 2;
+        let after = lists[k].split_off(middle + 1);
+        let m = lists[k].pop().unwrap_or(a);
+        let [before, bc, ca] = [0, 1, 2].map(|i| core::mem::take(&mut lists[(k + i) % 3]));
+        work.push(([m, b, c], [after, bc, Vec::new()]));
+        work.push(([a, m, c], [before, Vec::new(), ca]));
+    }
+}

@@ -1,0 +1,216 @@
+//! Which triangle lies across which side: half-edges of a closed mesh, and the collapse of an edge among them.
+//!
+//! Half-edge 3t + k runs from corner k of triangle t to the next one.
+
+/// No half-edge, no vertex.
+pub const NONE: u32 = u32::MAX;
+
+/// The half-edge that follows in its triangle.
+#[inline]
+pub fn next(h: u32) -> u32 {
+    if h % 3 == 2 { h - 2 } else { h + 1 }
+}
+
+/// The half-edge that precedes in its triangle.
+#[inline]
+pub fn prev(h: u32) -> u32 {
+    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
+}
+
+/// Triangles of a closed, oriented, manifold mesh, linked across their sides. A triangle that is gone has the corners
+/// [`NONE`].
+pub struct Links {
+    /// Corners of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// The other half-edge of each edge.
+    twin: Vec<u32>,
+    /// A half-edge that leaves each vertex, or [`NONE`].
+    out: Vec<u32>,
+}
+
+impl Links {
+    /// Links the triangles of `n` vertices; `None` if an edge has not exactly two triangles of opposite direction.
+    pub fn new(triangles: Vec<[u32; 3]>, n: usize) -> Option<Links> {
+        let origin = |h: usize| triangles[h / 3][h % 3];
+        // Half-edges by their origin; a twin is found among those that leave its end.
+        let mut start = vec![0u32; n + 1];
+        for &v in triangles.iter().flatten() {
+            start[v as usize + 1] += 1;
+        }
+        for v in 0..n {
+            start[v + 1] += start[v];
+        }
+        let sides = 3 * triangles.len();
+        let mut next_free = start.clone();
+        let mut leaving = vec![0u32; sides];
+        for h in 0..sides {
+            let place = &mut next_free[origin(h) as usize];
+            leaving[*place as usize] = h as u32;
+            *place += 1;
+        }
+        let mut twin = vec![NONE; sides];
+        for h in 0..sides {
+            let (a, b) = (origin(h), origin(next(h as u32) as usize));
+            let from = start[b as usize] as usize..start[b as usize + 1] as usize;
+            let mut back = leaving[from]
+                .iter()
+                .filter(|g| origin(next(**g) as usize) == a);
+            twin[h] = *back.next()?;
+            if a == b || back.next().is_some() {
+                return None;
+            }
+        }
+        let whole = (0..sides).all(|h| twin[twin[h] as usize] == h as u32);
+        let out = (0..n)
+            .map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE))
+            .collect();
+        whole.then_some(Links {
+            triangles,
+            twin,
+            out,
+        })
+    }
+
+    /// The vertex that `h` leaves.
+    #[inline]
+    pub fn from(&self, h: u32) -> u32 {
+        self.triangles[(h / 3) as usize][(h % 3) as usize]
+    }
+
+    /// The vertex that `h` leads to.
+    #[inline]
+    pub fn to(&self, h: u32) -> u32 {
+        self.from(next(h))
+    }
+
+    /// The same edge the other way.
+    #[inline]
+    pub fn twin(&self, h: u32) -> u32 {
+        self.twin[h as usize]
+    }
+
+    /// Whether the triangle of `h` is still there.
+    #[inline]
+    pub fn is_live(&self, h: u32) -> bool {
+        self.from(h) != NONE
+    }
+
+    /// The next half-edge counter-clockwise that leaves the same vertex.
+    #[inline]
+    pub fn turned(&self, h: u32) -> u32 {
+        self.twin(prev(h))
+    }
+
+    /// The half-edges that leave `v`, counter-clockwise.
+    pub fn leaving(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = self.out[v as usize];
+        let mut now = first;
+        core::iter::from_fn(move || {
+            let h = now;
+            if h == NONE {
+                return None;
+            }
+            now = self.turned(h);
+            if now == first {
+                now = NONE;
+            }
+            Some(h)
+        })
+    }
+
+    /// Takes away the edge `h` and its two triangles: its ends become the vertex that `h` leaves.
+    ///
+    /// The caller has seen to it that the ends have no common neighbours but the two opposite corners, and that neither
+    /// of these has three triangles.
+    pub fn collapse(&mut self, h: u32) {
+        let g = self.twin(h);
+        let (u, v) = (self.from(h), self.from(g));
+        let (x, y) = (self.from(prev(h)), self.from(prev(g)));
+        let around: [u32; 4] = [next(h), prev(h), next(g), prev(g)].map(|e| self.twin(e));
+        let mut e = self.turned(g);
+        while e != g {
+            self.triangles[(e / 3) as usize][(e % 3) as usize] = u;
+            e = self.turned(e);
+        }
+        self.join(around[0], around[1]);
+        self.join(around[2], around[3]);
+        self.out[u as usize] = around[1];
+        self.out[x as usize] = around[0];
+        self.out[y as usize] = around[2];
+        self.out[v as usize] = NONE;
+        for t in [h / 3, g / 3] {
+            self.triangles[t as usize] = [NONE; 3];
+        }
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        self.twin[a as usize] = b;
+        self.twin[b as usize] = a;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An octahedron: 0 and 5 are the poles.
+    fn octahedron() -> Vec<[u32; 3]> {
+        let ring = [1, 2, 3, 4];
+        (0..4)
+            .flat_map(|i| {
+                let (a, b) = (ring[i], ring[(i + 1) % 4]);
+                [[0, a, b], [5, b, a]]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn fans_go_round() {
+        let links = Links::new(octahedron(), 6).expect("closed");
+        for v in 0..6 {
+            let ends: Vec<u32> = links.leaving(v).map(|h| links.to(h)).collect();
+            assert_eq!(ends.len(), 4);
+            for (i, h) in links.leaving(v).enumerate() {
+                assert_eq!((links.from(h), links.twin(links.twin(h))), (v, h));
+                assert_eq!(links.from(prev(h)), ends[(i + 1) % 4]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_collapse_leaves_a_closed_mesh() {
+        for h in 0..24 {
+            let mut links = Links::new(octahedron(), 6).expect("closed");
+            links.collapse(h);
+            let left: Vec<[u32; 3]> = links
+                .triangles
+                .iter()
+                .copied()
+                .filter(|t| t[0] != NONE)
+                .collect();
+            assert_eq!(left.len(), 6);
+            let fresh = Links::new(left, 6).expect("closed");
+            for v in (0..6).filter(|v| links.out[*v as usize] != NONE) {
+                let count = |l: &Links| {
+                    let mut ends: Vec<u32> = l.leaving(v).map(|h| l.to(h)).collect();
+                    ends.sort_unstable();
+                    ends
+                };
+                assert_eq!(count(&links), count(&fresh));
+            }
+        }
+    }
+
+    #[test]
+    fn open_crowded_and_flipped_meshes_are_refused() {
+        let mut open = octahedron();
+        open.pop();
+        let mut flipped = octahedron();
+        flipped[0].swap(0, 1);
+        let mut twice = octahedron();
+        twice.push([0, 1, 2]);
+        for t in [open, flipped, twice] {
+            assert!(Links::new(t, 6).is_none());
+        }
+    }
+}

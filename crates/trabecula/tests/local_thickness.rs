@@ -1,0 +1,270 @@
+//! Local thickness of shapes where it is known in closed form, and the rate at which its error falls.
+
+use std::sync::Arc;
+
+use trabecula::cell::{Cell, Part, Series, named};
+use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
+use trabecula::grade::Grade;
+use trabecula::lattice::{Lattice, Level};
+use trabecula::map::{Affine, Map};
+use trabecula::math::{Vec3, apply, rotation};
+use trabecula::measure::{Spread, size, thickness, usual_step, voxels_for};
+use trabecula::mesh::Mesh;
+use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
+use trabecula::solid::Solid;
+
+fn bare(mesh: Mesh) -> Surface {
+    Surface {
+        cut: vec![false; mesh.triangles.len()],
+        mesh,
+    }
+}
+
+fn wall(mesh: Mesh, step: f64) -> Spread {
+    thickness(&bare(mesh), None, step, &Silent)
+        .expect("thickness")
+        .wall
+}
+
+/// A box as twelve triangles.
+fn block(min: Vec3, size: Vec3) -> Mesh {
+    let corner = |i: usize| core::array::from_fn(|a| min[a] + size[a] * (i >> a & 1) as f64);
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    Mesh {
+        vertices: (0..8).map(corner).collect(),
+        triangles: quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .collect(),
+    }
+}
+
+fn turned(mut mesh: Mesh, degrees: Vec3) -> Mesh {
+    let by = rotation(degrees);
+    mesh.vertices.iter_mut().for_each(|v| *v = apply(&by, *v));
+    mesh
+}
+
+fn full(region: Region, edge: f64) -> Surface {
+    let solid = Solid {
+        filled: Vec::new(),
+        region,
+        field: None,
+        wavelength: 1.0,
+    };
+    surface(&solid, edge, &Silent).expect("surface")
+}
+
+fn ball(center: Vec3, radius: f64) -> Sphere {
+    Sphere::new(center, radius).expect("ball")
+}
+
+/// A cube of gyroid, cells of 4 mm.
+fn gyroid(part: Part, fraction: f64, edge: f64) -> (Surface, Region) {
+    let cell = Cell::new(Series::new(named("gyroid").expect("gyroid").terms()).expect("series"));
+    let map = Affine::rigid([4.0; 3], [0.0; 3], [0.0; 3], &[]).expect("map");
+    let level = Level::Fraction(Grade::Constant(fraction));
+    let field = Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level));
+    let region: Region = Arc::new(Cuboid::new([0.0; 3], [8.0; 3]).expect("box"));
+    let solid = Solid {
+        filled: Vec::new(),
+        region: region.clone(),
+        field: Some(field),
+        wavelength: 4.0,
+    };
+    (surface(&solid, edge, &Silent).expect("surface"), region)
+}
+
+#[test]
+fn slabs_have_their_thickness_however_they_lie() {
+    for degrees in [[0.0; 3], [20.0, 33.0, 47.0], [0.0, 45.0, 0.0]] {
+        for step in [0.4, 0.2, 0.1] {
+            let s = wall(turned(block([0.1; 3], [20.0, 20.0, 1.03]), degrees), step);
+            for found in [s.min, s.p05, s.max] {
+                // Planes are exact but for the rounding of single precision; balls touch to a fiftieth of a step.
+                assert!(
+                    (found - 1.03).abs() < 0.02 * step,
+                    "{degrees:?} {step}: {s:?}"
+                );
+            }
+            // Less than the whole only by what no ball reaches at the rim.
+            assert!(s.mean > 0.98 * 1.03 && s.mean <= s.max, "{s:?}");
+            assert!((s.share.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn spheres_and_cylinders_have_their_diameter() {
+    let sphere = full(Arc::new(ball([0.0; 3], 1.5)), 0.04).mesh;
+    let rod = Cylinder::new([0.0; 3], [0.3, 0.2, 1.0], 0.7, 6.0).expect("cylinder");
+    let rod = full(Arc::new(rod), 0.04).mesh;
+    for step in [0.2, 0.1] {
+        let s = wall(sphere.clone(), step);
+        for found in [s.min, s.p05, s.mean, s.max] {
+            assert!((found - 3.0).abs() < 0.05 * step, "{step}: {s:?}");
+        }
+        let s = wall(rod.clone(), step);
+        for found in [s.min, s.max] {
+            assert!((found - 1.4).abs() < 0.15 * step, "{step}: {s:?}");
+        }
+    }
+}
+
+#[test]
+fn two_slabs_have_two_peaks() {
+    let mut two = block([0.0; 3], [20.0, 20.0, 1.0]);
+    let other = block([0.0, 0.0, 3.0], [20.0, 20.0, 2.0]);
+    two.vertices.extend(other.vertices);
+    two.triangles
+        .extend(other.triangles.iter().map(|t| t.map(|v| v + 8)));
+    let s = wall(two, 0.2);
+    assert!(
+        (s.min - 1.0).abs() < 0.01 && (s.max - 2.0).abs() < 0.01,
+        "{s:?}"
+    );
+    let within = |low: f64, high: f64| {
+        let bars = s.edges.windows(2).zip(&s.share);
+        bars.filter(|(e, _)| e[0] >= low && e[1] <= high)
+            .map(|(_, share)| share)
+            .sum::<f64>()
+    };
+    // A third of the volume and two thirds, less what lies at the rims.
+    assert!((within(0.9, 1.1) - 1.0 / 3.0).abs() < 0.03, "{s:?}");
+    assert!((within(1.9, 2.1) - 2.0 / 3.0).abs() < 0.05, "{s:?}");
+}
+
+#[test]
+fn a_shell_and_the_ball_in_it() {
+    let region: Region = Arc::new(ball([0.0; 3], 3.0));
+    let shell: Region = Arc::new(
+        Difference::new(vec![region.clone(), Arc::new(ball([0.0; 3], 2.0))]).expect("shell"),
+    );
+    let made = full(shell, 0.08);
+    let t = thickness(&made, Some(&region), 0.15, &Silent).expect("thickness");
+    let pore = t.pore.expect("pore");
+    for found in [t.wall.min, t.wall.p05, t.wall.mean, t.wall.max] {
+        assert!((found - 1.0).abs() < t.accuracy, "{:?}", t.wall);
+    }
+    for found in [pore.min, pore.p05, pore.mean, pore.max] {
+        assert!((found - 4.0).abs() < t.accuracy, "{pore:?}");
+    }
+}
+
+#[test]
+fn turning_and_moving_change_nothing() {
+    let (made, _) = gyroid(Part::Sheet, 0.3, 0.1);
+    let still = wall(made.mesh.clone(), 0.08);
+    let mut moved = turned(made.mesh, [15.0, 40.0, 65.0]);
+    moved
+        .vertices
+        .iter_mut()
+        .flatten()
+        .for_each(|x| *x += 0.0317);
+    let moved = wall(moved, 0.08);
+    for (a, b) in [
+        (still.mean, moved.mean),
+        (still.sd, moved.sd),
+        (still.max, moved.max),
+    ] {
+        assert!((a - b).abs() < 0.15 * 0.08, "{still:?} {moved:?}");
+    }
+}
+
+#[test]
+fn errors_fall_with_the_step() {
+    let (made, region) = gyroid(Part::Sheet, 0.3, 4.0 / 48.0);
+    let mean = |step| {
+        let t = thickness(&made, Some(&region), step, &Silent).expect("thickness");
+        [t.wall.mean, t.pore.expect("pores").mean]
+    };
+    let [a, b, c] = [0.16, 0.08, 0.04].map(mean);
+    for k in 0..2 {
+        // Of an error C·h^p, differences fall by 2^p. Measured: 2.2 and more.
+        let rate = (b[k] - a[k]).abs() / (c[k] - b[k]).abs();
+        assert!(rate > 1.8, "{rate} {a:?} {b:?} {c:?}");
+        assert!((b[k] - c[k]).abs() < 0.15 * 0.08, "{a:?} {b:?} {c:?}");
+    }
+}
+
+#[test]
+fn a_thin_sheet_is_as_thick_as_its_volume_over_half_its_area() {
+    let (made, region) = gyroid(Part::Sheet, 0.1, 4.0 / 48.0);
+    let t = thickness(&made, Some(&region), 0.04, &Silent).expect("thickness");
+    let cut = made.cut.iter().enumerate().filter(|c| *c.1);
+    let area = made.mesh.area() - cut.map(|(i, _)| triangle(&made.mesh, i)).sum::<f64>();
+    let expected = size(&made.mesh).volume / (area / 2.0);
+    assert!(
+        (t.wall.mean - expected).abs() < t.accuracy,
+        "{} {expected}",
+        t.wall.mean
+    );
+}
+
+fn triangle(mesh: &Mesh, i: usize) -> f64 {
+    let one = Mesh {
+        vertices: mesh.corners(i).to_vec(),
+        triangles: vec![[0, 1, 2]],
+    };
+    one.area()
+}
+
+#[test]
+fn the_same_for_any_number_of_threads() {
+    let (made, region) = gyroid(Part::Upper, 0.3, 0.2);
+    let on = |n| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .expect("pool");
+        pool.install(|| thickness(&made, Some(&region), 0.15, &Silent).expect("thickness"))
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn refused_with_reasons() {
+    let refused = |mesh: Mesh, step: f64| match thickness(&bare(mesh), None, step, &Silent) {
+        Err(Stopped::Refused(fault)) => fault.to_string(),
+        other => panic!("{other:?}"),
+    };
+    let good = block([0.0; 3], [1.0; 3]);
+    for step in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(refused(good.clone(), step).contains("greater than 0"));
+    }
+    assert!(refused(good.clone(), 1e-5).contains("use a step above"));
+    let thin = block([0.2; 3], [10.0, 10.0, 0.01]);
+    assert!(voxels_for(&bare(thin), None, 0.5).is_ok());
+    let mut open = good.clone();
+    open.triangles.pop();
+    assert!(refused(open, 0.1).contains("not closed"));
+    let mut inverted = good.clone();
+    inverted.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    assert!(refused(inverted, 0.1).contains("inside out"));
+    assert!(refused(Mesh::default(), 0.1).contains("empty"));
+    let step = usual_step(&bare(good), None);
+    assert!(step > 0.0 && step < 0.1);
+}
+
+#[test]
+fn it_can_be_stopped() {
+    struct Stop;
+    impl Progress for Stop {
+        fn step(&self, done: u64, total: u64) -> bool {
+            assert!(done <= total);
+            done < 5
+        }
+    }
+    let made = bare(block([0.0; 3], [1.0; 3]));
+    assert!(matches!(
+        thickness(&made, None, 0.05, &Stop),
+        Err(Stopped::Interrupted)
+    ));
+}

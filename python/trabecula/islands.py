@@ -1,0 +1,29 @@
+"""Pieces beside the largest: what is to become of them, and what is said of them."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Literal, get_args
+
+from .errors import DesignWarning
+
+__all__ = ["Islands", "check_islands", "left_out", "warn_islands"]
+
+Islands = Literal["keep", "drop", "error"]
+
+
+def check_islands(islands: object) -> None:
+    """Refuses what is no word for it, before any work is done."""
+    if not (isinstance(islands, str) and islands in get_args(Islands)):
+        raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+
+
+def left_out(islands: dict) -> float:
+    """Volume of what was dropped, mm³."""
+    return islands["volume"] if islands["dropped"] else 0.0
+
+
+def warn_islands(islands: dict, words: str) -> None:
+    """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
+    if islands["found"] > islands["dropped"]:
+        warnings.warn(f'the result is not in one piece: {words}; islands = "drop" leaves them out', DesignWarning, stacklevel=3)

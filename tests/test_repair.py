@@ -1,0 +1,75 @@
+"""Broken meshes as regions: repaired with a warning, or refused with counts."""
+
+import json
+
+import numpy as np
+import pytest
+import trabecula as lt
+
+CORNERS = np.array([[x, y, z] for x in (0, 8) for y in (0, 8) for z in (0, 8)], dtype=float)
+FACES = [
+    *[[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]],
+    *[[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]],
+]
+
+
+def design(folder, vertices, faces, wavelength=4, **keys):
+    """A gyroid in the mesh of these triangles."""
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    (folder / "part.obj").write_text("\n".join(lines))
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=wavelength), level=lt.level.fraction(0.3))
+    return lt.Design(region=lt.region.mesh("part.obj", **keys), lattice={"core": core}, folder=str(folder))
+
+
+def volume(solid):
+    return solid.report()["region"]["volume"]
+
+
+def test_a_clean_mesh_has_nothing_to_tell(tmp_path):
+    solid = design(tmp_path, CORNERS, FACES, repair="refuse").build()
+    assert volume(solid) == pytest.approx(512, rel=1e-14)
+    assert not any(solid.repairs["region.mesh"].values())
+    assert solid.warnings == []
+
+
+@pytest.mark.parametrize(
+    ("faces", "key", "count", "words"),
+    [
+        (FACES[1:], "holes", 1, "1 hole capped"),
+        ([FACES[0][::-1], *FACES[1:]], "turned", 1, "1 flipped triangle"),
+        ([*FACES, FACES[4]], "duplicates", 1, "1 duplicate"),
+        ([f[::-1] for f in FACES], "bodies_turned", 1, "inside out"),
+    ],
+)
+def test_damage_is_repaired_and_told(tmp_path, faces, key, count, words):
+    built = design(tmp_path, CORNERS, faces)
+    solid = built.build()
+    assert volume(solid) == pytest.approx(512, rel=1e-12)
+    assert solid.repairs["region.mesh"][key] == count
+    [warning] = [w for w in solid.warnings if w["path"] == "region.mesh"]
+    assert words in warning["message"]
+    assert warning in json.loads(json.dumps(solid.report()))["warnings"]
+    with pytest.raises(lt.DesignError) as e:
+        design(tmp_path, CORNERS, faces, repair="refuse").build()
+    assert e.value.path == "region.mesh.path"
+
+
+def test_overlapping_bodies_are_one(tmp_path):
+    both = np.vstack([CORNERS, CORNERS + np.array([4, 1, 2])])
+    solid = design(tmp_path, both, FACES + [[v + 8 for v in f] for f in FACES]).build()
+    assert volume(solid) == pytest.approx(2 * 512 - 4 * 7 * 6, rel=1e-9)
+    assert solid.repairs["region.mesh"]["crossings"] > 0
+    mesh = solid.mesh(edge=0.5)
+    assert mesh.closed
+
+
+def test_a_soup_is_refused_with_its_share(tmp_path):
+    points = np.random.default_rng(3).uniform(0, 10, (60, 3))
+    with pytest.raises(lt.DesignError, match=r"20 holes .* 50.0 %"):
+        design(tmp_path, points, np.arange(60).reshape(20, 3)).build()
+
+
+def test_metres_are_asked_about(tmp_path):
+    small = design(tmp_path, CORNERS / 1000, FACES, wavelength=0.004).build()
+    assert any("metre" in w["message"] and w["path"] == "region.mesh" for w in small.warnings)
+    assert not any("unit" in w["message"] for w in design(tmp_path, CORNERS / 1000, FACES, unit="m").build().warnings)
