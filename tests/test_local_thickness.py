@@ -124,9 +124,9 @@ def test_the_command(cube, tmp_path):
     """New keys beside the old ones; a picture of two histograms."""
     words = ("measure", cube, "--per-cell", "20", "--thickness", "--step", "0.15", "--json", "--histogram", "out.png")
     figures = json.loads(run(*words, cwd=tmp_path).stdout)
-    assert list(figures)[:11] == [
+    assert list(figures)[:12] == [
         *("volume", "area", "area_lattice", "area_cut", "solid_fraction", "porosity", "euler", "pieces"),
-        *("cavities", "closed", "bounds"),
+        *("cavities", "voids", "closed", "bounds"),
     ]
     assert figures["wall_thickness"]["step"] == figures["pore_size"]["step"] == 0.15
     assert figures["self_intersections"] == 0 and figures["defects"] == []

@@ -163,6 +163,8 @@ def measure(args) -> None:
     """``trabecula measure``."""
     if not args.thickness and (args.step is not None or args.histogram is not None):
         raise Refused("--step and --histogram belong to --thickness; add it")
+    if args.region is not None and not os.path.exists(args.region):
+        raise Refused(f"{args.region} does not exist")
     if args.histogram is not None:
         check_place(args.histogram)
         keep_measured(args)

@@ -161,14 +161,39 @@ impl Grid {
         for (f, p) in planes {
             laid[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
-        Ok(Grid {
+        let grid = Grid {
             axes,
             margin: needed.max(1.0 / 4096.0),
             step: edge,
             faces,
             tree,
             laid,
-        })
+        };
+        grid.few_enough().map(|()| grid)
+    }
+
+    /// Refuses a solid with more faces in some tile than a word has bits.
+    fn few_enough(&self) -> Result<(), Fault> {
+        const MOST_FACES: usize = 64;
+        if self.faces.len() <= MOST_FACES {
+            return Ok(());
+        }
+        let count = |i: usize| {
+            let tile = self.tile(i);
+            let local = self.local(&self.nodes(tile), &self.block(tile).bounds());
+            local.map_or(0, |l| l.live.len())
+        };
+        let most = (0..self.tiles().iter().product()).map(count).max();
+        match most {
+            Some(n) if n > MOST_FACES => Err(Fault::new(
+                "edge",
+                format!(
+                    "{n} smooth faces meet in a block of {TILE} grid steps, and {MOST_FACES} are possible; \
+                     use a smaller edge, or a mesh for the region"
+                ),
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Number of cells along each axis.
