@@ -382,7 +382,9 @@ def surface(args):
     """The mesh of a design or a mesh file."""
     if kind_of(args.file) in DESIGNS:
         solid = build(args.file)
-        with Progress("meshing", args.progress) as progress:
+        with Progress("meshing", args.progress) as progress, warnings.catch_warnings():
+            # Measures count the pieces and a picture shows them; nothing is made that somebody would print.
+            warnings.filterwarnings("ignore", "the result is not in one piece", DesignWarning)
             return solid.mesh(threads=args.threads, progress=progress, **resolved(args))
     if args.edge is not None or args.per_cell is not None:
         raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
