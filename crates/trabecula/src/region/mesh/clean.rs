@@ -1,5 +1,7 @@
 //! First repairs: what is written twice, what has no area, corners and sides that just miss each other.
 
+use std::collections::HashSet;
+
 use super::edges::{Sets, ends, halves, open};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use crate::measure::BoxTree;
@@ -29,9 +31,10 @@ pub fn drop_degenerate(mesh: &mut Mesh) -> usize {
 
 /// Leaves out triangles given more than once; gives their number.
 ///
-/// Copies that face one way leave one. Copies that face both ways are either a wall drawn from both sides (one is
-/// left) or a partition between two bodies that meet there (none is left): a side of the wall has an odd number of
-/// other triangles, one of the partition an even number.
+/// Copies that face one way leave one, unless they are where two bodies have the same surface: each needs its own
+/// there. Copies that face both ways are either a wall drawn from both sides (one is left) or a partition between two
+/// bodies that meet there (none is left): a side of the wall has an odd number of other triangles, one of the
+/// partition an even number.
 pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     let sorted = |t: &[u32; 3]| {
         let mut s = *t;
@@ -63,8 +66,12 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         let first = edges.partition_point(|e| e.0 < key);
         edges[first..].iter().take_while(|e| e.0 == key).count() - 1
     };
+    let of_two_bodies = of_two_bodies(mesh, &all);
     let mut keep = vec![true; mesh.triangles.len()];
     for group in all.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+        if of_two_bodies.contains(&group[0].0) {
+            continue;
+        }
         group.iter().for_each(|(_, i)| keep[*i as usize] = false);
         let ups = group
             .iter()
@@ -90,6 +97,50 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     let mut kept = keep.iter();
     mesh.triangles.retain(|_| *kept.next().unwrap_or(&true));
     before - mesh.triangles.len()
+}
+
+/// Of the triangles that are there twice, facing one way, those that two bodies have in common.
+///
+/// A patch of them has edges along its rim with an even number of triangles where both copies go on, each in its own
+/// body, and with an odd number where a copy just ends. `all`: the triangles by their corners, and their numbers.
+fn of_two_bodies(mesh: &Mesh, all: &[([u32; 3], u32)]) -> HashSet<[u32; 3]> {
+    let turned = |t: [u32; 3]| {
+        let first = (0..3).fold(0, |m, k| if t[k] < t[m] { k } else { m });
+        t[(first + 1) % 3] > t[(first + 2) % 3]
+    };
+    let alike = |g: &[([u32; 3], u32)]| {
+        let [a, b] = [g[0].1, g[1].1].map(|i| turned(mesh.triangles[i as usize]));
+        a == b
+    };
+    let pairs: Vec<[u32; 3]> = all
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|g| g.len() == 2 && alike(g))
+        .map(|g| g[0].0)
+        .collect();
+    let patches = Mesh {
+        vertices: Vec::new(),
+        triangles: pairs,
+    };
+    let every = halves(mesh);
+    let (sides, mut sets) = (halves(&patches), Sets::new(patches.triangles.len()));
+    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+        for other in &edge[1..] {
+            sets.join(edge[0].1 / 3, other.1 / 3);
+        }
+    }
+    // Along each patch's rim, edges at which both copies go on less those at which one ends.
+    let mut votes = vec![0i64; patches.triangles.len()];
+    for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
+        let first = every.partition_point(|e| e.0 < edge[0].0);
+        let count = every[first..]
+            .iter()
+            .take_while(|e| e.0 == edge[0].0)
+            .count();
+        let vote = if count % 2 == 0 { 1 } else { -1 };
+        votes[sets.root(edge[0].1 / 3) as usize] += vote;
+    }
+    let found = (0..patches.triangles.len()).filter(|i| votes[sets.root(*i as u32) as usize] > 0);
+    found.map(|i| patches.triangles[i]).collect()
 }
 
 /// Joins corners of open edges that lie close together, at their mean; gives the number of corners that went.
