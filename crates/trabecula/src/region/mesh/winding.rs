@@ -15,10 +15,7 @@ use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Solid angle of a triangle seen from `p`, over 4π: positive where the normal points away from `p`.
 pub fn turn(corners: [Vec3; 3], p: Vec3) -> f64 {
-    let [a, b, c] = corners.map(|q| sub(q, p));
-    let (la, lb, lc) = (norm(a), norm(b), norm(c));
-    let above = dot(a, cross(b, c));
-    let below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    let [above, below] = sides(corners, p);
     // On the triangle itself the two sides cancel: the mean is taken.
     if above == 0.0 {
         return 0.0;
@@ -26,12 +23,60 @@ pub fn turn(corners: [Vec3; 3], p: Vec3) -> f64 {
     above.atan2(below) / (2.0 * PI)
 }
 
+/// Half the solid angle of a triangle is the angle of a complex number: its imaginary and its real part.
+#[inline]
+fn sides(corners: [Vec3; 3], p: Vec3) -> [f64; 2] {
+    let [a, b, c] = corners.map(|q| sub(q, p));
+    let (la, lb, lc) = (norm(a), norm(b), norm(c));
+    let above = dot(a, cross(b, c));
+    let below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    [above, below]
+}
+
+/// A sum of angles below a half turn, as the angle of a product of complex numbers and the full turns it has made:
+/// one arc tangent for all.
+struct Angle {
+    re: f64,
+    im: f64,
+    full: i32,
+}
+
+impl Angle {
+    #[inline]
+    fn add(&mut self, [above, below]: [f64; 2]) {
+        if above == 0.0 {
+            return; // on the triangle: the mean of both sides
+        }
+        let im = self.re * above + self.im * below;
+        self.re = self.re * below - self.im * above;
+        // The way round, by less than half a turn, went through the negative half-axis.
+        if above > 0.0 && self.im >= 0.0 && im < 0.0 {
+            self.full += 1;
+        } else if above < 0.0 && self.im < 0.0 && im >= 0.0 {
+            self.full -= 1;
+        }
+        self.im = im;
+    }
+
+    /// Keeps the product from overflowing.
+    fn rescale(&mut self) {
+        let size = self.re.abs() + self.im.abs();
+        self.re /= size;
+        self.im /= size;
+    }
+
+    /// In turns.
+    fn turns(&self) -> f64 {
+        f64::from(self.full) + (self.im + 0.0).atan2(self.re) / (2.0 * PI)
+    }
+}
+
 /// Moments of a set of triangles about its middle: ∫ n, ∫ x n and ∫ x x n dA, folded to what the expansion needs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     center: Vec3,
-    /// Square of the distance from the middle to the farthest corner of the box.
-    square: f64,
+    /// Distance from the middle to the farthest corner.
+    radius: f64,
     normal: Vec3,
     /// Σᵢ ∫ xᵢ nᵢ.
     trace: f64,
@@ -58,10 +103,14 @@ impl Moments {
         } else {
             bounds.center()
         };
-        let far = [0, 1, 2].map(|k| (bounds.max[k] - center[k]).max(center[k] - bounds.min[k]));
+        let square = |p: &Vec3| {
+            let d = sub(*p, center);
+            dot(d, d)
+        };
+        let corners = faces.iter().flat_map(|f| &f.corners);
         let mut m = Moments {
             center,
-            square: dot(far, far),
+            radius: corners.map(square).fold(0.0, f64::max).sqrt(),
             ..Moments::default()
         };
         for f in faces {
@@ -107,35 +156,90 @@ impl Moments {
         m
     }
 
-    /// The expansion at r = middle − point, |r|² = `square`: K·∫n + ∂K:∫xn + ½ ∂∂K:∫xxn with K = r/(4π|r|³).
-    fn far(&self, r: Vec3, square: f64) -> f64 {
-        let [x, y, z] = r;
-        let inverse = 1.0 / square;
-        let cube = inverse * inverse.sqrt();
-        let f = &self.first;
-        let quadric = f[0] * x * x
-            + f[1] * y * y
-            + f[2] * z * z
-            + 2.0 * (f[3] * x * y + f[4] * y * z + f[5] * z * x);
-        let c = &self.cubic;
-        let cubic = x * x * (c[0] * x + c[3] * y + c[4] * z)
-            + y * y * (c[1] * y + c[5] * x + c[6] * z)
-            + z * z * (c[2] * z + c[7] * x + c[8] * y)
-            + c[9] * x * y * z;
-        let sum = dot(self.normal, r) + self.trace - 3.0 * quadric * inverse
-            + 0.5 * (-3.0 * dot(self.vector, r) + 15.0 * cubic * inverse) * inverse;
-        sum * cube / (4.0 * PI)
+    /// The numbers of the expansion where lengths are counted in radii, in the order in which it takes them.
+    fn in_radii(&self) -> [f32; TERMS] {
+        let per = 1.0 / self.radius;
+        let mut out = [0.0; TERMS];
+        let parts: [(&[f64], f64); 5] = [
+            (&self.normal, per.powi(2)),
+            (&[self.trace], per.powi(3)),
+            (&self.first, per.powi(3)),
+            (&self.vector, per.powi(4)),
+            (&self.cubic, per.powi(4)),
+        ];
+        let all = parts.iter().flat_map(|(v, by)| v.iter().map(move |x| x * by));
+        for (o, v) in out.iter_mut().zip(all) {
+            *o = v as f32;
+        }
+        out
     }
 }
 
-/// The moments of every node of a tree over oriented triangles.
+/// Numbers of an expansion.
+const TERMS: usize = 23;
+/// Children of a node. Their expansions are taken side by side.
+const WIDE: usize = 8;
+
+/// One number for each child.
+type Lanes = [f32; WIDE];
+
+/// Sets of triangles side by side.
+#[derive(Clone, Debug)]
+struct Node {
+    /// Their middles.
+    center: [[f64; WIDE]; 3],
+    /// One over their radii.
+    per: [f64; WIDE],
+    terms: [Lanes; TERMS],
+    /// The node that a set is parted into, or its first triangle if it is a leaf.
+    at: [u32; WIDE],
+    /// Triangles of a leaf; zero for a set that is parted, and where there is no set.
+    count: [u32; WIDE],
+    /// How many sets there are.
+    used: usize,
+}
+
+impl Node {
+    /// Squared distances of the middles in radii, and the expansions' values there:
+    /// K·∫n + ∂K:∫xn + ½ ∂∂K:∫xxn with K = r/(4π|r|³), r = middle − point.
+    ///
+    /// In single precision, for it is off by its fourth term anyhow.
+    #[inline]
+    fn far(&self, p: Vec3) -> (Lanes, Lanes) {
+        let (mut squares, mut sums) = ([0f32; WIDE], [0f32; WIDE]);
+        for k in 0..WIDE {
+            let [x, y, z] = [0, 1, 2].map(|a| ((self.center[a][k] - p[a]) * self.per[k]) as f32);
+            let t = |i: usize| self.terms[i][k];
+            let square = x * x + y * y + z * z;
+            let inverse = 1.0 / square;
+            let cube = inverse * inverse.sqrt();
+            let quadric = t(4) * x * x
+                + t(5) * y * y
+                + t(6) * z * z
+                + 2.0 * (t(7) * x * y + t(8) * y * z + t(9) * z * x);
+            let cubic = x * x * (t(13) * x + t(16) * y + t(17) * z)
+                + y * y * (t(14) * y + t(18) * x + t(19) * z)
+                + z * z * (t(15) * z + t(20) * x + t(21) * y)
+                + t(22) * x * y * z;
+            let sum = t(0) * x + t(1) * y + t(2) * z + t(3) - 3.0 * quadric * inverse
+                + 0.5
+                    * (-3.0 * (t(10) * x + t(11) * y + t(12) * z) + 15.0 * cubic * inverse)
+                    * inverse;
+            squares[k] = square;
+            sums[k] = sum * cube;
+        }
+        (squares, sums)
+    }
+}
+
+/// The moments of sets of oriented triangles, in a tree with eight children a node.
 #[derive(Debug)]
 pub struct Winding {
-    moments: Vec<Moments>,
+    nodes: Vec<Node>,
 }
 
 impl Winding {
-    /// Takes the moments of the nodes of `tree`.
+    /// Takes the moments of the nodes of `tree`, and puts those side by side that a query asks for together.
     pub fn new(tree: &Tree) -> Winding {
         let nodes = tree.nodes();
         let mut range = vec![(0u32, 0u32); nodes.len()];
@@ -147,50 +251,91 @@ impl Winding {
                 (range[i + 1].0, range[n.at as usize].1)
             };
         }
-        let moments = nodes
+        let moments: Vec<Moments> = nodes
             .par_iter()
             .zip(&range)
             .map(|(n, r)| Moments::of(&tree.faces()[r.0 as usize..r.1 as usize], &n.bounds))
             .collect();
-        Winding { moments }
+        // The sets of each node, by their numbers in the tree; those that are parted have a node of their own.
+        let mut sets: Vec<Vec<usize>> = vec![vec![0]];
+        let mut out: Vec<Node> = Vec::new();
+        while let Some(all) = sets.get(out.len()) {
+            let mut all = all.clone();
+            // The largest is parted first, so that sets side by side are about as large.
+            while all.len() < WIDE {
+                let size = |k: &usize| moments[all[*k]].radius;
+                let parted = (0..all.len()).filter(|k| nodes[all[*k]].count == 0);
+                let Some(k) = parted.max_by(|a, b| size(a).total_cmp(&size(b))) else {
+                    break;
+                };
+                let i = all[k];
+                all[k] = i + 1;
+                all.push(nodes[i].at as usize);
+            }
+            let mut node = Node {
+                center: [[0.0; WIDE]; 3],
+                per: [0.0; WIDE],
+                terms: [[0.0; WIDE]; TERMS],
+                at: [0; WIDE],
+                count: [0; WIDE],
+                used: all.len(),
+            };
+            for (k, i) in all.into_iter().enumerate() {
+                let m = &moments[i];
+                (0..3).for_each(|a| node.center[a][k] = m.center[a]);
+                node.per[k] = 1.0 / m.radius;
+                for (t, v) in node.terms.iter_mut().zip(m.in_radii()) {
+                    t[k] = v;
+                }
+                node.count[k] = nodes[i].count;
+                if nodes[i].count > 0 {
+                    node.at[k] = nodes[i].at;
+                } else {
+                    node.at[k] = sets.len() as u32;
+                    sets.push(vec![i + 1, nodes[i].at as usize]);
+                }
+            }
+            out.push(node);
+        }
+        Winding { nodes: out }
     }
 
     /// The winding number about `p` of the triangles that `skip` (positions in the tree's order) leaves in.
     ///
-    /// A node is replaced by its expansion where it is farther than `reach` times its radius. What is skipped must be
-    /// within rounding of `p`, so that no replaced node holds it.
+    /// A set is replaced by its expansion where it is farther than `reach` times its radius, which leaves an error of
+    /// the order of `reach`⁻³ times its share of the sphere. What is skipped must be within rounding of `p`, so that no
+    /// replaced set holds it.
     pub fn at(&self, tree: &Tree, p: Vec3, reach: f64, skip: impl Fn(u32) -> bool) -> f64 {
-        let nodes = tree.nodes();
-        let mut stack = [0u32; 128];
-        let mut top = 1;
-        let mut sum = 0.0;
-        while top > 0 {
-            top -= 1;
-            let mut i = stack[top] as usize;
-            loop {
-                let m = &self.moments[i];
-                let r = sub(m.center, p);
-                let square = dot(r, r);
-                if square > reach * reach * m.square {
-                    sum += m.far(r, square);
-                    break;
+        let limit = (reach * reach) as f32;
+        let mut angle = Angle {
+            re: 1.0,
+            im: 0.0,
+            full: 0,
+        };
+        let mut sum = 0f64;
+        let mut work = vec![0u32];
+        while let Some(i) = work.pop() {
+            let node = &self.nodes[i as usize];
+            let (squares, values) = node.far(p);
+            let mut far = 0f32;
+            for k in 0..node.used {
+                if squares[k] > limit {
+                    far += values[k];
+                    continue;
                 }
-                let node = &nodes[i];
-                if node.count > 0 {
-                    for k in node.at..node.at + node.count {
-                        if !skip(k) {
-                            sum += turn(tree.faces()[k as usize].corners, p);
-                        }
+                if node.count[k] == 0 {
+                    work.push(node.at[k]);
+                    continue;
+                }
+                for t in node.at[k]..node.at[k] + node.count[k] {
+                    if !skip(t) {
+                        angle.add(sides(tree.faces()[t as usize].corners, p));
                     }
-                    break;
                 }
-                if top < stack.len() {
-                    stack[top] = node.at;
-                    top += 1;
-                }
-                i += 1;
+                angle.rescale();
             }
+            sum += f64::from(far);
         }
-        sum
+        angle.turns() + sum / (4.0 * PI)
     }
 }
