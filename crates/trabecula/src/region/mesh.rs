@@ -30,9 +30,9 @@ use winding::Winding;
 
 /// A place and its signed distance, where none is known: no comparison with it holds.
 const NOTHING: (Vec3, f64) = ([0.0; 3], f64::NAN);
-/// Nodes farther off than twice their radius are taken as a whole where inside is told from outside: the winding
+/// Sets of triangles farther off than so many radii are taken as a whole where inside is told from outside: the winding
 /// number of a closed surface is then within a few hundredths of zero or one.
-const REACH: f64 = 2.0;
+const REACH: f64 = 1.4;
 
 /// The solid inside a triangle mesh, which is repaired if it is not clean: bodies, perhaps with cavities.
 ///

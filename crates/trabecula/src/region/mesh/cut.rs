@@ -28,8 +28,8 @@ enum Meeting {
     Flat(u32, u32),
 }
 
-/// How far nodes of the tree are, in their radii, to be taken as a whole: a look needs the nearest whole number.
-const REACH: f64 = 2.5;
+/// How far sets of triangles are, in their radii, to be taken as a whole: a look needs the nearest whole number.
+const REACH: f64 = 2.0;
 /// A number so near a whole one is sure.
 const SURE: f64 = 0.05;
 /// Places of a piece that are looked at, at most, after its middle.
