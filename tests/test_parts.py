@@ -142,8 +142,8 @@ def test_given_parts_are_filled_or_refused(path):
         return
     low, high = np.array(region["bounds"])
     assert region["volume"] > 0
-    # Cells so small that some thousand lie in the part.
-    wavelength = (region["volume"] / 1500) ** (1 / 3)
+    # Cells so small that some hundred lie in the part.
+    wavelength = (region["volume"] / 150) ** (1 / 3)
     for cell in LATTICES:
         volumes = []
         for skin in (False, True):

@@ -177,6 +177,22 @@ impl Tree {
         }
     }
 
+    /// Whether two faces that are named once are joined where all must be solid, rather than any.
+    pub fn both_must(&self, pair: [usize; 2]) -> bool {
+        let (of, all) = match self {
+            Tree::Face(_) => return false,
+            Tree::All(of) => (of, true),
+            Tree::Any(of) => (of, false),
+        };
+        let names = |t: &Tree, face: usize| {
+            let mut found = false;
+            t.each(&mut |f| found |= f == face);
+            found
+        };
+        let both = of.iter().find(|t| pair.iter().all(|f| names(t, *f)));
+        both.map_or(all, |t| t.both_must(pair))
+    }
+
     /// Calls `f` for every face named.
     pub fn each(&self, f: &mut impl FnMut(usize)) {
         match self {

@@ -34,18 +34,27 @@ impl Solid {
 
     /// The same solid with one more body that is solid whatever the lattice says.
     pub fn with(mut self, mut body: Body) -> Solid {
-        let mut others = Vec::new();
-        self.region.clone().faces(0.0, &mut others);
+        let mut others = self.boundary().faces;
         others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
-        flush::apart(&mut body, &others, &self.region.bounds());
+        let mut moved = others.len();
+        flush::apart(&mut body, &others, &self.region.bounds(), &mut moved);
         self.filled.push(body);
         self
     }
 
+    /// The region by its faces, none of which coincide.
+    fn boundary(&self) -> Body {
+        let mut faces = Vec::new();
+        let tree = self.region.clone().faces(0.0, &mut faces);
+        let mut body = Body { faces, tree };
+        flush::parted(&mut body, &self.region.bounds(), &mut 0);
+        body
+    }
+
     /// The smooth faces of the solid and how they make it. The region's come first.
     pub fn faces(&self) -> (Vec<Face>, Tree) {
-        let mut faces = Vec::new();
-        let mut all = vec![self.region.clone().faces(0.0, &mut faces)];
+        let Body { mut faces, tree } = self.boundary();
+        let mut all = vec![tree];
         if let Some(field) = &self.field {
             let mut any = Vec::new();
             for body in &self.filled {
