@@ -1,4 +1,4 @@
-"""The commands. This module brings all that they need, so that nothing is imported once the work has begun."""
+"""The commands."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import os
 import time
 import warnings
 from difflib import get_close_matches
-
-import numpy  # noqa: F401  voxels and figures want it later
 
 from . import _core, cell
 from .design import load
