@@ -1,4 +1,4 @@
-"""The commands."""
+"""The commands. What one needs is imported before its work begins."""
 
 from __future__ import annotations
 
@@ -138,6 +138,8 @@ def simplified(mesh: Mesh, args) -> Mesh:
 
 def voxels(args) -> None:
     """``trabecula voxels``."""
+    import numpy  # noqa: F401  wanted in the end; see `interrupt` for why no import waits until then
+
     check_place(args.output)
     start = time.perf_counter()
     solid = build(args.design)
