@@ -8,7 +8,6 @@ import gemmi
 import numpy as np
 import pytest
 import spglib
-
 import trabecula as lt
 
 
