@@ -17,8 +17,8 @@ use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale};
 const APART: f64 = 1e-5;
 /// Faces are flush where they are this close, as a share of the size.
 const FLUSH: f64 = 1e-8;
-/// Places on each face at which it is looked at.
-const LOOKS: usize = 96;
+/// Places on each face at which it is looked at: what coincides on less than some thousandths of a face is not seen.
+const LOOKS: usize = 1024;
 
 /// The body with its faces that are flush with one of `others` moved outwards, and those that are flush with each other
 /// kept apart. `bounds` are those of the region. `moved` counts: no two faces move by the same.
