@@ -2,7 +2,7 @@
 #
 #   make demo    a part with a lattice, measured and drawn, in demo/
 #   make test    the core's tests and the Python tests
-#   make campaign  thousands of random designs instead of dozens
+#   make campaign  thousands of random designs and damaged meshes instead of dozens, every damage in every part
 #   make bench   our command beside other tools (those that are installed)
 #   make tidy    formatters and linters
 #   make docs    remakes the generated pages and figures under docs/
@@ -82,8 +82,10 @@ core-test: $(VENV)/.made
 	cargo test --release --locked -p trabecula
 
 CASES ?= 2000
-campaign: $(VENV)/.made
+campaign: $(VENV)/.test-tools
 	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test surface random
+	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test damage --test flush -- --nocapture
+	TRABECULA_CAMPAIGN=1 $(BIN)/python -m pytest -q tests/test_parts.py
 
 python-test: $(VENV)/.test-tools
 	$(BIN)/python -m pytest -q tests --ignore tests/test_docs.py

@@ -73,3 +73,45 @@ def test_metres_are_asked_about(tmp_path):
     small = design(tmp_path, CORNERS / 1000, FACES, wavelength=0.004).build()
     assert any("metre" in w["message"] and w["path"] == "region.mesh" for w in small.warnings)
     assert not any("unit" in w["message"] for w in design(tmp_path, CORNERS / 1000, FACES, unit="m").build().warnings)
+
+
+def refused(folder, vertices, faces):
+    """What is said of a mesh that is no part."""
+    with pytest.raises(lt.DesignError) as error:
+        design(folder, vertices, faces).build()
+    assert error.value.path == "region.mesh.path"
+    return str(error.value)
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "1e999"])
+def test_numbers_that_are_none(tmp_path, bad):
+    """A corner that is nowhere is told by its number."""
+    vertices = [list(map(str, v)) for v in CORNERS]
+    vertices[5][1] = bad
+    assert "5" in refused(tmp_path, vertices, FACES) and "finite" in refused(tmp_path, vertices, FACES)
+
+
+def test_nothing_but_degenerate_faces(tmp_path):
+    """Triangles without area are left out; a mesh of nothing else, or without volume, is refused with its numbers."""
+    line = [[0, 0, 1], [2, 2, 5], [0, 1, 1]]
+    solid = design(tmp_path, CORNERS, FACES + line).build()
+    assert volume(solid) == pytest.approx(512, rel=1e-12)
+    assert "3 triangles without area" in next(w["message"] for w in solid.warnings if w["path"] == "region.mesh")
+    assert "3 triangles" in refused(tmp_path, CORNERS, line)
+    # A sheet from both sides, and a box pressed flat.
+    assert "2 triangles" in refused(tmp_path, CORNERS, [FACES[0], FACES[0][::-1]])
+    assert "12 triangles" in refused(tmp_path, CORNERS * [1, 1, 0], FACES) or "flat" in refused(
+        tmp_path, CORNERS * [1, 1, 0], FACES
+    )
+
+
+def test_more_faces_than_a_block_holds():
+    """Eighty balls close together are too many smooth faces for a coarse grid, and not for the finer one advised."""
+    places = [[x, y, z] for x in range(4) for y in range(4) for z in range(5)]
+    balls = [lt.region.sphere(0.6, center=p) for p in places]
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=1), level=lt.level.fraction(0.3))
+    solid = lt.Design(region=lt.region.union(*balls), lattice={"core": core}).build()
+    with pytest.raises(lt.DesignError, match=r"81 smooth faces meet in a block of 61 grid steps, and 64 are possible") as error:
+        solid.mesh(edge=0.12)
+    assert "use a smaller edge, or a mesh for the region" in str(error.value)
+    assert solid.mesh(edge=0.05).closed
