@@ -34,12 +34,30 @@ fn number(some: &mut Random, from: usize, below: usize) -> f64 {
     (from + some.below(below - from)) as f64
 }
 
+/// A box as a mesh.
+fn mesh_box(lo: Vec3, hi: Vec3, frame: &Frame) -> Region {
+    let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { hi[a] } else { lo[a] });
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let halves = |q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
+    let mesh = Mesh {
+        vertices: (0..8).map(|i| frame.place(corner(i))).collect(),
+        triangles: quads.iter().flat_map(halves).collect(),
+    };
+    Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("mesh"))
+}
+
 /// A body on whole numbers between 0 and 4: a box (by its planes, or as a mesh), a cylinder, a ball.
-fn body(some: &mut Random, frame: &Frame, boxes: bool) -> Region {
+fn body(some: &mut Random, frame: &Frame, kinds: usize) -> Region {
     let lo = [0; 3].map(|_| number(some, 0, 3));
     let hi = lo.map(|x| number(some, x as usize + 1, 5));
-    let kind = if boxes { some.below(2) } else { some.below(5) };
-    match kind {
+    match some.below(kinds) {
         0 | 2 if frame.turned => {
             let sides = (0..6).map(|i| {
                 let (axis, up) = (i / 2, i % 2 == 1);
@@ -59,25 +77,7 @@ fn body(some: &mut Random, frame: &Frame, boxes: bool) -> Region {
             Arc::new(Intersection::new(vec![Arc::new(sides), Arc::new(about)]).expect("block"))
         }
         0 | 2 => Arc::new(Cuboid::new(frame.place(lo), frame.place(hi)).expect("box")),
-        1 => {
-            let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { hi[a] } else { lo[a] });
-            let quads = [
-                [0, 2, 3, 1],
-                [4, 5, 7, 6],
-                [0, 1, 5, 4],
-                [2, 6, 7, 3],
-                [0, 4, 6, 2],
-                [1, 3, 7, 5],
-            ];
-            let mesh = Mesh {
-                vertices: (0..8).map(|i| frame.place(corner(i))).collect(),
-                triangles: quads
-                    .iter()
-                    .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-                    .collect(),
-            };
-            Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("mesh"))
-        }
+        1 => mesh_box(lo, hi, frame),
         3 => {
             let axis = some.below(3);
             let mut way = [0.0; 3];
@@ -96,10 +96,10 @@ fn body(some: &mut Random, frame: &Frame, boxes: bool) -> Region {
     }
 }
 
-fn region(some: &mut Random, frame: &Frame, boxes: bool) -> Region {
-    let mut all = body(some, frame, boxes);
+fn region(some: &mut Random, frame: &Frame, kinds: usize) -> Region {
+    let mut all = body(some, frame, kinds);
     for _ in 0..1 + some.below(3) {
-        let other = body(some, frame, boxes);
+        let other = body(some, frame, kinds);
         let pair = vec![all, other];
         all = match some.below(5) {
             0 | 1 => Arc::new(Union::new(pair).expect("union")),
@@ -110,7 +110,7 @@ fn region(some: &mut Random, frame: &Frame, boxes: bool) -> Region {
     all
 }
 
-/// The volume by the middles of the cells of side 1/n, and how much of them the surface may pass.
+/// The volume by the middles of cells of side 1/n.
 fn count(region: &Region, frame: &Frame, n: usize) -> f64 {
     let (lo, side) = (-2.0, 1.0 / n as f64);
     let steps = 8 * n;
@@ -138,9 +138,9 @@ fn run(seed: u64) -> Result<bool, String> {
         turned,
         by: some.point(3.0),
     };
-    let boxes = some.share() < 0.5;
-    let region = region(&mut some, &frame, boxes);
-    let want = count(&region, &frame, if boxes { 1 } else { 6 });
+    let kinds = [1, 2, 5][some.below(3)];
+    let region = region(&mut some, &frame, kinds);
+    let want = count(&region, &frame, if kinds < 5 { 1 } else { 6 });
     if want == 0.0 {
         return Ok(false);
     }
@@ -169,17 +169,21 @@ fn run(seed: u64) -> Result<bool, String> {
         if !full {
             continue;
         }
-        let volume = s.mesh.volume();
-        // Flat faces are met to a few ten-thousandths of a step and moved by some hundred-thousandths of the size; mesh
-        // faces are rounded off at their edges, and round ones counted by cells.
-        let slack = if boxes {
-            0.0
-        } else {
-            0.06 * s.mesh.area() * frame.unit
+        let (volume, area) = (s.mesh.volume(), s.mesh.area());
+        // The bounds of the balls that bound turned boxes.
+        let size = 16.0 * 3f64.sqrt() * frame.unit;
+        let slack = match kinds {
+            // Flat faces keep a few 1/4096 of a step away from nodes; at most twenty are moved, each farther.
+            1 => area * (1e-3 * edge + 20.0 * 1e-5 * size),
+            // Faces of a mesh meet in edges that the grid rounds off, over a step.
+            2 => 6.0 * 0.2 * edge * edge * area.sqrt(),
+            // Cells are counted that the surface passes through.
+            _ => 0.06 * area * frame.unit + 6.0 * 0.2 * edge * edge * area.sqrt(),
         };
-        let off = (volume - want).abs();
-        if off > slack + 0.2 * edge * edge * s.mesh.area().sqrt() * 6.0 {
-            return Err(format!("edge {edge}: volume {volume}, not {want}"));
+        if (volume - want).abs() > slack {
+            return Err(format!(
+                "edge {edge}: volume {volume}, not {want} within {slack}"
+            ));
         }
     }
     Ok(true)
@@ -187,7 +191,7 @@ fn run(seed: u64) -> Result<bool, String> {
 
 #[test]
 fn random_bodies_that_touch_or_coincide() {
-    let all: Vec<_> = (0..cases(200)).into_par_iter().map(run).collect();
+    let all: Vec<_> = (0..cases(48)).into_par_iter().map(run).collect();
     let solids = all.iter().filter(|r| matches!(r, Ok(true))).count();
     let faults: Vec<String> = all
         .iter()
@@ -201,4 +205,26 @@ fn random_bodies_that_touch_or_coincide() {
     );
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     assert!(solids > all.len() / 2);
+}
+
+/// Faces of meshes that have little in common: one looked at in a hundred places was not seen to.
+#[test]
+fn meshes_with_small_common_faces() {
+    let frame = Frame {
+        unit: 1.3857687042485702,
+        turn: rotation([0.0; 3]),
+        turned: false,
+        by: [0.16338187015910233, -1.4701313338543425, 0.9611694878340291],
+    };
+    let long = mesh_box([0.0; 3], [4.0, 2.0, 2.0], &frame);
+    let notch = mesh_box([0.0, 1.0, 1.0], [2.0, 3.0, 3.0], &frame);
+    let left = Arc::new(Difference::new(vec![long, notch]).expect("difference"));
+    let [lo, hi] = [[2.0, 1.0, 2.0], [4.0, 2.0, 4.0]].map(|p| frame.place(p));
+    let post = Arc::new(Cuboid::new(lo, hi).expect("box"));
+    let region: Region = Arc::new(Union::new(vec![left, post]).expect("union"));
+    let solid = Solid::new(region, None, 1.0);
+    for edge in [0.18595632115820984, 0.31, 0.11] {
+        let s = surface(&solid, edge, &Silent).expect("surface");
+        assert_eq!(fault(&s), None, "edge {edge}");
+    }
 }
