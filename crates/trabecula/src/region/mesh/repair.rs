@@ -62,9 +62,7 @@ impl Repaired {
 
     /// What was done in one sentence with its numbers; `None` where nothing was.
     pub fn sentence(&self) -> Option<String> {
-        let s = |n: usize, one: &str, more: &str| {
-            (n > 0).then(|| format!("{n} {}", if n == 1 { one } else { more }))
-        };
+        let s = |n: usize, one: &str, more: &str| (n > 0).then(|| counted(n, one, more));
         let holes = s(self.holes, "hole capped", "holes capped").map(|h| {
             let [length, area] = [self.hole_length, self.hole_area].map(short);
             let share = short(100.0 * self.hole_share);
@@ -112,6 +110,11 @@ impl Repaired {
         let all: Vec<String> = all.into_iter().flatten().collect();
         (!all.is_empty()).then(|| format!("the mesh was repaired: {}", all.join(", ")))
     }
+}
+
+/// A number of things.
+fn counted(n: usize, one: &str, more: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { more })
 }
 
 /// Three digits.
@@ -193,10 +196,16 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         } else {
             0.0
         };
-        if done.hole_share > CAPPED || mesh.triangles.is_empty() {
+        if mesh.triangles.is_empty() {
             return Err(refuse(format!(
-                "the mesh of {given} triangles has {} holes with rims of {} mm; closing them took {} mm², {} % of the surface, and more than {} % would be guessing: found {}",
-                caps.holes,
+                "the mesh of {given} triangles holds no solid: none are left without those that have no area and those that lie on each other; found {}",
+                found.unwrap_or_default()
+            )));
+        }
+        if done.hole_share > CAPPED {
+            return Err(refuse(format!(
+                "the mesh of {given} triangles has {} with rims of {} mm; closing them took {} mm², {} % of the surface, and more than {} % would be guessing: found {}",
+                counted(caps.holes, "hole", "holes"),
                 short(caps.length),
                 short(caps.area),
                 short(100.0 * done.hole_share),
