@@ -30,7 +30,7 @@ def near_pairs(vertices, triangles):
     corners = vertices[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     origin = low.min(axis=0)
-    cell = 1.5 * np.median((high - low).max(axis=1)) + 1e-300
+    cell = 1.1 * np.median((high - low).max(axis=1)) + 1e-300
     first = np.floor((low - origin) / cell).astype(np.int64)
     shape = np.floor((high - origin) / cell).astype(np.int64) - first + 1
     count = shape.prod(axis=1)

@@ -32,7 +32,7 @@ def ball():
     vertices, triangles = arrays(manifold3d.Manifold.sphere(1, 32))
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     x, y, z = vertices.T
-    return vertices * (9 + 0.7 * np.sin(5 * x + 1) * np.sin(4 * y) * np.cos(5 * z))[:, None], triangles
+    return vertices * (8 + 0.6 * np.sin(5 * x + 1) * np.sin(4 * y) * np.cos(5 * z))[:, None], triangles
 
 
 def torus():
