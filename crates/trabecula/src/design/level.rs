@@ -68,9 +68,7 @@ pub(super) fn level(
         AmountSpec::Porosity(v) => ("porosity", v, Allowed::Share("porosity")),
         AmountSpec::Thickness(v) => {
             check_sheet(part, "thickness", &path("thickness"))?;
-            let Map::Affine(a) = map;
-            let longest = a.wavelength.into_iter().fold(0.0, f64::max);
-            ("thickness", v, Allowed::Length("thickness", longest))
+            ("thickness", v, Allowed::Length("thickness", map.longest()))
         }
     };
     let amount = grade(value, &path(key), place.region, allowed, key == "porosity")?;
