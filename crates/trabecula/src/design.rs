@@ -9,6 +9,7 @@ mod error;
 mod grade;
 mod json;
 mod level;
+mod map;
 mod node;
 mod read;
 mod region;

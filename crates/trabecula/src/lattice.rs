@@ -9,8 +9,8 @@ use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::{self, Affine, Map};
 use crate::math::{
-    Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, dot, inverse, norm, scale, sin_cos_turns,
-    spectral_norm, transpose,
+    Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, dot, inverse, norm, product, scale,
+    sin_cos_turns, spectral_norm, transpose,
 };
 
 /// How much of the cell is solid.
@@ -110,6 +110,19 @@ impl Lattice {
     /// The signed distance to the mid-surface, where the level is a thickness.
     pub fn distance(&self) -> Option<&Distance> {
         self.distance.as_deref()
+    }
+
+    /// The thickness (mm) beyond which the faces of a wall fold, where the level is a thickness: that of the cell, where
+    /// the map presses cells together most.
+    pub fn folding(&self) -> Option<f64> {
+        let d = self.distance.as_ref()?;
+        let back = inverse(&self.map.typical());
+        let pressed = |j: &Mat3| spectral_norm(&product(j, &back));
+        let most = match self.map.affine() {
+            Some(_) => 1.0,
+            None => self.map.extremes().iter().map(pressed).fold(0.0, f64::max),
+        };
+        Some(d.folding()? / most)
     }
 
     /// Fills the core f at points (mm).

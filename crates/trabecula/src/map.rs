@@ -202,6 +202,14 @@ impl Map {
         }
     }
 
+    /// The Jacobians where cells are largest and smallest.
+    pub fn extremes(&self) -> Vec<Mat3> {
+        match self {
+            Map::Affine(a) => vec![a.matrix],
+            Map::Phase(map) => map.extremes().to_vec(),
+        }
+    }
+
     /// A bound of the spectral norm of du/dx in a box, turns per mm.
     pub fn stretch(&self, b: &Aabb) -> f64 {
         match self {

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, region, sample, skin};
+use super::{Built, Design, Loader, Warning, level, map, region, sample, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
-use crate::map::{Affine, Map};
 use crate::region::Region;
 use crate::solid::Solid;
 
@@ -117,6 +116,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
         warn(&built, &place, spec, &mut warnings);
+        map::warn(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
     let Some((_, first)) = lattices.first() else {
@@ -143,7 +143,11 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let (name, cell) = cell(&spec.cell, &below("cell"))?;
     let cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
     let cell = Arc::new(cell);
-    let map = map(&spec.map, &below("map"))?;
+    let here = Place {
+        path: below("map"),
+        ..*place
+    };
+    let map = map::map(&spec.map, &here)?;
     let here = Place {
         path: below("level"),
         ..*place
@@ -187,59 +191,6 @@ pub(super) fn cell<'a>(
     };
     let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
     Ok((name, Cell::new(series)))
-}
-
-fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {
-    let (kind, wavelength, rotate, offset) = match spec {
-        MapSpec::Affine(a) => ("affine", a.wavelength, a.rotate, a.offset),
-        MapSpec::Spartan(s) => ("spartan", s.wavelength, s.rotate, s.offset),
-    };
-    let path = format!("{path}.{kind}");
-    let below = |key: &str| format!("{path}.{key}");
-    for (i, v) in wavelength.three().into_iter().enumerate() {
-        if !(v.is_finite() && v > 0.0) {
-            let at = match wavelength {
-                OneOrThree::One(_) => below("wavelength"),
-                OneOrThree::Three(_) => format!("{}[{i}]", below("wavelength")),
-            };
-            let message = format!(
-                "wavelength is {}; it must be a finite number of mm greater than 0",
-                number(v)
-            );
-            return Err(DesignError::new(at, message).found(number(v)));
-        }
-    }
-    for (key, three) in [("rotate", rotate), ("offset", offset)] {
-        for v in three {
-            finite(&below(key), v)?;
-        }
-    }
-    let affine = match spec {
-        MapSpec::Spartan(_) => Affine::spartan(wavelength.three(), rotate, offset),
-        MapSpec::Affine(a) => {
-            let axis = |c: u8| usize::from(c - b'x');
-            let mut skew = Vec::new();
-            for (name, angle) in a.skew.named() {
-                let at = below(&format!("skew.{name}"));
-                finite(&at, angle)?;
-                if angle.abs() >= 89.0 {
-                    let message = format!(
-                        "a shear of {} degrees; it must be between -89 and 89",
-                        number(angle)
-                    );
-                    return Err(DesignError::new(at, message).found(number(angle)));
-                }
-                if angle != 0.0 {
-                    let n = name.as_bytes();
-                    skew.push((axis(n[0]), axis(n[1]), angle));
-                }
-            }
-            Affine::rigid(wavelength.three(), rotate, offset, &skew)
-        }
-    };
-    affine
-        .map(Map::Affine)
-        .map_err(|f| DesignError::fault(&path, f))
 }
 
 /// The key under which the amount stands.
@@ -380,7 +331,7 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             });
         }
     }
-    if let Some(limit) = lattice.distance().and_then(Distance::folding) {
+    if let Some(limit) = lattice.folding() {
         let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
         if thickness.max > limit {
             let most = figure(thickness.max);
@@ -409,11 +360,7 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             number(wavelength),
             number(least)
         );
-        let kind = if matches!(spec.map, MapSpec::Affine(_)) {
-            "affine"
-        } else {
-            "spartan"
-        };
+        let kind = map::kind(&spec.map);
         warnings.push(Warning {
             path: format!("{}.map.{kind}.wavelength", place.path),
             message,

@@ -338,6 +338,13 @@ impl<'a> At<'a> {
         }
     }
 
+    pub fn truth(&self) -> Result<bool, DesignError> {
+        match &self.node.value {
+            Value::Bool(b) => Ok(*b),
+            _ => Err(self.expected("true or false")),
+        }
+    }
+
     pub fn list(&self, what: &str) -> Result<Vec<At<'a>>, DesignError> {
         let Value::List(items) = &self.node.value else {
             return Err(self.expected(what));

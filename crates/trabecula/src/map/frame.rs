@@ -95,11 +95,6 @@ impl Orientation {
             }
         }
     }
-
-    /// Whether the frames are chosen, rather than given.
-    pub(super) fn is_chosen(&self) -> bool {
-        matches!(self, Orientation::Stress(_))
-    }
 }
 
 /// Values of some grades at points, side by side.

@@ -13,7 +13,7 @@ use super::spline::{self, Spline};
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, sub};
+use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -56,6 +56,7 @@ pub struct Phase {
     mean: Vec3,
     steepest: f64,
     distortion: Distortion,
+    extremes: [Mat3; 2],
     steps: usize,
 }
 
@@ -116,6 +117,9 @@ impl Phase {
             .filter(|&n| inside[n])
             .fold([0.0; 3], |s, n| add(s, wavelength[n]));
         let steepest = spline.stretch(bounds);
+        let by_length = |a: &&Mat3, b: &&Mat3| spectral_norm(a).total_cmp(&spectral_norm(b));
+        let within = || jacobians.iter().zip(&inside).filter(|j| *j.1).map(|j| j.0);
+        let extremes = [within().min_by(by_length), within().max_by(by_length)];
         Ok(Phase {
             spline,
             shift,
@@ -127,6 +131,7 @@ impl Phase {
             },
             steepest,
             distortion,
+            extremes: extremes.map(|j| *j.unwrap_or(&jacobians[0])),
             steps,
         })
     }
@@ -144,6 +149,11 @@ impl Phase {
     /// How far the map is from what was asked for.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
+    }
+
+    /// The Jacobians at the nodes in the region where cells are largest and smallest.
+    pub fn extremes(&self) -> &[Mat3; 2] {
+        &self.extremes
     }
 
     /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
