@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "spartan"]
+__all__ = ["affine", "phase", "spartan"]
 
 
 def affine(
@@ -33,3 +33,42 @@ def spartan(
     With unequal wavelengths this shears the lattice in space; ``affine`` turns it rigidly.
     """
     return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}
+
+
+def phase(
+    wavelength: float | dict | Sequence[float | dict],
+    rotate: Sequence[float | dict] | None = None,
+    *,
+    rotate_x: float | dict | None = None,
+    rotate_y: float | dict | None = None,
+    rotate_z: float | dict | None = None,
+    direction: Sequence[float | dict] | None = None,
+    frame: dict | None = None,
+    stress: Sequence[float | dict] | dict | None = None,
+    offset: Sequence[float] | None = None,
+    step: float | None = None,
+    domain: str | None = None,
+    folds: bool | None = None,
+) -> dict:
+    """Cells that turn and stretch as asked for without tearing: phases with ∇Φᵢ = R eᵢ / λᵢ in least squares.
+
+    Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
+    ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
+    components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``step`` is the spacing in mm
+    of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
+    """
+    given = settings(
+        wavelength=wavelength,
+        rotate=rotate,
+        rotate_x=rotate_x,
+        rotate_y=rotate_y,
+        rotate_z=rotate_z,
+        direction=direction,
+        frame=frame,
+        stress=stress,
+        offset=offset,
+        step=step,
+        domain=domain,
+        folds=folds,
+    )
+    return {"phase": given}
