@@ -15,6 +15,7 @@ mod read;
 mod region;
 mod report;
 mod sample;
+mod samples;
 mod schema;
 mod skin;
 #[cfg(test)]

@@ -31,6 +31,8 @@ pub(super) struct Place<'a> {
     pub points: &'a [[f64; 3]],
     /// What is solid in the region whatever the lattice says.
     pub filled: &'a [Body],
+    /// Hands over files.
+    pub loader: &'a dyn Loader,
 }
 
 impl From<PartSpec> for Part {
@@ -112,6 +114,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             region: &space,
             points: &points,
             filled: &filled,
+            loader,
         };
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;

@@ -7,6 +7,7 @@ use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::samples;
 use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
@@ -53,7 +54,6 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
         }
     }
     let affine = match spec {
-        MapSpec::Spartan(_) => Affine::spartan(wavelength.three(), rotate, offset),
         MapSpec::Affine(a) => {
             let axis = |c: u8| usize::from(c - b'x');
             let mut skew = Vec::new();
@@ -74,7 +74,7 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
             }
             Affine::rigid(wavelength.three(), rotate, offset, &skew)
         }
-        MapSpec::Phase(_) => unreachable!(),
+        _ => Affine::spartan(wavelength.three(), rotate, offset),
     };
     affine
         .map(Map::Affine)
@@ -83,8 +83,7 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
 
 fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
     let below = |key: &str| format!("{path}.{key}");
-    let vary =
-        |spec: &GradeSpec, path: String, allowed| grade(spec, &path, place.region, allowed, false);
+    let vary = |spec: &GradeSpec, path: String, allowed| grade(spec, &path, place, allowed, false);
     let any = |spec: &GradeSpec, path: String| vary(spec, path, Allowed::Finite);
     let length = |spec: &GradeSpec, path: String| vary(spec, path, Allowed::Positive("wavelength"));
     let wavelength = match &spec.wavelength {
@@ -96,6 +95,11 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
     };
     let vector = |of: &VectorSpec, key: &str| match of {
         VectorSpec::Components(of) => each(of, &below(key), &any),
+        VectorSpec::Field(of) => {
+            samples::several(&of.field, &below(&format!("{key}.field")), place, |n| {
+                (n == 3).then_some([0, 1, 2])
+            })
+        }
     };
     let angles = |of: [Option<&GradeSpec>; 3]| {
         let names = ["rotate_x", "rotate_y", "rotate_z"];
@@ -121,8 +125,19 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
             z: vector(&of.z, "frame.z")?,
         }
     } else if let Some(of) = &spec.stress {
-        let TensorSpec::Components(of) = of;
-        Orientation::Stress(each(of, &below("stress"), &any)?)
+        Orientation::Stress(match of {
+            TensorSpec::Components(of) => each(of, &below("stress"), &any)?,
+            TensorSpec::Field(of) => {
+                samples::several(&of.field, &below("stress.field"), place, |n| {
+                    match (n, of.order) {
+                        (9, _) => Some([0, 4, 8, 5, 2, 1]),
+                        (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
+                        (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
+                        _ => None,
+                    }
+                })?
+            }
+        })
     } else {
         Orientation::Angles(angles([
             spec.rotate_x.as_ref(),

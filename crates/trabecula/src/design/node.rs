@@ -384,7 +384,9 @@ impl<'a> At<'a> {
 }
 
 /// The kinds of grade in this version.
-pub(super) const GRADES: [&str; 3] = ["linear", "depth", "formula"];
+pub(super) const GRADES: [&str; 7] = [
+    "linear", "depth", "radial", "formula", "grid", "points", "field",
+];
 
 /// A table whose keys are known to be allowed.
 pub(super) struct Fields<'a> {

@@ -62,6 +62,11 @@ fn every_kind_of_region_and_grade_survives() {
             "porosity = 0.7\nfit = \"spartan\"",
             "thickness = 0.6\nmid = 0.2",
             "thickness = { linear = { along = [0, 0, 1], stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { radial = { stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { radial = { center = [1, 2, 3], axis = [0, 0, 1], stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { grid = { path = \"a.npy\", origin = [0, 0, 0], step = 0.5 } }",
+            "iso = { points = { path = \"a.csv\", neighbours = 4, remap = [[0, 1], [2, 3]] } }",
+            "iso = { field = { path = \"a.vtu\", array = \"S\", component = 2 } }",
         ] {
             let text = format!(
                 "schema = 1\n[region]\n{region}\n[lattice.a]\npart = \"upper\"\n[[lattice.a.cell.series.terms]]\nhkl = \
@@ -207,8 +212,12 @@ fn words_of_later_versions_are_not_slips() {
             "blend = { between = [\"a\", \"b\"] }",
             "blend",
         ),
-        ("map.affine", "map.phase", "lattice.core.map.phase"),
-        ("linear =", "radial =", "lattice.core.level.porosity.radial"),
+        ("map.affine", "map.tets", "lattice.core.map.tets"),
+        (
+            "cell = \"gyroid\"",
+            "cell.tet = { }",
+            "lattice.core.cell.tet",
+        ),
     ] {
         let e = with(line, instead);
         assert_eq!((e.path.as_str(), e.nearest.as_deref()), (path, None));

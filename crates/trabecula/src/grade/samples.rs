@@ -359,8 +359,7 @@ impl Samples {
         let missed = |p: &&Vec3| {
             let at = node(p);
             !(0..8).any(|d| {
-                let [i, j, k] =
-                    core::array::from_fn(|a| (at[a] + (d >> a & 1)).min(shape[a] - 1));
+                let [i, j, k] = core::array::from_fn(|a| (at[a] + (d >> a & 1)).min(shape[a] - 1));
                 found[(k * shape[1] + j) * shape[0] + i]
             })
         };

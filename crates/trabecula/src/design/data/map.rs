@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{GradeSpec, OneOrThree, is_default};
+use super::{FieldSpec, GradeSpec, OneOrThree, is_default};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -145,6 +145,16 @@ pub enum GradeOrThree {
 pub enum VectorSpec {
     /// By its components along x, y, z.
     Components([GradeSpec; 3]),
+    /// An array of three numbers of a result.
+    Field(VectorField),
+}
+
+/// An array of three numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VectorField {
+    /// The array.
+    pub field: FieldSpec,
 }
 
 /// Two of the cell's axes; the third is at right angles to both.
@@ -163,6 +173,30 @@ pub struct FrameSpec {
 pub enum TensorSpec {
     /// By its components 11, 22, 33, 23, 13, 12.
     Components([GradeSpec; 6]),
+    /// An array of six or nine numbers of a result.
+    Field(TensorField),
+}
+
+/// An array of six or nine numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TensorField {
+    /// The array.
+    pub field: FieldSpec,
+    /// In which order six numbers come.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub order: TensorOrder,
+}
+
+/// In which order the six numbers of a symmetric tensor come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TensorOrder {
+    /// 11, 22, 33, 12, 23, 13, as VTK has them.
+    #[default]
+    Vtk,
+    /// 11, 22, 33, 23, 13, 12, as Voigt has them.
+    Voigt,
 }
 
 /// What counts when phases are solved.

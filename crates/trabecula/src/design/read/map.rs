@@ -131,10 +131,26 @@ fn phase(at: &At) -> Read<PhaseSpec> {
 }
 
 fn vector(at: &At) -> Read<VectorSpec> {
+    if !at.is_list() {
+        let f = at.fields("a vector", &["field"], &[])?;
+        let field = f.need("field", "an array of three numbers of a result")?;
+        return Ok(VectorSpec::Field(VectorField {
+            field: super::grade::field(field)?,
+        }));
+    }
     grades(at, "three numbers [x, y, z], each of which may vary").map(VectorSpec::Components)
 }
 
 fn tensor(at: &At) -> Read<TensorSpec> {
+    if !at.is_list() {
+        let f = at.fields("a tensor", &["field", "order"], &[])?;
+        let field = f.need("field", "an array of six or nine numbers of a result")?;
+        let orders = [("vtk", TensorOrder::Vtk), ("voigt", TensorOrder::Voigt)];
+        return Ok(TensorSpec::Field(TensorField {
+            field: super::grade::field(field)?,
+            order: f.read("order", TensorOrder::Vtk, |at| at.word("order", &orders))?,
+        }));
+    }
     grades(
         at,
         "six numbers [11, 22, 33, 23, 13, 12], each of which may vary",
