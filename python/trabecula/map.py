@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "phase", "spartan"]
+__all__ = ["affine", "cylinder", "phase", "spartan", "sphere"]
 
 
 def affine(
@@ -72,3 +72,26 @@ def phase(
         folds=folds,
     )
     return {"phase": given}
+
+
+def cylinder(
+    wavelength: float | Sequence[float],
+    around: int,
+    center: Sequence[float] | None = None,
+    axis: Sequence[float] | None = None,
+) -> dict:
+    """Cells round an axis, ``around`` of them, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
+
+    ``wavelength`` is the cell's edge in mm along the radius and along the axis, one or two.
+    """
+    return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
+
+
+def sphere(
+    wavelength: float,
+    around: int,
+    center: Sequence[float] | None = None,
+    axis: Sequence[float] | None = None,
+) -> dict:
+    """Shells of cells about a centre, ``around`` (even) of them round the equator and half as many from pole to pole."""
+    return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}

@@ -5,11 +5,13 @@ mod frame;
 mod grid;
 mod phase;
 mod poisson;
+mod round;
 mod spline;
 
 pub use distortion::{Distortion, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
+pub use round::Round;
 
 use std::sync::Arc;
 
@@ -144,6 +146,8 @@ pub enum Map {
     Affine(Affine),
     /// Solved for varying orientation and wavelength.
     Phase(Arc<Phase>),
+    /// Wrapped round an axis or a centre.
+    Round(Round),
 }
 
 impl Map {
@@ -152,6 +156,7 @@ impl Map {
         match self {
             Map::Affine(a) => a.wavelength.iter().copied().fold(f64::INFINITY, f64::min),
             Map::Phase(p) => p.wavelength()[0],
+            Map::Round(r) => r.wavelengths()[0],
         }
     }
 
@@ -160,6 +165,7 @@ impl Map {
         match self {
             Map::Affine(a) => a.wavelength.iter().copied().fold(0.0, f64::max),
             Map::Phase(p) => p.wavelength()[1],
+            Map::Round(r) => r.wavelengths()[1],
         }
     }
 
@@ -172,6 +178,11 @@ impl Map {
                 }
             }
             Map::Phase(map) => map.phases(points, out),
+            Map::Round(map) => {
+                for (o, &p) in out.iter_mut().zip(points) {
+                    *o = map.phase(p);
+                }
+            }
         }
     }
 
@@ -180,6 +191,7 @@ impl Map {
         match self {
             Map::Affine(a) => a.matrix,
             Map::Phase(map) => map.jacobian(at),
+            Map::Round(map) => map.jacobian(at),
         }
     }
 
@@ -187,7 +199,7 @@ impl Map {
     pub fn affine(&self) -> Option<&Affine> {
         match self {
             Map::Affine(a) => Some(a),
-            Map::Phase(_) => None,
+            Map::Phase(_) | Map::Round(_) => None,
         }
     }
 
@@ -199,6 +211,7 @@ impl Map {
                 let w = map.mean_wavelength();
                 core::array::from_fn(|a| scale(IDENTITY[a], 1.0 / w[a]))
             }
+            Map::Round(map) => map.typical(),
         }
     }
 
@@ -207,6 +220,7 @@ impl Map {
         match self {
             Map::Affine(a) => vec![a.matrix],
             Map::Phase(map) => map.extremes().to_vec(),
+            Map::Round(map) => map.extremes().to_vec(),
         }
     }
 
@@ -215,6 +229,7 @@ impl Map {
         match self {
             Map::Affine(a) => spectral_norm(&a.matrix),
             Map::Phase(map) => map.stretch(b),
+            Map::Round(map) => map.stretch(b),
         }
     }
 
@@ -223,6 +238,7 @@ impl Map {
         match self {
             Map::Affine(a) => spectral_norm(&a.matrix),
             Map::Phase(map) => map.steepest(),
+            Map::Round(map) => map.steepest(),
         }
     }
 
@@ -232,7 +248,7 @@ impl Map {
             map: self,
             block: *block,
             spline: match self {
-                Map::Affine(_) => None,
+                Map::Affine(_) | Map::Round(_) => None,
                 Map::Phase(map) => Some(map.rows(block)),
             },
             layer: 0,

@@ -11,7 +11,8 @@ use super::samples;
 use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::map::{Affine, Map, Orientation, Phase, Settings, Wanted};
+use crate::map::{Affine, Map, Orientation, Phase, Round, Settings, Wanted};
+use crate::math::{dot, norm, scale, sub, unit};
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
 const TURN: f64 = 45.0;
@@ -24,6 +25,8 @@ pub(super) fn kind(spec: &MapSpec) -> &'static str {
         MapSpec::Affine(_) => "affine",
         MapSpec::Spartan(_) => "spartan",
         MapSpec::Phase(_) => "phase",
+        MapSpec::Cylinder(_) => "cylinder",
+        MapSpec::Sphere(_) => "sphere",
     }
 }
 
@@ -33,6 +36,24 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
         MapSpec::Affine(a) => (a.wavelength, a.rotate, a.offset),
         MapSpec::Spartan(s) => (s.wavelength, s.rotate, s.offset),
         MapSpec::Phase(p) => return phase(p, &path, place),
+        MapSpec::Cylinder(c) => {
+            let wavelength = match c.wavelength {
+                OneOrTwo::One(w) => [w; 2],
+                OneOrTwo::Two(two) => two,
+            };
+            let radii = radii(c.center, c.axis, place);
+            let map = Round::cylinder(c.center, c.axis, wavelength, c.around, radii);
+            return map
+                .map(Map::Round)
+                .map_err(|f| DesignError::fault(&path, f));
+        }
+        MapSpec::Sphere(s) => {
+            let radii = radii(s.center, s.axis, place);
+            let map = Round::sphere(s.center, s.axis, s.wavelength, s.around, radii);
+            return map
+                .map(Map::Round)
+                .map_err(|f| DesignError::fault(&path, f));
+        }
     };
     let below = |key: &str| format!("{path}.{key}");
     for (i, v) in wavelength.three().into_iter().enumerate() {
@@ -79,6 +100,20 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
     affine
         .map(Map::Affine)
         .map_err(|f| DesignError::fault(&path, f))
+}
+
+/// Least, mean and greatest distance from an axis in the region.
+fn radii(center: [f64; 3], axis: [f64; 3], place: &Place) -> [f64; 3] {
+    let n = unit(axis);
+    let of = place.points.iter().map(|p| {
+        let d = sub(*p, center);
+        norm(sub(d, scale(n, dot(d, n))))
+    });
+    let (mut least, mut most, mut sum) = (f64::INFINITY, 0.0f64, 0.0);
+    for r in of {
+        (least, most, sum) = (least.min(r), most.max(r), sum + r);
+    }
+    [least, sum / place.points.len() as f64, most]
 }
 
 fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError> {

@@ -15,6 +15,10 @@ pub enum MapSpec {
     Spartan(SpartanSpec),
     /// Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares.
     Phase(Box<PhaseSpec>),
+    /// Wrapped round an axis: cells along the radius, round the axis, along the axis.
+    Cylinder(CylinderMapSpec),
+    /// Wrapped about a centre: cells along the radius, round the axis, from pole to pole.
+    Sphere(SphereMapSpec),
 }
 
 /// A rigid rotation of the scaled lattice.
@@ -127,6 +131,54 @@ pub struct PhaseSpec {
     /// Whether the map may fold, where cells turn inside out.
     #[serde(default, skip_serializing_if = "is_default")]
     pub folds: bool,
+}
+
+/// Cells round an axis, a whole number of them, so that the lattice closes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderMapSpec {
+    /// Cell edge (mm) along the radius and along the axis, one or two.
+    pub wavelength: OneOrTwo,
+    /// Cells around.
+    pub around: f64,
+    /// A point on the axis (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Direction of the axis.
+    #[serde(
+        default = "super::build_axis",
+        skip_serializing_if = "super::is_build_axis"
+    )]
+    pub axis: [f64; 3],
+}
+
+/// Shells of cells about a centre, a whole number of them round the equator and half as many from pole to pole.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereMapSpec {
+    /// Cell edge (mm) along the radius.
+    pub wavelength: f64,
+    /// Cells round the equator; an even number.
+    pub around: f64,
+    /// The centre (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Direction from pole to pole.
+    #[serde(
+        default = "super::build_axis",
+        skip_serializing_if = "super::is_build_axis"
+    )]
+    pub axis: [f64; 3],
+}
+
+/// A number, or two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrTwo {
+    /// The same for both.
+    One(f64),
+    /// One for each.
+    Two([f64; 2]),
 }
 
 /// A number that may vary, or three of them.

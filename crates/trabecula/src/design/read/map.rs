@@ -5,11 +5,7 @@ use crate::design::data::*;
 use crate::design::node::{At, Fields, Later};
 use crate::fault::counted;
 
-const LATER: [Later; 3] = [
-    ("cylinder", "use affine"),
-    ("sphere", "use affine"),
-    ("tets", "use affine"),
-];
+const LATER: [Later; 1] = [("tets", "use affine or phase")];
 
 /// Ways to say how cells are turned, of which one is given.
 const TURNS: [&str; 7] = [
@@ -23,9 +19,53 @@ const TURNS: [&str; 7] = [
 ];
 
 pub(super) fn map(at: &At) -> Read<MapSpec> {
-    let (kind, at) = at.kind("map", &["affine", "spartan", "phase"], &LATER)?;
+    let (kind, at) = at.kind(
+        "map",
+        &["affine", "spartan", "phase", "cylinder", "sphere"],
+        &LATER,
+    )?;
     if kind == "phase" {
         return Ok(MapSpec::Phase(Box::new(phase(&at)?)));
+    }
+    if kind == "cylinder" {
+        let f = at.fields(
+            "a map round an axis",
+            &["wavelength", "around", "center", "axis"],
+            &[],
+        )?;
+        let wavelength = f.need(
+            "wavelength",
+            "the cell's edge in mm along the radius and the axis, one number or two",
+        )?;
+        return Ok(MapSpec::Cylinder(CylinderMapSpec {
+            wavelength: if wavelength.is_list() {
+                OneOrTwo::Two(wavelength.numbers("one number or two, mm")?)
+            } else {
+                OneOrTwo::One(wavelength.number()?)
+            },
+            around: f
+                .need("around", "the whole number of cells around")?
+                .number()?,
+            center: f.read("center", [0.0; 3], three)?,
+            axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
+        }));
+    }
+    if kind == "sphere" {
+        let f = at.fields(
+            "a map about a centre",
+            &["wavelength", "around", "center", "axis"],
+            &[],
+        )?;
+        return Ok(MapSpec::Sphere(SphereMapSpec {
+            wavelength: f
+                .need("wavelength", "the cell's edge in mm along the radius")?
+                .number()?,
+            around: f
+                .need("around", "the even number of cells round the equator")?
+                .number()?,
+            center: f.read("center", [0.0; 3], three)?,
+            axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
+        }));
     }
     if kind == "spartan" {
         let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"], &[])?;
