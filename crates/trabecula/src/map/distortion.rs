@@ -1,5 +1,9 @@
 //! How far a solved map is from what was asked for.
 
+use std::cmp::Ordering;
+
+use rayon::prelude::*;
+
 use super::grid::Grid;
 use crate::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
 
@@ -58,17 +62,15 @@ pub struct Distortion {
 
 /// What is found at a node.
 pub(super) struct Found {
-    at: Vec3,
     angle: Vec3,
     spacing: Vec3,
     shear: f64,
     anisotropy: f64,
-    density: f64,
     curl: f64,
 }
 
 /// Compares J with K (rows of both: the three gratings) at a place.
-pub(super) fn compare(at: Vec3, j: &Mat3, k: &Mat3, curl: f64) -> Found {
+pub(super) fn compare(j: &Mat3, k: &Mat3, curl: f64) -> Found {
     let angle = |a: Vec3, b: Vec3| {
         let c = dot(a, b) / (norm(a) * norm(b));
         c.clamp(-1.0, 1.0).acos().to_degrees()
@@ -95,7 +97,6 @@ pub(super) fn compare(at: Vec3, j: &Mat3, k: &Mat3, curl: f64) -> Found {
         .into_iter()
         .fold(0.0, f64::max);
     Found {
-        at,
         angle: core::array::from_fn(|i| angle(j[i], k[i])),
         spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
         shear,
@@ -104,18 +105,14 @@ pub(super) fn compare(at: Vec3, j: &Mat3, k: &Mat3, curl: f64) -> Found {
         } else {
             f64::INFINITY
         },
-        density,
         curl,
     }
 }
 
 impl Distortion {
+    /// All but the density.
     pub(super) fn of(found: &[Found], (turn, turn_at): (f64, Vec3)) -> Distortion {
         let axis = |f: &dyn Fn(&Found) -> f64| Spread::of(found.iter().map(f).collect());
-        let least = found.iter().min_by(|a, b| a.density.total_cmp(&b.density));
-        let most = found
-            .iter()
-            .fold(f64::NEG_INFINITY, |m, f| m.max(f.density));
         let outside = found
             .iter()
             .flat_map(|f| f.spacing)
@@ -130,14 +127,10 @@ impl Distortion {
             outside: outside as f64 / (3 * found.len()).max(1) as f64,
             shear: axis(&|f| f.shear),
             anisotropy: axis(&|f| f.anisotropy),
-            density: [
-                least.map_or(1.0, |f| f.density),
-                if most.is_finite() { most } else { 1.0 },
-            ],
-            least_at: least.map_or([0.0; 3], |f| f.at),
             curl: axis(&|f| f.curl),
             turn,
             turn_at,
+            ..Distortion::default()
         }
     }
 }
@@ -172,23 +165,32 @@ pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64
         // Nodes nearly one cell apart; where a cell has less than a step, what a step turns is shared out.
         let apart = ((length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
         let share = (length / (apart as f64 * grid.step[a])).min(1.0);
-        for n in (0..grid.len()).filter(|&n| inside[n] && grid.index(n)[a] + apart < grid.shape[a])
-        {
+        let angle = |n: usize| {
             let m = n + apart * strides[a];
-            if !inside[m] {
-                continue;
+            if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
+                return (0.0, n);
             }
-            let trace: f64 = frames[n]
+            let pairs = frames[n]
                 .as_flattened()
                 .iter()
-                .zip(frames[m].as_flattened())
-                .map(|(a, b)| a * b)
-                .sum();
-            let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees() * share;
-            if angle > most.0 {
-                let (p, q) = (grid.node(n), grid.node(m));
-                most = (angle, Aabb::EMPTY.with(p).with(q).center());
-            }
+                .zip(frames[m].as_flattened());
+            let trace: f64 = pairs.map(|(a, b)| a * b).sum();
+            let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+            (angle * share, n)
+        };
+        // Of equals the first, whatever the threads do.
+        let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
+            Ordering::Less => b,
+            Ordering::Equal if b.1 < a.1 => b,
+            _ => a,
+        };
+        let found = (0..grid.len())
+            .into_par_iter()
+            .map(angle)
+            .reduce(|| (0.0, usize::MAX), greater);
+        if found.0 > most.0 {
+            let (p, q) = (grid.node(found.1), grid.node(found.1 + apart * strides[a]));
+            most = (found.0, Aabb::EMPTY.with(p).with(q).center());
         }
     }
     most

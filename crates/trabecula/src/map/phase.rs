@@ -23,6 +23,8 @@ const FINE: f64 = 4.0;
 const ABRUPT: f64 = 1.5;
 /// Weights fall off outside the region by e² for each of so many steps.
 const FALL: f64 = 3.0;
+/// Nodes at which a solution is held against what was asked for.
+const LOOKS: usize = 60_000;
 /// Least weight, as its root.
 const FAINT: f64 = 1e-3;
 
@@ -86,18 +88,27 @@ impl Phase {
         });
         let (values, mean, steps) = integrate(&grid, &k, &depth);
         let spline = Spline::through(grid, values);
-        let jacobians: Vec<Mat3> = nodes.par_iter().map(|p| spline.jacobian(*p).1).collect();
-        let found: Vec<_> = (0..grid.len())
-            .into_par_iter()
-            .filter(|&n| inside[n])
-            .map(|n| {
+        let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
+        // Cells for each cell wanted, everywhere; the rest, which costs more, at some tens of thousands of nodes.
+        let density: Vec<f64> = within
+            .par_iter()
+            .map(|&n| {
+                let cells = determinant(&spline.jacobian(nodes[n]).1);
+                cells * wavelength[n].iter().product::<f64>()
+            })
+            .collect();
+        let keep = LOOKS as f64 / within.len().max(1) as f64;
+        let looked: Vec<usize> = (within.iter().copied())
+            .filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
+            .collect();
+        let jacobians: Vec<Mat3> = looked
+            .par_iter()
+            .map(|&n| spline.jacobian(nodes[n]).1)
+            .collect();
+        let found: Vec<_> = (looked.par_iter().zip(&jacobians))
+            .map(|(&n, j)| {
                 let wanted = [k[0][n], k[1][n], k[2][n]];
-                distortion::compare(
-                    nodes[n],
-                    &jacobians[n],
-                    &wanted,
-                    distortion::curl(&grid, &k, n),
-                )
+                distortion::compare(j, &wanted, distortion::curl(&grid, &k, n))
             })
             .collect();
         let range = wavelength
@@ -107,31 +118,39 @@ impl Phase {
                 [a.min(*w), b.max(*w)]
             });
         let turn = distortion::turning(&grid, &frames, &inside, range[1]);
-        let distortion = Distortion::of(&found, turn);
+        let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
+        let least = (0..density.len()).min_by(order);
+        let most = (0..density.len()).max_by(order);
+        let distortion = Distortion {
+            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
+            least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
+            ..Distortion::of(&found, turn)
+        };
         if !settings.folds {
             refuse_folds(&grid, &spline, &distortion, &inside)?;
         }
         let shift = mean.map(|m| -dot(m, wanted.offset));
-        let count = found.len().max(1) as f64;
-        let average = (0..grid.len())
-            .filter(|&n| inside[n])
-            .fold([0.0; 3], |s, n| add(s, wavelength[n]));
+        let average = (within.iter()).fold([0.0; 3], |s, &n| add(s, wavelength[n]));
         let steepest = spline.stretch(bounds);
-        let by_length = |a: &&Mat3, b: &&Mat3| spectral_norm(a).total_cmp(&spectral_norm(b));
-        let within = || jacobians.iter().zip(&inside).filter(|j| *j.1).map(|j| j.0);
-        let extremes = [within().min_by(by_length), within().max_by(by_length)];
+        let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
+        let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
+        let typical = spline.jacobian(bounds.center()).1;
+        let extremes = [
+            (0..lengths.len()).min_by(by_length),
+            (0..lengths.len()).max_by(by_length),
+        ];
         Ok(Phase {
             spline,
             shift,
             wavelength: range,
-            mean: if found.is_empty() {
+            mean: if within.is_empty() {
                 wavelength[0]
             } else {
-                scale(average, 1.0 / count)
+                scale(average, 1.0 / within.len() as f64)
             },
             steepest,
             distortion,
-            extremes: extremes.map(|j| *j.unwrap_or(&jacobians[0])),
+            extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
         })
     }

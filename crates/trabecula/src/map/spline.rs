@@ -13,6 +13,9 @@ use crate::math::{Aabb, Mat3, Vec3};
 /// Fewest nodes along an axis.
 pub(super) const LEAST: usize = 6;
 
+/// Intervals along each side of a block that has one bound.
+const BLOCK: usize = 4;
+
 /// A map u(x) through values at the nodes of a grid.
 pub(super) struct Spline {
     grid: Grid,
@@ -20,7 +23,7 @@ pub(super) struct Spline {
     shape: [usize; 3],
     /// The coefficients of the three functions, x fastest; entry m belongs to node m − 1.
     coefficients: [Vec<f64>; 3],
-    /// For each interval between nodes, x fastest: a bound of |J − J₀| (Frobenius) and one of |J₀| (spectral), J₀ the
+    /// For each block of intervals between nodes, x fastest: a bound of |J − J₀| (Frobenius) and one of |J₀| (spectral), J₀ the
     /// middle of what the entries can be.
     stretch: Vec<[f32; 2]>,
 }
@@ -51,7 +54,7 @@ impl Spline {
             coefficients,
             stretch: Vec::new(),
         };
-        let [nx, ny, nz] = grid.shape.map(|n| n - 1);
+        let [nx, ny, nz] = spline.blocks();
         spline.stretch = (0..nx * ny * nz)
             .into_par_iter()
             .map(|i| spline.stretch_of([i % nx, i / nx % ny, i / nx / ny]))
@@ -129,20 +132,30 @@ impl Spline {
         (u, m)
     }
 
-    /// [|J − J₀|, |J₀|] over an interval. A derivative is a mean of differences of coefficients along its axis.
+    /// Blocks of intervals along each axis.
+    fn blocks(&self) -> [usize; 3] {
+        self.grid.shape.map(|n| (n - 1).div_ceil(BLOCK))
+    }
+
+    /// [|J − J₀|, |J₀|] over a block. A derivative is a mean of differences of coefficients along its axis.
     fn stretch_of(&self, at: [usize; 3]) -> [f32; 2] {
         let s = self.strides();
-        let base = at[0] + at[1] * s[1] + at[2] * s[2];
+        let base = BLOCK * (at[0] + at[1] * s[1] + at[2] * s[2]);
+        // Coefficients that count.
+        let n: [usize; 3] =
+            core::array::from_fn(|a| BLOCK.min(self.grid.shape[a] - 1 - BLOCK * at[a]) + 3);
         let (mut middle, mut half) = ([[0.0; 3]; 3], 0.0);
         for (i, c) in self.coefficients.iter().enumerate() {
             for a in 0..3 {
-                let (b, d) = ((a + 1) % 3, (a + 2) % 3);
                 let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-                for q in 0..16 {
-                    let row = base + q % 4 * s[b] + q / 4 * s[d];
-                    for n in 0..3 {
-                        let v = c[row + (n + 1) * s[a]] - c[row + n * s[a]];
-                        (lo, hi) = (lo.min(v), hi.max(v));
+                let count = |b: usize| n[b] - usize::from(a == b);
+                for z in 0..count(2) {
+                    for y in 0..count(1) {
+                        let row = base + y * s[1] + z * s[2];
+                        for x in row..row + count(0) {
+                            let v = c[x + s[a]] - c[x];
+                            (lo, hi) = (lo.min(v), hi.max(v));
+                        }
                     }
                 }
                 let h = self.grid.step[a];
@@ -167,10 +180,10 @@ impl Spline {
             let out = (-lo).max(hi - last).max(0.0);
             // A straight line weighs with at most a half and its distance on either side.
             beyond *= 1.0 + out;
-            let inside = |s: f64| (s.clamp(0.0, last) as usize).min(self.grid.shape[a] - 2);
+            let inside = |s: f64| (s.clamp(0.0, last) as usize).min(self.grid.shape[a] - 2) / BLOCK;
             range[a] = (inside(lo), inside(hi));
         }
-        let [nx, ny, _] = self.grid.shape.map(|n| n - 1);
+        let [nx, ny, _] = self.blocks();
         let mut most = 0.0f64;
         for k in range[2].0..=range[2].1 {
             for j in range[1].0..=range[1].1 {
