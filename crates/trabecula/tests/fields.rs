@@ -384,3 +384,48 @@ fn bad_files_are_refused_with_what_is_wrong() {
             .any(|w| w.path == "lattice.a.map.phase" && w.message.contains("within one cell"))
     );
 }
+
+/// A gyroid given as numbers is the gyroid; a rod given as a mesh fills as much of the cell as it did.
+#[test]
+fn cells_come_from_files() {
+    use std::f64::consts::TAU;
+    let gyroid = npy([16; 3], |at| {
+        let [x, y, z] = at.map(|i| TAU * i as f64 / 16.0);
+        x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos()
+    });
+    let lattice = |cell: &str, level: &str| {
+        let text = format!(
+            "schema = 1\n[region.box]\nmin = [0, 0, 0]\nmax = [8, 8, 8]\n[lattice.a]\ncell = {cell}\npart = \"upper\"\n\
+             map = {{ {PLAIN} }}\nlevel = {{ {level} }}\n"
+        );
+        let mut files = files();
+        files.0.insert("gyroid.npy".into(), gyroid.clone());
+        Design::from_toml(&text)?.build(&files)
+    };
+    let file = lattice("{ file = { path = \"gyroid.npy\" } }", "iso = 0.3")
+        .unwrap_or_else(|e| panic!("{e}"));
+    let named = lattice("\"gyroid\"", "iso = 0.3").expect("named");
+    for p in places() {
+        assert!((file.lattices[0].1.value(p) - named.lattices[0].1.value(p)).abs() < 1e-9);
+    }
+    assert!(
+        file.report()["lattices"]["a"]["truncation"]
+            .as_f64()
+            .expect("told")
+            < 1e-6
+    );
+    let e = lattice("{ file = { path = \"nan.npy\" } }", "iso = 0.3")
+        .err()
+        .expect("refused");
+    assert!(
+        e.path == "lattice.a.cell.file.path" && e.message.contains("[3, 2, 1]"),
+        "{e}"
+    );
+    let e = lattice(
+        "{ file = { path = \"gyroid.npy\", terms = 0 } }",
+        "iso = 0.3",
+    )
+    .err()
+    .expect("refused");
+    assert_eq!(e.path, "lattice.a.cell.file.terms");
+}

@@ -108,6 +108,104 @@ impl Series {
         Ok(Series::of(terms))
     }
 
+    /// The series of the `count` largest waves of a function given at the nodes (i, j, k) / shape of the torus, x fastest:
+    /// its discrete Fourier transform, truncated. Also the root mean square of what is left out, over that of the function
+    /// less its mean. Waves up to a quarter of the nodes along each axis are kept at most.
+    ///
+    /// # Errors
+    /// Fewer than four nodes along an axis, numbers that are not finite, a function that is constant.
+    pub fn sampled(
+        values: &[f64],
+        shape: [usize; 3],
+        count: usize,
+    ) -> Result<(Series, f64), Fault> {
+        use rustfft::{FftDirection, FftPlannerScalar, num_complex::Complex64};
+        let all: usize = shape.iter().product();
+        if shape.iter().any(|n| *n < 4) || values.len() != all {
+            return Err(Fault::new(
+                "path",
+                format!("a cell of {shape:?} numbers; give at least four along each axis"),
+            ));
+        }
+        if let Some(n) = values.iter().position(|v| !v.is_finite()) {
+            let at = [
+                n % shape[0],
+                n / shape[0] % shape[1],
+                n / shape[0] / shape[1],
+            ];
+            return Err(Fault::new(
+                "path",
+                format!("the number at {at:?} is {}; all must be finite", values[n]),
+            ));
+        }
+        let mut f: Vec<Complex64> = values.iter().map(|v| Complex64::new(*v, 0.0)).collect();
+        let mut planner = FftPlannerScalar::new();
+        for axis in 0..3 {
+            let (n, stride) = (shape[axis], shape[..axis].iter().product::<usize>());
+            let plan = planner.plan_fft(n, FftDirection::Forward);
+            let mut line = vec![Complex64::default(); n];
+            for first in (0..all).filter(|i| i / stride % n == 0) {
+                (0..n).for_each(|k| line[k] = f[first + k * stride]);
+                plan.process(&mut line);
+                (0..n).for_each(|k| f[first + k * stride] = line[k]);
+            }
+        }
+        let wave = |n: usize| -> [i32; 3] {
+            let at = [
+                n % shape[0],
+                n / shape[0] % shape[1],
+                n / shape[0] / shape[1],
+            ];
+            core::array::from_fn(|a| {
+                let (i, n) = (at[a] as i32, shape[a] as i32);
+                if 2 * i > n { i - n } else { i }
+            })
+        };
+        // One of each pair of opposite waves stands for both.
+        let mut waves: Vec<(f64, [i32; 3], Complex64)> = (0..all)
+            .map(|n| (wave(n), f[n] / all as f64))
+            .filter(|(h, _)| h.iter().find(|v| **v != 0).is_none_or(|v| *v > 0))
+            .map(|(h, c)| (c.norm(), h, c))
+            .collect();
+        let energy = f[1..].iter().map(|c| c.norm_sqr()).sum::<f64>() / (all as f64).powi(2);
+        waves.retain(|(_, h, _)| {
+            (0..3).all(|a| {
+                h[a].unsigned_abs() as usize <= (shape[a] / 4).clamp(1, MAX_INDEX as usize)
+            })
+        });
+        // Of equal ones the shorter, then by their indices, so that the choice is always the same.
+        let length = |h: &[i32; 3]| h.iter().map(|v| v * v).sum::<i32>();
+        let rounded = |v: f64| (v * 1e12).round();
+        waves.sort_by(|a, b| {
+            let by_size = rounded(b.0).total_cmp(&rounded(a.0));
+            by_size
+                .then(length(&a.1).cmp(&length(&b.1)))
+                .then(a.1.cmp(&b.1))
+        });
+        waves.truncate(count.max(1));
+        let kept: f64 = waves
+            .iter()
+            .filter(|w| w.1 != [0; 3])
+            .map(|w| 2.0 * w.0 * w.0)
+            .sum();
+        let terms = waves.iter().map(|(size, h, c)| Term {
+            hkl: *h,
+            amplitude: if *h == [0; 3] { c.re } else { 2.0 * size },
+            phase: if *h == [0; 3] {
+                0.0
+            } else {
+                c.im.atan2(c.re) / core::f64::consts::TAU
+            },
+        });
+        let series = Series::new(terms.collect()).map_err(|_| {
+            Fault::new(
+                "path",
+                "the numbers of the cell do not vary, so it has no surface",
+            )
+        })?;
+        Ok((series, ((energy - kept).max(0.0) / energy).sqrt()))
+    }
+
     fn of(terms: Vec<Term>) -> Series {
         let waves = terms.iter().map(Wave::new).collect();
         let all = terms.iter().flat_map(|t| t.hkl);
@@ -467,6 +565,40 @@ mod tests {
         assert!(Series::new(vec![term([1, 0, 0], 1.0, 0.0), term([1, 0, 0], 1.0, 0.5)]).is_err());
         assert!(Series::new(vec![term([65, 0, 0], 1.0, 0.0)]).is_err());
         assert!(Series::new(vec![term([1, 0, 0], f64::NAN, 0.0)]).is_err());
+    }
+
+    #[test]
+    fn a_series_comes_back_from_its_samples_and_truncation_is_told() {
+        let s = Series::new(vec![
+            term([1, -2, 0], 0.7, 0.13),
+            term([0, 3, 1], -0.4, 0.0),
+            term([2, 2, -2], 0.2, 0.25),
+            term([0, 0, 0], 0.5, 0.0),
+        ])
+        .expect("valid");
+        let shape = [12usize, 16, 10];
+        let u: Vec<Vec3> = (0..12 * 16 * 10)
+            .map(|n| [n % 12, n / 12 % 16, n / 192])
+            .map(|i| core::array::from_fn(|a| i[a] as f64 / shape[a] as f64))
+            .collect();
+        let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
+        s.gradients(&u, &mut v, &mut g);
+        let (all, error) = Series::sampled(&v, shape, 50).expect("sampled");
+        assert!(
+            error < 1e-7 && all.terms().len() == 4,
+            "{error} {:?}",
+            all.terms()
+        );
+        let p = [[0.123, 0.456, 0.789]];
+        let (mut a, mut b, mut h) = ([0.0], [0.0], [[0.0; 3]]);
+        s.gradients(&p, &mut a, &mut h);
+        all.gradients(&p, &mut b, &mut h);
+        assert!((a[0] - b[0]).abs() < 1e-12);
+        // Without the least: 0.2 of root 0.7² + 0.4² + 0.2².
+        let (_, error) = Series::sampled(&v, shape, 3).expect("sampled");
+        assert!((error - 0.2 / 0.69f64.sqrt()).abs() < 1e-9);
+        assert!(Series::sampled(&vec![1.0; 1920], shape, 9).is_err());
+        assert!(Series::sampled(&v, [12, 16, 11], 9).is_err());
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, map, region, sample, skin};
+use super::{Built, Design, Loader, Warning, level, map, region, sample, samples, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -25,6 +25,9 @@ const FARTHEST: f64 = 1e9;
 
 /// Index of a series beyond which the grids on which a cell is analysed have less than four nodes on a wave.
 const FINEST: usize = 24;
+
+/// The share of a cell in a file that may be left out before it is warned of.
+const TRUNCATED: f64 = 0.25;
 
 /// Where a part of a lattice stands, and the region it is to fill.
 pub(super) struct Place<'a> {
@@ -146,8 +149,12 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
-    let (name, cell) = cell(&spec.cell, &below("cell"))?;
-    let cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
+    let (name, cell) = cell(&spec.cell, &below("cell"), place.loader)?;
+    let left_out = cell.truncation();
+    let mut cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
+    if let Some(share) = left_out {
+        cell = cell.truncated(share);
+    }
     let cell = Arc::new(cell);
     let here = Place {
         path: below("map"),
@@ -166,6 +173,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
 pub(super) fn cell<'a>(
     spec: &'a CellSpec,
     path: &str,
+    loader: &dyn Loader,
 ) -> Result<(Option<&'a str>, Cell), DesignError> {
     let (name, terms, at) = match spec {
         CellSpec::Name(name) => {
@@ -174,6 +182,9 @@ pub(super) fn cell<'a>(
                 DesignError::unknown(path, "cell", name, &names)
             })?;
             (Some(name.as_str()), known.terms(), path.to_string())
+        }
+        CellSpec::Kind(CellKind::File(f)) => {
+            return Ok((None, samples::cell(f, &format!("{path}.file"), loader)?));
         }
         CellSpec::Kind(CellKind::Series(s)) => {
             let at = format!("{path}.series");
@@ -349,6 +360,16 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
         let message = format!("{place} the periodic solid is not one piece in space; {limit}");
         warnings.push(Warning {
             path: format!("{}.level.{}", path, amount_key(spec)),
+            message,
+        });
+    }
+    if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
+        let message = format!(
+            "the waves that are kept leave out {:.1} % (root mean square) of the cell in the file; keep more terms",
+            100.0 * share
+        );
+        warnings.push(Warning {
+            path: format!("{}.cell.file.terms", place.path),
             message,
         });
     }

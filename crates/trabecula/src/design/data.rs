@@ -234,6 +234,28 @@ pub enum CellSpec {
 pub enum CellKind {
     /// A Fourier series.
     Series(SeriesSpec),
+    /// Numbers or a mesh in a file: the largest waves of their Fourier transform.
+    File(FileCellSpec),
+}
+
+/// A cell from a file: numbers at the nodes of one period, without the repeated end, or a mesh of the solid in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FileCellSpec {
+    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, obj, ply, off, 3mf), whose bounds are the
+    /// cell and whose inside has the value 1, the outside 0.
+    pub path: String,
+    /// How many waves are kept.
+    #[serde(default = "waves", skip_serializing_if = "is_waves")]
+    pub terms: f64,
+}
+
+fn waves() -> f64 {
+    200.0
+}
+
+fn is_waves(v: &f64) -> bool {
+    *v == waves()
 }
 
 /// A Fourier series: the sum of its terms.

@@ -328,7 +328,15 @@ fn cell(at: &At) -> Read<CellSpec> {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
-    let (_, at) = at.kind("cell", &["series"], &LATER_CELL)?;
+    let (kind, at) = at.kind("cell", &["series", "file"], &LATER_CELL)?;
+    if kind == "file" {
+        let f = at.fields("a cell from a file", &["path", "terms"], &[])?;
+        let path = f.need("path", "numbers (npy) or a mesh of one cell")?;
+        return Ok(CellSpec::Kind(CellKind::File(FileCellSpec {
+            path: path.text("a path")?.to_string(),
+            terms: f.read("terms", 200.0, At::number)?,
+        })));
+    }
     let f = at.fields("a series", &["terms", "group"], &[])?;
     let terms = f.need(
         "terms",

@@ -117,6 +117,9 @@ pub(super) fn report(built: &Built) -> Json {
             "folding": lattice.folding(),
             "connected_fraction": lattice.connected_fraction(),
         });
+        if let Some(share) = lattice.cell.truncation() {
+            entry["truncation"] = json!(share);
+        }
         if let Map::Phase(map) = &lattice.map {
             entry["distortion"] = distortion(map.distortion());
         }

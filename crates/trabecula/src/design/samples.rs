@@ -2,14 +2,18 @@
 
 use std::sync::Arc;
 
+use super::Loader;
 use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::Allowed;
+use crate::cell::{Cell, Series};
 use crate::fault::{Fault, counted, number};
+use crate::field::Field;
 use crate::grade::{Grade, Samples};
 use crate::io::{self, Shape};
 use crate::math::{Aabb, Vec3};
+use crate::region::{MeshRegion, Repair, Shape as _};
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
@@ -19,6 +23,60 @@ fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {
         .loader
         .load(path)
         .map_err(|m| DesignError::new(at, m).found(path))
+}
+
+/// Nodes along an axis of the grid on which a mesh of one cell is looked at.
+const CELL: usize = 64;
+
+/// A cell from numbers or a mesh.
+pub(super) fn cell(
+    spec: &FileCellSpec,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<Cell, DesignError> {
+    let at = format!("{path}.path");
+    let wrong =
+        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    if !(spec.terms >= 1.0 && spec.terms <= 2000.0 && spec.terms.fract() == 0.0) {
+        let message = format!(
+            "terms is {}; it must be a whole number from 1 to 2000",
+            number(spec.terms)
+        );
+        return Err(DesignError::new(format!("{path}.terms"), message));
+    }
+    let file = loader
+        .load(&spec.path)
+        .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
+    let kind = extension(&spec.path);
+    let (shape, values) = if kind == "npy" {
+        let (shape, values) = io::read_npy(&file).map_err(wrong)?;
+        let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
+            let message =
+                format!("the array has shape {shape:?}; a cell has three dimensions [x, y, z]");
+            wrong(Fault::new("", message))
+        })?;
+        (shape, values)
+    } else if io::READABLE.contains(&kind.as_str()) {
+        let mesh = io::read_mesh(&file, &kind).map_err(wrong)?.mesh;
+        let solid = MeshRegion::new(mesh, Repair::Auto).map_err(wrong)?;
+        let (b, size) = (solid.bounds(), solid.bounds().size());
+        let points: Vec<Vec3> = (0..CELL.pow(3))
+            .map(|n| [n % CELL, n / CELL % CELL, n / CELL / CELL])
+            .map(|i| {
+                core::array::from_fn(|a| b.min[a] + size[a] * (i[a] as f64 + 0.5) / CELL as f64)
+            })
+            .collect();
+        let mut values = vec![0.0; points.len()];
+        solid.values(&points, &mut values);
+        let inside = |v: &f64| if *v < 0.0 { 1.0 } else { 0.0 };
+        ([CELL; 3], values.iter().map(inside).collect())
+    } else {
+        let known = io::READABLE.join(", ");
+        let message = format!("the name must end in npy, {known}; found \"{}\"", spec.path);
+        return Err(DesignError::new(at, message).found(&spec.path));
+    };
+    let (series, share) = Series::sampled(&values, shape, spec.terms as usize).map_err(wrong)?;
+    Ok(Cell::new(series).truncated(share))
 }
 
 fn extension(path: &str) -> String {
