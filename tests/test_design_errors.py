@@ -102,9 +102,24 @@ CASES = [
     # cells
     ('cell = "gyroid"', "cell.tet = {}", "lattice.core.cell.tet", ["not in this version yet"]),
     ('cell = "gyroid"', "cell.series = { terms = [] }", "lattice.core.cell.series", []),
-    ('cell = "gyroid"', "cell.series = { group = 231, terms = [{ hkl = [1, 0, 0] }] }", "lattice.core.cell.series.group", ["1 to 230"]),
-    ('cell = "gyroid"', 'cell.series = { group = "Fd3x", terms = [{ hkl = [1, 0, 0] }] }', "lattice.core.cell.series.group", ["Fd3x"]),
-    ('cell = "gyroid"', "cell.series = { group = 1.5, terms = [{ hkl = [1, 0, 0] }] }", "lattice.core.cell.series.group", ["1.5"]),
+    (
+        'cell = "gyroid"',
+        "cell.series = { group = 231, terms = [{ hkl = [1, 0, 0] }] }",
+        "lattice.core.cell.series.group",
+        ["1 to 230"],
+    ),
+    (
+        'cell = "gyroid"',
+        'cell.series = { group = "Fd3x", terms = [{ hkl = [1, 0, 0] }] }',
+        "lattice.core.cell.series.group",
+        ["Fd3x"],
+    ),
+    (
+        'cell = "gyroid"',
+        "cell.series = { group = 1.5, terms = [{ hkl = [1, 0, 0] }] }",
+        "lattice.core.cell.series.group",
+        ["1.5"],
+    ),
     (
         'cell = "gyroid"',
         "cell.series = { group = 229, terms = [{ hkl = [1, 0, 0] }] }",
