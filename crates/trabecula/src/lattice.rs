@@ -427,7 +427,7 @@ impl Lattice {
 enum Rows<'a> {
     Waves(RowWaves),
     Distance(&'a Distance, &'a Affine, Block<'a>),
-    Phases(&'a Series, map::Rows<'a>, [Vec<f64>; 3]),
+    Phases(&'a Series, Box<map::Rows<'a>>, [Vec<f64>; 3]),
     Points(&'a Lattice, Block<'a>),
 }
 
@@ -440,7 +440,11 @@ impl<'a> Rows<'a> {
             (Some(_), None) => Rows::Points(lattice, *block),
             (None, None) => {
                 let row = || vec![0.0; block.axes[0].len()];
-                Rows::Phases(series, lattice.map.rows(block), [row(), row(), row()])
+                Rows::Phases(
+                    series,
+                    Box::new(lattice.map.rows(block)),
+                    [row(), row(), row()],
+                )
             }
         }
     }

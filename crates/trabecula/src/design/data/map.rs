@@ -188,7 +188,7 @@ pub enum GradeOrThree {
     /// The same along all three axes.
     One(GradeSpec),
     /// Along the cell's x, y, z.
-    Three([GradeSpec; 3]),
+    Three(Box<[GradeSpec; 3]>),
 }
 
 /// A vector that may vary.
@@ -196,7 +196,7 @@ pub enum GradeOrThree {
 #[serde(untagged)]
 pub enum VectorSpec {
     /// By its components along x, y, z.
-    Components([GradeSpec; 3]),
+    Components(Box<[GradeSpec; 3]>),
     /// An array of three numbers of a result.
     Field(VectorField),
 }
@@ -224,7 +224,7 @@ pub struct FrameSpec {
 #[serde(untagged)]
 pub enum TensorSpec {
     /// By its components 11, 22, 33, 23, 13, 12.
-    Components([GradeSpec; 6]),
+    Components(Box<[GradeSpec; 6]>),
     /// An array of six or nine numbers of a result.
     Field(TensorField),
 }

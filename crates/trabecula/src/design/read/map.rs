@@ -144,7 +144,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
     let domains = [("region", Domain::Region), ("box", Domain::Box)];
     Ok(PhaseSpec {
         wavelength: if wavelength.is_list() {
-            GradeOrThree::Three(grades(wavelength, "one number or three, mm")?)
+            GradeOrThree::Three(Box::new(grades(wavelength, "one number or three, mm")?))
         } else {
             GradeOrThree::One(grade(wavelength)?)
         },
@@ -178,7 +178,8 @@ fn vector(at: &At) -> Read<VectorSpec> {
             field: super::grade::field(field)?,
         }));
     }
-    grades(at, "three numbers [x, y, z], each of which may vary").map(VectorSpec::Components)
+    grades(at, "three numbers [x, y, z], each of which may vary")
+        .map(|g| VectorSpec::Components(Box::new(g)))
 }
 
 fn tensor(at: &At) -> Read<TensorSpec> {
@@ -195,7 +196,7 @@ fn tensor(at: &At) -> Read<TensorSpec> {
         at,
         "six numbers [11, 22, 33, 23, 13, 12], each of which may vary",
     )
-    .map(TensorSpec::Components)
+    .map(|g| TensorSpec::Components(Box::new(g)))
 }
 
 /// So many numbers, each of which may vary.
