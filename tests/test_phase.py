@@ -14,7 +14,7 @@ def test_a_turned_and_graded_part_is_one_closed_piece():
     turn = lt.grade.linear(along=[1, 0, 0], stops={0: 0, 12: 20})
     ask = lt.level.fraction(lt.grade.radial(center=[6, 6, 6], stops={0: 0.5, 8: 0.3}))
     solid = design(lt.map.phase(wavelength=[3, 3, lt.grade.formula("3 + 0.05*x")], rotate_z=turn), ask).build()
-    mesh = solid.mesh(edge=0.25)
+    mesh = solid.mesh(edge=0.25, islands="drop")
     assert mesh.closed and mesh.pieces == 1
     report = solid.report()["lattices"]["core"]
     assert report["fraction"][0] >= 0.29 and report["distortion"]["density"][0] > 0.7

@@ -265,7 +265,7 @@ pub struct SeriesSpec {
     /// A space group: then each term stands for the sum of its wave over the group, divided by that sum's largest Fourier
     /// coefficient. By number (227), Hermann–Mauguin symbol ("Fd-3m"), either with a setting ("227:1"; origin choice 2 unless
     /// given), or Hall symbol.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "schema::group")]
     pub group: Option<String>,
     /// The terms.
