@@ -14,7 +14,7 @@ from difflib import get_close_matches
 
 from .given import plain
 
-__all__ = ["group", "names", "series", "term"]
+__all__ = ["file", "group", "names", "series", "term"]
 
 
 def names() -> list[str]:
@@ -51,6 +51,15 @@ def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
     if group is not None:
         made["group"] = plain(group)
     return {"series": made}
+
+
+def file(path: str, terms: int | None = None) -> dict:
+    """A cell from a file: numbers over one period (npy), or a mesh of the solid in one cell; its largest ``terms`` waves.
+
+    A mesh has the value 1 inside and 0 outside, so ``part="upper"`` with ``iso`` 0.5 is the solid itself, but for what the
+    waves leave out: ``truncation`` in a solid's report.
+    """
+    return {"file": {"path": path} | ({} if terms is None else {"terms": terms})}
 
 
 def group(symbol: int | str) -> dict:

@@ -1,12 +1,12 @@
-"""Grades: numbers that vary in space, accepted where a level's amount stands."""
+"""Grades: numbers that vary in space, accepted where a level's amount or a number of a phase map stands."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from .given import copied, plain
+from .given import copied, plain, settings
 
-__all__ = ["depth", "formula", "linear"]
+__all__ = ["depth", "field", "formula", "grid", "linear", "points", "radial"]
 
 Stops = Mapping[float, float] | Iterable[Sequence[float]]
 
@@ -24,6 +24,41 @@ def depth(stops: Stops) -> dict:
 def formula(text: str) -> dict:
     """A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)"; parsed, never run as code."""
     return {"formula": text}
+
+
+def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+    """Piecewise linear in the distance (mm) from a point, or from the line through it along ``axis``; constant beyond."""
+    given = settings(center=center, axis=axis)
+    return {"radial": {**given, "stops": copied(_stops(stops))}}
+
+
+def grid(
+    path: str,
+    origin: Sequence[float] | None = None,
+    step: float | Sequence[float] | None = None,
+    array: str | None = None,
+    remap: Stops | None = None,
+) -> dict:
+    """Numbers on a grid from a file: npy (with the ``origin`` of the first number and the ``step``, mm), vti, vtk.
+
+    ``remap`` says what they stand for: {number: value} or pairs, linear between. A ``path`` is relative to the design's
+    folder.
+    """
+    return {"grid": settings(path=path, origin=origin, step=step, array=array, remap=_remap(remap))}
+
+
+def points(path: str, neighbours: int | None = None, remap: Stops | None = None) -> dict:
+    """Numbers at scattered points from a table (csv) of x, y, z (mm), value: the mean of the nearest ``neighbours``."""
+    return {"points": settings(path=path, neighbours=neighbours, remap=_remap(remap))}
+
+
+def field(path: str, array: str, component: int | None = None, remap: Stops | None = None) -> dict:
+    """An array of points or cells of a result on a mesh (vtu, vtk) or a grid (vti, vtk)."""
+    return {"field": settings(path=path, array=array, component=component, remap=_remap(remap))}
+
+
+def _remap(remap: Stops | None) -> list | None:
+    return None if remap is None else copied(_stops(remap))
 
 
 def _stops(stops: Stops) -> list:

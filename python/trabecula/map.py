@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "spartan"]
+__all__ = ["affine", "cylinder", "phase", "spartan", "sphere"]
 
 
 def affine(
@@ -33,3 +33,65 @@ def spartan(
     With unequal wavelengths this shears the lattice in space; ``affine`` turns it rigidly.
     """
     return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}
+
+
+def phase(
+    wavelength: float | dict | Sequence[float | dict],
+    rotate: Sequence[float | dict] | None = None,
+    *,
+    rotate_x: float | dict | None = None,
+    rotate_y: float | dict | None = None,
+    rotate_z: float | dict | None = None,
+    direction: Sequence[float | dict] | None = None,
+    frame: dict | None = None,
+    stress: Sequence[float | dict] | dict | None = None,
+    offset: Sequence[float] | None = None,
+    step: float | None = None,
+    domain: str | None = None,
+    folds: bool | None = None,
+) -> dict:
+    """Cells that turn and stretch as asked for without tearing: phases with ∇Φᵢ = R eᵢ / λᵢ in least squares.
+
+    Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
+    ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
+    components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``step`` is the spacing in mm
+    of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
+    """
+    given = settings(
+        wavelength=wavelength,
+        rotate=rotate,
+        rotate_x=rotate_x,
+        rotate_y=rotate_y,
+        rotate_z=rotate_z,
+        direction=direction,
+        frame=frame,
+        stress=stress,
+        offset=offset,
+        step=step,
+        domain=domain,
+        folds=folds,
+    )
+    return {"phase": given}
+
+
+def cylinder(
+    wavelength: float | Sequence[float],
+    around: int,
+    center: Sequence[float] | None = None,
+    axis: Sequence[float] | None = None,
+) -> dict:
+    """Cells round an axis, ``around`` of them, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
+
+    ``wavelength`` is the cell's edge in mm along the radius and along the axis, one or two.
+    """
+    return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
+
+
+def sphere(
+    wavelength: float,
+    around: int,
+    center: Sequence[float] | None = None,
+    axis: Sequence[float] | None = None,
+) -> dict:
+    """Shells of cells about a centre, ``around`` (even) of them round the equator and half as many from pole to pole."""
+    return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}

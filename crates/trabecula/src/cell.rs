@@ -37,6 +37,7 @@ pub struct Cell {
     /// it, since the finer one only repeats it.
     plain: Series,
     repeats: [i32; 3],
+    truncation: Option<f64>,
     range: OnceLock<Interval>,
     table: OnceLock<quantile::Quantile>,
     connect: [OnceLock<Connectivity>; 3],
@@ -50,10 +51,22 @@ impl Cell {
             series,
             plain,
             repeats,
+            truncation: None,
             range: OnceLock::new(),
             table: OnceLock::new(),
             connect: Default::default(),
         }
+    }
+
+    /// The same cell, known to leave out this share (root mean square) of a function that was given.
+    pub fn truncated(mut self, share: f64) -> Cell {
+        self.truncation = Some(share);
+        self
+    }
+
+    /// The share (root mean square) of a given function that the series leaves out.
+    pub fn truncation(&self) -> Option<f64> {
+        self.truncation
     }
 
     /// The series.

@@ -9,11 +9,13 @@ mod error;
 mod grade;
 mod json;
 mod level;
+mod map;
 mod node;
 mod read;
 mod region;
 mod report;
 mod sample;
+mod samples;
 mod schema;
 mod skin;
 #[cfg(test)]
@@ -167,7 +169,15 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 
 /// The cell that a tree describes, as under the key `cell` of a lattice.
 pub fn cell(node: &Node) -> Result<Cell, DesignError> {
-    Ok(build::cell(&read::cell_in(node)?, "cell")?.1)
+    struct Nothing;
+    impl Loader for Nothing {
+        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+            Err(format!(
+                "{path}: a cell from a file needs a design that says where the file is"
+            ))
+        }
+    }
+    Ok(build::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
 }
 
 impl Built {

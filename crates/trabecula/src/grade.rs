@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use crate::fault::Fault;
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, dot, scale};
+use crate::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
 
 mod formula;
+mod samples;
 pub use formula::Formula;
+pub use samples::Samples;
 
 /// A number that may vary in space. Its unit is that of the key it stands under.
 #[derive(Clone)]
@@ -30,6 +32,22 @@ pub enum Grade {
     },
     /// A formula in x, y, z (mm).
     Formula(Formula),
+    /// Piecewise linear in the distance (mm) from a point, or from a line through it, constant beyond the stops.
+    Radial {
+        /// The point.
+        center: Vec3,
+        /// Direction of the line, a unit vector; none for the distance from the point.
+        axis: Option<Vec3>,
+        /// (distance, value), distance ascending.
+        stops: Vec<[f64; 2]>,
+    },
+    /// Numbers on a grid.
+    Samples {
+        /// The numbers.
+        of: Arc<Samples>,
+        /// What they stand for: (number, value), number ascending; empty if for themselves.
+        remap: Vec<[f64; 2]>,
+    },
 }
 
 impl Grade {
@@ -79,6 +97,20 @@ impl Grade {
                 }
             }
             Grade::Formula(f) => f.values(points, out),
+            Grade::Radial {
+                center,
+                axis,
+                stops,
+            } => {
+                for (o, p) in out.iter_mut().zip(points) {
+                    *o = interpolate(stops, norm(off(*p, *center, *axis))).0;
+                }
+            }
+            Grade::Samples { of, remap } => {
+                for (o, p) in out.iter_mut().zip(points) {
+                    *o = remapped(remap, of.at(*p).0).0;
+                }
+            }
         }
     }
 
@@ -105,6 +137,26 @@ impl Grade {
                 }
             }
             Grade::Formula(f) => f.gradients(points, values, gradients),
+            Grade::Radial {
+                center,
+                axis,
+                stops,
+            } => {
+                for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
+                    let off = off(*p, *center, *axis);
+                    let (value, slope) = interpolate(stops, norm(off));
+                    *v = value;
+                    *g = scale(unit(off), slope);
+                }
+            }
+            Grade::Samples { of, remap } => {
+                for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
+                    let (number, slope) = of.at(*p);
+                    let (value, by) = remapped(remap, number);
+                    *v = value;
+                    *g = scale(slope, by);
+                }
+            }
         }
     }
 
@@ -126,7 +178,42 @@ impl Grade {
             }
             Grade::Depth { region, stops } => range(stops, -region.bound(b)),
             Grade::Formula(f) => f.bound(b),
+            Grade::Radial {
+                center,
+                axis,
+                stops,
+            } => {
+                if !b.is_finite() {
+                    return range(stops, Interval::new(0.0, f64::INFINITY));
+                }
+                // Distances from points and lines change by no more than the way between two places.
+                let r = norm(off(b.center(), *center, *axis));
+                let reach = norm(b.size()) / 2.0 * (1.0 + 1e-12) + 1e-12 * r;
+                range(stops, Interval::new((r - reach).max(0.0), r + reach))
+            }
+            Grade::Samples { of, remap } => {
+                let r = of.bound(b);
+                if remap.is_empty() { r } else { range(remap, r) }
+            }
         }
+    }
+}
+
+/// From the point, or from the nearest place on the line, to `p`.
+fn off(p: Vec3, center: Vec3, axis: Option<Vec3>) -> Vec3 {
+    let d = sub(p, center);
+    match axis {
+        None => d,
+        Some(n) => sub(d, scale(n, dot(d, n))),
+    }
+}
+
+/// What a number stands for, and the slope.
+fn remapped(remap: &[[f64; 2]], v: f64) -> (f64, f64) {
+    if remap.is_empty() {
+        (v, 1.0)
+    } else {
+        interpolate(remap, v)
     }
 }
 
@@ -196,7 +283,6 @@ fn range(stops: &[[f64; 2]], s: Interval) -> Interval {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::math::norm;
 
     /// Distance to the unit sphere.
     struct Ball;
@@ -227,6 +313,28 @@ mod tests {
             Grade::linear([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap(),
             Grade::depth(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap(),
             Grade::Formula(Formula::parse("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)").unwrap()),
+            Grade::Radial {
+                center: [0.2, 0.1, 0.0],
+                axis: None,
+                stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]],
+            },
+            Grade::Radial {
+                center: [0.2, 0.1, 0.0],
+                axis: Some([0.6, 0.0, 0.8]),
+                stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]],
+            },
+            Grade::Samples {
+                of: Arc::new(
+                    Samples::new(
+                        [-1.0; 3],
+                        [0.7, 0.5, 1.0],
+                        [4, 4, 3],
+                        (0..48).map(|i| f64::from(i * 7 % 13)).collect(),
+                    )
+                    .unwrap(),
+                ),
+                remap: vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]],
+            },
         ]
     }
 

@@ -17,9 +17,11 @@ pub(crate) mod stl;
 mod text;
 mod threemf;
 mod vti;
+mod vtk;
 
-pub use npy::write_npy;
+pub use npy::{read_npy, write_npy};
 pub use vti::write_vti;
+pub use vtk::{Array, Data, Shape, read_vtk};
 
 /// Extensions of the mesh formats that can be read.
 pub const READABLE: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];

@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use multiversion::multiversion;
 
-use crate::cell::{Cell, Distance, Part, Term};
+use crate::cell::{Cell, Distance, Part, Series, Term};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
-use crate::map::{Affine, Map};
-use crate::math::{Aabb, Interval, Vec3, add, apply, dot, norm, scale, sin_cos_turns, transpose};
+use crate::map::{self, Affine, Map};
+use crate::math::{
+    Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, dot, inverse, norm, product, scale,
+    sin_cos_turns, spectral_norm, transpose,
+};
 
 /// How much of the cell is solid.
 #[derive(Clone)]
@@ -30,6 +33,10 @@ impl Level {
     }
 }
 
+/// A distance under a map that varies is at most so many times the one in the table: beyond it a cell is stretched out
+/// of all likeness.
+const STRETCHED: f64 = 8.0;
+
 /// A lattice as a field: sheet |f| − t, lower f − t, upper t − f.
 ///
 /// f is the core: cell ∘ map, or, where the level is a thickness w, the signed distance (mm) to the mid-surface
@@ -46,7 +53,7 @@ pub struct Lattice {
     pub level: Level,
     /// The core, where it is a distance.
     distance: Option<Arc<Distance>>,
-    /// A bound of |∇f|, per mm.
+    /// A bound of |∇f|: per mm if the map is affine, else per turn.
     steepness: f64,
     /// t, where it does not vary.
     uniform: Option<f64>,
@@ -57,14 +64,17 @@ pub struct Lattice {
 impl Lattice {
     /// Joins the pieces.
     pub fn new(cell: Arc<Cell>, map: Map, part: Part, level: Level) -> Lattice {
-        let to_phase = map.jacobian([0.0; 3]);
+        let typical = map.typical();
         let distance = match &level {
-            Level::Thickness(_) => Some(Arc::new(Distance::new(cell.series(), &to_phase))),
+            Level::Thickness(_) => Some(Arc::new(Distance::new(cell.series(), &typical))),
             _ => None,
         };
-        let steepness = match &distance {
-            Some(d) => d.steepness(),
-            None => cell.steepness(&to_phase),
+        let steepness = match (&distance, map.affine()) {
+            (Some(d), Some(_)) => d.steepness(),
+            // Per turn of the direction in which a turn is longest.
+            (Some(d), None) => d.steepness() * spectral_norm(&inverse(&typical)),
+            (None, Some(map)) => cell.steepness(&map.matrix),
+            (None, None) => cell.steepness(&IDENTITY),
         };
         let uniform = match &level {
             Level::Iso(g) => g.constant(),
@@ -102,46 +112,122 @@ impl Lattice {
         self.distance.as_deref()
     }
 
+    /// The thickness (mm) beyond which the faces of a wall fold, where the level is a thickness: that of the cell, where
+    /// the map presses cells together most.
+    pub fn folding(&self) -> Option<f64> {
+        let d = self.distance.as_ref()?;
+        let back = inverse(&self.map.typical());
+        let pressed = |j: &Mat3| spectral_norm(&product(j, &back));
+        let most = match self.map.affine() {
+            Some(_) => 1.0,
+            None => self.map.extremes().iter().map(pressed).fold(0.0, f64::max),
+        };
+        Some(d.folding()? / most)
+    }
+
     /// Fills the core f at points (mm).
     pub fn cores(&self, points: &[Vec3], out: &mut [f64]) {
         let mut u = vec![[0.0; 3]; points.len()];
         self.map.phases(points, &mut u);
+        let g = || vec![[0.0; 3]; points.len()];
         match &self.distance {
-            Some(d) => d.values(&u, out),
-            None => self
-                .cell
-                .gradients(&u, out, &mut vec![[0.0; 3]; points.len()]),
+            Some(d) if self.map.affine().is_some() => d.values(&u, out),
+            Some(d) => {
+                let mut g = g();
+                d.gradients(&u, out, &mut g);
+                for ((f, g), p) in out.iter_mut().zip(g).zip(points) {
+                    *f *= self.ratio(d, g, &self.map.jacobian(*p));
+                }
+            }
+            None => self.cell.gradients(&u, out, &mut g()),
         }
+    }
+
+    /// What a distance on the torus is to be multiplied with where the Jacobian is this one.
+    fn ratio(&self, d: &Distance, gradient: Vec3, jacobian: &Mat3) -> f64 {
+        d.under(1.0, gradient, jacobian).min(STRETCHED)
     }
 
     /// Fills the core f and ∇f (per mm) at points (mm).
     pub fn core_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let Some(map) = self.map.affine() else {
+            return self.curved_gradients(points, values, gradients);
+        };
         let mut u = vec![[0.0; 3]; points.len()];
         self.map.phases(points, &mut u);
         match &self.distance {
             Some(d) => d.gradients(&u, values, gradients),
             None => self.cell.gradients(&u, values, gradients),
         }
-        let Map::Affine(a) = &self.map;
-        let back = transpose(&a.matrix);
+        let back = transpose(&map.matrix);
         for g in gradients.iter_mut() {
             *g = apply(&back, *g);
         }
     }
 
+    /// The same where the Jacobian varies.
+    fn curved_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        if self.distance.is_none() {
+            let mut u = vec![[0.0; 3]; points.len()];
+            self.map.phases(points, &mut u);
+            self.cell.gradients(&u, values, gradients);
+            for (g, p) in gradients.iter_mut().zip(points) {
+                *g = apply(&transpose(&self.map.jacobian(*p)), *g);
+            }
+            return;
+        }
+        self.cores(points, values);
+        // The factor of a distance has the second derivatives of both tables in its own: differences are as good.
+        let step = 1e-5 * self.map.wavelength();
+        for (g, p) in gradients.iter_mut().zip(points) {
+            let near: [Vec3; 6] = core::array::from_fn(|i| {
+                let mut q = *p;
+                q[i / 2] += if i % 2 == 0 { step } else { -step };
+                q
+            });
+            let mut v = [0.0; 6];
+            self.cores(&near, &mut v);
+            *g = core::array::from_fn(|a| (v[2 * a] - v[2 * a + 1]) / (2.0 * step));
+        }
+    }
+
     /// An interval that contains the core's values in the box.
     fn core_bound(&self, b: &Aabb) -> Interval {
-        let mut v = [0.0];
-        self.cores(&[b.center()], &mut v);
-        let reach = self.steepness * norm(b.size()) / 2.0;
-        let all = match &self.distance {
-            Some(d) => d.range(),
-            None => {
-                let most = self.cell.series().amplitude();
-                Interval::new(-most, most)
-            }
+        let reach = norm(b.size()) / 2.0;
+        let around = |v: f64, reach: f64, all: Interval| {
+            Interval::new((v - reach).max(all.lo), (v + reach).min(all.hi))
         };
-        Interval::new((v[0] - reach).max(all.lo), (v[0] + reach).min(all.hi))
+        let most = self.cell.series().amplitude();
+        let waves = Interval::new(-most, most);
+        let mut v = [0.0];
+        if self.map.affine().is_some() {
+            self.cores(&[b.center()], &mut v);
+            let all = self.distance.as_ref().map_or(waves, |d| d.range());
+            return around(v[0], self.steepness * reach, all);
+        }
+        let turns = self.map.stretch(b) * reach;
+        let Some(d) = &self.distance else {
+            self.cores(&[b.center()], &mut v);
+            return around(v[0], self.steepness * turns, waves);
+        };
+        let mut u = [[0.0; 3]];
+        self.map.phases(&[b.center()], &mut u);
+        d.values(&u, &mut v);
+        let r = around(v[0], self.steepness * turns, d.range());
+        // No gradient is lengthened by more than this, so no distance is multiplied by less than its inverse.
+        let longest = self.map.stretch(b) * spectral_norm(&inverse(&self.map.typical()));
+        let least = (1.0 / longest).min(1.0);
+        let lo = if r.lo > 0.0 {
+            r.lo * least
+        } else {
+            r.lo * STRETCHED
+        };
+        let hi = if r.hi < 0.0 {
+            r.hi * least
+        } else {
+            r.hi * STRETCHED
+        };
+        Interval::new(lo, hi)
     }
 
     /// The level t of the core where the level's number is `v`, and its slope.
@@ -273,7 +359,10 @@ impl Field for Lattice {
     }
 
     fn slope(&self) -> f64 {
-        self.steepness
+        match self.map.affine() {
+            Some(_) => self.steepness,
+            None => self.steepness * self.map.steepest(),
+        }
     }
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
@@ -306,7 +395,7 @@ impl Lattice {
                 row.fill(1.0);
                 continue;
             }
-            cores.fill(j, k, row);
+            cores.fill(j, k, word, row);
             if self.uniform.is_none() {
                 points.clear();
                 points.extend(
@@ -334,30 +423,62 @@ impl Lattice {
 ///
 /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
 /// multiplications per distinct wave number along x and no trigonometry; a distance is looked up in its table.
+/// Under any other map phases come row by row, and waves are summed at each node.
 enum Rows<'a> {
     Waves(RowWaves),
     Distance(&'a Distance, &'a Affine, Block<'a>),
+    Phases(&'a Series, Box<map::Rows<'a>>, [Vec<f64>; 3]),
+    Points(&'a Lattice, Block<'a>),
 }
 
 impl<'a> Rows<'a> {
     fn new(lattice: &'a Lattice, block: &Block<'a>) -> Rows<'a> {
-        let Map::Affine(map) = &lattice.map;
-        match &lattice.distance {
-            Some(d) => Rows::Distance(d, map, *block),
-            None => Rows::Waves(RowWaves::new(lattice.cell.series().terms(), map, block)),
+        let series = lattice.cell.series();
+        match (&lattice.distance, lattice.map.affine()) {
+            (Some(d), Some(map)) => Rows::Distance(d, map, *block),
+            (None, Some(map)) => Rows::Waves(RowWaves::new(series.terms(), map, block)),
+            (Some(_), None) => Rows::Points(lattice, *block),
+            (None, None) => {
+                let row = || vec![0.0; block.axes[0].len()];
+                Rows::Phases(
+                    series,
+                    Box::new(lattice.map.rows(block)),
+                    [row(), row(), row()],
+                )
+            }
         }
     }
 
     /// Makes ready for the rows of layer k.
     fn enter_layer(&mut self, k: usize) {
-        if let Rows::Waves(waves) = self {
-            waves.enter_layer(k);
+        match self {
+            Rows::Waves(waves) => waves.enter_layer(k),
+            Rows::Phases(_, map, _) => map.enter_layer(k),
+            Rows::Distance(..) | Rows::Points(..) => {}
         }
     }
 
-    /// Fills the row (j, k) of the layer entered last.
-    fn fill(&mut self, j: usize, k: usize, row: &mut [f32]) {
+    /// Fills the row (j, k) of the layer entered last; nodes whose bit in `wanted` is not set may be left out.
+    fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
         match self {
+            Rows::Phases(series, map, u) => {
+                map.fill(j, u);
+                series.fill(u, row);
+            }
+            Rows::Points(lattice, block) => {
+                let [xs, ys, zs] = block.axes;
+                // Blocks wider than a word are wanted whole.
+                let here = |i: &usize| wanted == u64::MAX || wanted >> i & 1 == 1;
+                let points: Vec<Vec3> = (0..xs.len())
+                    .filter(here)
+                    .map(|i| [xs[i], ys[j], zs[k]])
+                    .collect();
+                let mut values = vec![0.0; points.len()];
+                lattice.cores(&points, &mut values);
+                for (i, v) in (0..xs.len()).filter(here).zip(values) {
+                    row[i] = v as f32;
+                }
+            }
             Rows::Waves(waves) => sum_waves(waves, j, row),
             Rows::Distance(d, map, block) => {
                 let [xs, ys, zs] = block.axes;
@@ -491,7 +612,7 @@ pub fn sample_points(b: &Aabb, n: usize) -> Vec<Vec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::{Series, named};
+    use crate::cell::named;
 
     fn lattice(part: Part, level: Level, map: Affine) -> Lattice {
         let cell = Cell::new(Series::new(named("gyroid").expect("named").terms()).expect("series"));

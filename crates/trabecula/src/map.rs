@@ -1,8 +1,25 @@
 //! Maps from position (mm) to phase (turns).
 
+mod distortion;
+mod frame;
+mod grid;
+mod phase;
+mod poisson;
+mod round;
+mod spline;
+
+pub use distortion::{Distortion, Spread};
+pub use frame::Orientation;
+pub use phase::{Phase, Settings, Wanted};
+pub use round::Round;
+
+use std::sync::Arc;
+
 use crate::fault::Fault;
+use crate::field::Block;
 use crate::math::{
-    IDENTITY, Mat3, Vec3, apply, determinant, inverse, product, rotation, scale, transpose,
+    Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, inverse, product, rotation, scale,
+    spectral_norm, transpose,
 };
 
 /// An affine map u = M x + b.
@@ -123,10 +140,14 @@ fn per_wavelength(wavelength: Vec3) -> Result<Mat3, Fault> {
 }
 
 /// A map from position to phase.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub enum Map {
     /// u = M x + b.
     Affine(Affine),
+    /// Solved for varying orientation and wavelength.
+    Phase(Arc<Phase>),
+    /// Wrapped round an axis or a centre.
+    Round(Round),
 }
 
 impl Map {
@@ -134,22 +155,144 @@ impl Map {
     pub fn wavelength(&self) -> f64 {
         match self {
             Map::Affine(a) => a.wavelength.iter().copied().fold(f64::INFINITY, f64::min),
+            Map::Phase(p) => p.wavelength()[0],
+            Map::Round(r) => r.wavelengths()[0],
+        }
+    }
+
+    /// The greatest wavelength, mm.
+    pub fn longest(&self) -> f64 {
+        match self {
+            Map::Affine(a) => a.wavelength.iter().copied().fold(0.0, f64::max),
+            Map::Phase(p) => p.wavelength()[1],
+            Map::Round(r) => r.wavelengths()[1],
         }
     }
 
     /// Fills phases (turns) of points (mm).
     pub fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
-        let Map::Affine(a) = self;
-        for (o, &p) in out.iter_mut().zip(points) {
-            let u = apply(&a.matrix, p);
-            *o = [u[0] + a.shift[0], u[1] + a.shift[1], u[2] + a.shift[2]];
+        match self {
+            Map::Affine(a) => {
+                for (o, &p) in out.iter_mut().zip(points) {
+                    *o = add(apply(&a.matrix, p), a.shift);
+                }
+            }
+            Map::Phase(map) => map.phases(points, out),
+            Map::Round(map) => {
+                for (o, &p) in out.iter_mut().zip(points) {
+                    *o = map.phase(p);
+                }
+            }
         }
     }
 
     /// du/dx at a point, turns per mm.
-    pub fn jacobian(&self, _at: Vec3) -> Mat3 {
-        let Map::Affine(a) = self;
-        a.matrix
+    pub fn jacobian(&self, at: Vec3) -> Mat3 {
+        match self {
+            Map::Affine(a) => a.matrix,
+            Map::Phase(map) => map.jacobian(at),
+            Map::Round(map) => map.jacobian(at),
+        }
+    }
+
+    /// The affine map that this is, if it is one.
+    pub fn affine(&self) -> Option<&Affine> {
+        match self {
+            Map::Affine(a) => Some(a),
+            Map::Phase(_) | Map::Round(_) => None,
+        }
+    }
+
+    /// A Jacobian typical of the map, but for its rotation: what distances on the torus are measured with.
+    pub fn typical(&self) -> Mat3 {
+        match self {
+            Map::Affine(a) => a.matrix,
+            Map::Phase(map) => {
+                let w = map.mean_wavelength();
+                core::array::from_fn(|a| scale(IDENTITY[a], 1.0 / w[a]))
+            }
+            Map::Round(map) => map.typical(),
+        }
+    }
+
+    /// The Jacobians where cells are largest and smallest.
+    pub fn extremes(&self) -> Vec<Mat3> {
+        match self {
+            Map::Affine(a) => vec![a.matrix],
+            Map::Phase(map) => map.extremes().to_vec(),
+            Map::Round(map) => map.extremes().to_vec(),
+        }
+    }
+
+    /// A bound of the spectral norm of du/dx in a box, turns per mm.
+    pub fn stretch(&self, b: &Aabb) -> f64 {
+        match self {
+            Map::Affine(a) => spectral_norm(&a.matrix),
+            Map::Phase(map) => map.stretch(b),
+            Map::Round(map) => map.stretch(b),
+        }
+    }
+
+    /// A bound of the spectral norm of du/dx where the map is made for, turns per mm.
+    pub fn steepest(&self) -> f64 {
+        match self {
+            Map::Affine(a) => spectral_norm(&a.matrix),
+            Map::Phase(map) => map.steepest(),
+            Map::Round(map) => map.steepest(),
+        }
+    }
+
+    /// The map on the rows of a block.
+    pub(crate) fn rows<'a>(&'a self, block: &Block<'a>) -> Rows<'a> {
+        Rows {
+            map: self,
+            block: *block,
+            spline: match self {
+                Map::Affine(_) | Map::Round(_) => None,
+                Map::Phase(map) => Some(map.rows(block)),
+            },
+            layer: 0,
+        }
+    }
+}
+
+/// A map on the rows of a block.
+pub(crate) struct Rows<'a> {
+    map: &'a Map,
+    block: Block<'a>,
+    spline: Option<(spline::Rows<'a>, Vec3)>,
+    layer: usize,
+}
+
+impl Rows<'_> {
+    /// Makes ready for the rows of layer k.
+    pub fn enter_layer(&mut self, k: usize) {
+        self.layer = k;
+        if let Some((rows, _)) = &mut self.spline {
+            rows.enter_layer(k);
+        }
+    }
+
+    /// Fills the three phases along row j of the layer entered last.
+    pub fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
+        if let Some((rows, shift)) = &mut self.spline {
+            rows.fill(j, out);
+            for (out, shift) in out.iter_mut().zip(shift) {
+                if *shift != 0.0 {
+                    out.iter_mut().for_each(|u| *u += *shift);
+                }
+            }
+            return;
+        }
+        let [xs, ys, zs] = self.block.axes;
+        let points: Vec<Vec3> = xs.iter().map(|&x| [x, ys[j], zs[self.layer]]).collect();
+        let mut u = vec![[0.0; 3]; points.len()];
+        self.map.phases(&points, &mut u);
+        for (i, u) in u.iter().enumerate() {
+            for (out, u) in out.iter_mut().zip(u) {
+                out[i] = *u;
+            }
+        }
     }
 }
 

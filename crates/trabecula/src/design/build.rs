@@ -6,13 +6,12 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, region, sample, skin};
+use super::{Built, Design, Loader, Warning, level, map, region, sample, samples, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::lattice::Lattice;
-use crate::map::{Affine, Map};
 use crate::math::sin_cos_turns;
 use crate::region::Region;
 use crate::solid::Solid;
@@ -27,6 +26,9 @@ const FARTHEST: f64 = 1e9;
 /// Index of a series beyond which the grids on which a cell is analysed have less than four nodes on a wave.
 const FINEST: usize = 24;
 
+/// The share of a cell in a file that may be left out before it is warned of.
+const TRUNCATED: f64 = 0.25;
+
 /// Where a part of a lattice stands, and the region it is to fill.
 pub(super) struct Place<'a> {
     pub path: String,
@@ -35,6 +37,8 @@ pub(super) struct Place<'a> {
     pub points: &'a [[f64; 3]],
     /// What is solid in the region whatever the lattice says.
     pub filled: &'a [Body],
+    /// Hands over files.
+    pub loader: &'a dyn Loader,
 }
 
 impl From<PartSpec> for Part {
@@ -116,10 +120,12 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             region: &space,
             points: &points,
             filled: &filled,
+            loader,
         };
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
         warn(&built, &place, spec, &mut warnings);
+        map::warn(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
     let Some((_, first)) = lattices.first() else {
@@ -143,10 +149,18 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
-    let (name, cell) = cell(&spec.cell, &below("cell"))?;
-    let cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
+    let (name, cell) = cell(&spec.cell, &below("cell"), place.loader)?;
+    let left_out = cell.truncation();
+    let mut cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
+    if let Some(share) = left_out {
+        cell = cell.truncated(share);
+    }
     let cell = Arc::new(cell);
-    let map = map(&spec.map, &below("map"))?;
+    let here = Place {
+        path: below("map"),
+        ..*place
+    };
+    let map = map::map(&spec.map, &here)?;
     let here = Place {
         path: below("level"),
         ..*place
@@ -159,6 +173,7 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
 pub(super) fn cell<'a>(
     spec: &'a CellSpec,
     path: &str,
+    loader: &dyn Loader,
 ) -> Result<(Option<&'a str>, Cell), DesignError> {
     let (name, terms, at) = match spec {
         CellSpec::Name(name) => {
@@ -167,6 +182,9 @@ pub(super) fn cell<'a>(
                 DesignError::unknown(path, "cell", name, &names)
             })?;
             (Some(name.as_str()), known.terms(), path.to_string())
+        }
+        CellSpec::Kind(CellKind::File(f)) => {
+            return Ok((None, samples::cell(f, &format!("{path}.file"), loader)?));
         }
         CellSpec::Kind(CellKind::Series(s)) => {
             let at = format!("{path}.series");
@@ -231,59 +249,6 @@ fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
         return Err(Fault::new("hkl", message));
     }
     Ok(terms)
-}
-
-fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {
-    let (kind, wavelength, rotate, offset) = match spec {
-        MapSpec::Affine(a) => ("affine", a.wavelength, a.rotate, a.offset),
-        MapSpec::Spartan(s) => ("spartan", s.wavelength, s.rotate, s.offset),
-    };
-    let path = format!("{path}.{kind}");
-    let below = |key: &str| format!("{path}.{key}");
-    for (i, v) in wavelength.three().into_iter().enumerate() {
-        if !(v.is_finite() && v > 0.0) {
-            let at = match wavelength {
-                OneOrThree::One(_) => below("wavelength"),
-                OneOrThree::Three(_) => format!("{}[{i}]", below("wavelength")),
-            };
-            let message = format!(
-                "wavelength is {}; it must be a finite number of mm greater than 0",
-                number(v)
-            );
-            return Err(DesignError::new(at, message).found(number(v)));
-        }
-    }
-    for (key, three) in [("rotate", rotate), ("offset", offset)] {
-        for v in three {
-            finite(&below(key), v)?;
-        }
-    }
-    let affine = match spec {
-        MapSpec::Spartan(_) => Affine::spartan(wavelength.three(), rotate, offset),
-        MapSpec::Affine(a) => {
-            let axis = |c: u8| usize::from(c - b'x');
-            let mut skew = Vec::new();
-            for (name, angle) in a.skew.named() {
-                let at = below(&format!("skew.{name}"));
-                finite(&at, angle)?;
-                if angle.abs() >= 89.0 {
-                    let message = format!(
-                        "a shear of {} degrees; it must be between -89 and 89",
-                        number(angle)
-                    );
-                    return Err(DesignError::new(at, message).found(number(angle)));
-                }
-                if angle != 0.0 {
-                    let n = name.as_bytes();
-                    skew.push((axis(n[0]), axis(n[1]), angle));
-                }
-            }
-            Affine::rigid(wavelength.three(), rotate, offset, &skew)
-        }
-    };
-    affine
-        .map(Map::Affine)
-        .map_err(|f| DesignError::fault(&path, f))
 }
 
 /// The key under which the amount stands.
@@ -398,6 +363,16 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             message,
         });
     }
+    if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
+        let message = format!(
+            "the waves that are kept leave out {:.1} % (root mean square) of the cell in the file; keep more terms",
+            100.0 * share
+        );
+        warnings.push(Warning {
+            path: format!("{}.cell.file.terms", place.path),
+            message,
+        });
+    }
     let top = lattice.cell.plain().top();
     if top > FINEST {
         let message = format!(
@@ -424,7 +399,7 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             });
         }
     }
-    if let Some(limit) = lattice.distance().and_then(Distance::folding) {
+    if let Some(limit) = lattice.folding() {
         let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
         if thickness.max > limit {
             let most = figure(thickness.max);
@@ -453,11 +428,7 @@ fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec
             number(wavelength),
             number(least)
         );
-        let kind = if matches!(spec.map, MapSpec::Affine(_)) {
-            "affine"
-        } else {
-            "spartan"
-        };
+        let kind = map::kind(&spec.map);
         warnings.push(Warning {
             path: format!("{}.map.{kind}.wavelength", place.path),
             message,

@@ -7,6 +7,12 @@ use serde::Serialize;
 
 use super::schema;
 
+mod grade;
+mod map;
+
+pub use grade::*;
+pub use map::*;
+
 /// A number, or three of them along x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
@@ -228,6 +234,28 @@ pub enum CellSpec {
 pub enum CellKind {
     /// A Fourier series.
     Series(SeriesSpec),
+    /// Numbers or a mesh in a file: the largest waves of their Fourier transform.
+    File(FileCellSpec),
+}
+
+/// A cell from a file: numbers at the nodes of one period, without the repeated end, or a mesh of the solid in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FileCellSpec {
+    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, obj, ply, off, 3mf), whose bounds are the
+    /// cell and whose inside has the value 1, the outside 0.
+    pub path: String,
+    /// How many waves are kept.
+    #[serde(default = "waves", skip_serializing_if = "is_waves")]
+    pub terms: f64,
+}
+
+fn waves() -> f64 {
+    200.0
+}
+
+fn is_waves(v: &f64) -> bool {
+    *v == waves()
 }
 
 /// A Fourier series: the sum of its terms.
@@ -237,7 +265,7 @@ pub struct SeriesSpec {
     /// A space group: then each term stands for the sum of its wave over the group, divided by that sum's largest Fourier
     /// coefficient. By number (227), Hermann–Mauguin symbol ("Fd-3m"), either with a setting ("227:1"; origin choice 2 unless
     /// given), or Hall symbol.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "schema::group")]
     pub group: Option<String>,
     /// The terms.
@@ -283,86 +311,6 @@ pub enum PartSpec {
     Lower,
     /// f ≥ t.
     Upper,
-}
-
-/// Position (mm) to phase (turns).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum MapSpec {
-    /// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
-    Affine(AffineSpec),
-    /// The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
-    Spartan(SpartanSpec),
-}
-
-/// A rigid rotation of the scaled lattice.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AffineSpec {
-    /// Cell edge (mm), one or three.
-    pub wavelength: OneOrThree,
-    /// Angles about x, y, z (degrees): z is turned first, then y, then x.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub rotate: [f64; 3],
-    /// Moves the lattice (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub offset: [f64; 3],
-    /// Shears.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub skew: SkewSpec,
-}
-
-/// Shears in degrees: `xz = 20` moves x by tan(20°) · z.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SkewSpec {
-    /// x by tan · y.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub xy: f64,
-    /// x by tan · z.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub xz: f64,
-    /// y by tan · x.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub yx: f64,
-    /// y by tan · z.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub yz: f64,
-    /// z by tan · x.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub zx: f64,
-    /// z by tan · y.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub zy: f64,
-}
-
-impl SkewSpec {
-    /// The six shears by name.
-    pub fn named(&self) -> [(&'static str, f64); 6] {
-        let s = self;
-        [
-            ("xy", s.xy),
-            ("xz", s.xz),
-            ("yx", s.yx),
-            ("yz", s.yz),
-            ("zx", s.zx),
-            ("zy", s.zy),
-        ]
-    }
-}
-
-/// The SPARTAN reading: scaled first, rotated in phase.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SpartanSpec {
-    /// Wavelength (mm), one or three.
-    pub wavelength: OneOrThree,
-    /// Angles about x, y, z (degrees).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub rotate: [f64; 3],
-    /// Moves the lattice (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub offset: [f64; 3],
 }
 
 /// How much is solid: exactly one amount.
@@ -417,46 +365,6 @@ pub enum Fit {
     Table,
     /// By the SPARTAN polynomial (diamond as published; gyroid fitted in the same form). Part `lower` only.
     Spartan,
-}
-
-/// A number that may vary in space.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum GradeSpec {
-    /// The same everywhere.
-    Constant(f64),
-    /// Varying.
-    Kind(GradeKind),
-}
-
-/// How a number varies.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum GradeKind {
-    /// Along a direction.
-    Linear(LinearSpec),
-    /// By depth (mm) below the region's surface.
-    Depth(DepthSpec),
-    /// A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)".
-    Formula(String),
-}
-
-/// Piecewise linear in s = along · x, constant beyond the ends.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LinearSpec {
-    /// Direction; s is measured in multiples of its length.
-    pub along: [f64; 3],
-    /// (s, value), s rising.
-    pub stops: Vec<[f64; 2]>,
-}
-
-/// Piecewise linear in depth, constant beyond the ends.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DepthSpec {
-    /// (depth in mm, value), depth rising.
-    pub stops: Vec<[f64; 2]>,
 }
 
 /// Named lattices.

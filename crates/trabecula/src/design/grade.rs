@@ -1,11 +1,12 @@
 //! Numbers that may vary: data to [`Grade`], values checked.
 
-use super::build::finite;
+use super::build::{Place, finite};
 use super::data::{GradeKind, GradeSpec};
 use super::error::DesignError;
+use super::samples;
 use crate::fault::number;
 use crate::grade::{Formula, Grade};
-use crate::region::Region;
+use crate::math::{norm, unit};
 
 /// What values an amount may take.
 #[derive(Clone, Copy, PartialEq)]
@@ -66,7 +67,7 @@ fn hint(name: &str, v: f64) -> String {
 pub(super) fn grade(
     spec: &GradeSpec,
     path: &str,
-    region: &Region,
+    place: &Place,
     allowed: Allowed,
     complement: bool,
 ) -> Result<Grade, DesignError> {
@@ -121,9 +122,40 @@ pub(super) fn grade(
             })
         }
         GradeKind::Depth(d) => Ok(Grade::Depth {
-            region: region.clone(),
+            region: place.region.clone(),
             stops: stops(&format!("{path}.depth.stops"), &d.stops)?,
         }),
+        GradeKind::Radial(r) => {
+            let below = |key: &str| format!("{path}.radial.{key}");
+            for v in r.center {
+                finite(&below("center"), v)?;
+            }
+            let axis = match r.axis {
+                Some(axis) => {
+                    for v in axis {
+                        finite(&below("axis"), v)?;
+                    }
+                    if norm(axis) == 0.0 {
+                        let message = "the direction is zero; give one such as [0, 0, 1]";
+                        return Err(DesignError::new(below("axis"), message));
+                    }
+                    Some(unit(axis))
+                }
+                None => None,
+            };
+            Ok(Grade::Radial {
+                center: r.center,
+                axis,
+                stops: stops(&below("stops"), &r.stops)?,
+            })
+        }
+        GradeKind::Grid(g) => samples::grid(g, &format!("{path}.grid"), place, allowed, complement),
+        GradeKind::Points(p) => {
+            samples::points(p, &format!("{path}.points"), place, allowed, complement)
+        }
+        GradeKind::Field(f) => {
+            samples::field(f, &format!("{path}.field"), place, allowed, complement)
+        }
         GradeKind::Formula(text) => {
             let place = format!("{path}.formula");
             let own =

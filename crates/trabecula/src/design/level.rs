@@ -11,7 +11,6 @@ use crate::field::Field;
 use crate::grade::Grade;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
-use crate::region::Region;
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
@@ -68,12 +67,10 @@ pub(super) fn level(
         AmountSpec::Porosity(v) => ("porosity", v, Allowed::Share("porosity")),
         AmountSpec::Thickness(v) => {
             check_sheet(part, "thickness", &path("thickness"))?;
-            let Map::Affine(a) = map;
-            let longest = a.wavelength.into_iter().fold(0.0, f64::max);
-            ("thickness", v, Allowed::Length("thickness", longest))
+            ("thickness", v, Allowed::Length("thickness", map.longest()))
         }
     };
-    let amount = grade(value, &path(key), place.region, allowed, key == "porosity")?;
+    let amount = grade(value, &path(key), place, allowed, key == "porosity")?;
     if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
@@ -90,14 +87,7 @@ pub(super) fn level(
     if let Grade::Formula(_) = &amount {
         let at = path(&format!("{key}.formula"));
         let complement = key == "porosity";
-        check_formula(
-            &amount,
-            &at,
-            allowed,
-            complement,
-            place.region,
-            place.points,
-        )?;
+        check_varied(&amount, &at, allowed, complement, place)?;
     }
     if key == "thickness" {
         let range = cell.range();
@@ -190,15 +180,15 @@ pub(super) fn about_mid(
     Ok(Cell::new(series.map_err(|f| DesignError::fault(&path, f))?))
 }
 
-/// Refuses a formula that leaves what is allowed at any of some thousands of points in the region.
-pub(super) fn check_formula(
+/// Refuses a number that leaves what is allowed at any of some thousands of points in the region.
+pub(super) fn check_varied(
     amount: &Grade,
     path: &str,
     allowed: Allowed,
     complement: bool,
-    region: &Region,
-    points: &[[f64; 3]],
+    place: &Place,
 ) -> Result<(), DesignError> {
+    let Place { region, points, .. } = *place;
     let bounds = region.bounds();
     let corner = |i: usize| {
         core::array::from_fn(|a| {

@@ -338,6 +338,13 @@ impl<'a> At<'a> {
         }
     }
 
+    pub fn truth(&self) -> Result<bool, DesignError> {
+        match &self.node.value {
+            Value::Bool(b) => Ok(*b),
+            _ => Err(self.expected("true or false")),
+        }
+    }
+
     pub fn list(&self, what: &str) -> Result<Vec<At<'a>>, DesignError> {
         let Value::List(items) = &self.node.value else {
             return Err(self.expected(what));
@@ -377,7 +384,9 @@ impl<'a> At<'a> {
 }
 
 /// The kinds of grade in this version.
-pub(super) const GRADES: [&str; 3] = ["linear", "depth", "formula"];
+pub(super) const GRADES: [&str; 7] = [
+    "linear", "depth", "radial", "formula", "grid", "points", "field",
+];
 
 /// A table whose keys are known to be allowed.
 pub(super) struct Fields<'a> {

@@ -3,9 +3,15 @@
 use super::Design;
 use super::data::*;
 use super::error::DesignError;
-use super::node::{At, Fields, GRADES, Later, Node};
+use super::node::{At, Later, Node};
 use crate::cell::catalogue;
 use crate::fault::{self, counted};
+
+mod grade;
+mod map;
+
+use grade::grade;
+use map::map;
 
 type Read<T> = Result<T, DesignError>;
 
@@ -34,22 +40,6 @@ const LATER_CELL: [Later; 3] = [
     ("beams", "use a named cell or a series"),
     ("waves", "use a named cell or a series"),
 ];
-const LATER_MAP: [Later; 4] = [
-    ("phase", "use affine, with constant wavelength and rotation"),
-    ("cylinder", "use affine"),
-    ("sphere", "use affine"),
-    ("tets", "use affine"),
-];
-const LATER_GRADE: [Later; 4] = [
-    (
-        "radial",
-        "use a formula, such as \"0.3 + 0.01*sqrt(x^2 + y^2)\"",
-    ),
-    ("grid", "use linear, depth or formula"),
-    ("points", "use linear, depth or formula"),
-    ("field", "use linear, depth or formula"),
-];
-
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
@@ -338,7 +328,15 @@ fn cell(at: &At) -> Read<CellSpec> {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
-    let (_, at) = at.kind("cell", &["series"], &LATER_CELL)?;
+    let (kind, at) = at.kind("cell", &["series", "file"], &LATER_CELL)?;
+    if kind == "file" {
+        let f = at.fields("a cell from a file", &["path", "terms"], &[])?;
+        let path = f.need("path", "numbers (npy) or a mesh of one cell")?;
+        return Ok(CellSpec::Kind(CellKind::File(FileCellSpec {
+            path: path.text("a path")?.to_string(),
+            terms: f.read("terms", 200.0, At::number)?,
+        })));
+    }
     let f = at.fields("a series", &["terms", "group"], &[])?;
     let terms = f.need(
         "terms",
@@ -386,62 +384,6 @@ fn term(at: &At) -> Read<TermSpec> {
         component: f.read("component", Component::Re, |at| {
             at.word("component", &components)
         })?,
-    })
-}
-
-fn map(at: &At) -> Read<MapSpec> {
-    let (kind, at) = at.kind("map", &["affine", "spartan"], &LATER_MAP)?;
-    if kind == "spartan" {
-        let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"], &[])?;
-        let (wavelength, rotate, offset) = common(&f)?;
-        return Ok(MapSpec::Spartan(SpartanSpec {
-            wavelength,
-            rotate,
-            offset,
-        }));
-    }
-    let f = at.fields(
-        "an affine map",
-        &["wavelength", "rotate", "offset", "skew"],
-        &[],
-    )?;
-    let (wavelength, rotate, offset) = common(&f)?;
-    Ok(MapSpec::Affine(AffineSpec {
-        wavelength,
-        rotate,
-        offset,
-        skew: f.read("skew", SkewSpec::default(), skew)?,
-    }))
-}
-
-fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
-    let wavelength = f.need("wavelength", "the cell's edge in mm, one number or three")?;
-    let wavelength = if wavelength.is_list() {
-        OneOrThree::Three(wavelength.numbers("one number or three, mm")?)
-    } else {
-        OneOrThree::One(wavelength.number()?)
-    };
-    Ok((
-        wavelength,
-        f.read("rotate", [0.0; 3], three)?,
-        f.read("offset", [0.0; 3], three)?,
-    ))
-}
-
-fn skew(at: &At) -> Read<SkewSpec> {
-    let f = at.fields(
-        "shears in degrees",
-        &["xy", "xz", "yx", "yz", "zx", "zy"],
-        &[],
-    )?;
-    let angle = |key| f.read(key, 0.0, At::number);
-    Ok(SkewSpec {
-        xy: angle("xy")?,
-        xz: angle("xz")?,
-        yx: angle("yx")?,
-        yz: angle("yz")?,
-        zx: angle("zx")?,
-        zy: angle("zy")?,
     })
 }
 
@@ -495,38 +437,4 @@ fn level(at: &At) -> Read<LevelSpec> {
         fit,
         mid,
     })
-}
-
-fn grade(at: &At) -> Read<GradeSpec> {
-    if at.is_number() {
-        return Ok(GradeSpec::Constant(at.number()?));
-    }
-    if at.is_list() || at.is_text() {
-        return Err(at.expected("a number or a grade (a table with linear, depth or formula)"));
-    }
-    let (kind, at) = at.kind("grade", &GRADES, &LATER_GRADE)?;
-    Ok(GradeSpec::Kind(match kind {
-        "formula" => GradeKind::Formula(at.text("a formula in x, y, z as text")?.to_string()),
-        "depth" => {
-            let f = at.fields("a grade by depth", &["stops"], &[])?;
-            GradeKind::Depth(DepthSpec { stops: stops(&f)? })
-        }
-        _ => {
-            let f = at.fields("a linear grade", &["along", "stops"], &[])?;
-            let along = three(f.need("along", "the direction [x, y, z]")?)?;
-            GradeKind::Linear(LinearSpec {
-                along,
-                stops: stops(&f)?,
-            })
-        }
-    }))
-}
-
-fn stops(f: &Fields) -> Read<Vec<[f64; 2]>> {
-    let stops = f.need("stops", "a list of [position, value]")?;
-    stops
-        .list("a list of [position, value]")?
-        .iter()
-        .map(|s| s.numbers("[position, value]"))
-        .collect()
 }

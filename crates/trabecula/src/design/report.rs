@@ -3,9 +3,10 @@
 use serde_json::{Value as Json, json};
 
 use super::{Built, build::LOOKS, sample};
-use crate::cell::{Distance, Part};
+use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
+use crate::map::{Distortion, Map, Spread};
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,20 +106,24 @@ pub(super) fn report(built: &Built) -> Json {
     for (name, lattice) in &built.lattices {
         let iso = Varied::of_iso(lattice, &points);
         let fraction = Varied::of_fraction(lattice, &points);
-        lattices.insert(
-            name.clone(),
-            json!({
-                "part": match lattice.part { Part::Sheet => "sheet", Part::Lower => "lower", Part::Upper => "upper" },
-                "wavelength": lattice.map.wavelength(),
-                // A wall of even thickness is not bounded by levels of f.
-                "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
-                "fraction": fraction.json(),
-                "porosity": fraction.map(|f| 1.0 - f).json(),
-                "thickness": thickness(lattice, iso),
-                "folding": lattice.distance().and_then(Distance::folding),
-                "connected_fraction": lattice.connected_fraction(),
-            }),
-        );
+        let mut entry = json!({
+            "part": match lattice.part { Part::Sheet => "sheet", Part::Lower => "lower", Part::Upper => "upper" },
+            "wavelength": lattice.map.wavelength(),
+            // A wall of even thickness is not bounded by levels of f.
+            "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
+            "fraction": fraction.json(),
+            "porosity": fraction.map(|f| 1.0 - f).json(),
+            "thickness": thickness(lattice, iso),
+            "folding": lattice.folding(),
+            "connected_fraction": lattice.connected_fraction(),
+        });
+        if let Some(share) = lattice.cell.truncation() {
+            entry["truncation"] = json!(share);
+        }
+        if let Map::Phase(map) = &lattice.map {
+            entry["distortion"] = distortion(map.distortion());
+        }
+        lattices.insert(name.clone(), entry);
     }
     json!({
         "lattices": lattices,
@@ -136,15 +141,32 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Json {
     if lattice.distance().is_some() {
         return iso.map(|t| 2.0 * t).json();
     }
-    let to_phase = lattice.map.jacobian([0.0; 3]);
+    let to_phase = lattice.map.extremes();
     let steps = if iso.min == iso.max { 1 } else { 5 };
     let level = |i: usize| iso.min + (iso.max - iso.min) * i as f64 / (steps - 1).max(1) as f64;
-    let found: Vec<f64> = (0..steps)
-        .filter_map(|i| lattice.cell.thickness(lattice.part, level(i), &to_phase))
+    let found: Vec<f64> = to_phase
+        .iter()
+        .flat_map(|m| (0..steps).map(move |i| (i, m)))
+        .filter_map(|(i, m)| lattice.cell.thickness(lattice.part, level(i), m))
         .collect();
     if found.is_empty() {
         Json::Null
     } else {
         Varied::of(&found).json()
     }
+}
+
+/// How far a solved map is from what was asked for.
+fn distortion(d: &Distortion) -> Json {
+    let spread = |s: &Spread| json!({ "mean": s.mean, "p95": s.p95, "max": s.max });
+    json!({
+        "angle": d.angle.iter().map(spread).collect::<Vec<Json>>(),
+        "spacing": d.spacing.iter().map(spread).collect::<Vec<Json>>(),
+        "outside": d.outside,
+        "shear": spread(&d.shear),
+        "anisotropy": spread(&d.anisotropy),
+        "density": d.density,
+        "curl": spread(&d.curl),
+        "turn": d.turn,
+    })
 }

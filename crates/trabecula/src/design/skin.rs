@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::build::LOOKS;
+use super::build::{LOOKS, Place};
 use super::data::{OpenSpec, SkinSpec};
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
-use super::level::check_formula;
+use super::level::check_varied;
 use super::report::Varied;
 use super::{Design, Loader, region, sample};
 use crate::face::Body;
@@ -28,7 +28,14 @@ pub(super) fn filled(
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
-        let (body, least) = grown(spec, space, points)?;
+        let place = Place {
+            path: "skin".into(),
+            region: space,
+            points,
+            filled: &[],
+            loader,
+        };
+        let (body, least) = grown(spec, &place)?;
         filled.push(body);
         thinnest = Some(least);
     }
@@ -67,13 +74,18 @@ fn is_open(filled: &[Body], space: &Region, points: &[Vec3]) -> bool {
 }
 
 /// The skin and its least thickness.
-fn grown(spec: &SkinSpec, space: &Region, points: &[Vec3]) -> Result<(Body, f64), DesignError> {
+fn grown(spec: &SkinSpec, place: &Place) -> Result<(Body, f64), DesignError> {
+    let Place {
+        region: space,
+        points,
+        ..
+    } = *place;
     let path = "skin.thickness";
     let allowed = Allowed::Positive("thickness");
-    let thickness = grade(&spec.thickness, path, space, allowed, false)?;
+    let thickness = grade(&spec.thickness, path, place, allowed, false)?;
     if let Grade::Formula(_) = &thickness {
         let at = format!("{path}.formula");
-        check_formula(&thickness, &at, allowed, false, space, points)?;
+        check_varied(&thickness, &at, allowed, false, place)?;
     }
     let bounds = space.bounds();
     let open = spec.open.iter().enumerate().map(|(i, o)| match o {

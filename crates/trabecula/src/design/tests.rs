@@ -62,6 +62,11 @@ fn every_kind_of_region_and_grade_survives() {
             "porosity = 0.7\nfit = \"spartan\"",
             "thickness = 0.6\nmid = 0.2",
             "thickness = { linear = { along = [0, 0, 1], stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { radial = { stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { radial = { center = [1, 2, 3], axis = [0, 0, 1], stops = [[0, 0.2], [1, 0.3]] } }",
+            "iso = { grid = { path = \"a.npy\", origin = [0, 0, 0], step = 0.5 } }",
+            "iso = { points = { path = \"a.csv\", neighbours = 4, remap = [[0, 1], [2, 3]] } }",
+            "iso = { field = { path = \"a.vtu\", array = \"S\", component = 2 } }",
         ] {
             let text = format!(
                 "schema = 1\n[region]\n{region}\n[lattice.a]\npart = \"upper\"\n[[lattice.a.cell.series.terms]]\nhkl = \
@@ -71,6 +76,28 @@ fn every_kind_of_region_and_grade_survives() {
             let again = Design::from_toml(&d.to_toml().expect("writable")).expect("readable");
             assert_eq!(again.to_json(), d.to_json(), "{text}");
         }
+    }
+}
+
+#[test]
+fn every_kind_of_map_survives() {
+    for map in [
+        "phase = { wavelength = 4, rotate = [0, { formula = \"x\" }, 3] }",
+        "phase = { wavelength = [4, { formula = \"5 + x/9\" }, 3], rotate_x = 2, rotate_z = { formula = \"x\" }, step = 0.5 }",
+        "phase = { wavelength = 4, direction = [0, { formula = \"x\" }, 3], domain = \"box\", folds = true }",
+        "phase = { wavelength = 4, frame = { x = [1, 0, 0], z = { field = { path = \"a.vtu\", array = \"v\" } } } }",
+        "phase = { wavelength = 4, stress = { field = { path = \"a.vtu\", array = \"S\" }, order = \"voigt\" }, offset = [1, 2, 3] }",
+        "phase = { wavelength = 4, stress = [1, 2, 3, 0, 0, 0] }",
+        "cylinder = { wavelength = [3, 4], around = 12, center = [1, 2, 3] }",
+        "sphere = { wavelength = 3, around = 12, axis = [0, 1, 0] }",
+    ] {
+        let text = format!(
+            "schema = 1\n[region.box]\nsize = [8, 8, 8]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\nmap = {{ {map} }}\n\
+             level = {{ iso = 0.2 }}\n"
+        );
+        let d = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let again = Design::from_toml(&d.to_toml().expect("writable")).expect("readable");
+        assert_eq!(again.to_json(), d.to_json(), "{text}");
     }
 }
 
@@ -207,8 +234,12 @@ fn words_of_later_versions_are_not_slips() {
             "blend = { between = [\"a\", \"b\"] }",
             "blend",
         ),
-        ("map.affine", "map.phase", "lattice.core.map.phase"),
-        ("linear =", "radial =", "lattice.core.level.porosity.radial"),
+        ("map.affine", "map.tets", "lattice.core.map.tets"),
+        (
+            "cell = \"gyroid\"",
+            "cell.tet = { }",
+            "lattice.core.cell.tet",
+        ),
     ] {
         let e = with(line, instead);
         assert_eq!((e.path.as_str(), e.nearest.as_deref()), (path, None));
@@ -343,6 +374,15 @@ fn the_schema_and_the_reader_agree() {
     assert_eq!(listed(with("porosity =", "zzzzzzzz =")), keys("LevelSpec"));
     assert_eq!(listed(with("map.affine", "map.zzzzzzzz")), keys("MapSpec"));
     assert_eq!(listed(with("linear =", "zzzzzzzz =")), keys("GradeKind"));
+    for (kind, name) in [
+        ("phase", "PhaseSpec"),
+        ("cylinder", "CylinderMapSpec"),
+        ("sphere", "SphereMapSpec"),
+    ] {
+        // The first key that an affine map alone has is unknown.
+        let words = listed(with("map.affine", &format!("map.{kind}")));
+        assert_eq!(words, keys(name), "{kind}");
+    }
     assert_eq!(listed(with("along =", "zzzzzzzz =")), keys("LinearSpec"));
 }
 

@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 
 mod deflate;
 mod read;
-mod xml;
+pub(super) mod xml;
 mod zip;
 
 pub use read::read;

@@ -22,6 +22,7 @@ pub struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
     depth: usize,
+    what: &'static str,
 }
 
 fn find(bytes: &[u8], from: usize, what: &[u8]) -> Option<usize> {
@@ -39,12 +40,26 @@ impl<'a> Scanner<'a> {
             bytes,
             at: 0,
             depth: 0,
+            what: "3MF model",
         }
+    }
+
+    /// Scans UTF-8 text that is called `what` in faults.
+    pub fn of(bytes: &'a [u8], what: &'static str) -> Self {
+        Scanner {
+            what,
+            ..Scanner::new(bytes)
+        }
+    }
+
+    /// The byte after what was read last.
+    pub fn at(&self) -> usize {
+        self.at
     }
 
     /// A fault at the present byte.
     pub fn fault(&self, message: impl core::fmt::Display) -> Fault {
-        Fault::new("", format!("3MF model, byte {}: {message}", self.at))
+        Fault::new("", format!("{}, byte {}: {message}", self.what, self.at))
     }
 
     /// The next element's start or end; `None` when the root has ended.
@@ -75,7 +90,7 @@ impl<'a> Scanner<'a> {
             } else if rest.starts_with(b"<?") {
                 self.at = until(b"?>")?;
             } else if rest.starts_with(b"<!") {
-                return Err(self.fault("document types are not allowed in 3MF"));
+                return Err(self.fault("document types are not allowed"));
             } else {
                 return self.tag().map(Some);
             }

@@ -1,0 +1,126 @@
+//! Grades, as data.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{OneOrThree, is_default};
+
+/// A number that may vary in space.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum GradeSpec {
+    /// The same everywhere.
+    Constant(f64),
+    /// Varying.
+    Kind(GradeKind),
+}
+
+/// How a number varies.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum GradeKind {
+    /// Along a direction.
+    Linear(LinearSpec),
+    /// By depth (mm) below the region's surface.
+    Depth(DepthSpec),
+    /// A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)".
+    Formula(String),
+    /// By the distance (mm) from a point or a line.
+    Radial(RadialSpec),
+    /// Numbers on a grid, from a file.
+    Grid(GridSpec),
+    /// Numbers at scattered points, from a file.
+    Points(PointsSpec),
+    /// An array of a result on a mesh, from a file.
+    Field(FieldSpec),
+}
+
+/// Piecewise linear in s = along · x, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinearSpec {
+    /// Direction; s is measured in multiples of its length.
+    pub along: [f64; 3],
+    /// (s, value), s rising.
+    pub stops: Vec<[f64; 2]>,
+}
+
+/// Piecewise linear in depth, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DepthSpec {
+    /// (depth in mm, value), depth rising.
+    pub stops: Vec<[f64; 2]>,
+}
+
+/// Piecewise linear in the distance from a point or a line, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RadialSpec {
+    /// The point, or a point on the line (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Direction of the line; without it, distances are from the point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// (distance in mm, value), distance rising.
+    pub stops: Vec<[f64; 2]>,
+}
+
+/// Numbers on a grid, linear between them.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSpec {
+    /// Path of the file (npy, vti, vtk), relative to the design file.
+    pub path: String,
+    /// Name of the array, where a file has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<String>,
+    /// Place of the first number (mm); VTI and VTK files say it themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<[f64; 3]>,
+    /// Distance between numbers (mm), one or three; VTI and VTK files say it themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<OneOrThree>,
+    /// What the numbers stand for: (number, value), number rising, linear between.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub remap: Vec<[f64; 2]>,
+}
+
+/// Numbers at scattered points: between them the mean of the nearest, by one over the square of the distance.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointsSpec {
+    /// Path of a table (csv) of x, y, z (mm), value, relative to the design file.
+    pub path: String,
+    /// How many of the nearest points count.
+    #[serde(default = "eight", skip_serializing_if = "is_eight")]
+    pub neighbours: f64,
+    /// What the numbers stand for: (number, value), number rising, linear between.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub remap: Vec<[f64; 2]>,
+}
+
+/// An array of a result on a mesh of volume elements.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FieldSpec {
+    /// Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
+    pub path: String,
+    /// Name of the array, of points or cells.
+    pub array: String,
+    /// Which of its numbers, from 0, where it has several for each point or cell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub component: Option<f64>,
+    /// What the numbers stand for: (number, value), number rising, linear between.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub remap: Vec<[f64; 2]>,
+}
+
+fn eight() -> f64 {
+    8.0
+}
+
+fn is_eight(v: &f64) -> bool {
+    *v == eight()
+}

@@ -1,0 +1,263 @@
+//! Maps, as data.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{FieldSpec, GradeSpec, OneOrThree, is_default};
+
+/// Position (mm) to phase (turns).
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum MapSpec {
+    /// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
+    Affine(AffineSpec),
+    /// The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
+    Spartan(SpartanSpec),
+    /// Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares.
+    Phase(Box<PhaseSpec>),
+    /// Wrapped round an axis: cells along the radius, round the axis, along the axis.
+    Cylinder(CylinderMapSpec),
+    /// Wrapped about a centre: cells along the radius, round the axis, from pole to pole.
+    Sphere(SphereMapSpec),
+}
+
+/// A rigid rotation of the scaled lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AffineSpec {
+    /// Cell edge (mm), one or three.
+    pub wavelength: OneOrThree,
+    /// Angles about x, y, z (degrees): z is turned first, then y, then x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotate: [f64; 3],
+    /// Moves the lattice (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset: [f64; 3],
+    /// Shears.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub skew: SkewSpec,
+}
+
+/// Shears in degrees: `xz = 20` moves x by tan(20°) · z.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkewSpec {
+    /// x by tan · y.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub xy: f64,
+    /// x by tan · z.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub xz: f64,
+    /// y by tan · x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub yx: f64,
+    /// y by tan · z.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub yz: f64,
+    /// z by tan · x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub zx: f64,
+    /// z by tan · y.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub zy: f64,
+}
+
+impl SkewSpec {
+    /// The six shears by name.
+    pub fn named(&self) -> [(&'static str, f64); 6] {
+        let s = self;
+        [
+            ("xy", s.xy),
+            ("xz", s.xz),
+            ("yx", s.yx),
+            ("yz", s.yz),
+            ("zx", s.zx),
+            ("zy", s.zy),
+        ]
+    }
+}
+
+/// The SPARTAN reading: scaled first, rotated in phase.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpartanSpec {
+    /// Wavelength (mm), one or three.
+    pub wavelength: OneOrThree,
+    /// Angles about x, y, z (degrees).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotate: [f64; 3],
+    /// Moves the lattice (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset: [f64; 3],
+}
+
+/// A solved map. At most one of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not
+/// turned.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseSpec {
+    /// Cell edge (mm), one or three; each may vary.
+    pub wavelength: GradeOrThree,
+    /// Angles about x, y, z (degrees): z is turned first, then y, then x. Each may vary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<[GradeSpec; 3]>,
+    /// The angle about x alone (degrees), beside or instead of `rotate_y` and `rotate_z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate_x: Option<GradeSpec>,
+    /// The angle about y alone (degrees).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate_y: Option<GradeSpec>,
+    /// The angle about z alone (degrees).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate_z: Option<GradeSpec>,
+    /// The cell's z axis lies along this vector; its sign and length do not matter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<VectorSpec>,
+    /// The directions of the cell's x and z axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<FrameSpec>,
+    /// The cell's axes lie along the principal directions of a stress tensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<TensorSpec>,
+    /// Moves the lattice (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset: [f64; 3],
+    /// Spacing (mm) of the grid that the phases are solved on; a quarter of the least wavelength unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<f64>,
+    /// What counts when the phases are solved.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub domain: Domain,
+    /// Whether the map may fold, where cells turn inside out.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub folds: bool,
+}
+
+/// Cells round an axis, a whole number of them, so that the lattice closes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderMapSpec {
+    /// Cell edge (mm) along the radius and along the axis, one or two.
+    pub wavelength: OneOrTwo,
+    /// Cells around.
+    pub around: f64,
+    /// A point on the axis (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Direction of the axis.
+    #[serde(
+        default = "super::build_axis",
+        skip_serializing_if = "super::is_build_axis"
+    )]
+    pub axis: [f64; 3],
+}
+
+/// Shells of cells about a centre, a whole number of them round the equator and half as many from pole to pole.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereMapSpec {
+    /// Cell edge (mm) along the radius.
+    pub wavelength: f64,
+    /// Cells round the equator; an even number.
+    pub around: f64,
+    /// The centre (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub center: [f64; 3],
+    /// Direction from pole to pole.
+    #[serde(
+        default = "super::build_axis",
+        skip_serializing_if = "super::is_build_axis"
+    )]
+    pub axis: [f64; 3],
+}
+
+/// A number, or two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrTwo {
+    /// The same for both.
+    One(f64),
+    /// One for each.
+    Two([f64; 2]),
+}
+
+/// A number that may vary, or three of them.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum GradeOrThree {
+    /// The same along all three axes.
+    One(GradeSpec),
+    /// Along the cell's x, y, z.
+    Three(Box<[GradeSpec; 3]>),
+}
+
+/// A vector that may vary.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum VectorSpec {
+    /// By its components along x, y, z.
+    Components(Box<[GradeSpec; 3]>),
+    /// An array of three numbers of a result.
+    Field(VectorField),
+}
+
+/// An array of three numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VectorField {
+    /// The array.
+    pub field: FieldSpec,
+}
+
+/// Two of the cell's axes; the third is at right angles to both.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FrameSpec {
+    /// Direction of the cell's x axis; what it has along z is left out.
+    pub x: VectorSpec,
+    /// Direction of the cell's z axis.
+    pub z: VectorSpec,
+}
+
+/// A symmetric tensor that may vary.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum TensorSpec {
+    /// By its components 11, 22, 33, 23, 13, 12.
+    Components(Box<[GradeSpec; 6]>),
+    /// An array of six or nine numbers of a result.
+    Field(TensorField),
+}
+
+/// An array of six or nine numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TensorField {
+    /// The array.
+    pub field: FieldSpec,
+    /// In which order six numbers come.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub order: TensorOrder,
+}
+
+/// In which order the six numbers of a symmetric tensor come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TensorOrder {
+    /// 11, 22, 33, 12, 23, 13, as VTK has them.
+    #[default]
+    Vtk,
+    /// 11, 22, 33, 23, 13, 12, as Voigt has them.
+    Voigt,
+}
+
+/// What counts when phases are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Domain {
+    /// The region; its surroundings within its bounds as little as possible.
+    #[default]
+    Region,
+    /// All of the region's bounds alike.
+    Box,
+}

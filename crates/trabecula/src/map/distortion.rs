@@ -1,0 +1,197 @@
+//! How far a solved map is from what was asked for.
+
+use std::cmp::Ordering;
+
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use crate::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
+
+/// A number over the region: its mean, its 95th percentile, its greatest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// Mean.
+    pub mean: f64,
+    /// 95 of 100 are at most that.
+    pub p95: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Spread {
+        if values.is_empty() {
+            return Spread::default();
+        }
+        let n = values.len();
+        let mean = values.iter().sum::<f64>() / n as f64;
+        values.sort_by(f64::total_cmp);
+        Spread {
+            mean,
+            p95: values[(95 * (n - 1)).div_ceil(100)],
+            max: values[n - 1],
+        }
+    }
+}
+
+/// How far the gradients ∇Φᵢ are from the wanted Kᵢ, over the nodes of the solution's grid that lie in the region.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Distortion {
+    /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
+    pub angle: [Spread; 3],
+    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. `max` and `p95` are of the ratio or its
+    /// inverse, whichever is greater.
+    pub spacing: [Spread; 3],
+    /// Share of the places and axes where the spacing ratio is outside 1/1.5 to 1.5.
+    pub outside: f64,
+    /// The greatest deviation from a right angle between two gradients, degrees.
+    pub shear: Spread,
+    /// Greatest over least stretch of a cell.
+    pub anisotropy: Spread,
+    /// Least and greatest det J over the one asked for: cells for each cell wanted. Zero or less where the map folds.
+    pub density: [f64; 2],
+    /// Where the density is least, mm.
+    pub least_at: Vec3,
+    /// |curl Kᵢ| λᵢ² before solving: what no map can follow; zero where K is a gradient.
+    pub curl: Spread,
+    /// The most that the wanted orientation turns within a cell, degrees, and where.
+    pub turn: f64,
+    /// Where that is, mm.
+    pub turn_at: Vec3,
+}
+
+/// What is found at a node.
+pub(super) struct Found {
+    angle: Vec3,
+    spacing: Vec3,
+    shear: f64,
+    anisotropy: f64,
+    curl: f64,
+}
+
+/// Compares J with K (rows of both: the three gratings) at a place.
+pub(super) fn compare(j: &Mat3, k: &Mat3, curl: f64) -> Found {
+    let angle = |a: Vec3, b: Vec3| {
+        let c = dot(a, b) / (norm(a) * norm(b));
+        c.clamp(-1.0, 1.0).acos().to_degrees()
+    };
+    // J K⁻¹, K being D Rᵀ: its inverse is R / D = Kᵀ / |Kᵢ|².
+    let mut back = transpose(k);
+    for row in &mut back {
+        for i in 0..3 {
+            row[i] /= dot(k[i], k[i]);
+        }
+    }
+    let relative = product(j, &back);
+    let density = determinant(&relative);
+    let greatest = spectral_norm(&relative);
+    // |det| is the product of all three stretches; the least is one over that of the inverse.
+    let cofactors = [
+        crate::math::cross(relative[1], relative[2]),
+        crate::math::cross(relative[2], relative[0]),
+        crate::math::cross(relative[0], relative[1]),
+    ];
+    let least = density.abs() / spectral_norm(&cofactors);
+    let shear = [(0, 1), (0, 2), (1, 2)]
+        .map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs())
+        .into_iter()
+        .fold(0.0, f64::max);
+    Found {
+        angle: core::array::from_fn(|i| angle(j[i], k[i])),
+        spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
+        shear,
+        anisotropy: if least > 0.0 {
+            greatest / least
+        } else {
+            f64::INFINITY
+        },
+        curl,
+    }
+}
+
+impl Distortion {
+    /// All but the density.
+    pub(super) fn of(found: &[Found], (turn, turn_at): (f64, Vec3)) -> Distortion {
+        let axis = |f: &dyn Fn(&Found) -> f64| Spread::of(found.iter().map(f).collect());
+        let outside = found
+            .iter()
+            .flat_map(|f| f.spacing)
+            .filter(|s| s.max(1.0 / s) > 1.5)
+            .count();
+        Distortion {
+            angle: [0, 1, 2].map(|i| axis(&|f| f.angle[i])),
+            spacing: [0, 1, 2].map(|i| Spread {
+                mean: axis(&|f| f.spacing[i]).mean,
+                ..axis(&|f| f.spacing[i].max(1.0 / f.spacing[i]))
+            }),
+            outside: outside as f64 / (3 * found.len()).max(1) as f64,
+            shear: axis(&|f| f.shear),
+            anisotropy: axis(&|f| f.anisotropy),
+            curl: axis(&|f| f.curl),
+            turn,
+            turn_at,
+            ..Distortion::default()
+        }
+    }
+}
+
+/// |curl Kᵢ| / |Kᵢ|², the greatest of the three gratings, by differences at a node.
+pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
+    let (at, strides) = (grid.index(n), grid.strides());
+    let mut most = 0.0f64;
+    for k in k {
+        let slope = |a: usize| {
+            let lo = if at[a] > 0 { n - strides[a] } else { n };
+            let hi = if at[a] + 1 < grid.shape[a] {
+                n + strides[a]
+            } else {
+                n
+            };
+            let span = (hi - lo) as f64 / strides[a] as f64 * grid.step[a];
+            [0, 1, 2].map(|c| (k[hi][c] - k[lo][c]) / span)
+        };
+        let d = [slope(0), slope(1), slope(2)];
+        let curl = [d[1][2] - d[2][1], d[2][0] - d[0][2], d[0][1] - d[1][0]];
+        most = most.max(norm(curl) / dot(k[n], k[n]));
+    }
+    most
+}
+
+/// The most that frames turn within one cell of edge `length`, and where.
+pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64) -> (f64, Vec3) {
+    let strides = grid.strides();
+    let mut most = (0.0, grid.origin);
+    for a in 0..3 {
+        // Nodes nearly one cell apart; where a cell has less than a step, what a step turns is shared out.
+        let apart = ((length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
+        let share = (length / (apart as f64 * grid.step[a])).min(1.0);
+        let angle = |n: usize| {
+            let m = n + apart * strides[a];
+            if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
+                return (0.0, n);
+            }
+            let pairs = frames[n]
+                .as_flattened()
+                .iter()
+                .zip(frames[m].as_flattened());
+            let trace: f64 = pairs.map(|(a, b)| a * b).sum();
+            let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+            (angle * share, n)
+        };
+        // Of equals the first, whatever the threads do.
+        let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
+            Ordering::Less => b,
+            Ordering::Equal if b.1 < a.1 => b,
+            _ => a,
+        };
+        let found = (0..grid.len())
+            .into_par_iter()
+            .map(angle)
+            .reduce(|| (0.0, usize::MAX), greater);
+        if found.0 > most.0 {
+            let (p, q) = (grid.node(found.1), grid.node(found.1 + apart * strides[a]));
+            most = (found.0, Aabb::EMPTY.with(p).with(q).center());
+        }
+    }
+    most
+}

@@ -1,0 +1,525 @@
+//! Which way a cell is turned: orthonormal frames from angles, vectors or a stress tensor.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::grid::Grid;
+use crate::fault::{Fault, number};
+use crate::grade::Grade;
+use crate::math::{
+    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose,
+    unit,
+};
+
+/// Which way a cell is turned at each place. A frame's columns are the directions of the cell's axes in space.
+#[derive(Clone)]
+pub enum Orientation {
+    /// R = Rx Ry Rz of three angles (degrees).
+    Angles([Grade; 3]),
+    /// The third axis along a vector, by the least turn from z. The vector's sign and length do not matter.
+    Direction([Grade; 3]),
+    /// The first and the third axis along two vectors: the third exactly, the first as nearly as it can.
+    Frame {
+        /// The first axis.
+        x: [Grade; 3],
+        /// The third axis.
+        z: [Grade; 3],
+    },
+    /// The axes along the principal directions of a symmetric tensor, given as 11, 22, 33, 23, 13, 12.
+    Stress([Grade; 6]),
+}
+
+impl Orientation {
+    /// The frames at the nodes of a grid. Where signs and axes are not given, they are chosen so that neighbours agree.
+    pub(super) fn frames(&self, grid: &Grid, nodes: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+        match self {
+            Orientation::Angles(of) => {
+                let angles = columns(of, nodes, "rotate")?;
+                if of.iter().all(|g| g.constant().is_some()) {
+                    return Ok(vec![rotation(angles[0]); nodes.len()]);
+                }
+                Ok(angles.into_iter().map(rotation).collect())
+            }
+            Orientation::Direction(of) => {
+                let mut along = vectors(of, nodes, "direction")?;
+                comb(
+                    grid,
+                    &mut along,
+                    |_| 1.0,
+                    |_, v, to| {
+                        if dot(*v, *to) < 0.0 {
+                            scale(*v, -1.0)
+                        } else {
+                            *v
+                        }
+                    },
+                );
+                Ok(along.into_iter().map(turned_from_z).collect())
+            }
+            Orientation::Frame { x, z } => {
+                let (x, z) = (vectors(x, nodes, "frame.x")?, vectors(z, nodes, "frame.z")?);
+                let both = x.into_iter().zip(z).enumerate();
+                both.map(|(n, (x, z))| {
+                    let x = sub(x, scale(z, dot(x, z)));
+                    if norm(x) < 1e-6 {
+                        let message = format!(
+                            "the first and the third axis are parallel at {}; give two that differ",
+                            place(nodes[n])
+                        );
+                        return Err(Fault::new("frame.x", message));
+                    }
+                    let x = unit(x);
+                    Ok(transpose(&[x, cross(z, x), z]))
+                })
+                .collect()
+            }
+            Orientation::Stress(of) => {
+                let values = columns(of, nodes, "stress")?;
+                let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) =
+                    values.iter().map(principal).unzip();
+                let sure: Vec<f64> = gaps.iter().map(|g| g[0].min(g[1]).min(g[2])).collect();
+                if gaps.iter().all(|g| *g == [0.0; 3]) {
+                    let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
+                    return Err(Fault::new("stress", message));
+                }
+                let turns = cube();
+                comb(
+                    grid,
+                    &mut frames,
+                    |n| sure[n],
+                    |n, f, to| settled(f, &gaps[n], to, &turns),
+                );
+                Ok(frames)
+            }
+        }
+    }
+}
+
+/// Values of some grades at points, side by side.
+fn columns<const N: usize>(
+    of: &[Grade; N],
+    points: &[Vec3],
+    key: &str,
+) -> Result<Vec<[f64; N]>, Fault> {
+    let mut out = vec![[0.0; N]; points.len()];
+    let mut values = vec![0.0; points.len()];
+    for (c, grade) in of.iter().enumerate() {
+        grade.values(points, &mut values);
+        for (n, (o, v)) in out.iter_mut().zip(&values).enumerate() {
+            if !v.is_finite() {
+                return Err(Fault::new(
+                    key,
+                    format!(
+                        "found {} at {}; it must be a finite number all over the region's bounds",
+                        number(*v),
+                        place(points[n])
+                    ),
+                ));
+            }
+            o[c] = *v;
+        }
+    }
+    Ok(out)
+}
+
+/// Unit vectors.
+fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fault> {
+    let mut found = columns(of, points, key)?;
+    for (v, p) in found.iter_mut().zip(points) {
+        if norm(*v) < 1e-12 {
+            return Err(Fault::new(
+                key,
+                format!(
+                    "the vector is zero at {}; it needs a direction all over the region's bounds",
+                    place(*p)
+                ),
+            ));
+        }
+        *v = unit(*v);
+    }
+    Ok(found)
+}
+
+pub(super) fn place([x, y, z]: Vec3) -> String {
+    format!("({x:.4}, {y:.4}, {z:.4}) mm")
+}
+
+/// The frame of the least turn that takes z to `d`.
+fn turned_from_z(d: Vec3) -> Mat3 {
+    let [x, y, z] = d;
+    if z < -1.0 + 1e-12 {
+        return [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+    }
+    let s = 1.0 / (1.0 + z);
+    transpose(&[
+        [1.0 - x * x * s, -x * y * s, -x],
+        [-x * y * s, 1.0 - y * y * s, -y],
+        [x, y, z],
+    ])
+}
+
+/// A gap between principal values, over the greatest of them, below which they count as equal.
+const DOUBT: f64 = 0.05;
+
+/// The principal directions of a symmetric tensor, as a right-handed frame, and for each how far its value is from the
+/// nearest other, over the greatest value.
+fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
+    let [xx, yy, zz, yz, xz, xy] = *t;
+    let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let mut v = IDENTITY;
+    let size = a.as_flattened().iter().fold(0.0f64, |m, c| m.max(c.abs()));
+    if size == 0.0 {
+        return (v, [0.0; 3]);
+    }
+    // Jacobi's rotations: a few rounds leave nothing off the diagonal.
+    for _ in 0..8 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q].abs() <= 1e-300 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = if theta >= 0.0 { 1.0 } else { -1.0 } / (theta.abs() + theta.hypot(1.0));
+            let c = 1.0 / t.hypot(1.0);
+            let mut r = IDENTITY;
+            (r[p][p], r[q][q], r[p][q], r[q][p]) = (c, c, t * c, -t * c);
+            a = product(&transpose(&r), &product(&a, &r));
+            v = product(&v, &r);
+        }
+    }
+    let values = [a[0][0], a[1][1], a[2][2]];
+    let gap = |i: usize| {
+        let other = |j: usize| (values[i] - values[(i + j) % 3]).abs();
+        other(1).min(other(2)) / size
+    };
+    let gaps = [gap(0), gap(1), gap(2)];
+    if determinant(&v) < 0.0 {
+        v = v.map(|row| row.map(|c| -c));
+    }
+    (v, gaps)
+}
+
+/// The 24 turns of a cube.
+fn cube() -> Vec<Mat3> {
+    let mut all = Vec::new();
+    for p in [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ] {
+        for signs in 0..8 {
+            let mut m = [[0.0; 3]; 3];
+            for a in 0..3 {
+                m[p[a]][a] = if signs >> a & 1 == 0 { 1.0 } else { -1.0 };
+            }
+            if determinant(&m) > 0.0 {
+                all.push(m);
+            }
+        }
+    }
+    all
+}
+
+/// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
+fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
+    let agree = |m: &Mat3| -> f64 {
+        m.as_flattened()
+            .iter()
+            .zip(to.as_flattened())
+            .map(|(a, b)| a * b)
+            .sum()
+    };
+    let all = turns.iter().map(|t| product(f, t));
+    all.max_by(|a, b| agree(a).total_cmp(&agree(b)))
+        .unwrap_or(*f)
+}
+
+/// The frame at a node whose neighbour has the frame `to`: the principal one nearest to it, as far as there is one. Where
+/// two values agree only the third direction is kept to, and where all do, the neighbour's frame is.
+fn settled(f: &Mat3, gaps: &Vec3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
+    let sure = gaps.map(|g| g > DOUBT);
+    match sure.iter().filter(|s| **s).count() {
+        3 => nearest(f, to, turns),
+        1 => {
+            let i = sure.iter().position(|s| *s).unwrap_or(0);
+            let axis = [f[0][i], f[1][i], f[2][i]];
+            let columns = transpose(to);
+            let near = columns
+                .iter()
+                .max_by(|a, b| dot(**a, axis).abs().total_cmp(&dot(**b, axis).abs()));
+            let from = *near.unwrap_or(&columns[0]);
+            let axis = if dot(from, axis) < 0.0 {
+                scale(axis, -1.0)
+            } else {
+                axis
+            };
+            product(&least_turn(from, axis), to)
+        }
+        _ => *to,
+    }
+}
+
+/// The least turn that takes one unit vector to another, which is not its opposite.
+fn least_turn(from: Vec3, to: Vec3) -> Mat3 {
+    let v = cross(from, to);
+    let k = [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]];
+    let kk = product(&k, &k);
+    let s = 1.0 / (1.0 + dot(from, to));
+    core::array::from_fn(|i| core::array::from_fn(|j| IDENTITY[i][j] + k[i][j] + s * kk[i][j]))
+}
+
+/// A node that may be reached next.
+struct Step {
+    sure: f64,
+    /// How sure the node is that it is reached from.
+    behind: f64,
+    node: usize,
+    from: usize,
+}
+
+impl PartialEq for Step {
+    fn eq(&self, o: &Step) -> bool {
+        self.cmp(o) == Ordering::Equal
+    }
+}
+impl Eq for Step {}
+impl PartialOrd for Step {
+    fn partial_cmp(&self, o: &Step) -> Option<Ordering> {
+        Some(self.cmp(o))
+    }
+}
+impl Ord for Step {
+    fn cmp(&self, o: &Step) -> Ordering {
+        self.sure
+            .total_cmp(&o.sure)
+            .then(self.behind.total_cmp(&o.behind))
+            .then(o.node.cmp(&self.node))
+            .then(o.from.cmp(&self.from))
+    }
+}
+
+/// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
+/// places come last, where they can do no harm. The first is made to agree with the axes of space.
+fn comb<T: Copy + FirstOf>(
+    grid: &Grid,
+    values: &mut [T],
+    sure: impl Fn(usize) -> f64,
+    agree: impl Fn(usize, &T, &T) -> T,
+) {
+    let strides = grid.strides();
+    let mut seen = vec![false; values.len()];
+    let mut heap = BinaryHeap::new();
+    let start = (0..values.len())
+        .max_by(|&a, &b| sure(a).total_cmp(&sure(b)).then(b.cmp(&a)))
+        .unwrap_or(0);
+    values[start] = agree(start, &values[start], &T::FIRST);
+    heap.push(Step {
+        sure: sure(start),
+        behind: sure(start),
+        node: start,
+        from: start,
+    });
+    while let Some(Step { node, from, .. }) = heap.pop() {
+        if core::mem::replace(&mut seen[node], true) {
+            continue;
+        }
+        values[node] = agree(node, &values[node], &values[from]);
+        let at = grid.index(node);
+        for a in 0..3 {
+            let below = (at[a] > 0).then(|| node - strides[a]);
+            let above = (at[a] + 1 < grid.shape[a]).then(|| node + strides[a]);
+            for next in below.into_iter().chain(above).filter(|&n| !seen[n]) {
+                heap.push(Step {
+                    sure: sure(next),
+                    behind: sure(node),
+                    node: next,
+                    from: node,
+                });
+            }
+        }
+    }
+}
+
+/// What the first node is made to agree with.
+trait FirstOf {
+    const FIRST: Self;
+}
+impl FirstOf for Vec3 {
+    const FIRST: Vec3 = [1e-6, 1e-3, 1.0];
+}
+impl FirstOf for Mat3 {
+    const FIRST: Mat3 = IDENTITY;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grade::Formula;
+    use crate::math::{Aabb, apply};
+
+    fn formula(text: &str) -> Grade {
+        Grade::Formula(Formula::parse(text).expect("formula"))
+    }
+
+    fn grid() -> (Grid, Vec<Vec3>) {
+        let b = Aabb {
+            min: [1.0, 2.0, 3.0],
+            max: [5.0, 5.0, 6.0],
+        };
+        let g = Grid::over(&b, [12, 9, 8]);
+        let nodes = (0..g.len()).map(|n| g.node(n)).collect();
+        (g, nodes)
+    }
+
+    fn angle(a: &Mat3, b: &Mat3) -> f64 {
+        let trace: f64 = a
+            .as_flattened()
+            .iter()
+            .zip(b.as_flattened())
+            .map(|(a, b)| a * b)
+            .sum();
+        ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
+    }
+
+    /// A stress made from a smoothly turning frame, its principal values changing order half way: the frames found are
+    /// that frame everywhere, up to one turn of the cube.
+    #[test]
+    fn combed_frames_are_smooth_through_a_crossing_of_principal_values() {
+        let (g, nodes) = grid();
+        let frame = |p: Vec3| rotation([10.0 * p[0], 5.0 * p[1] * p[2], 20.0 * p[0] - 7.0 * p[2]]);
+        let tensor = |p: Vec3| {
+            let (f, d) = (frame(p), [p[0] - 3.05, 10.0, -8.0]);
+            let m = product(
+                &f,
+                &product(
+                    &[
+                        [d[0], 0.0, 0.0],
+                        [0.0, 6.1 - p[0] - 3.05, 0.0],
+                        [0.0, 0.0, d[2]],
+                    ],
+                    &transpose(&f),
+                ),
+            );
+            [m[0][0], m[1][1], m[2][2], m[1][2], m[0][2], m[0][1]]
+        };
+        let turns = cube();
+        assert_eq!(turns.len(), 24);
+        let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) =
+            nodes.iter().map(|p| principal(&tensor(*p))).unzip();
+        comb(
+            &g,
+            &mut frames,
+            |n| gaps[n][0].min(gaps[n][1]).min(gaps[n][2]),
+            |n, f, to| settled(f, &gaps[n], to, &turns),
+        );
+        let by = product(&transpose(&frame(nodes[0])), &frames[0]);
+        for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
+            // The eigenvectors' rounding over the gap; where values agree, the way to the next node that is sure.
+            let within = if gaps.iter().all(|g| *g > DOUBT) {
+                1e-3
+            } else {
+                15.0
+            };
+            assert!(
+                angle(f, &product(&frame(*p), &by)) < within,
+                "{} {within}",
+                angle(f, &product(&frame(*p), &by))
+            );
+            assert!((determinant(f) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    /// Two values agree in half of the box, all three in a part of it: the sure direction is kept to, and nothing jumps.
+    #[test]
+    fn where_values_agree_the_neighbours_decide() {
+        let (g, nodes) = grid();
+        let axis = |p: Vec3| unit([1.0, 0.2 * p[1], 0.1 * p[2]]);
+        let tensor = |p: Vec3| {
+            let n = axis(p);
+            // Without a tilt in the half where x is small only n is known; where it is largest, nothing is.
+            let tilt = if p[0] < 3.0 { 0.0 } else { 3.0 };
+            let size = if p[0] > 4.6 { 0.0 } else { 10.0 };
+            let e = unit(cross(n, [0.0, 0.0, 1.0]));
+            let m = |i: usize, j: usize| {
+                size * n[i] * n[j] + (if size > 0.0 { tilt } else { 0.0 }) * e[i] * e[j]
+            };
+            [m(0, 0), m(1, 1), m(2, 2), m(1, 2), m(0, 2), m(0, 1)]
+        };
+        let component = |c: usize| {
+            let values = nodes.iter().map(|p| tensor(*p)[c]).collect();
+            Grade::Samples {
+                of: std::sync::Arc::new(
+                    crate::grade::Samples::new(g.origin, g.step, g.shape, values).expect("samples"),
+                ),
+                remap: Vec::new(),
+            }
+        };
+        let frames = Orientation::Stress(core::array::from_fn(component))
+            .frames(&g, &nodes)
+            .expect("frames");
+        for (n, f) in frames.iter().enumerate() {
+            assert!((determinant(f) - 1.0).abs() < 1e-9);
+            if nodes[n][0] < 4.6 {
+                let most = (0..3)
+                    .map(|i| dot([f[0][i], f[1][i], f[2][i]], axis(nodes[n])).abs())
+                    .fold(0.0, f64::max);
+                assert!(most > 1.0 - 1e-9, "{most}");
+            }
+            for s in g.strides() {
+                if n >= s
+                    && g.index(n - s)
+                        .iter()
+                        .zip(g.index(n))
+                        .filter(|(a, b)| **a != *b)
+                        .count()
+                        == 1
+                {
+                    // The axis turns from node to node, and so does what the ways there make of the rest; another of the 24
+                    // frames would be 45 degrees away or more.
+                    assert!(
+                        angle(f, &frames[n - s]) < 30.0,
+                        "{} {:?}",
+                        angle(f, &frames[n - s]),
+                        nodes[n]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn directions_are_lines_and_frames_are_orthonormal() {
+        let (g, nodes) = grid();
+        // The sign flips in the middle; lines do not care.
+        let of = [
+            formula("sin(x)*(y-3.3)"),
+            formula("0.5*(y-3.3)"),
+            formula("cos(x)*(y-3.3)"),
+        ];
+        let frames = Orientation::Direction(of)
+            .frames(&g, &nodes)
+            .expect("frames");
+        for (n, f) in frames.iter().enumerate() {
+            let want = unit([nodes[n][0].sin(), 0.5, nodes[n][0].cos()]);
+            let z = apply(f, [0.0, 0.0, 1.0]);
+            assert!((dot(z, want).abs() - 1.0).abs() < 1e-12);
+            assert!(
+                dot(
+                    z,
+                    apply(&frames[n - usize::from(n % 12 > 0)], [0.0, 0.0, 1.0])
+                ) > 0.5
+            );
+            let ff = product(f, &transpose(f));
+            assert!(angle(&ff, &IDENTITY) < 1e-5);
+        }
+        let zero = Orientation::Direction([formula("x-1"), formula("y-2"), formula("z-3")]);
+        assert!(
+            zero.frames(&g, &nodes)
+                .expect_err("zero")
+                .message
+                .contains("(1.0000, 2.0000, 3.0000)")
+        );
+    }
+}

@@ -1,0 +1,64 @@
+//! A grid of nodes over a box, ends included.
+
+use crate::math::{Aabb, Vec3};
+
+/// Nodes origin + step · (i, j, k), 0 ≤ i < shape, x running fastest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grid {
+    pub origin: Vec3,
+    pub step: Vec3,
+    pub shape: [usize; 3],
+}
+
+impl Grid {
+    /// A grid over the box with so many nodes along each axis (at least two).
+    pub fn over(b: &Aabb, shape: [usize; 3]) -> Grid {
+        let size = b.size();
+        Grid {
+            origin: b.min,
+            step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64),
+            shape,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// The place along each axis of node `n`.
+    pub fn index(&self, n: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.shape;
+        [n % nx, n / nx % ny, n / nx / ny]
+    }
+
+    pub fn node(&self, n: usize) -> Vec3 {
+        let at = self.index(n);
+        core::array::from_fn(|a| self.origin[a] + self.step[a] * at[a] as f64)
+    }
+
+    /// How far apart neighbours along each axis are stored.
+    pub fn strides(&self) -> [usize; 3] {
+        [1, self.shape[0], self.shape[0] * self.shape[1]]
+    }
+
+    /// The weight of the trapezoid rule at node `n`: halved for each face of the box that it lies in.
+    pub fn trapezoid(&self, n: usize) -> f64 {
+        let at = self.index(n);
+        (0..3)
+            .filter(|&a| at[a] == 0 || at[a] + 1 == self.shape[a])
+            .fold(1.0, |w, _| 0.5 * w)
+    }
+
+    /// The number (from 2·3·5-smooth lengths plus one, so that transforms are fast) at or above `n`.
+    pub fn handy(n: usize) -> usize {
+        let smooth = |mut m: usize| {
+            for p in [2, 3, 5] {
+                while m.is_multiple_of(p) {
+                    m /= p;
+                }
+            }
+            m == 1
+        };
+        (n.max(2)..).find(|m| smooth(m - 1)).unwrap_or(n)
+    }
+}

@@ -1,0 +1,414 @@
+//! Maps that turn and stretch the cells as asked for, by three phases whose gradients are nearest to three wanted ones.
+//!
+//! Where orientation and wavelength vary there is mostly no phase with ∇Φᵢ = Kᵢ, Kᵢ = R eᵢ / λᵢ: least squares. The
+//! phases are solved on a coarse grid over the region's bounds and carried between its nodes by splines.
+
+use rayon::prelude::*;
+
+use super::distortion::{self, Distortion};
+use super::frame::{Orientation, place};
+use super::grid::Grid;
+use super::poisson::Poisson;
+use super::spline::{self, Spline};
+use crate::fault::{Fault, number};
+use crate::field::Field;
+use crate::grade::Grade;
+use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub};
+
+/// Most nodes of a grid that is chosen, and of one that is asked for.
+const NODES: [f64; 2] = [2.2e6, 4e7];
+/// Nodes on a wavelength.
+const FINE: f64 = 4.0;
+/// The most that a wavelength may change between neighbouring nodes, as a factor.
+const ABRUPT: f64 = 1.5;
+/// Weights fall off outside the region by e² for each of so many steps.
+const FALL: f64 = 3.0;
+/// Nodes at which a solution is held against what was asked for.
+const LOOKS: usize = 60_000;
+/// Least weight, as its root.
+const FAINT: f64 = 1e-3;
+
+/// What a map is asked for.
+#[derive(Clone)]
+pub struct Wanted {
+    /// Cell edges (mm) along the cell's axes.
+    pub wavelength: [Grade; 3],
+    /// Which way the cells are turned.
+    pub orientation: Orientation,
+    /// Moves the lattice (mm).
+    pub offset: Vec3,
+}
+
+/// How a map is solved for.
+#[derive(Clone, Copy, Default)]
+pub struct Settings<'a> {
+    /// Spacing of the grid (mm); chosen if not given.
+    pub step: Option<f64>,
+    /// Signed distance of the region that counts; all of the box if none.
+    pub region: Option<&'a dyn Field>,
+    /// Whether the map may fold.
+    pub folds: bool,
+}
+
+/// A solved map.
+pub struct Phase {
+    spline: Spline,
+    shift: Vec3,
+    wavelength: [f64; 2],
+    mean: Vec3,
+    steepest: f64,
+    distortion: Distortion,
+    extremes: [Mat3; 2],
+    steps: usize,
+}
+
+impl Phase {
+    /// Solves for the map in a box.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
+    /// grid that is too coarse or too large; a map that folds.
+    pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
+        let grid = grid(bounds, wanted, settings.step)?;
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
+        let frames = wanted.orientation.frames(&grid, &nodes)?;
+        let mut depth = vec![f64::NEG_INFINITY; grid.len()];
+        if let Some(region) = settings.region {
+            let pieces = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
+            pieces.for_each(|(d, p)| region.values(p, d));
+        }
+        let reach = 1e-9 * norm(bounds.size());
+        let inside: Vec<bool> = depth.iter().map(|d| *d <= reach).collect();
+        check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
+        let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| {
+            let of = frames.iter().zip(&wavelength);
+            of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i]))
+                .collect()
+        });
+        let (values, mean, steps) = integrate(&grid, &k, &depth);
+        let spline = Spline::through(grid, values);
+        let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
+        // Cells for each cell wanted, everywhere; the rest, which costs more, at some tens of thousands of nodes.
+        let density: Vec<f64> = within
+            .par_iter()
+            .map(|&n| {
+                let cells = determinant(&spline.jacobian(nodes[n]).1);
+                cells * wavelength[n].iter().product::<f64>()
+            })
+            .collect();
+        let keep = LOOKS as f64 / within.len().max(1) as f64;
+        let looked: Vec<usize> = (within.iter().copied())
+            .filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
+            .collect();
+        let jacobians: Vec<Mat3> = looked
+            .par_iter()
+            .map(|&n| spline.jacobian(nodes[n]).1)
+            .collect();
+        let found: Vec<_> = (looked.par_iter().zip(&jacobians))
+            .map(|(&n, j)| {
+                let wanted = [k[0][n], k[1][n], k[2][n]];
+                distortion::compare(j, &wanted, distortion::curl(&grid, &k, n))
+            })
+            .collect();
+        let range = wavelength
+            .iter()
+            .flatten()
+            .fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| {
+                [a.min(*w), b.max(*w)]
+            });
+        let turn = distortion::turning(&grid, &frames, &inside, range[1]);
+        let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
+        let least = (0..density.len()).min_by(order);
+        let most = (0..density.len()).max_by(order);
+        let distortion = Distortion {
+            density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
+            least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
+            ..Distortion::of(&found, turn)
+        };
+        if !settings.folds {
+            refuse_folds(&grid, &spline, &distortion, &inside)?;
+        }
+        let shift = mean.map(|m| -dot(m, wanted.offset));
+        let average = (within.iter()).fold([0.0; 3], |s, &n| add(s, wavelength[n]));
+        let steepest = spline.stretch(bounds);
+        let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
+        let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
+        let typical = spline.jacobian(bounds.center()).1;
+        let extremes = [
+            (0..lengths.len()).min_by(by_length),
+            (0..lengths.len()).max_by(by_length),
+        ];
+        Ok(Phase {
+            spline,
+            shift,
+            wavelength: range,
+            mean: if within.is_empty() {
+                wavelength[0]
+            } else {
+                scale(average, 1.0 / within.len() as f64)
+            },
+            steepest,
+            distortion,
+            extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
+            steps,
+        })
+    }
+
+    /// Least and greatest wavelength asked for, mm.
+    pub fn wavelength(&self) -> [f64; 2] {
+        self.wavelength
+    }
+
+    /// The mean wavelengths along the three axes of the cell, mm.
+    pub fn mean_wavelength(&self) -> Vec3 {
+        self.mean
+    }
+
+    /// How far the map is from what was asked for.
+    pub fn distortion(&self) -> &Distortion {
+        &self.distortion
+    }
+
+    /// The Jacobians at the nodes in the region where cells are largest and smallest.
+    pub fn extremes(&self) -> &[Mat3; 2] {
+        &self.extremes
+    }
+
+    /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
+    pub fn effort(&self) -> ([usize; 3], usize) {
+        (self.spline.grid().shape, self.steps)
+    }
+
+    /// Fills phases (turns) of points (mm).
+    pub fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
+        self.spline.values(points, out);
+        out.iter_mut().for_each(|u| *u = add(*u, self.shift));
+    }
+
+    /// du/dx at a point, turns per mm.
+    pub fn jacobian(&self, at: Vec3) -> Mat3 {
+        self.spline.jacobian(at).1
+    }
+
+    /// A bound of the spectral norm of du/dx in a box, turns per mm.
+    pub fn stretch(&self, b: &Aabb) -> f64 {
+        self.spline.stretch(b)
+    }
+
+    /// A bound of the spectral norm of du/dx in the region's bounds, turns per mm.
+    pub fn steepest(&self) -> f64 {
+        self.steepest
+    }
+
+    /// The map on the rows of a block, but for `shift`.
+    pub(super) fn rows<'a>(&'a self, block: &crate::field::Block<'a>) -> (spline::Rows<'a>, Vec3) {
+        (self.spline.rows(block), self.shift)
+    }
+}
+
+/// The grid that resolves the least wavelength, or has the spacing asked for.
+fn grid(bounds: &Aabb, wanted: &Wanted, step: Option<f64>) -> Result<Grid, Fault> {
+    let size = bounds.size();
+    let coarse: Vec<Vec3> = {
+        let g = Grid::over(bounds, [13; 3]);
+        (0..g.len()).map(|n| g.node(n)).collect()
+    };
+    let all = wavelengths(&wanted.wavelength, &coarse)?;
+    let least = all
+        .iter()
+        .flatten()
+        .fold(f64::INFINITY, |m: f64, w| m.min(*w));
+    let shape = |h: f64| {
+        size.map(|s| Grid::handy(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST)))
+    };
+    let count = |shape: [usize; 3]| shape.map(|n| n as f64).iter().product::<f64>();
+    match step {
+        Some(h) => {
+            if !(h > 0.0 && h.is_finite()) {
+                return Err(Fault::new(
+                    "step",
+                    format!(
+                        "{} mm; the spacing of the grid is a positive, finite length",
+                        number(h)
+                    ),
+                ));
+            }
+            let rough = size.iter().map(|s| s / h).product::<f64>();
+            if rough > NODES[1] || count(shape(h)) > NODES[1] {
+                let enough = (size.iter().product::<f64>() / NODES[1]).cbrt();
+                return Err(Fault::new(
+                    "step",
+                    format!(
+                        "{} mm makes a grid of {rough:.1e} nodes; at most {:.0e} are possible: use a step above {enough:.3} mm, or leave it out",
+                        number(h),
+                        NODES[1]
+                    ),
+                ));
+            }
+            Ok(Grid::over(bounds, shape(h)))
+        }
+        None => {
+            let mut h = (least / FINE).max((size.iter().product::<f64>() / NODES[0]).cbrt());
+            while count(shape(h)) > 1.3 * NODES[0] {
+                h *= 1.05;
+            }
+            Ok(Grid::over(bounds, shape(h)))
+        }
+    }
+}
+
+/// The three wavelengths at points.
+fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
+    let mut out = vec![[0.0; 3]; points.len()];
+    let mut values = vec![0.0; points.len()];
+    for (i, grade) in of.iter().enumerate() {
+        grade.values(points, &mut values);
+        for ((o, v), p) in out.iter_mut().zip(&values).zip(points) {
+            if !(*v > 0.0 && v.is_finite()) {
+                return Err(Fault::new(
+                    "wavelength",
+                    format!(
+                        "{} mm at {}; a wavelength is a positive, finite length all over the region's bounds",
+                        number(*v),
+                        place(*p)
+                    ),
+                ));
+            }
+            o[i] = *v;
+        }
+    }
+    Ok(out)
+}
+
+/// Refuses wavelengths that jump between nodes, or that nodes do not see vary.
+fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
+    if of.iter().all(|g| g.constant().is_some()) {
+        return Ok(());
+    }
+    let refuse = |a: f64, b: f64, p: Vec3, apart: f64| {
+        let message = format!(
+            "the wavelength goes from {} to {} mm within {} mm at {}: faster than the grid can carry; let it change over several cells, or give a smaller step",
+            number(a),
+            number(b),
+            number(apart),
+            place(p)
+        );
+        Err(Fault::new("wavelength", message))
+    };
+    let strides = grid.strides();
+    let mut middles = Vec::new();
+    for n in (0..grid.len()).filter(|&n| inside[n]) {
+        let index = grid.index(n);
+        for a in (0..3).filter(|&a| index[a] + 1 < grid.shape[a]) {
+            let m = n + strides[a];
+            for i in 0..3 {
+                let (v, w) = (at[n][i], at[m][i]);
+                if inside[m] && v.max(w) > ABRUPT * v.min(w) {
+                    return refuse(v, w, grid.node(n), grid.step[a]);
+                }
+            }
+        }
+        if (0..3).all(|a| index[a] + 1 < grid.shape[a]) {
+            middles.push(n);
+        }
+    }
+    let points: Vec<Vec3> = middles
+        .iter()
+        .map(|&n| add(grid.node(n), scale(grid.step, 0.5)))
+        .collect();
+    let between = wavelengths(of, &points)?;
+    for ((n, w), p) in middles.iter().zip(&between).zip(&points) {
+        let far = n + strides.iter().sum::<usize>();
+        for i in 0..3 {
+            let (lo, hi) = (at[*n][i].min(at[far][i]), at[*n][i].max(at[far][i]));
+            if inside[far] && (w[i] > ABRUPT * hi || w[i] < lo / ABRUPT) {
+                return refuse(at[*n][i], w[i], *p, 0.5 * norm(grid.step));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
+/// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by the closeness to the region.
+fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], depth: &[f64]) -> ([Vec<f64>; 3], Mat3, usize) {
+    let fall = FALL * grid.step.into_iter().fold(0.0, f64::max);
+    let s: Option<Vec<f64>> = depth.iter().any(|d| *d > 1e-6 * fall).then(|| {
+        let weight = |d: &f64| (-d.max(0.0) / fall).exp().max(FAINT);
+        depth.iter().map(weight).collect()
+    });
+    let weights: Vec<f64> = (0..grid.len())
+        .map(|n| grid.trapezoid(n) * s.as_ref().map_or(1.0, |s| s[n] * s[n]))
+        .collect();
+    let whole: f64 = weights.iter().sum();
+    let poisson = Poisson::new(*grid);
+    let solved: Vec<(Vec<f64>, Vec3, usize)> = k
+        .par_iter()
+        .map(|k| {
+            // From a first value on, so that a K that does not vary has exactly itself as its mean.
+            let first = k[0];
+            let off = k
+                .iter()
+                .zip(&weights)
+                .fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
+            let mean = add(first, scale(off, 1.0 / whole));
+            let rest: Vec<Vec3> = k.iter().map(|k| sub(*k, mean)).collect();
+            let (mut f, steps) = match &s {
+                _ if rest.iter().all(|r| norm(*r) <= 1e-15 * norm(mean)) => (vec![0.0; k.len()], 0),
+                None => (poisson.integrate(&rest), 0),
+                Some(s) => {
+                    let (f, steps, _) = poisson.integrate_weighted(&rest, s);
+                    (f, steps)
+                }
+            };
+            let off = f.iter().zip(&weights).map(|(f, w)| f * w).sum::<f64>() / whole;
+            for (n, f) in f.iter_mut().enumerate() {
+                *f += dot(mean, grid.node(n)) - off;
+            }
+            (f, mean, steps)
+        })
+        .collect();
+    let mean = [solved[0].1, solved[1].1, solved[2].1];
+    let steps = solved.iter().map(|s| s.2).max().unwrap_or(0);
+    let mut values = solved.into_iter().map(|s| s.0);
+    (
+        core::array::from_fn(|_| values.next().unwrap_or_default()),
+        mean,
+        steps,
+    )
+}
+
+/// Refuses a map that turns inside out at a node or between nodes in the region.
+fn refuse_folds(
+    grid: &Grid,
+    spline: &Spline,
+    distortion: &Distortion,
+    inside: &[bool],
+) -> Result<(), Fault> {
+    let at_node = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
+    let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
+    let far: usize = strides.iter().sum();
+    let between = || {
+        (0..grid.len())
+            .into_par_iter()
+            .filter(|&n| {
+                (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far]
+            })
+            .map(|n| add(grid.node(n), half))
+            .find_first(|p| determinant(&spline.jacobian(*p).1) <= 0.0)
+    };
+    match at_node.or_else(between) {
+        None => Ok(()),
+        Some(p) => Err(Fault::new(
+            "",
+            format!(
+                "the map folds at {}: cells turn inside out there. Let orientation and wavelength vary more slowly, or allow it with folds = true",
+                place(p)
+            ),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,390 @@
+//! Least squares for a gradient on a grid: Σ w (Φⱼ − Φᵢ − h (Kᵢ + Kⱼ)/2)² / h² over the grid's edges is made least.
+//!
+//! With the weights of the trapezoid rule the normal equations are a second difference, mirrored at the faces, and the
+//! cosines of the DCT-I are its eigenvectors: one transform forth and one back solve it (the fixed point of the iteration
+//! of Rumpf and Pazos, Synthesis of spatially variant lattices, Opt. Express 20, 2012, in one step).
+//!
+//! With a weight s² that varies, v = s Φ turns the equations into the same second difference plus a potential (Concus and
+//! Golub, Use of fast direct methods for nonseparable elliptic equations, SIAM J. Numer. Anal. 10, 1973), and conjugate
+//! gradients need few steps with the direct solution as preconditioner.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
+
+use super::grid::Grid;
+use crate::math::Vec3;
+
+/// Residual, relative to the first, at which conjugate gradients end.
+const RESIDUAL: f64 = 1e-7;
+/// Most steps of conjugate gradients.
+const STEPS: usize = 400;
+
+/// The mirrored second difference on a grid, and its inverse.
+pub(super) struct Poisson {
+    grid: Grid,
+    /// Transforms of twice the length less two, one for each axis. Scalar ones: the same bits on every processor.
+    plans: [Arc<dyn Fft<f64>>; 3],
+    /// 2 (1 − cos(π m / (n − 1))) / h² for each axis.
+    modes: [Vec<f64>; 3],
+}
+
+impl Poisson {
+    pub fn new(grid: Grid) -> Poisson {
+        let mut planner = FftPlannerScalar::new();
+        let plans = grid
+            .shape
+            .map(|n| planner.plan_fft(2 * (n - 1), FftDirection::Forward));
+        let modes = core::array::from_fn(|a| {
+            let n = grid.shape[a];
+            let mode = |m: usize| {
+                let angle = core::f64::consts::PI * m as f64 / (n - 1) as f64;
+                4.0 * (angle / 2.0).sin().powi(2) / grid.step[a].powi(2)
+            };
+            (0..n).map(mode).collect()
+        });
+        Poisson { grid, plans, modes }
+    }
+
+    /// Φ of zero trapezoid mean whose steps along the edges of the grid are nearest to those of K.
+    pub fn integrate(&self, k: &[Vec3]) -> Vec<f64> {
+        let mut f = self.divergence(k, None);
+        self.solve(&mut f, 0.0);
+        f
+    }
+
+    /// As `integrate`, the square of an edge counting as the product of `s` at its ends. Also the number of steps taken,
+    /// and the residual left, relative to the first.
+    pub fn integrate_weighted(&self, k: &[Vec3], s: &[f64]) -> (Vec<f64>, usize, f64) {
+        let n = self.grid.len();
+        let t: Vec<f64> = (0..n).map(|i| self.grid.trapezoid(i)).collect();
+        let dot = |a: &[f64], b: &[f64]| -> f64 {
+            // In pieces of one length, so that the sum does not depend on the number of threads.
+            let sums: Vec<f64> = (a.par_chunks(4096), b.par_chunks(4096), t.par_chunks(4096))
+                .into_par_iter()
+                .map(|(a, b, t)| a.iter().zip(b).zip(t).map(|((a, b), t)| a * b * t).sum())
+                .collect();
+            sums.iter().sum()
+        };
+        let potential: Vec<f64> = {
+            let bend = self.apply(s);
+            bend.iter().zip(s).map(|(b, s)| -b / s).collect()
+        };
+        // The mean of the potential, where it is positive, makes the preconditioner regular and like the operator.
+        let shift = potential.iter().map(|q| q.max(0.0)).sum::<f64>() / n as f64;
+        let operator = |v: &[f64]| {
+            let mut out = self.apply(v);
+            out.par_iter_mut()
+                .zip(v)
+                .zip(&potential)
+                .for_each(|((o, v), q)| *o += q * v);
+            out
+        };
+        let mut v: Vec<f64> = self
+            .integrate(k)
+            .iter()
+            .zip(s)
+            .map(|(f, s)| f * s)
+            .collect();
+        let mut r = operator(&v);
+        let f = self.divergence(k, Some(s));
+        let scale = dot(&f, &f).sqrt();
+        r.iter_mut().zip(&f).for_each(|(r, f)| *r = f - *r);
+        let precondition = |r: &[f64]| {
+            let mut z = r.to_vec();
+            self.solve(&mut z, shift);
+            z
+        };
+        let first = dot(&r, &r).sqrt();
+        // What rounding leaves of a gradient that needs no solving.
+        if first <= 1e-12 * scale {
+            return (v.iter().zip(s).map(|(v, s)| v / s).collect(), 0, 0.0);
+        }
+        let mut z = precondition(&r);
+        let mut p = z.clone();
+        let mut rz = dot(&r, &z);
+        let (mut steps, mut left) = (0, 1.0);
+        while steps < STEPS && left > RESIDUAL {
+            let q = operator(&p);
+            let alpha = rz / dot(&p, &q);
+            if !alpha.is_finite() {
+                break;
+            }
+            v.iter_mut().zip(&p).for_each(|(v, p)| *v += alpha * p);
+            r.iter_mut().zip(&q).for_each(|(r, q)| *r -= alpha * q);
+            z = precondition(&r);
+            let next = dot(&r, &z);
+            p.iter_mut()
+                .zip(&z)
+                .for_each(|(p, z)| *p = z + next / rz * *p);
+            rz = next;
+            steps += 1;
+            left = dot(&r, &r).sqrt() / first;
+        }
+        (v.iter().zip(s).map(|(v, s)| v / s).collect(), steps, left)
+    }
+
+    /// Minus the mirrored second difference.
+    pub fn apply(&self, v: &[f64]) -> Vec<f64> {
+        let (g, strides) = (&self.grid, self.grid.strides());
+        let [nx, ny, _] = g.shape;
+        let over = g.step.map(|h| 1.0 / (h * h));
+        let mut out = vec![0.0; v.len()];
+        out.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
+            let at = [0, row % ny, row / ny];
+            for (i, o) in out.iter_mut().enumerate() {
+                let n = row * nx + i;
+                for a in 0..3 {
+                    let (c, last) = (if a == 0 { i } else { at[a] }, g.shape[a] - 1);
+                    let below = if c == 0 {
+                        n + strides[a]
+                    } else {
+                        n - strides[a]
+                    };
+                    let above = if c == last {
+                        n - strides[a]
+                    } else {
+                        n + strides[a]
+                    };
+                    *o += over[a] * (2.0 * v[n] - v[below] - v[above]);
+                }
+            }
+        });
+        out
+    }
+
+    /// The right-hand side: minus the sum over a node's edges of the weight at the other end times the step of K, over
+    /// h², edges mirrored at the faces.
+    fn divergence(&self, k: &[Vec3], s: Option<&[f64]>) -> Vec<f64> {
+        let (g, strides) = (&self.grid, self.grid.strides());
+        (0..g.len())
+            .into_par_iter()
+            .map(|n| {
+                let at = g.index(n);
+                let mut sum = 0.0;
+                for a in 0..3 {
+                    let edge = |m: usize| {
+                        s.map_or(1.0, |s| s[m]) * (k[n][a] + k[m][a]) / (2.0 * g.step[a])
+                    };
+                    sum += match at[a] {
+                        0 => -2.0 * edge(n + strides[a]),
+                        c if c + 1 == g.shape[a] => 2.0 * edge(n - strides[a]),
+                        _ => edge(n - strides[a]) - edge(n + strides[a]),
+                    };
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// Solves (−Δ + shift) Φ = f for zero trapezoid mean of what constants cannot give; f becomes Φ.
+    pub fn solve(&self, f: &mut Vec<f64>, shift: f64) {
+        let [nx, ny, nz] = self.grid.shape;
+        let mut spare = vec![0.0; f.len()];
+        self.transform(f, &mut spare);
+        // Three turns of the axes bring their order back.
+        let scale = 1.0 / (8 * (nx - 1) * (ny - 1) * (nz - 1)) as f64;
+        f.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
+            let yz = self.modes[1][row % ny] + self.modes[2][row / ny] + shift;
+            for (v, m) in values.iter_mut().zip(&self.modes[0]) {
+                let mode = m + yz;
+                *v *= if mode > 0.0 { scale / mode } else { 0.0 };
+            }
+        });
+        self.transform(f, &mut spare);
+    }
+
+    /// DCT-I along all three axes.
+    fn transform(&self, f: &mut Vec<f64>, spare: &mut Vec<f64>) {
+        for (a, plan) in self.plans.iter().enumerate() {
+            let n = self.grid.shape[a];
+            f.par_chunks_mut(2 * n).for_each_init(
+                || vec![Complex64::default(); 2 * (n - 1) + plan.get_inplace_scratch_len()],
+                |work, lines| pair(&**plan, n, lines, work),
+            );
+            turn(f, spare, n);
+            core::mem::swap(f, spare);
+        }
+    }
+}
+
+/// DCT-I of one line or two lines of length `n` in place: the real and the imaginary part of one transform of the lines
+/// continued evenly, both of which stay real.
+fn pair(plan: &dyn Fft<f64>, n: usize, lines: &mut [f64], work: &mut [Complex64]) {
+    let m = 2 * (n - 1);
+    let (line, scratch) = work.split_at_mut(m);
+    let (a, b) = lines.split_at_mut(n);
+    for i in 0..n {
+        line[i] = Complex64::new(a[i], b.get(i).copied().unwrap_or(0.0));
+    }
+    for i in n..m {
+        line[i] = line[m - i];
+    }
+    plan.process_with_scratch(line, scratch);
+    for i in 0..n {
+        a[i] = line[i].re;
+        if let Some(b) = b.get_mut(i) {
+            *b = line[i].im;
+        }
+    }
+}
+
+/// Writes lines of length `n` across: (i, r) becomes (r, i).
+fn turn(from: &[f64], to: &mut [f64], n: usize) {
+    const SLAB: usize = 8;
+    let rows = from.len() / n;
+    to.par_chunks_mut(SLAB * rows)
+        .enumerate()
+        .for_each(|(slab, to)| {
+            let width = to.len() / rows;
+            for (r, line) in from.chunks_exact(n).enumerate() {
+                let piece = &line[slab * SLAB..slab * SLAB + width];
+                for (i, v) in piece.iter().enumerate() {
+                    to[i * rows + r] = *v;
+                }
+            }
+        });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Aabb;
+
+    fn noise(seed: u64) -> impl FnMut() -> f64 {
+        let mut s = seed;
+        move || {
+            s = s
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (s >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    fn grid(shape: [usize; 3], size: Vec3) -> Grid {
+        let b = Aabb {
+            min: [-1.0, 0.5, 2.0],
+            max: core::array::from_fn(|a| [-1.0, 0.5, 2.0][a] + size[a]),
+        };
+        Grid::over(&b, shape)
+    }
+
+    fn largest(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    }
+
+    /// The iteration of the paper with its signs put right and, for unequal steps, the weights 1/h²: it stands still at
+    /// the direct solution and comes to it from zero, for a random K, which no phase has as its gradient.
+    #[test]
+    fn the_iteration_of_the_paper_ends_where_the_direct_solution_is() {
+        let g = grid([9, 11, 8], [2.0, 3.0, 1.4]);
+        let mut random = noise(3);
+        let k: Vec<Vec3> = (0..g.len())
+            .map(|_| [random(), random(), random()])
+            .collect();
+        let direct = Poisson::new(g).integrate(&k);
+        let strides = g.strides();
+        let weight = g.step.map(|h| 1.0 / (h * h));
+        let sweep = |f: &[f64]| -> Vec<f64> {
+            (0..g.len())
+                .map(|n| {
+                    let at = g.index(n);
+                    let each = |a: usize| {
+                        let (h, s) = (g.step[a], strides[a]);
+                        match at[a] {
+                            0 => f[n + s] - h / 2.0 * (k[n + s][a] + k[n][a]),
+                            c if c + 1 == g.shape[a] => {
+                                f[n - s] + h / 2.0 * (k[n][a] + k[n - s][a])
+                            }
+                            _ => {
+                                (f[n - s] + f[n + s]) / 2.0 - h / 4.0 * (k[n + s][a] - k[n - s][a])
+                            }
+                        }
+                    };
+                    (0..3).map(|a| weight[a] * each(a)).sum::<f64>() / weight.iter().sum::<f64>()
+                })
+                .collect()
+        };
+        // Rounding of sums of size one.
+        assert!(largest(&sweep(&direct), &direct) < 1e-13);
+        let mut f = vec![0.0; g.len()];
+        for _ in 0..6000 {
+            // Half way: the plain iteration leaves the checkerboard for ever.
+            let next = sweep(&f);
+            f.iter_mut()
+                .zip(&next)
+                .for_each(|(f, n)| *f = 0.5 * (*f + n));
+        }
+        let weights: Vec<f64> = (0..g.len()).map(|n| g.trapezoid(n)).collect();
+        let mean =
+            f.iter().zip(&weights).map(|(f, w)| f * w).sum::<f64>() / weights.iter().sum::<f64>();
+        f.iter_mut().for_each(|f| *f -= mean);
+        assert!(largest(&f, &direct) < 1e-10, "{}", largest(&f, &direct));
+    }
+
+    /// A wave of the grid is scaled by its eigenvalue; lengths that are prime or even are no exception.
+    #[test]
+    fn solving_undoes_the_operator() {
+        for shape in [[5, 6, 7], [12, 18, 20], [33, 4, 3]] {
+            let g = grid(shape, [2.0, 3.0, 1.4]);
+            let p = Poisson::new(g);
+            let mut random = noise(7);
+            let mut f: Vec<f64> = (0..g.len()).map(|_| random()).collect();
+            let whole: f64 = (0..g.len()).map(|n| g.trapezoid(n)).sum();
+            let mean = (0..g.len()).map(|n| f[n] * g.trapezoid(n)).sum::<f64>() / whole;
+            f.iter_mut().for_each(|f| *f -= mean);
+            let mut back = p.apply(&f);
+            p.solve(&mut back, 0.0);
+            assert!(largest(&back, &f) < 1e-12, "{shape:?}");
+        }
+    }
+
+    /// With a weight, what is found is stationary: the weighted sum of squares does not fall in any direction, which a
+    /// direct look at the sum shows; and where all edges weigh the same it is the direct solution.
+    #[test]
+    fn weighted_least_squares_are_least() {
+        let g = grid([14, 12, 11], [2.0, 3.0, 1.4]);
+        let p = Poisson::new(g);
+        let mut random = noise(5);
+        let k: Vec<Vec3> = (0..g.len())
+            .map(|_| [random(), random(), random()])
+            .collect();
+        let s: Vec<f64> = (0..g.len())
+            .map(|n| (-2.0 * (g.node(n)[0].abs() - 0.3).max(0.0)).exp().max(1e-3))
+            .collect();
+        let (f, steps, left) = p.integrate_weighted(&k, &s);
+        assert!(left < RESIDUAL && steps < 60, "{steps} steps, {left}");
+        let strides = g.strides();
+        let sum = |f: &[f64]| {
+            let mut sum = 0.0;
+            for n in 0..g.len() {
+                let at = g.index(n);
+                for a in 0..3 {
+                    if at[a] + 1 < g.shape[a] {
+                        let m = n + strides[a];
+                        let faces = (0..3)
+                            .filter(|&b| b != a && (at[b] == 0 || at[b] + 1 == g.shape[b]))
+                            .fold(1.0, |w, _| 0.5 * w);
+                        let miss = (f[m] - f[n]) / g.step[a] - (k[n][a] + k[m][a]) / 2.0;
+                        sum += faces * s[n] * s[m] * miss * miss;
+                    }
+                }
+            }
+            sum
+        };
+        let least = sum(&f);
+        for _ in 0..20 {
+            let d: Vec<f64> = (0..g.len()).map(|n| random() * s[n]).collect();
+            let moved = |by: f64| {
+                let f: Vec<f64> = f.iter().zip(&d).map(|(f, d)| f + by * d).collect();
+                sum(&f)
+            };
+            let slope = (moved(1e-3) - moved(-1e-3)) / 2e-3;
+            // The residual, times the length of the direction and the steepness of the sum.
+            assert!(slope.abs() < 1e-4 * least, "{slope} of {least}");
+        }
+        let (even, ..) = p.integrate_weighted(&k, &vec![1.0; g.len()]);
+        assert!(largest(&even, &p.integrate(&k)) < 1e-10);
+    }
+}

@@ -1,0 +1,287 @@
+//! Maps that wrap a lattice round an axis or a centre, with a whole number of cells around, so that it closes.
+
+use crate::fault::{Fault, number};
+use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
+
+/// A lattice wrapped round an axis or about a centre. Phases are (r/λ, n θ/2π, z/λ) on a cylinder and (r/λ, n φ/2π,
+/// n θ/2π) on a sphere: φ round the axis, θ from it, n cells around and half as many from pole to pole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Round {
+    center: Vec3,
+    /// Two directions across the axis, and the axis.
+    frame: Mat3,
+    /// Along the radius and along the axis, mm; the second does not count on a sphere.
+    wavelength: [f64; 2],
+    around: f64,
+    /// Whether about a centre.
+    sphere: bool,
+    /// Least, mean and greatest distance from the axis in the region.
+    radii: [f64; 3],
+}
+
+impl Round {
+    /// Cells round the line through `center` along `axis`: `around` of them, with edges `wavelength` (mm) along the radius
+    /// and along the axis. `radii` are the least, mean and greatest distance from the line where the lattice is wanted.
+    ///
+    /// # Errors
+    /// Lengths that are not positive, no axis, a number of cells that is not whole and positive.
+    pub fn cylinder(
+        center: Vec3,
+        axis: Vec3,
+        wavelength: [f64; 2],
+        around: f64,
+        radii: [f64; 3],
+    ) -> Result<Round, Fault> {
+        Round::new(center, axis, wavelength, around, radii, false)
+    }
+
+    /// Shells of cells about `center`: `around` of them round the equator, half as many from pole to pole, with edges
+    /// `wavelength` (mm) along the radius. Cells shrink towards the poles.
+    ///
+    /// # Errors
+    /// As `cylinder`; an odd number of cells.
+    pub fn sphere(
+        center: Vec3,
+        axis: Vec3,
+        wavelength: f64,
+        around: f64,
+        radii: [f64; 3],
+    ) -> Result<Round, Fault> {
+        if around % 2.0 != 0.0 && around.fract() == 0.0 {
+            return Err(Fault::new(
+                "around",
+                format!(
+                    "{} cells around; half as many lie between the poles, so give an even number",
+                    number(around)
+                ),
+            ));
+        }
+        Round::new(center, axis, [wavelength; 2], around, radii, true)
+    }
+
+    fn new(
+        center: Vec3,
+        axis: Vec3,
+        wavelength: [f64; 2],
+        around: f64,
+        radii: [f64; 3],
+        sphere: bool,
+    ) -> Result<Round, Fault> {
+        for w in wavelength {
+            if !(w > 0.0 && w.is_finite()) {
+                return Err(Fault::new(
+                    "wavelength",
+                    format!(
+                        "{} mm; a wavelength is a positive, finite length",
+                        number(w)
+                    ),
+                ));
+            }
+        }
+        if !(around >= 1.0 && around.fract() == 0.0 && around <= 1e6) {
+            return Err(Fault::new(
+                "around",
+                format!(
+                    "{} cells around; it must be a whole number from 1 to 1e6, so that the lattice closes",
+                    number(around)
+                ),
+            ));
+        }
+        if center.iter().chain(&axis).any(|v| !v.is_finite()) || norm(axis) == 0.0 {
+            return Err(Fault::new(
+                "axis",
+                format!(
+                    "found {axis:?} through {center:?}; give finite numbers, and a direction that is not zero"
+                ),
+            ));
+        }
+        let n = unit(axis);
+        // Along z the directions across are x and y.
+        let least = (0..3)
+            .min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs()))
+            .unwrap_or(0);
+        let mut e = [0.0; 3];
+        e[least] = 1.0;
+        let x = unit(sub(e, scale(n, dot(e, n))));
+        Ok(Round {
+            center,
+            frame: [x, cross(n, x), n],
+            wavelength,
+            around,
+            sphere,
+            radii,
+        })
+    }
+
+    /// Coordinates across and along the axis, and the distance from it.
+    fn local(&self, p: Vec3) -> (Vec3, f64) {
+        let d = sub(p, self.center);
+        let l = self.frame.map(|e| dot(e, d));
+        (l, l[0].hypot(l[1]))
+    }
+
+    /// Phases (turns) of a point (mm).
+    pub fn phase(&self, p: Vec3) -> Vec3 {
+        let (l, r) = self.local(p);
+        let turn = |a: f64| self.around * a / core::f64::consts::TAU;
+        let round = turn(l[1].atan2(l[0]));
+        if self.sphere {
+            [
+                r.hypot(l[2]) / self.wavelength[0],
+                round,
+                turn(r.atan2(l[2])),
+            ]
+        } else {
+            [r / self.wavelength[0], round, l[2] / self.wavelength[1]]
+        }
+    }
+
+    /// du/dx, turns per mm. Within a billionth of a wavelength of the axis, that at this distance.
+    pub fn jacobian(&self, p: Vec3) -> Mat3 {
+        let (l, r) = self.local(p);
+        let r = r.max(1e-9 * self.wavelength[0]);
+        let out = [l[0] / r, l[1] / r, 0.0];
+        let turn = self.around / core::f64::consts::TAU;
+        let round = [-l[1] / (r * r) * turn, l[0] / (r * r) * turn, 0.0];
+        let local = if self.sphere {
+            let s = r.hypot(l[2]);
+            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
+            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
+            [
+                scale(away, 1.0 / self.wavelength[0]),
+                round,
+                scale(down, turn / s),
+            ]
+        } else {
+            [
+                scale(out, 1.0 / self.wavelength[0]),
+                round,
+                [0.0, 0.0, 1.0 / self.wavelength[1]],
+            ]
+        };
+        product(&local, &self.frame)
+    }
+
+    /// A bound of the spectral norm of du/dx in a box; infinite where the axis may meet it.
+    pub fn stretch(&self, b: &Aabb) -> f64 {
+        let least = self.local(b.center()).1 - 0.5 * norm(b.size());
+        self.stretch_at(least.max(0.0)) * (1.0 + 1e-12)
+    }
+
+    fn stretch_at(&self, radius: f64) -> f64 {
+        let lengths = if self.sphere {
+            &self.wavelength[..1]
+        } else {
+            &self.wavelength[..]
+        };
+        let along = lengths.iter().map(|w| 1.0 / w).fold(0.0, f64::max);
+        along.max(self.around / (core::f64::consts::TAU * radius))
+    }
+
+    /// The edge of a cell round the axis at a distance from it, mm.
+    fn arc(&self, radius: f64) -> f64 {
+        core::f64::consts::TAU * radius / self.around
+    }
+
+    /// Least and greatest edge of a cell in the region, mm, the least at the mean distance from the axis.
+    pub fn wavelengths(&self) -> [f64; 2] {
+        let [a, b] = self.wavelength;
+        [
+            a.min(b).min(self.arc(self.radii[1])),
+            a.max(b).max(self.arc(self.radii[2])),
+        ]
+    }
+
+    /// A Jacobian typical of the map, but for its rotation.
+    pub fn typical(&self) -> Mat3 {
+        let arc = self.arc(self.radii[1]);
+        let last = if self.sphere { arc } else { self.wavelength[1] };
+        [
+            [1.0 / self.wavelength[0], 0.0, 0.0],
+            [0.0, 1.0 / arc, 0.0],
+            [0.0, 0.0, 1.0 / last],
+        ]
+    }
+
+    /// The Jacobians nearest to the axis and farthest from it in the region.
+    pub fn extremes(&self) -> [Mat3; 2] {
+        [self.radii[2], self.radii[0]]
+            .map(|r| self.jacobian(add(self.center, scale(self.frame[0], r))))
+    }
+
+    /// The largest stretch at the mean distance from the axis, turns per mm.
+    pub fn steepest(&self) -> f64 {
+        self.stretch_at(self.radii[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::spectral_norm;
+
+    fn places() -> impl Iterator<Item = Vec3> {
+        (1..400).map(|i| {
+            [0.8191725, 0.6710436, 0.5497005].map(|s| 20.0 * (s * f64::from(i)).fract() - 10.0)
+        })
+    }
+
+    #[test]
+    fn seams_close_and_jacobians_agree_with_differences() {
+        let axis = [0.3, -0.2, 0.9];
+        for map in [
+            Round::cylinder([1.0, 2.0, 3.0], axis, [2.0, 3.0], 12.0, [1.0, 5.0, 9.0])
+                .expect("cylinder"),
+            Round::sphere([1.0, 2.0, 3.0], axis, 2.0, 12.0, [1.0, 5.0, 9.0]).expect("sphere"),
+        ] {
+            for p in places() {
+                let (j, r) = (map.jacobian(p), map.local(p).1);
+                if r < 0.5 {
+                    continue;
+                }
+                for a in 0..3 {
+                    let mut q = [p, p];
+                    q[0][a] -= 1e-6;
+                    q[1][a] += 1e-6;
+                    let d = sub(map.phase(q[1]), map.phase(q[0]));
+                    for i in 0..3 {
+                        // Over the seam the phase jumps by the whole number of cells.
+                        let d = d[i] - 12.0 * (d[i] / 12.0).round();
+                        assert!((d / 2e-6 - j[i][a]).abs() < 1e-7, "{p:?}");
+                    }
+                }
+                let b = Aabb { min: p, max: p }.grown(0.1);
+                for q in places().take(20) {
+                    let q = core::array::from_fn(|a| p[a] + 0.01 * q[a]);
+                    assert!(spectral_norm(&map.jacobian(q)) <= map.stretch(&b));
+                }
+            }
+        }
+        let plain = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0, 3.0], 12.0, [1.0, 5.0, 9.0])
+            .expect("cylinder");
+        let u = plain.phase([0.0, 4.0, 6.0]);
+        assert!(norm(sub(u, [2.0, 3.0, 2.0])) < 1e-14, "{u:?}");
+        assert_eq!(
+            plain.stretch(&Aabb {
+                min: [-1.0; 3],
+                max: [1.0; 3]
+            }),
+            f64::INFINITY
+        );
+    }
+
+    #[test]
+    fn what_does_not_close_is_refused() {
+        let make = |around| {
+            Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0; 2], around, [1.0; 3])
+                .err()
+                .map(|f| f.at)
+        };
+        for n in [0.0, 2.5, f64::NAN, -3.0] {
+            assert_eq!(make(n).as_deref(), Some("around"));
+        }
+        assert_eq!(make(3.0), None);
+        let odd = Round::sphere([0.0; 3], [0.0, 0.0, 1.0], 2.0, 7.0, [1.0; 3]);
+        assert!(odd.err().is_some_and(|f| f.message.contains("even")));
+    }
+}

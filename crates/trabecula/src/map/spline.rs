@@ -1,0 +1,573 @@
+//! Three cubic splines through the nodes of a grid in a box: a map with two continuous derivatives.
+//!
+//! Along each axis the spline has no knot at the second and last but one node, so that a cubic is met exactly and the
+//! gradient keeps its order up to the faces. Beyond the box it goes on straight. Coefficients are those of B-splines.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use crate::field::Block;
+use crate::math::{Aabb, Mat3, Vec3};
+
+/// Fewest nodes along an axis.
+pub(super) const LEAST: usize = 6;
+
+/// Intervals along each side of a block that has one bound.
+const BLOCK: usize = 4;
+
+/// A map u(x) through values at the nodes of a grid.
+pub(super) struct Spline {
+    grid: Grid,
+    /// Coefficients along each axis: two more than nodes.
+    shape: [usize; 3],
+    /// The coefficients of the three functions, x fastest; entry m belongs to node m − 1.
+    coefficients: [Vec<f64>; 3],
+    /// For each block of intervals between nodes, x fastest: a bound of |J − J₀| (Frobenius) and one of |J₀| (spectral), J₀ the
+    /// middle of what the entries can be.
+    stretch: Vec<[f32; 2]>,
+}
+
+/// Where a coordinate falls: the interval, and the weights of its four coefficients in the value and in the slope.
+#[derive(Clone, Copy)]
+struct Spot {
+    first: usize,
+    value: [f64; 4],
+    slope: [f64; 4],
+}
+
+impl Spline {
+    pub fn through(grid: Grid, values: [Vec<f64>; 3]) -> Spline {
+        let shape = grid.shape.map(|n| n + 2);
+        let coefficients = {
+            let [a, b, c] = values;
+            let made: Vec<Vec<f64>> = [a, b, c]
+                .into_par_iter()
+                .map(|v| coefficients(v, grid.shape))
+                .collect();
+            let mut made = made.into_iter();
+            core::array::from_fn(|_| made.next().unwrap_or_default())
+        };
+        let mut spline = Spline {
+            grid,
+            shape,
+            coefficients,
+            stretch: Vec::new(),
+        };
+        let [nx, ny, nz] = spline.blocks();
+        spline.stretch = (0..nx * ny * nz)
+            .into_par_iter()
+            .map(|i| spline.stretch_of([i % nx, i / nx % ny, i / nx / ny]))
+            .collect();
+        spline
+    }
+
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    fn strides(&self) -> [usize; 3] {
+        [1, self.shape[0], self.shape[0] * self.shape[1]]
+    }
+
+    /// Where the coordinate `x` falls along an axis.
+    #[inline]
+    fn spot(&self, x: f64, axis: usize) -> Spot {
+        let h = self.grid.step[axis];
+        let s = (x - self.grid.origin[axis]) / h;
+        let last = self.grid.shape[axis] - 1;
+        let inside = s.clamp(0.0, last as f64);
+        let first = (inside as usize).min(last - 1);
+        let t = inside - first as f64;
+        let (mut value, slope) = (weights(t), slopes(t));
+        let beyond = s - inside;
+        for (v, d) in value.iter_mut().zip(slope) {
+            *v += beyond * d;
+        }
+        Spot {
+            first,
+            value,
+            slope: slope.map(|d| d / h),
+        }
+    }
+
+    /// u at points.
+    pub fn values(&self, points: &[Vec3], out: &mut [Vec3]) {
+        let [_, sy, sz] = self.strides();
+        for (o, p) in out.iter_mut().zip(points) {
+            let [x, y, z] = [0, 1, 2].map(|a| self.spot(p[a], a));
+            let base = x.first + y.first * sy + z.first * sz;
+            for (o, c) in o.iter_mut().zip(&self.coefficients) {
+                let mut sum = 0.0;
+                for k in 0..4 {
+                    for j in 0..4 {
+                        let row = &c[base + j * sy + k * sz..][..4];
+                        let w = z.value[k] * y.value[j];
+                        sum += w * along(row, &x.value);
+                    }
+                }
+                *o = sum;
+            }
+        }
+    }
+
+    /// u and its Jacobian ∂uᵢ/∂xⱼ at a point.
+    pub fn jacobian(&self, p: Vec3) -> (Vec3, Mat3) {
+        let [_, sy, sz] = self.strides();
+        let [x, y, z] = [0, 1, 2].map(|a| self.spot(p[a], a));
+        let base = x.first + y.first * sy + z.first * sz;
+        let (mut u, mut m) = ([0.0; 3], [[0.0; 3]; 3]);
+        for (i, c) in self.coefficients.iter().enumerate() {
+            for k in 0..4 {
+                for j in 0..4 {
+                    let row = &c[base + j * sy + k * sz..][..4];
+                    let s = along(row, &x.value);
+                    u[i] += z.value[k] * y.value[j] * s;
+                    m[i][0] += z.value[k] * y.value[j] * along(row, &x.slope);
+                    m[i][1] += z.value[k] * y.slope[j] * s;
+                    m[i][2] += z.slope[k] * y.value[j] * s;
+                }
+            }
+        }
+        (u, m)
+    }
+
+    /// Blocks of intervals along each axis.
+    fn blocks(&self) -> [usize; 3] {
+        self.grid.shape.map(|n| (n - 1).div_ceil(BLOCK))
+    }
+
+    /// [|J − J₀|, |J₀|] over a block. A derivative is a mean of differences of coefficients along its axis.
+    fn stretch_of(&self, at: [usize; 3]) -> [f32; 2] {
+        let s = self.strides();
+        let base = BLOCK * (at[0] + at[1] * s[1] + at[2] * s[2]);
+        // Coefficients that count.
+        let n: [usize; 3] =
+            core::array::from_fn(|a| BLOCK.min(self.grid.shape[a] - 1 - BLOCK * at[a]) + 3);
+        let (mut middle, mut half) = ([[0.0; 3]; 3], 0.0);
+        for (i, c) in self.coefficients.iter().enumerate() {
+            for a in 0..3 {
+                let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
+                let count = |b: usize| n[b] - usize::from(a == b);
+                for z in 0..count(2) {
+                    for y in 0..count(1) {
+                        let row = base + y * s[1] + z * s[2];
+                        for x in row..row + count(0) {
+                            let v = c[x + s[a]] - c[x];
+                            (lo, hi) = (lo.min(v), hi.max(v));
+                        }
+                    }
+                }
+                let h = self.grid.step[a];
+                middle[i][a] = 0.5 * (lo + hi) / h;
+                half += (0.5 * (hi - lo) / h).powi(2);
+            }
+        }
+        // Rounded up, and by more than the rounding of the sums.
+        let up = |v: f64| (v * (1.0 + 1e-6)) as f32;
+        [up(half.sqrt()), up(longest(&middle))]
+    }
+
+    /// A bound of |J| (spectral norm) in the box.
+    pub fn stretch(&self, b: &Aabb) -> f64 {
+        let mut range = [(0, 0); 3];
+        // Beyond a face the weights are those of a straight line; they add up to one, their sizes to more.
+        let mut beyond = 1.0;
+        for a in 0..3 {
+            let at = |x: f64| (x - self.grid.origin[a]) / self.grid.step[a];
+            let last = (self.grid.shape[a] - 1) as f64;
+            let [lo, hi] = [at(b.min[a]), at(b.max[a])];
+            let out = (-lo).max(hi - last).max(0.0);
+            // A straight line weighs with at most a half and its distance on either side.
+            beyond *= 1.0 + out;
+            let inside = |s: f64| (s.clamp(0.0, last) as usize).min(self.grid.shape[a] - 2) / BLOCK;
+            range[a] = (inside(lo), inside(hi));
+        }
+        let [nx, ny, _] = self.blocks();
+        let mut most = 0.0f64;
+        for k in range[2].0..=range[2].1 {
+            for j in range[1].0..=range[1].1 {
+                let row = &self.stretch[(k * ny + j) * nx..][range[0].0..=range[0].1];
+                for [half, middle] in row {
+                    most = most.max(f64::from(*half) * beyond + f64::from(*middle));
+                }
+            }
+        }
+        most
+    }
+
+    /// The map on the rows of a block.
+    pub fn rows<'a>(&'a self, block: &Block<'a>) -> Rows<'a> {
+        let [x, y, z] = [0, 1, 2].map(|a| {
+            let spots = block.axes[a].iter().map(|&x| self.spot(x, a));
+            spots.collect::<Vec<Spot>>()
+        });
+        let range = |s: &[Spot]| {
+            let first = s.iter().map(|s| s.first).min().unwrap_or(0);
+            let last = s.iter().map(|s| s.first).max().unwrap_or(0);
+            (first, last - first + 4)
+        };
+        let (along_x, along_y) = (range(&x), range(&y));
+        // On an interval a spline is a cubic; beyond the box it is another one, which is straight.
+        let last = self.grid.shape[0] - 1;
+        let place = |x: &f64| (x - self.grid.origin[0]) / self.grid.step[0];
+        let runs = block.axes[0].iter().zip(&x).map(|(at, spot)| {
+            let s = place(at);
+            let beyond = if s < 0.0 {
+                0
+            } else if s > last as f64 {
+                2
+            } else {
+                1
+            };
+            let t = match beyond {
+                0 => s,
+                2 => s - last as f64,
+                _ => s - spot.first as f64,
+            };
+            (beyond, spot.first - along_x.0, t)
+        });
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut t = Vec::with_capacity(x.len());
+        for (n, (beyond, first, at)) in runs.enumerate() {
+            t.push(at);
+            match pieces.last_mut() {
+                Some(p) if p.first == first && p.beyond == beyond => p.to = n + 1,
+                _ => pieces.push(Piece {
+                    beyond,
+                    first,
+                    from: n,
+                    to: n + 1,
+                }),
+            }
+        }
+        Rows {
+            spline: self,
+            along_x,
+            along_y,
+            y,
+            z,
+            t,
+            pieces,
+            layer: core::array::from_fn(|_| vec![0.0; along_x.1 * along_y.1]),
+            line: vec![0.0; along_x.1],
+        }
+    }
+}
+
+/// Nodes of a row in one interval.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    /// Before the box, in it, after it.
+    beyond: u8,
+    first: usize,
+    from: usize,
+    to: usize,
+}
+
+/// The map on the rows of a block: coefficients are summed along z once for a layer, along y once for a row, and what is
+/// left is a cubic for each interval along x.
+pub(in super::super) struct Rows<'a> {
+    spline: &'a Spline,
+    /// First coefficient and number of them.
+    along_x: (usize, usize),
+    along_y: (usize, usize),
+    y: Vec<Spot>,
+    z: Vec<Spot>,
+    t: Vec<f64>,
+    pieces: Vec<Piece>,
+    layer: [Vec<f64>; 3],
+    line: Vec<f64>,
+}
+
+impl Rows<'_> {
+    /// Makes ready for the rows of layer k.
+    pub fn enter_layer(&mut self, k: usize) {
+        let [_, sy, sz] = self.spline.strides();
+        let (x0, nx) = self.along_x;
+        let (y0, ny) = self.along_y;
+        let z = self.z[k];
+        for (layer, c) in self.layer.iter_mut().zip(&self.spline.coefficients) {
+            for j in 0..ny {
+                let base = x0 + (y0 + j) * sy + z.first * sz;
+                let row = |k: usize| &c[base + k * sz..][..nx];
+                blend(
+                    [row(0), row(1), row(2), row(3)],
+                    &z.value,
+                    &mut layer[j * nx..][..nx],
+                );
+            }
+        }
+    }
+
+    /// Fills phases of row j of the layer entered last.
+    pub fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
+        let nx = self.along_x.1;
+        let y = self.y[j];
+        let first = y.first - self.along_y.0;
+        for (layer, out) in self.layer.iter().zip(out) {
+            let row = |j: usize| &layer[(first + j) * nx..][..nx];
+            blend([row(0), row(1), row(2), row(3)], &y.value, &mut self.line);
+            cubics(&self.line, &self.pieces, &self.t, out);
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn blend(rows: [&[f64]; 4], w: &[f64; 4], out: &mut [f64]) {
+    let [a, b, c, d] = rows;
+    for ((((o, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        *o = w[0] * a + w[1] * b + w[2] * c + w[3] * d;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn cubics(line: &[f64], pieces: &[Piece], t: &[f64], out: &mut [f64]) {
+    for p in pieces {
+        let c = &line[p.first..][..4];
+        // The powers of t in the value.
+        let mut a = [
+            (c[0] + 4.0 * c[1] + c[2]) / 6.0,
+            (c[2] - c[0]) / 2.0,
+            (c[0] - 2.0 * c[1] + c[2]) / 2.0,
+            (c[3] - c[0] + 3.0 * (c[1] - c[2])) / 6.0,
+        ];
+        match p.beyond {
+            0 => (a[2], a[3]) = (0.0, 0.0),
+            2 => {
+                a = [
+                    (c[1] + 4.0 * c[2] + c[3]) / 6.0,
+                    (c[3] - c[1]) / 2.0,
+                    0.0,
+                    0.0,
+                ]
+            }
+            _ => {}
+        }
+        for (o, t) in out[p.from..p.to].iter_mut().zip(&t[p.from..p.to]) {
+            *o = a[0] + t * (a[1] + t * (a[2] + t * a[3]));
+        }
+    }
+}
+
+#[inline]
+fn along(row: &[f64], w: &[f64; 4]) -> f64 {
+    row[0] * w[0] + row[1] * w[1] + row[2] * w[2] + row[3] * w[3]
+}
+
+/// The weights of four coefficients in the value at the share t of an interval.
+#[inline]
+fn weights(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [
+        s * s * s / 6.0,
+        (4.0 + t * t * (3.0 * t - 6.0)) / 6.0,
+        (4.0 + s * s * (3.0 * s - 6.0)) / 6.0,
+        t * t * t / 6.0,
+    ]
+}
+
+/// The derivatives of `weights`.
+#[inline]
+fn slopes(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [
+        -s * s / 2.0,
+        t * (3.0 * t - 4.0) / 2.0,
+        s * (4.0 - 3.0 * s) / 2.0,
+        t * t / 2.0,
+    ]
+}
+
+/// A bound of the spectral norm, at most a seventh above it: λ of the greatest of M Mᵀ, to the eighth, is at most the sum
+/// of all.
+fn longest(m: &Mat3) -> f64 {
+    let mut a = crate::math::product(m, &crate::math::transpose(m));
+    for _ in 0..2 {
+        a = crate::math::product(&a, &a);
+    }
+    // tr (A⁴)² = Σ aᵢⱼ², A = M Mᵀ; the eighth root for A, half of it for M.
+    let trace: f64 = a.as_flattened().iter().map(|v| v * v).sum();
+    trace.powf(1.0 / 16.0)
+}
+
+/// The coefficients of the spline through `values` (x fastest).
+fn coefficients(values: Vec<f64>, shape: [usize; 3]) -> Vec<f64> {
+    let (mut from, mut shape) = (values, shape);
+    for axis in 0..3 {
+        let inner: usize = shape[..axis].iter().product();
+        let (n, outer) = (shape[axis], shape[axis + 1..].iter().product::<usize>());
+        let mut to = vec![0.0; inner * (n + 2) * outer];
+        for (from, to) in from.chunks(inner * n).zip(to.chunks_mut(inner * (n + 2))) {
+            prefilter(from, to, n, inner);
+        }
+        from = to;
+        shape[axis] += 2;
+    }
+    from
+}
+
+/// Finds n + 2 coefficients along an axis, for `inner` lines side by side: (c₋ + 4c + c₊)/6 is the value, and the third
+/// derivative has no jump at the nodes beside the ends.
+fn prefilter(from: &[f64], to: &mut [f64], n: usize, inner: usize) {
+    let f = |i: usize, x: usize| from[i * inner + x];
+    // Coefficient i stands at entry i + 1.
+    let at = |i: usize| (i + 1) * inner;
+    for x in 0..inner {
+        // Known outright: what no knot there amounts to.
+        to[at(1) + x] = (8.0 * f(1, x) - f(0, x) - f(2, x)) / 6.0;
+        let m = n - 2;
+        to[at(m) + x] = (8.0 * f(m, x) - f(m - 1, x) - f(m + 1, x)) / 6.0;
+    }
+    // Between them, elimination and the way back.
+    let mut factor = vec![0.0; n];
+    for i in 2..n - 2 {
+        factor[i] = 1.0 / (4.0 - factor[i - 1]);
+        for x in 0..inner {
+            to[at(i) + x] = (6.0 * f(i, x) - to[at(i - 1) + x]) * factor[i];
+        }
+    }
+    for i in (2..n - 2).rev() {
+        for x in 0..inner {
+            to[at(i) + x] -= factor[i] * to[at(i + 1) + x];
+        }
+    }
+    for x in 0..inner {
+        let c = |to: &[f64], i: usize| to[at(i) + x];
+        to[at(0) + x] = 6.0 * f(1, x) - 4.0 * c(to, 1) - c(to, 2);
+        to[x] = 6.0 * f(0, x) - 4.0 * c(to, 0) - c(to, 1);
+        let l = n - 1;
+        to[at(l) + x] = 6.0 * f(l - 1, x) - 4.0 * c(to, l - 1) - c(to, l - 2);
+        to[at(n) + x] = 6.0 * f(l, x) - 4.0 * c(to, l) - c(to, l - 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{norm, spectral_norm, sub};
+
+    fn grid() -> Grid {
+        let b = Aabb {
+            min: [-1.0, 0.5, 2.0],
+            max: [2.0, 2.5, 4.4],
+        };
+        Grid::over(&b, [9, 7, 6])
+    }
+
+    fn bent(p: Vec3) -> Vec3 {
+        let [x, y, z] = p;
+        [
+            x + 0.3 * (y + 0.4 * z).sin(),
+            1.4 * y - 0.2 * (x * 0.8).cos() * z,
+            0.7 * z + 0.1 * x * y,
+        ]
+    }
+
+    fn spline(f: impl Fn(Vec3) -> Vec3) -> Spline {
+        let g = grid();
+        let at = |i: usize| (0..g.len()).map(|n| f(g.node(n))[i]).collect();
+        Spline::through(g, [at(0), at(1), at(2)])
+    }
+
+    fn places() -> Vec<Vec3> {
+        let mut s = 9u64;
+        let mut next = || {
+            s = s
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (s >> 11) as f64 / (1u64 << 53) as f64
+        };
+        // In the box and about it.
+        (0..500)
+            .map(|_| [-2.0 + 5.0 * next(), 3.5 * next(), 1.0 + 4.5 * next()])
+            .collect()
+    }
+
+    #[test]
+    fn nodes_are_met_and_cubics_are_met_everywhere() {
+        let s = spline(bent);
+        let g = grid();
+        let cubic = |[x, y, z]: Vec3| [x * y * z - z * z * z, x * x * x * y, 1.0 + y * y * x - z];
+        let c = spline(cubic);
+        for n in 0..g.len() {
+            let mut u = [[0.0; 3]];
+            s.values(&[g.node(n)], &mut u);
+            assert!(norm(sub(u[0], bent(g.node(n)))) < 1e-13);
+        }
+        for p in places() {
+            let b = Aabb {
+                min: [-1.0, 0.5, 2.0],
+                max: [2.0, 2.5, 4.4],
+            };
+            if b.distance(p) == 0.0 {
+                let mut u = [[0.0; 3]];
+                c.values(&[p], &mut u);
+                // Rounding of coefficients of size a hundred.
+                assert!(norm(sub(u[0], cubic(p))) < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences_and_rows_with_points_also_outside() {
+        let s = spline(bent);
+        for p in places() {
+            let (u, m) = s.jacobian(p);
+            let mut v = [[0.0; 3]; 2];
+            s.values(&[p, p], &mut v);
+            assert_eq!(u, v[0]);
+            for a in 0..3 {
+                let mut q = [p, p];
+                q[0][a] -= 1e-6;
+                q[1][a] += 1e-6;
+                s.values(&q, &mut v);
+                for i in 0..3 {
+                    assert!(((v[1][i] - v[0][i]) / 2e-6 - m[i][a]).abs() < 1e-7);
+                }
+            }
+        }
+        let axis =
+            |from: f64, n: usize| -> Vec<f64> { (0..n).map(|i| from + 0.13 * i as f64).collect() };
+        let (x, y, z) = (axis(-2.0, 40), axis(0.0, 25), axis(1.0, 30));
+        let block = Block { axes: [&x, &y, &z] };
+        let mut rows = s.rows(&block);
+        let mut out = [vec![0.0; 40], vec![0.0; 40], vec![0.0; 40]];
+        for k in 0..z.len() {
+            rows.enter_layer(k);
+            for j in 0..y.len() {
+                rows.fill(j, &mut out);
+                for i in 0..x.len() {
+                    let mut u = [[0.0; 3]];
+                    s.values(&[[x[i], y[j], z[k]]], &mut u);
+                    for a in 0..3 {
+                        assert!((u[0][a] - out[a][i]).abs() < 1e-12);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_jacobian_in_a_box_is_longer_than_the_bound() {
+        let s = spline(bent);
+        let p = places();
+        for pair in p.windows(2) {
+            let b = Aabb {
+                min: pair[0],
+                max: pair[0],
+            }
+            .with(pair[1]);
+            let bound = s.stretch(&b);
+            for i in 0..27 {
+                let t = [i % 3, i / 3 % 3, i / 9].map(|v| f64::from(v) / 2.0);
+                let q = core::array::from_fn(|a| b.min[a] + t[a] * (b.max[a] - b.min[a]));
+                let here = spectral_norm(&s.jacobian(q).1);
+                assert!(here <= bound, "{here} {bound}");
+            }
+            if s.grid.step.iter().zip(b.size()).all(|(h, s)| s < *h) {
+                assert!(bound < 4.0, "{bound}");
+            }
+        }
+    }
+}

@@ -1,0 +1,51 @@
+"""Cells that turn, from Python: builders, files made by NumPy, the report, and what is refused."""
+
+import numpy as np
+import pytest
+import trabecula as lt
+
+
+def design(map, level=None, part="sheet", size=12):
+    core = lt.Lattice(cell=lt.cell.gyroid(), part=part, map=map, level=level or lt.level.fraction(0.3))
+    return lt.Design(region=lt.region.box(min=[0, 0, 0], max=[size] * 3), lattice={"core": core})
+
+
+def test_a_turned_and_graded_part_is_one_closed_piece():
+    turn = lt.grade.linear(along=[1, 0, 0], stops={0: 0, 12: 20})
+    ask = lt.level.fraction(lt.grade.radial(center=[6, 6, 6], stops={0: 0.5, 8: 0.3}))
+    solid = design(lt.map.phase(wavelength=[3, 3, lt.grade.formula("3 + 0.05*x")], rotate_z=turn), ask).build()
+    mesh = solid.mesh(edge=0.25, islands="drop")
+    assert mesh.closed and mesh.pieces == 1
+    report = solid.report()["lattices"]["core"]
+    assert report["fraction"][0] >= 0.29 and report["distortion"]["density"][0] > 0.7
+    assert 2 < report["distortion"]["turn"] < 20
+
+
+def test_files_made_by_numpy_are_read(tmp_path):
+    i, j, _ = np.indices((7, 7, 7))
+    np.save(tmp_path / "field.npy", (0.2 + 0.02 * i + 0.01 * j).astype(np.float32))
+    grid = lt.grade.grid(str(tmp_path / "field.npy"), origin=[0, 0, 0], step=2, remap={0: 0, 1: 1})
+    report = design(lt.map.affine(wavelength=3), lt.level.fraction(grid)).build().report()
+    assert report["lattices"]["core"]["fraction"] == pytest.approx([0.2, 0.38], abs=1e-6)
+    with pytest.raises(lt.DesignError, match="does not cover"):
+        design(lt.map.affine(wavelength=3), lt.level.fraction({"grid": {**grid["grid"], "step": 1}})).build()
+
+
+def test_a_map_that_folds_is_refused_and_can_be_allowed():
+    turn = lt.grade.formula("170*tanh(2*(x-6))")
+    with pytest.raises(lt.DesignError, match="folds at"):
+        design(lt.map.phase(wavelength=3, rotate_z=turn)).build()
+    with pytest.warns(lt.DesignWarning, match="within one cell"):
+        design(lt.map.phase(wavelength=3, rotate_z=turn, folds=True)).build()
+
+
+def test_tubes_and_balls_close():
+    assert lt.map.cylinder(wavelength=[3, 4], around=12) == {"cylinder": {"wavelength": [3, 4], "around": 12}}
+    solid = design(lt.map.sphere(wavelength=3, around=12, center=[0, 0, 0], axis=[1, 1, 1])).build()
+    # On both sides of the seam.
+    n = np.array([1, 1, 1]) / np.sqrt(3)
+    seam = np.array([0, 1, -1]) / np.sqrt(2)
+    across = np.cross(n, seam)
+    at = np.array([6.0 * n + 4 * (np.cos(t) * seam + np.sin(t) * across) for t in np.linspace(0, 2 * np.pi, 721)])
+    values = solid.field(at)
+    assert np.abs(np.diff(values)).max() < 0.2
