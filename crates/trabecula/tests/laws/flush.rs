@@ -1,10 +1,8 @@
 //! Regions of bodies that touch or coincide: closed meshes that do not cross themselves, of the right volume.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Random, cases, fault, lattice};
+use crate::common::{Random, cases, fault, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
@@ -152,7 +150,8 @@ fn run(seed: u64) -> Result<bool, String> {
             "gyroid",
             Part::Sheet,
             some.between(0.2, 0.6),
-            wavelength,
+            [wavelength; 3],
+            [11.0, 22.0, 33.0],
         )),
     ];
     for field in filling {
@@ -163,7 +162,7 @@ fn run(seed: u64) -> Result<bool, String> {
             &Silent,
         );
         let s = s.map_err(|e| format!("edge {edge}: {e:?}"))?;
-        if let Some(fault) = fault(&s) {
+        if let Some(fault) = fault(&s.mesh) {
             return Err(format!("full {full}, edge {edge}: {fault}"));
         }
         if !full {
@@ -225,6 +224,6 @@ fn meshes_with_small_common_faces() {
     let solid = Solid::new(region, None, 1.0);
     for edge in [0.18595632115820984, 0.31, 0.11] {
         let s = surface(&solid, edge, &Silent).expect("surface");
-        assert_eq!(fault(&s), None, "edge {edge}");
+        assert_eq!(fault(&s.mesh), None, "edge {edge}");
     }
 }

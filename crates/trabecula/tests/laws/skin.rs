@@ -1,26 +1,23 @@
 //! Skin, openings and keep zones: volumes in closed form, membership by logic of its own, the mesh's guarantees.
 
-use std::collections::HashSet;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::{Silent, Surface, surface, voxels};
+use trabecula::cell::{Part, catalogue};
+use trabecula::extract::{Silent, surface, voxels};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
-use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
 use trabecula::math::{Aabb, Interval, Vec3, norm, sub};
-use trabecula::measure::{non_manifold_vertices, self_intersections, size};
 use trabecula::mesh::Mesh;
 use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair,
-    Sphere, Union,
+    Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union,
 };
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
+
+use crate::common::{ball, check, cuboid, lattice};
 
 /// A lattice with nothing solid.
 struct Nothing;
@@ -40,27 +37,6 @@ impl Field for Nothing {
 
 fn gyroid(fraction: f64, wavelength: f64) -> Arc<dyn Field> {
     lattice("gyroid", Part::Sheet, fraction, [wavelength; 3], [0.0; 3])
-}
-
-fn lattice(
-    name: &str,
-    part: Part,
-    fraction: f64,
-    wavelength: [f64; 3],
-    rotate: [f64; 3],
-) -> Arc<dyn Field> {
-    let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
-    let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
-    let level = Level::Fraction(Grade::Constant(fraction));
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
-}
-
-fn cuboid(min: Vec3, max: Vec3) -> Region {
-    Arc::new(Cuboid::new(min, max).expect("box"))
-}
-
-fn ball(radius: f64) -> Region {
-    Arc::new(Sphere::new([0.0; 3], radius).expect("ball"))
 }
 
 fn cylinder(base: Vec3, radius: f64, height: f64) -> Region {
@@ -96,26 +72,6 @@ fn volume(solid: &Solid, edge: f64, what: &str) -> f64 {
     let s = surface(solid, edge, &Silent).expect("surface");
     check(what, &s);
     s.mesh.volume()
-}
-
-/// Every guarantee, on the mesh as re-read from single precision.
-fn check(what: &str, s: &Surface) {
-    let vertices = s.mesh.vertices.iter();
-    let m = Mesh {
-        vertices: vertices
-            .map(|v| v.map(|x| f64::from(x as f32) + 0.0))
-            .collect(),
-        triangles: s.mesh.triangles.clone(),
-    };
-    let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(places.len(), m.vertices.len(), "{what}: vertices coincide");
-    assert!(size(&m).closed, "{what}: not closed");
-    assert_eq!(non_manifold_vertices(&m), 0, "{what}: two fans");
-    assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
-    for i in 0..m.triangles.len() {
-        let [a, b, c] = m.corners(i);
-        assert!(a != b && b != c && c != a, "{what}: degenerate triangle");
-    }
 }
 
 fn close(found: f64, want: f64, tolerance: f64, what: &str) {
@@ -207,7 +163,7 @@ fn the_skin_of_a_ball_converges() {
     let want = 4.0 / 3.0 * PI * (1.0 - 0.8f64.powi(3));
     let errors = [8.0, 16.0, 32.0, 64.0].map(|n| {
         let v = volume(
-            &shell(&ball(1.0), &Grade::Constant(0.2), &[]),
+            &shell(&ball([0.0; 3], 1.0), &Grade::Constant(0.2), &[]),
             1.0 / n,
             "ball",
         );
@@ -240,7 +196,7 @@ fn a_thickness_that_varies_is_met() {
     );
     // (The faces are moved by hairs of 1e-6 of the size.) A constant, said as a formula.
     let constant = Grade::Formula(Formula::parse("0.2 + 0*x").expect("formula"));
-    let ball = |w: &Grade| volume(&shell(&ball(1.0), w, &[]), 0.05, "ball");
+    let ball = |w: &Grade| volume(&shell(&ball([0.0; 3], 1.0), w, &[]), 0.05, "ball");
     close(
         ball(&constant),
         ball(&Grade::Constant(0.2)),
@@ -275,7 +231,8 @@ fn slanted_faces_open_too() {
     // The lower half of a ball, its flat face slanted.
     let n = [0.3, -0.2, 1.0];
     let flat = Arc::new(half([0.0; 3], n));
-    let region: Region = Arc::new(Intersection::new(vec![ball(3.0), flat]).expect("half ball"));
+    let region: Region =
+        Arc::new(Intersection::new(vec![ball([0.0; 3], 3.0), flat]).expect("half ball"));
     let solid = shell(&region, &Grade::Constant(0.5), &[half([0.0; 3], n)]);
     let v = volume(&solid, 0.1, "half ball");
     let want = 2.0 / 3.0 * PI * (27.0 - 2.5f64.powi(3));
@@ -297,7 +254,7 @@ fn openings_without_a_flat_face_are_refused() {
     let w = Grade::Constant(0.2);
     let at = |region: &Region, open: &[HalfSpace]| skin(region, &w, open).err().map(|f| f.at);
     let top = half([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
-    assert_eq!(at(&ball(1.0), &[top]).as_deref(), Some("open[0]"));
+    assert_eq!(at(&ball([0.0; 3], 1.0), &[top]).as_deref(), Some("open[0]"));
     let block = cuboid([-1.0; 3], [1.0; 3]);
     let inwards = half([0.0, 0.0, 1.0], [0.0, 0.0, -1.0]);
     assert_eq!(at(&block, &[top, inwards]).as_deref(), Some("open[1]"));
@@ -392,7 +349,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
         let solid = p.map(|p| solid.value(p) <= 0.0);
         assert_eq!(solid, [open.is_empty(), true, open.is_empty(), true]);
     }
-    let round = mesh(&ball(2.0), 0.1);
+    let round = mesh(&ball([0.0; 3], 2.0), 0.1);
     let want = 4.0 / 3.0 * PI * (8.0 - 1.5f64.powi(3));
     let v = volume(&shell(&round, &Grade::Constant(0.5), &[]), 0.1, "mesh ball");
     close(v, want, 5e-3, "mesh ball");
@@ -450,7 +407,7 @@ fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
     let (a, b) = ([-r, -1.0, -t], [t, r, 1.0]);
     match kind {
         0 => (cuboid(a, b), Box::new(to_box(a, b))),
-        1 => (ball(r), Box::new(move |p| r - norm(p))),
+        1 => (ball([0.0; 3], r), Box::new(move |p| r - norm(p))),
         2 => {
             let depth = move |p: Vec3| {
                 let side = r * 0.7 - (p[0] - s).hypot(p[1] + s);
@@ -467,7 +424,8 @@ fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
         _ => {
             let h = half([s, 0.0, 0.1], [s, 1.0, 0.5]);
             let depth = move |p: Vec3| (r - norm(p)).min(-h.value(p));
-            let both = Intersection::new(vec![ball(r), Arc::new(h)]).expect("intersection");
+            let both =
+                Intersection::new(vec![ball([0.0; 3], r), Arc::new(h)]).expect("intersection");
             (Arc::new(both), Box::new(depth))
         }
     }

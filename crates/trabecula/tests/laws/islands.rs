@@ -1,43 +1,22 @@
 //! Pieces found while a surface is streamed are those of the whole mesh, and what is dropped leaves the rest as it was.
 
-use std::collections::HashSet;
 use std::io::Cursor;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Cell, Part, Series, catalogue, named};
+use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{
     Islands, Pieces, Progress, Silent, Stopped, Summary, Surface, stream_stl, surface, surface_of,
 };
-use trabecula::field::Field;
-use trabecula::grade::Grade;
 use trabecula::io::read_mesh;
-use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
-use trabecula::measure::{non_manifold_vertices, self_intersections, size};
+use trabecula::measure::size;
 use trabecula::mesh::Mesh;
-use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Sphere, Union};
+use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
 
-fn lattice(name: &str, part: Part, fraction: f64, rotate: [f64; 3]) -> Arc<dyn Field> {
-    let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
-    let map = Affine::rigid([1.0, 1.1, 0.9], rotate, [0.0; 3], &[]).expect("map");
-    let level = Level::Fraction(Grade::Constant(fraction));
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
-}
+use crate::common::{ball, check, lattice, solid};
 
-fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
-    Solid {
-        filled: Vec::new(),
-        region,
-        field,
-        wavelength: 1.0,
-    }
-}
-
-fn ball(center: [f64; 3], radius: f64) -> Region {
-    Arc::new(Sphere::new(center, radius).expect("ball"))
-}
+const WAVELENGTH: [f64; 3] = [1.0, 1.1, 0.9];
 
 fn shell(center: [f64; 3], outer: f64, inner: f64) -> Region {
     let parts = vec![ball(center, outer), ball(center, inner)];
@@ -52,28 +31,6 @@ fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Summar
     let mut stl = Cursor::new(Vec::new());
     let summary = stream_stl(solid, edge, islands, &mut stl, &Silent)?;
     Ok((stl.into_inner(), summary))
-}
-
-/// Every guarantee, on the mesh as re-read from single precision.
-fn check(what: &str, mesh: &Mesh) {
-    let rounded = |v: &[f64; 3]| v.map(|x| f64::from(x as f32) + 0.0);
-    let m = Mesh {
-        vertices: mesh.vertices.iter().map(rounded).collect(),
-        triangles: mesh.triangles.clone(),
-    };
-    let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(
-        places.len(),
-        m.vertices.len(),
-        "{what}: vertices fall together"
-    );
-    assert!(size(&m).closed, "{what}: not closed");
-    assert_eq!(
-        non_manifold_vertices(&m),
-        0,
-        "{what}: a vertex with two fans"
-    );
-    assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
 }
 
 /// Solid angle of a mesh about a point, in turns: 1 inside, 0 outside.
@@ -168,7 +125,7 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
     assert_eq!(told.pieces, found, "{what}");
 
     let (one, kept) = surface_of(solid, edge, Islands::Drop, &Silent).expect("surface");
-    check(what, &one.mesh);
+    check(what, &one);
     let left = size(&one.mesh);
     assert_eq!(figures(&kept), of(&left), "{what}");
     assert_eq!((left.pieces, kept.dropped), (1, found.others), "{what}");
@@ -251,8 +208,8 @@ fn a_cavity_stays_with_its_piece_and_a_ball_in_it_is_another() {
 #[test]
 fn many_tiles_and_any_number_of_threads() {
     // 136 steps along each axis, two networks and the crumbs that the ball cuts off.
-    let field = lattice("gyroid", Part::Upper, 0.25, [5.0, 15.0, 25.0]);
-    let sheet = lattice("diamond", Part::Sheet, 0.4, [5.0, 15.0, 25.0]);
+    let field = lattice("gyroid", Part::Upper, 0.25, WAVELENGTH, [5.0, 15.0, 25.0]);
+    let sheet = lattice("diamond", Part::Sheet, 0.4, WAVELENGTH, [5.0, 15.0, 25.0]);
     for field in [field, sheet] {
         let solid = solid(ball([0.0; 3], 1.7), Some(field));
         let found = law("ball over tiles", &solid, 0.025);
@@ -274,7 +231,7 @@ fn many_tiles_and_any_number_of_threads() {
 #[test]
 fn crumbs_and_islands_are_told_apart() {
     // Balls of |f| beyond the network's limit: those inside are islands, those that the box cuts are crumbs.
-    let field = lattice("primitive", Part::Lower, 0.1, [0.0; 3]);
+    let field = lattice("primitive", Part::Lower, 0.1, WAVELENGTH, [0.0; 3]);
     let region = Arc::new(Cuboid::new([0.3, 0.3, 0.3], [3.7, 3.7, 3.2]).expect("box"));
     let found = law("balls", &solid(region.clone(), Some(field.clone())), 0.05);
     let s = surface(&solid(region, Some(field)), 0.05, &Silent).expect("surface");
@@ -287,7 +244,7 @@ fn crumbs_and_islands_are_told_apart() {
 
 #[test]
 fn figures_are_those_of_the_file() {
-    let field = lattice("gyroid", Part::Sheet, 0.2, [10.0, 20.0, 30.0]);
+    let field = lattice("gyroid", Part::Sheet, 0.2, WAVELENGTH, [10.0, 20.0, 30.0]);
     let solid = solid(ball([0.0; 3], 1.5), Some(field));
     for islands in [Islands::Keep, Islands::Drop] {
         let (bytes, summary) = stream(&solid, 0.04, islands).expect("stl");
@@ -318,7 +275,7 @@ impl Progress for Until {
 
 #[test]
 fn progress_rises_to_the_end_and_stops_at_any_time() {
-    let field = lattice("gyroid", Part::Upper, 0.15, [5.0, 15.0, 25.0]);
+    let field = lattice("gyroid", Part::Upper, 0.15, WAVELENGTH, [5.0, 15.0, 25.0]);
     let solid = solid(ball([0.0; 3], 1.7), Some(field));
     for islands in [Islands::Keep, Islands::Drop] {
         // Within the tiles, while records move up, never.
@@ -369,7 +326,7 @@ proptest! {
     ) {
         let name = catalogue()[cell].name;
         let what = format!("{name} {part:?} {fraction} region {kind} {shape:?} edge {edge}");
-        let field = lattice(name, part, fraction, rotate);
+        let field = lattice(name, part, fraction, WAVELENGTH, rotate);
         let solid = solid(region(kind, shape.0, shape.1, shape.2), Some(field));
         if !surface(&solid, edge, &Silent).is_ok_and(|s| s.mesh.volume() > 0.0) {
             return Ok(()); // thinner than the grid

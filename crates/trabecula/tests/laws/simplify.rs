@@ -1,111 +1,24 @@
 //! Simplified meshes: what they guarantee, how light they get, how far they are from the first.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Cell, Part, Series, catalogue, named};
+use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
-use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
+use trabecula::lattice::Level;
 use trabecula::math::{Vec3, add, cross, dot, norm, scale, sub};
-use trabecula::measure::{non_manifold_vertices, self_intersections, size};
+use trabecula::measure::size;
 use trabecula::mesh::Mesh;
-use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union,
-};
+use trabecula::region::{Cuboid, Cylinder, Region};
 use trabecula::simplify::{Goal, Report, simplify};
-use trabecula::solid::Solid;
 
-fn lattice(
-    name: &str,
-    part: Part,
-    level: Level,
-    wavelength: [f64; 3],
-    rotate: [f64; 3],
-) -> Arc<dyn Field> {
-    let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
-    let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
-}
-
-fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
-    Solid {
-        filled: Vec::new(),
-        region,
-        field,
-        wavelength: 1.0,
-    }
-}
+use crate::common::{ball, check, lattice, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
-}
-
-fn ball(radius: f64) -> Region {
-    Arc::new(Sphere::new([0.0; 3], radius).expect("ball"))
-}
-
-/// The mesh as a file in single precision holds it.
-fn rounded(mesh: &Mesh) -> Mesh {
-    let vertices = mesh
-        .vertices
-        .iter()
-        .map(|v| v.map(|x| f64::from(x as f32) + 0.0))
-        .collect();
-    Mesh {
-        vertices,
-        triangles: mesh.triangles.clone(),
-    }
-}
-
-/// Every guarantee, on the mesh as re-read from single precision.
-fn check(what: &str, s: &Surface) {
-    let m = rounded(&s.mesh);
-    let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(
-        places.len(),
-        m.vertices.len(),
-        "{what}: vertices fall together in single precision"
-    );
-    assert_eq!(s.cut.len(), m.triangles.len());
-    let found = size(&m);
-    assert!(found.closed, "{what}: not closed");
-    assert_eq!(
-        non_manifold_vertices(&m),
-        0,
-        "{what}: a vertex with two fans"
-    );
-    assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
-    for i in 0..m.triangles.len() {
-        let [a, b, c] = m.corners(i);
-        assert!(a != b && b != c && c != a, "{what}: degenerate triangle");
-    }
-}
-
-/// A region of one of seven kinds, shaped by three numbers.
-fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
-    let cylinder = |axis| {
-        Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region
-    };
-    let block = || Arc::new(Cuboid::new([-r, -1.0, -t], [t, r, 1.0]).expect("box")) as Region;
-    match kind {
-        0 => block(),
-        1 => ball(r),
-        2 => cylinder([0.0, 0.0, 1.0]),
-        3 => cylinder([0.3, 0.2 + s, 1.0]),
-        4 => Arc::new(Union::new(vec![block(), ball(r)]).expect("union")),
-        5 => {
-            Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference"))
-        }
-        _ => {
-            let half = HalfSpace::new([s, 0.0, 0.1], [s, 1.0, 0.5]).expect("half-space");
-            Arc::new(Intersection::new(vec![ball(r), Arc::new(half)]).expect("intersection"))
-        }
-    }
 }
 
 /// The distance of a point from a triangle, by its own plane and sides: nothing of the code under test.
@@ -243,7 +156,7 @@ fn a_cube_comes_down_to_twelve_triangles() {
 
 #[test]
 fn a_ball_needs_triangles_in_inverse_proportion_to_the_tolerance() {
-    let fine = of(ball(1.0), 0.02);
+    let fine = of(ball([0.0; 3], 1.0), 0.02);
     let counts = [0.02, 0.01, 0.005].map(|t| {
         let (made, report, found) = held("ball", &fine, within(t));
         println!(
@@ -293,7 +206,7 @@ fn a_cylinder_keeps_its_rims() {
 
 #[test]
 fn a_number_of_triangles_is_met() {
-    let field = lattice(
+    let field = lattice_at(
         "gyroid",
         Part::Sheet,
         Level::Fraction(Grade::Constant(0.3)),
@@ -326,7 +239,7 @@ fn a_number_of_triangles_is_met() {
 
 #[test]
 fn cuts_stay_what_they_are() {
-    let field = lattice(
+    let field = lattice_at(
         "gyroid",
         Part::Sheet,
         Level::Fraction(Grade::Constant(0.35)),
@@ -362,14 +275,14 @@ fn cuts_stay_what_they_are() {
 
 #[test]
 fn same_bytes_for_any_number_of_threads() {
-    let field = lattice(
+    let field = lattice_at(
         "diamond",
         Part::Sheet,
         Level::Fraction(Grade::Constant(0.3)),
         [1.0; 3],
         [5.0, 15.0, 25.0],
     );
-    let fine = surface(&solid(ball(1.0), Some(field)), 0.05, &Silent).expect("surface");
+    let fine = surface(&solid(ball([0.0; 3], 1.0), Some(field)), 0.05, &Silent).expect("surface");
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -421,7 +334,7 @@ fn what_cannot_be_done_is_refused_with_numbers() {
             false
         }
     }
-    let many = of(ball(1.0), 0.05);
+    let many = of(ball([0.0; 3], 1.0), 0.05);
     assert!(matches!(
         simplify(&many, &within(0.05), &Never),
         Err(Stopped::Interrupted)
@@ -447,7 +360,7 @@ proptest! {
     ) {
         let name = catalogue()[cell].name;
         let region = region(kind, shape.0, shape.1, shape.2);
-        let field = lattice(name, part, Level::Fraction(Grade::Constant(fraction)), wavelength, rotate);
+        let field = lattice(name, part, fraction, wavelength, rotate);
         let s = surface(&solid(region, Some(field)), edge, &Silent).expect("surface");
         let text = format!("{name} {part:?} {fraction} region {kind} {shape:?} edge {edge}");
         held(&format!("{text} tolerance {tolerance}"), &s, within(tolerance));

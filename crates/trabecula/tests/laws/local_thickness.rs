@@ -53,12 +53,7 @@ fn turned(mut mesh: Mesh, degrees: Vec3) -> Mesh {
 }
 
 fn full(region: Region, edge: f64) -> Surface {
-    let solid = Solid {
-        filled: Vec::new(),
-        region,
-        field: None,
-        wavelength: 1.0,
-    };
+    let solid = Solid::new(region, None, 1.0);
     surface(&solid, edge, &Silent).expect("surface")
 }
 
@@ -73,12 +68,7 @@ fn gyroid(part: Part, fraction: f64, edge: f64) -> (Surface, Region) {
     let level = Level::Fraction(Grade::Constant(fraction));
     let field = Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level));
     let region: Region = Arc::new(Cuboid::new([0.0; 3], [8.0; 3]).expect("box"));
-    let solid = Solid {
-        filled: Vec::new(),
-        region: region.clone(),
-        field: Some(field),
-        wavelength: 4.0,
-    };
+    let solid = Solid::new(region.clone(), Some(field), 4.0);
     (surface(&solid, edge, &Silent).expect("surface"), region)
 }
 

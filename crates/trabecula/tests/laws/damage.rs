@@ -1,12 +1,10 @@
 //! Meshes damaged at random, as regions: what comes out is closed, does not cross itself and holds what was there, or
 //! it is refused with the reason.
 
-mod common;
-
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use common::{Random, cases, fault, lattice};
+use crate::common::{Random, cases, fault, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
@@ -344,7 +342,7 @@ fn judge(victim: Victim) -> Result<End, String> {
         Err(e) if victim.broken && e.message.contains("vertex") => {
             return Ok(End::Refused("numbers that are not finite"));
         }
-        Err(e) if victim.missing > 0.5 * CAPPED && e.message.contains("holes") => {
+        Err(e) if victim.missing > 0.5 * CAPPED && e.message.contains("hole") => {
             return Ok(End::Refused("holes too large"));
         }
         Err(e) => return Err(format!("refused: {}", e.message)),
@@ -375,13 +373,19 @@ fn judge(victim: Victim) -> Result<End, String> {
     }
     let shared: Arc<dyn Shape> = Arc::new(region);
     let wavelength = size / some.between(3.0, 6.0);
-    let field = lattice("gyroid", Part::Sheet, 0.4, wavelength);
+    let field = lattice(
+        "gyroid",
+        Part::Sheet,
+        0.4,
+        [wavelength; 3],
+        [11.0, 22.0, 33.0],
+    );
     for (what, field) in [("full", None), ("gyroid", Some(field))] {
         let edge = wavelength / some.between(4.0, 9.0);
         let full = field.is_none();
         let solid = Solid::new(shared.clone(), field, wavelength);
         let s = surface(&solid, edge, &Silent).map_err(|e| format!("{what}: {e:?}"))?;
-        if let Some(fault) = fault(&s) {
+        if let Some(fault) = fault(&s.mesh) {
             return Err(format!("{what} at {edge}: {fault}"));
         }
         // The surface stays in the cells that the boundary passes, and their middles are half a step off it on average.

@@ -1,90 +1,31 @@
 //! What an extracted surface guarantees, and the rates at which its errors fall.
 
-use std::collections::HashSet;
 use std::f64::consts::PI;
 use std::io::Cursor;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::{Islands, Silent, Surface, stream_stl, surface, voxels};
+use trabecula::cell::{Part, catalogue};
+use trabecula::extract::{Islands, Silent, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
-use trabecula::measure::{non_manifold_vertices, self_intersections, size};
+use trabecula::lattice::Level;
+use trabecula::measure::size;
 use trabecula::mesh::Mesh;
 use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
-    Union,
 };
-use trabecula::solid::Solid;
 
-fn lattice(
-    name: &str,
-    part: Part,
-    level: Level,
-    wavelength: [f64; 3],
-    rotate: [f64; 3],
-) -> Arc<dyn Field> {
-    let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
-    let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
-}
-
-fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
-    Solid::new(region, field, 1.0)
-}
+use crate::common::{ball, cases, check, lattice, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
 }
 
-fn ball(radius: f64) -> Region {
-    Arc::new(Sphere::new([0.0; 3], radius).expect("ball"))
-}
-
-/// The mesh as a file in single precision holds it.
-fn rounded(mesh: &Mesh) -> Mesh {
-    let vertices = mesh
-        .vertices
-        .iter()
-        .map(|v| v.map(|x| f64::from(x as f32) + 0.0))
-        .collect();
-    Mesh {
-        vertices,
-        triangles: mesh.triangles.clone(),
-    }
-}
-
-/// Every guarantee, on the mesh as re-read from single precision.
-fn check(what: &str, s: &Surface) {
-    let m = rounded(&s.mesh);
-    let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(
-        places.len(),
-        m.vertices.len(),
-        "{what}: vertices fall together in single precision"
-    );
-    assert_eq!(s.cut.len(), m.triangles.len());
-    let found = size(&m);
-    assert!(found.closed, "{what}: not closed");
-    assert_eq!(
-        non_manifold_vertices(&m),
-        0,
-        "{what}: a vertex with two fans"
-    );
-    assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
-    for i in 0..m.triangles.len() {
-        let [a, b, c] = m.corners(i);
-        assert!(a != b && b != c && c != a, "{what}: degenerate triangle");
-    }
-}
-
 #[test]
 fn a_sheet_of_32_samples_a_cell_is_within_1e_4_of_its_volume() {
     // |G| ≤ 0.463951958 has the fraction 0.3 (exact table); eight whole cells.
-    let field = lattice(
+    let field = lattice_at(
         "gyroid",
         Part::Sheet,
         Level::Iso(Grade::Constant(0.463951958)),
@@ -105,7 +46,7 @@ fn a_sheet_of_32_samples_a_cell_is_within_1e_4_of_its_volume() {
 fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
     let exact = [4.0 * PI, 4.0 / 3.0 * PI];
     let errors = [8.0, 16.0, 32.0, 64.0, 128.0].map(|n| {
-        let s = surface(&solid(ball(1.0), None), 1.0 / n, &Silent).expect("surface");
+        let s = surface(&solid(ball([0.0; 3], 1.0), None), 1.0 / n, &Silent).expect("surface");
         assert!(s.cut.iter().all(|c| *c));
         [
             (s.mesh.area() / exact[0] - 1.0).abs(),
@@ -124,14 +65,14 @@ fn area_errors_fall_as_the_second_power_and_volume_errors_faster() {
 
 #[test]
 fn vertices_come_to_the_surface_as_the_second_power() {
-    let field = lattice(
+    let field = lattice_at(
         "diamond",
         Part::Upper,
         Level::Fraction(Grade::Constant(0.3)),
         [1.0, 1.2, 0.9],
         [10.0, 20.0, 30.0],
     );
-    let region = ball(1.0);
+    let region = ball([0.0; 3], 1.0);
     let solid = solid(region.clone(), Some(field.clone()));
     let distances = |f: &dyn Field, points: &[[f64; 3]]| -> Vec<f64> {
         let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
@@ -183,7 +124,8 @@ fn edges_are_met_to_second_order_and_flat_ones_exactly() {
     };
 
     // A cap of a ball: its rim is a circle.
-    let cap: Region = Arc::new(Intersection::new(vec![ball(1.0), half(n, 0.28)]).expect("cap"));
+    let cap: Region =
+        Arc::new(Intersection::new(vec![ball([0.0; 3], 1.0), half(n, 0.28)]).expect("cap"));
     let rim: Vec<[f64; 3]> = (0..500)
         .map(turns)
         .map(|(s, c)| along(0.96 * c, 0.96 * s, 0.28))
@@ -198,7 +140,8 @@ fn edges_are_met_to_second_order_and_flat_ones_exactly() {
         })
         .collect();
     // A ball from a block: the edge is concave.
-    let bite: Region = Arc::new(Difference::new(vec![half(n, 0.28), ball(1.0)]).expect("bite"));
+    let bite: Region =
+        Arc::new(Difference::new(vec![half(n, 0.28), ball([0.0; 3], 1.0)]).expect("bite"));
     let bite: Region = Arc::new(
         Intersection::new(vec![
             bite,
@@ -207,7 +150,7 @@ fn edges_are_met_to_second_order_and_flat_ones_exactly() {
         .expect("bounded"),
     );
     // A lattice in a ball: points of both surfaces, by Newton's method from all over.
-    let field = lattice(
+    let field = lattice_at(
         "gyroid",
         Part::Lower,
         Level::Iso(Grade::Constant(0.1)),
@@ -247,7 +190,11 @@ fn edges_are_met_to_second_order_and_flat_ones_exactly() {
         ("rim of a cap", solid(cap, None), &rim),
         ("rims of a cylinder", solid(barrel, None), &rims),
         ("rim of a bite", solid(bite, None), &rim),
-        ("lattice in a ball", solid(ball(1.0), Some(field)), &creases),
+        (
+            "lattice in a ball",
+            solid(ball([0.0; 3], 1.0), Some(field)),
+            &creases,
+        ),
     ] {
         let errors = [10.0, 20.0, 40.0].map(|n| {
             let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
@@ -332,7 +279,7 @@ fn topology_of_the_unit_cells_is_that_of_the_literature() {
         ("iwp", -12),
     ] {
         let euler = |n: f64| {
-            let field = lattice(
+            let field = lattice_at(
                 name,
                 Part::Lower,
                 Level::Iso(Grade::Constant(0.0)),
@@ -354,14 +301,14 @@ fn topology_of_the_unit_cells_is_that_of_the_literature() {
 
 #[test]
 fn same_bytes_for_any_number_of_threads_and_both_roads_agree() {
-    let field = lattice(
+    let field = lattice_at(
         "gyroid",
         Part::Sheet,
         Level::Fraction(Grade::Constant(0.25)),
         [1.0, 1.1, 0.9],
         [5.0, 15.0, 25.0],
     );
-    let solid = solid(ball(1.7), Some(field));
+    let solid = solid(ball([0.0; 3], 1.7), Some(field));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -402,7 +349,7 @@ fn every_named_cell_and_part_has_its_fraction() {
     // Whole cells of every kind: mesh volume over box is the fraction asked for.
     for n in catalogue() {
         for (part, fraction) in [(Part::Sheet, 0.35), (Part::Lower, 0.5), (Part::Upper, 0.6)] {
-            let field = lattice(
+            let field = lattice_at(
                 n.name,
                 part,
                 Level::Fraction(Grade::Constant(fraction)),
@@ -426,7 +373,7 @@ fn a_graded_fraction_is_met() {
         ("diamond", Part::Lower),
         ("primitive", Part::Sheet),
     ] {
-        let field = lattice(
+        let field = lattice_at(
             name,
             part,
             Level::Fraction(grade.clone()),
@@ -459,36 +406,8 @@ fn a_graded_fraction_is_met() {
     }
 }
 
-/// A region of one of seven kinds, shaped by three numbers.
-fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
-    let cylinder = |axis| {
-        Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region
-    };
-    let block = || Arc::new(Cuboid::new([-r, -1.0, -t], [t, r, 1.0]).expect("box")) as Region;
-    match kind {
-        0 => block(),
-        1 => ball(r),
-        2 => cylinder([0.0, 0.0, 1.0]),
-        3 => cylinder([0.3, 0.2 + s, 1.0]),
-        4 => Arc::new(Union::new(vec![block(), ball(r)]).expect("union")),
-        5 => {
-            Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference"))
-        }
-        _ => {
-            let half = HalfSpace::new([s, 0.0, 0.1], [s, 1.0, 0.5]).expect("half-space");
-            Arc::new(Intersection::new(vec![ball(r), Arc::new(half)]).expect("intersection"))
-        }
-    }
-}
-
-/// Random designs in one run: `make campaign` asks for more.
-fn cases() -> u32 {
-    let asked = std::env::var("TRABECULA_CASES").ok();
-    asked.and_then(|n| n.parse().ok()).unwrap_or(48)
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(48) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any cell, part, fraction, orientation and region, however coarse the grid.
     #[test]
@@ -505,8 +424,17 @@ proptest! {
         let name = catalogue()[cell].name;
         let region = region(kind, shape.0, shape.1, shape.2);
         let text = format!("region {kind} {shape:?}");
-        let field = lattice(name, part, Level::Fraction(Grade::Constant(fraction)), wavelength, rotate);
-        let s = surface(&solid(region.clone(), Some(field)), edge, &Silent).expect("surface");
+        let field = lattice(name, part, fraction, wavelength, rotate);
+        let design = solid(region.clone(), Some(field));
+        let s = match surface(&design, edge, &Silent) {
+            // So little may be there that no node of the grid meets it.
+            Err(Stopped::Refused(f)) if f.message.starts_with("no surface") => {
+                let solid = voxels(&design, edge, &Silent).expect("voxels").solid;
+                prop_assert!(solid.iter().map(|v| u32::from(*v)).sum::<u32>() < 8, "{f}");
+                return Ok(());
+            }
+            made => made.expect("surface"),
+        };
         check(&format!("{name} {part:?} {fraction} {text} edge {edge}"), &s);
         let full = surface(&solid(region, None), edge, &Silent).expect("surface");
         check(&format!("full {text} edge {edge}"), &full);

@@ -1,0 +1,157 @@
+//! What several suites need: regions, lattices, the judge of a surface, random numbers.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use trabecula::cell::{Cell, Part, Series, named};
+use trabecula::extract::Surface;
+use trabecula::field::Field;
+use trabecula::grade::Grade;
+use trabecula::lattice::{Lattice, Level};
+use trabecula::map::{Affine, Map};
+use trabecula::math::Vec3;
+use trabecula::measure::{non_manifold_vertices, self_intersections, size};
+use trabecula::mesh::Mesh;
+use trabecula::region::{
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union,
+};
+use trabecula::solid::Solid;
+
+pub fn ball(center: Vec3, radius: f64) -> Region {
+    Arc::new(Sphere::new(center, radius).expect("ball"))
+}
+
+pub fn cuboid(min: Vec3, max: Vec3) -> Region {
+    Arc::new(Cuboid::new(min, max).expect("box"))
+}
+
+/// Regions of all kinds, by three numbers about one.
+pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
+    let cylinder = |axis| {
+        Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region
+    };
+    let block = || cuboid([-r, -1.0, -t], [t, r, 1.0]);
+    match kind {
+        0 => block(),
+        1 => ball([0.0; 3], r),
+        2 => cylinder([0.0, 0.0, 1.0]),
+        3 => cylinder([0.3, 0.2 + s, 1.0]),
+        4 => Arc::new(Union::new(vec![block(), ball([0.0; 3], r)]).expect("union")),
+        5 => {
+            Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference"))
+        }
+        _ => {
+            let half = HalfSpace::new([s, 0.0, 0.1], [s, 1.0, 0.5]).expect("half-space");
+            let parts = vec![ball([0.0; 3], r), Arc::new(half) as Region];
+            Arc::new(Intersection::new(parts).expect("intersection"))
+        }
+    }
+}
+
+/// A named cell at a fraction, through a rigid map.
+pub fn lattice(
+    name: &str,
+    part: Part,
+    fraction: f64,
+    wavelength: Vec3,
+    rotate: Vec3,
+) -> Arc<dyn Field> {
+    let level = Level::Fraction(Grade::Constant(fraction));
+    lattice_at(name, part, level, wavelength, rotate)
+}
+
+/// The same at any level.
+pub fn lattice_at(
+    name: &str,
+    part: Part,
+    level: Level,
+    wavelength: Vec3,
+    rotate: Vec3,
+) -> Arc<dyn Field> {
+    let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
+    let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
+    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
+}
+
+pub fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
+    Solid::new(region, field, 1.0)
+}
+
+/// The mesh as files in single precision hold it; −0 is 0.
+pub fn rounded(mesh: &Mesh) -> Mesh {
+    let place = |v: &Vec3| v.map(|x| f64::from(x as f32) + 0.0);
+    Mesh {
+        vertices: mesh.vertices.iter().map(place).collect(),
+        triangles: mesh.triangles.clone(),
+    }
+}
+
+/// What keeps a mesh, as its file holds it, from bounding a solid.
+pub fn fault(mesh: &Mesh) -> Option<&'static str> {
+    let m = rounded(mesh);
+    let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
+    let degenerate = |i: usize| {
+        let [a, b, c] = m.corners(i);
+        a == b || b == c || c == a
+    };
+    if places.len() < m.vertices.len() {
+        Some("vertices fall together")
+    } else if (0..m.triangles.len()).any(degenerate) {
+        Some("a degenerate triangle")
+    } else if !size(&m).closed {
+        Some("open")
+    } else if non_manifold_vertices(&m) > 0 {
+        Some("a vertex with two fans")
+    } else if self_intersections(&m, 1) > 0 {
+        Some("crosses itself")
+    } else {
+        None
+    }
+}
+
+/// Every guarantee.
+pub fn check(what: &str, s: &Surface) {
+    assert_eq!(s.cut.len(), s.mesh.triangles.len(), "{what}");
+    if let Some(why) = fault(&s.mesh) {
+        panic!("{what}: {why}");
+    }
+}
+
+/// Random designs in one run: `make campaign` asks for more.
+pub fn cases(few: u64) -> u64 {
+    let asked = std::env::var("TRABECULA_CASES").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(few)
+}
+
+/// Random numbers, the same for the same seed (splitmix64).
+pub struct Random(pub u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    pub fn share(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// In [low, high).
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.share()
+    }
+
+    /// Below n.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.share() * n as f64) as usize
+    }
+
+    /// Each coordinate in [−reach, reach).
+    pub fn point(&mut self, reach: f64) -> [f64; 3] {
+        [0; 3].map(|_| self.between(-reach, reach))
+    }
+}

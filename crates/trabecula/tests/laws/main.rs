@@ -1,0 +1,13 @@
+//! Laws of the whole: random designs, rates of convergence, bodies known exactly.
+
+mod common;
+mod damage;
+mod fields;
+mod flush;
+mod islands;
+mod local_thickness;
+mod phase;
+mod simplify;
+mod skin;
+mod surface;
+mod thickness;
