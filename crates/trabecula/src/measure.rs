@@ -3,22 +3,19 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, cross, norm, sub};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, degenerate};
 
 mod adjacency;
 mod cavity;
 mod cut;
-pub(crate) mod exact;
-mod intersect;
 mod local;
 mod quality;
 
+pub use crate::mesh::{is_embedded, self_intersections};
 pub use adjacency::non_manifold_vertices;
 use adjacency::{Bodies, Edges};
 pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
-pub(crate) use intersect::{Tree as BoxTree, near_pairs};
-pub use intersect::{is_embedded, self_intersections};
 pub use local::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
 pub use quality::{Quality, quality};
 
@@ -118,82 +115,10 @@ pub fn defects(mesh: &Mesh) -> Defects {
     }
 }
 
-/// Whether triangle `i` has two equal vertices or exactly no area.
-fn degenerate(mesh: &Mesh, i: usize) -> bool {
-    let [a, b, c] = mesh.corners(i);
-    exact::plane_axis(a, b, c).is_none()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Vec3, add};
-
-    pub(super) fn tetrahedron() -> Mesh {
-        Mesh {
-            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-        }
-    }
-
-    pub(super) fn cube(min: Vec3, edge: f64) -> Mesh {
-        let vertices = (0..8)
-            .map(|i| {
-                add(
-                    min,
-                    [i & 1, i >> 1 & 1, i >> 2 & 1].map(|b| f64::from(b) * edge),
-                )
-            })
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        Mesh {
-            vertices,
-            triangles: quads
-                .iter()
-                .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-                .collect(),
-        }
-    }
-
-    pub(super) fn torus(n: u32, m: u32) -> Mesh {
-        let mut mesh = Mesh::default();
-        for i in 0..n {
-            for j in 0..m {
-                let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)]
-                    .map(|t| t * core::f64::consts::TAU);
-                let r = 2.0 + v.cos();
-                mesh.vertices.push([r * u.cos(), r * u.sin(), v.sin()]);
-                let at = |i: u32, j: u32| (i % n) * m + j % m;
-                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                mesh.triangles.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        mesh
-    }
-
-    /// One mesh of several.
-    pub(super) fn join(parts: &[Mesh]) -> Mesh {
-        let mut all = Mesh::default();
-        for p in parts {
-            let shift = all.vertices.len() as u32;
-            all.vertices.extend(&p.vertices);
-            all.triangles
-                .extend(p.triangles.iter().map(|t| t.map(|v| v + shift)));
-        }
-        all
-    }
-
-    pub(super) fn flipped(mut mesh: Mesh) -> Mesh {
-        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-        mesh
-    }
+    use crate::mesh::samples::{cube, flipped, join, tetrahedron, torus};
 
     #[test]
     fn simple_solids() {

@@ -4,6 +4,14 @@ use std::collections::HashMap;
 
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 
+pub(crate) mod exact;
+mod intersect;
+#[cfg(test)]
+pub(crate) mod samples;
+
+pub(crate) use intersect::{Tree as BoxTree, near_pairs};
+pub use intersect::{is_embedded, self_intersections};
+
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
@@ -108,6 +116,12 @@ impl Mesh {
             triangles,
         }
     }
+}
+
+/// Whether triangle `i` has two equal vertices or exactly no area.
+pub(crate) fn degenerate(mesh: &Mesh, i: usize) -> bool {
+    let [a, b, c] = mesh.corners(i);
+    exact::plane_axis(a, b, c).is_none()
 }
 
 #[cfg(test)]

@@ -19,8 +19,7 @@ use std::hash::BuildHasherDefault;
 use std::ops::Range;
 
 use crate::math::{Vec3, add, cross, scale, sub};
-use crate::measure::is_embedded;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, is_embedded};
 
 use super::grid::{Grid, Local};
 use super::islands::Spread;

@@ -112,7 +112,7 @@ fn turns(walls: &[[Vec3; 3]], p: Vec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::{cube, flipped, join, torus};
+    use crate::mesh::samples::{cube, flipped, join, torus};
 
     #[test]
     fn cavities_are_listed_with_volume_and_place_the_largest_first() {

@@ -56,7 +56,7 @@ fn shape([a, b, c]: [Vec3; 3]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::cube;
+    use crate::mesh::samples::cube;
 
     #[test]
     fn known_triangles() {

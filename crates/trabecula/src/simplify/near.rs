@@ -4,8 +4,7 @@
 //! keep their places in it, and the boxes above them grow.
 
 use crate::math::{Vec3, cross, dot, sub};
-use crate::measure::is_embedded;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, is_embedded};
 
 /// Triangles under a leaf.
 const LEAF: usize = 4;

@@ -6,8 +6,8 @@
 use core::ops::Range;
 
 use crate::math::{Vec3, cross, norm, scale, sub};
-use crate::measure::exact::orient2d;
 use crate::mesh::Mesh;
+use crate::mesh::exact::orient2d;
 
 /// No site.
 pub(super) const NONE: u32 = u32::MAX;
@@ -208,7 +208,7 @@ fn height(corners: [Vec3; 3], [p, q, r]: [[f64; 2]; 3], line: [f64; 2], axis: us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::{cube, join, torus};
+    use crate::mesh::samples::{cube, join, torus};
 
     fn lengths(mesh: &Mesh, size: [usize; 3]) -> [f64; 3] {
         let shape = Shape::new(mesh, [0.0; 3], 1.0);

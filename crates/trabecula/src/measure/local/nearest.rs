@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use crate::extract::Silent;
     use crate::measure::local::lines::Shape;
-    use crate::measure::tests::torus;
+    use crate::mesh::samples::torus;
 
     #[test]
     fn every_voxel_finds_the_nearest_of_all_sites() {

@@ -4,8 +4,7 @@ use std::collections::HashSet;
 
 use super::edges::{Sets, ends, halves, open};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::measure::BoxTree;
-use crate::mesh::Mesh;
+use crate::mesh::{BoxTree, Mesh};
 
 /// Corners of open edges join over at most this share of the mesh's diagonal: seams that exporters leave are far
 /// narrower, and holes that matter are wider.

@@ -16,9 +16,8 @@ use super::edges::{Sets, halves, rises};
 use super::tree::{Face, Tree};
 use super::winding::Winding;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
-use crate::measure::exact::{drop_axis, orient2d, orient3d};
-use crate::measure::near_pairs;
-use crate::mesh::Mesh;
+use crate::mesh::exact::{drop_axis, orient2d, orient3d};
+use crate::mesh::{Mesh, near_pairs};
 
 /// How two triangles meet.
 enum Meeting {

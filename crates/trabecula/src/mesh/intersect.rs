@@ -4,10 +4,9 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::degenerate;
 use super::exact::{drop_axis, orient2d, orient3d, plane_axis};
 use crate::math::{Aabb, Vec3};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, degenerate};
 
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
@@ -247,7 +246,7 @@ fn segments_meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{cube, flipped, join, tetrahedron, torus};
+    use super::super::samples::{cube, flipped, join, tetrahedron, torus};
     use super::*;
 
     /// The count for two triangles given by corners; equal corners are one vertex.
