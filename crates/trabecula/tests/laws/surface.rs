@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{Islands, Silent, stream_stl, surface, voxels};
+use trabecula::extract::{Islands, Silent, Stopped, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
