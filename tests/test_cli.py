@@ -280,13 +280,15 @@ def test_interrupted_while_it_starts(tmp_path, cube):
         "    def find_spec(self, name, *rest):\n"
         "        if name == which: os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Now())\n"
-        f"sys.argv[1:] = ['mesh', {str(cube)!r}, '-o', 'a.stl']\n"
+        f"sys.argv[1:] = [sys.argv[2], {str(cube)!r}, '-o', sys.argv[3]]\n"
         "from trabecula.__main__ import main\n"
         "sys.exit(main())"
     )
     default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
-    for name in ("argparse", "numpy", "trabecula._core", "trabecula.design", "trabecula.solid"):
-        words = [sys.executable, "-c", code, name]
+    mesh = ("mesh", "a.stl")
+    starts = {"argparse": mesh, "trabecula._core": mesh, "trabecula.design": mesh, "trabecula.solid": mesh}
+    for name, rest in {**starts, "numpy": ("voxels", "a.npy")}.items():
+        words = [sys.executable, "-c", code, name, *rest]
         done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=default)
         assert (done.returncode, done.stderr) == (130, "stopped; nothing was left behind\n"), name
     assert names(tmp_path) == ["cube.toml"]
@@ -439,6 +441,19 @@ def test_voxels_and_meshes_that_are_too_coarse(tmp_path, cube):
         done = run("mesh", cube, "-o", *words, cwd=tmp_path)
         assert "the grid is too coarse" in done.stderr and "use an edge of" in done.stderr
     assert "coarse" not in run("mesh", cube, "-o", "a.stl", "--edge", "0.2", cwd=tmp_path).stderr
+
+
+def test_check_tells_how_far_cells_are_from_what_was_asked_for(tmp_path):
+    turning = {"phase": {"wavelength": 4, "rotate_z": {"linear": {"along": [1, 0, 0], "stops": [[0, 0], [16, 30]]}}}}
+    lattice = {"cell": "gyroid", "part": "sheet", "map": turning, "level": {"fraction": 0.3}}
+    design = {"schema": 1, "region": {"box": {"min": [0, 0, 0], "max": [16, 16, 16]}}, "lattice": {"a": lattice}}
+    (tmp_path / "a.json").write_text(json.dumps(design))
+    report = json.loads(run("check", "a.json", "--json", cwd=tmp_path).stdout)["lattices"]["a"]["distortion"]
+    text = run("check", "a.json", cwd=tmp_path).stdout
+    worst = max(a["max"] for a in report["angle"])
+    assert 1 < worst < 20 and f"{worst:.1f}° at most" in text
+    # 30 degrees over 16 mm are 7.5 in a cell of 4 mm.
+    assert abs(report["turn"] - 7.5) < 0.5 and f"{report['turn']:.1f}° per cell" in text
 
 
 @pytest.mark.parametrize("kind", ["many", "fine"])

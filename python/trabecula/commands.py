@@ -58,6 +58,20 @@ def check(args) -> None:
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
         whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
         print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+        if it.get("distortion"):
+            tell_distortion(it["distortion"])
+
+
+def tell_distortion(d: dict) -> None:
+    """How far a solved map is from what was asked for: three axes' angles and spacings, mean and greatest."""
+    worst = max(d["angle"], key=lambda a: a["max"])
+    print(f"  angle      off by {worst['mean']:.1f}° on average, {worst['max']:.1f}° at most, along the worst axis")
+    farthest = max(d["spacing"], key=lambda s: abs(s["max"] - 1))
+    print(
+        f"  spacing    {farthest['mean']:.2f} of what was asked for on average, up to {farthest['max']:.2f}; "
+        f"{100 * d['outside']:.1f} % outside 1/1.5 to 1.5"
+    )
+    print(f"  turn       {d['turn']:.1f}° per cell at most")
 
 
 def mesh(args) -> None:
