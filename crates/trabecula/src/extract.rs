@@ -22,6 +22,7 @@ mod bodies;
 mod cap;
 mod grid;
 mod islands;
+mod key;
 mod knot;
 mod sift;
 mod signs;

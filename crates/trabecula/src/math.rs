@@ -131,6 +131,15 @@ pub fn rotation(degrees: Vec3) -> Mat3 {
     product(&rx, &product(&ry, &rz))
 }
 
+/// A complex number (re, im).
+pub type Complex = (f64, f64);
+
+/// The product of two complex numbers.
+#[inline]
+pub fn complex_product(a: Complex, b: Complex) -> Complex {
+    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+}
+
 /// (sin 2πu, cos 2πu) for a phase u in turns; error below 4e-16, exact at quarter turns.
 ///
 /// Plain polynomials on an eighth of a turn: every system gives the same bits and the loops vectorise.

@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-use super::knot::{Key, Knots};
+use super::key::Key;
+use super::knot::Knots;
 use super::signs::{Signs, bits};
 
 /// Adds the cap of a laid face on the tile's own cells.

@@ -1,31 +1,24 @@
-//! Box, cylinder, ball and half-space, as exact signed distances.
+//! Box, ball, half-space and cylinder, as exact signed distances.
+
+mod cylinder;
 
 use core::f64::consts::PI;
-
 use std::sync::Arc;
 
 use super::{Offset, Shape, one_face};
 use crate::face::{Face, Plane, Tree};
 use crate::fault::{Fault, number};
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
+
+use cylinder::Barrel;
+pub use cylinder::Cylinder;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     min: Vec3,
     max: Vec3,
-}
-
-/// A solid cylinder of circular section with flat caps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cylinder {
-    base: Vec3,
-    axis: Vec3,
-    radius: f64,
-    height: f64,
-    /// Coordinate axis that the cylinder runs along and the coordinates of its caps there, if it does.
-    aligned: Option<(usize, [f64; 2])>,
 }
 
 /// A ball.
@@ -248,179 +241,6 @@ impl Shape for Cuboid {
     }
 }
 
-impl Cylinder {
-    /// The cylinder from the middle of its base (mm) along `axis` (any length). Errors if a number is not
-    /// finite, the axis is zero, or radius or height is not above zero.
-    pub fn new(base: Vec3, axis: Vec3, radius: f64, height: f64) -> Result<Self, Fault> {
-        let (base, axis) = (finite("base", base)?, direction("axis", axis)?);
-        let (radius, height) = (length("radius", radius)?, length("height", height)?);
-        let aligned = coordinate_axis(axis).map(|a| {
-            let (from, to) = (base[a], base[a] + axis[a] * height);
-            (a, [from.min(to), from.max(to)])
-        });
-        Ok(Cylinder {
-            base,
-            axis,
-            radius,
-            height,
-            aligned,
-        })
-    }
-
-    /// Signed distances to the barrel and to the caps.
-    #[inline]
-    fn sides(&self, p: Vec3) -> [f64; 2] {
-        let d = sub(p, self.base);
-        match self.aligned {
-            Some((a, [lo, hi])) => {
-                let (u, v) = (d[(a + 1) % 3], d[(a + 2) % 3]);
-                [
-                    (u * u + v * v).sqrt() - self.radius,
-                    (lo - p[a]).max(p[a] - hi),
-                ]
-            }
-            None => {
-                let h = dot(d, self.axis);
-                [
-                    norm(sub(d, scale(self.axis, h))) - self.radius,
-                    (-h).max(h - self.height),
-                ]
-            }
-        }
-    }
-
-    #[inline]
-    fn distance(&self, p: Vec3) -> f64 {
-        joined(self.sides(p))
-    }
-
-    /// The direction away from the axis.
-    fn radial(&self, p: Vec3) -> Vec3 {
-        let d = sub(p, self.base);
-        let radial = unit(sub(d, scale(self.axis, dot(d, self.axis))));
-        if radial == [0.0; 3] {
-            // On the axis every radial direction is as good: take one square to it.
-            let least = (0..3).fold(0, |m, a| {
-                if self.axis[a].abs() < self.axis[m].abs() {
-                    a
-                } else {
-                    m
-                }
-            });
-            let mut e = [0.0; 3];
-            e[least] = 1.0;
-            return unit(cross(self.axis, e));
-        }
-        radial
-    }
-
-    fn gradient(&self, p: Vec3) -> Vec3 {
-        let cap = if dot(sub(p, self.base), self.axis) * 2.0 < self.height {
-            scale(self.axis, -1.0)
-        } else {
-            self.axis
-        };
-        joined_gradient(self.sides(p), [self.radial(p), cap])
-    }
-
-    /// Barrel and cap distances bounded apart; the distance grows with both.
-    fn range(&self, b: &Aabb) -> Interval {
-        let [r, h] = self.ranges(b);
-        Interval::new(joined([r.lo, h.lo]), joined([r.hi, h.hi]))
-    }
-
-    /// Bounds of the distances to the barrel and to the caps.
-    fn ranges(&self, b: &Aabb) -> [Interval; 2] {
-        let (r, h) = match self.aligned {
-            Some((a, [lo, hi])) => {
-                let middle = ((lo + hi) / 2.0).clamp(b.min[a], b.max[a]);
-                let cap = |v: f64| (lo - v).max(v - hi);
-                let ends = [b.min[a], b.max[a]].map(cap);
-                let low = ends[0].min(ends[1]).min(cap(middle));
-                (
-                    apart(b, self.base, &[(a + 1) % 3, (a + 2) % 3]),
-                    Interval::new(low, ends[0].max(ends[1])),
-                )
-            }
-            None => {
-                let far = norm(b.size()) / 2.0;
-                let r = self.sides(b.center())[0] + self.radius;
-                // Rounding of a projection: a few units in the last place of the lengths that enter it.
-                let far = far + 1e-14 * (far + norm(sub(b.center(), self.base)));
-                let h = along(b, self.base, self.axis);
-                let cap = |v: f64| (-v).max(v - self.height);
-                let low = cap((self.height / 2.0).clamp(h.lo, h.hi))
-                    .min(cap(h.lo))
-                    .min(cap(h.hi));
-                (
-                    Interval::new((r - far).max(0.0), r + far),
-                    Interval::new(low, cap(h.lo).max(cap(h.hi))),
-                )
-            }
-        };
-        [Interval::new(r.lo - self.radius, r.hi - self.radius), h]
-    }
-}
-
-impl Shape for Cylinder {
-    fn bounds(&self) -> Aabb {
-        let top = add(self.base, scale(self.axis, self.height));
-        let mut b = Aabb::EMPTY.with(self.base).with(top);
-        for a in 0..3 {
-            // The caps reach out by r·sin of the angle between the axis and this coordinate.
-            let reach = self.radius * (1.0 - self.axis[a] * self.axis[a]).max(0.0).sqrt();
-            b.min[a] -= reach;
-            b.max[a] += reach;
-        }
-        if let Some((a, [lo, hi])) = self.aligned {
-            (b.min[a], b.max[a]) = (lo, hi);
-        }
-        b
-    }
-
-    fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
-        if let Some((a, [lo, hi])) = self.aligned
-            && a == axis
-            && lo - level < hi + level
-        {
-            out.extend([lo - level, hi + level]);
-        }
-    }
-
-    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-        fill_rows(block, out, |p| self.distance(p) - level);
-    }
-
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
-        if by > 0.0 {
-            return rounded(self, by, out);
-        }
-        if self.radius + by <= 0.0 {
-            return Tree::EMPTY;
-        }
-        let ends = [false, true].map(|top| match self.aligned {
-            Some((a, ends)) => flat(
-                (a, [ends[0] - by, ends[1] + by][usize::from(top)], top),
-                out,
-            ),
-            None => {
-                let normal = scale(self.axis, if top { 1.0 } else { -1.0 });
-                let height = if top { self.height + by } else { -by };
-                let point = add(self.base, scale(self.axis, height));
-                one_face(Arc::new(HalfSpace { point, normal }), out)
-            }
-        });
-        let [bottom, top] = ends;
-        let mut barrel = *self;
-        barrel.radius += by;
-        Tree::All(vec![bottom, top, one_face(Arc::new(Barrel(barrel)), out)])
-    }
-
-    fn volume(&self) -> Option<f64> {
-        Some(PI * self.radius * self.radius * self.height)
-    }
-}
-
 impl Sphere {
     /// The ball about a point (mm). Errors if a number is not finite or the radius not above zero.
     pub fn new(center: Vec3, radius: f64) -> Result<Self, Fault> {
@@ -559,28 +379,6 @@ fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Face>) -> Tree {
     match Offset::new(of, by) {
         Ok(grown) => one_face(Arc::new(grown), out),
         Err(_) => Tree::FULL,
-    }
-}
-
-/// The endless barrel of a cylinder.
-struct Barrel(Cylinder);
-
-impl Barrel {
-    #[inline]
-    fn distance(&self, p: Vec3) -> f64 {
-        self.0.sides(p)[0]
-    }
-
-    fn gradient(&self, p: Vec3) -> Vec3 {
-        self.0.radial(p)
-    }
-
-    fn range(&self, b: &Aabb) -> Interval {
-        self.0.ranges(b)[0]
-    }
-
-    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-        fill_rows(block, out, |p| self.distance(p) - level);
     }
 }
 

@@ -1,0 +1,61 @@
+//! Names of vertices.
+
+/// The name of a vertex in a block: the lowest node of its simplex, the steps (sets of axes, each within the next) to
+/// the others, and the faces that meet in it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(super) struct Key(u64);
+
+impl Key {
+    const NODE: u32 = 18;
+    const FACE: u32 = 7;
+    /// The first two steps of the point inside a plain cell or its side: no simplex repeats a step.
+    const CENTER: u64 = 0o11;
+
+    pub fn new(node: usize, steps: &[usize], faces: &[usize]) -> Key {
+        let steps = steps.iter().rev().fold(0, |w, s| w << 3 | *s as u64);
+        let faces = faces
+            .iter()
+            .rev()
+            .fold(0, |w, f| w << Key::FACE | (*f as u64 + 1));
+        Key(node as u64 | (steps | faces << 9) << Key::NODE)
+    }
+
+    /// The point in the middle of the patch in a cell, or in a side of it, that spans some axes.
+    pub fn center(node: usize, span: usize) -> Key {
+        Key(node as u64 | (Key::CENTER * span as u64) << Key::NODE)
+    }
+
+    pub fn node(self) -> usize {
+        (self.0 & ((1 << Key::NODE) - 1)) as usize
+    }
+
+    pub fn steps(self) -> u64 {
+        self.0 >> Key::NODE & 0o777
+    }
+
+    pub fn faces(self) -> impl Iterator<Item = usize> {
+        (0..3).filter_map(move |i| {
+            let f = self.0 >> (Key::NODE + 9 + i * Key::FACE) & ((1 << Key::FACE) - 1);
+            (f > 0).then(|| f as usize - 1)
+        })
+    }
+
+    /// The axes along which the simplex extends, as bits.
+    pub fn spans(self) -> u64 {
+        let s = self.steps();
+        (s | s >> 3 | s >> 6) & 7
+    }
+
+    /// Whether this is a point of a grid edge along an axis.
+    pub fn is_along(self, axis: usize) -> bool {
+        self.steps() == 1 << axis
+    }
+
+    /// The name among all tiles.
+    pub fn global(self, node: u128, face: impl Fn(usize) -> usize) -> u128 {
+        let faces = self
+            .faces()
+            .fold(0u128, |w, f| w << 16 | (face(f) as u128 + 1));
+        node << 57 | u128::from(self.steps()) << 48 | faces
+    }
+}

@@ -1,0 +1,93 @@
+//! The moves that cancel the volume errors of triangles.
+
+use multiversion::multiversion;
+
+use super::{Nodes, Scratch};
+use crate::extract::grid::{Grid, Local};
+use crate::math::Vec3;
+
+/// Moves vertices along their edges so that each triangle's chord error in volume cancels.
+///
+/// A surface that is locally quadratic, through the corners of a triangle, lies on average Σ II(e)/24 above it, e the
+/// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
+/// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
+/// edge: what faces its edge can move without running far along it.
+pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
+    s.moments.clear();
+    s.moments.resize(s.vertices.len(), (0.0, 0.0));
+    let mut rest = &s.plain.triangles[..];
+    for (face, numbers) in s.numbers.iter().enumerate().take(local.live.len()) {
+        let (triangles, others) = rest.split_at(s.plain.counts[face]);
+        rest = others;
+        // The face's vertices on edges along x come first, then y, then z.
+        let starts = [numbers.offset[1][0], numbers.offset[2][0]];
+        let edged = grid.faces[local.live[face]].edged;
+        share_out(
+            triangles,
+            starts,
+            edged,
+            &s.places,
+            &s.normals,
+            &mut s.moments,
+        );
+    }
+    let margin = grid.margin as f32;
+    for ((v, place), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.places).zip(&s.moments) {
+        // Volume gained per unit of t: a third of the ring's area as seen along the edge.
+        let gain = area * v.reach(nodes) as f32 / 3.0;
+        if gain > 0.0 {
+            let step = (volume / gain).clamp(-0.25, 0.25);
+            v.t = (v.t + step).clamp(margin, 1.0 - margin);
+            *place = v.at(nodes, f64::from(v.t));
+        }
+    }
+}
+
+/// Gives the corners of a face's triangles their shares. `edged`: the face may have edges of its own.
+///
+/// Single precision is ample for a move that is a small share of an edge, and neighbouring tiles still agree: it is used
+/// on differences of places that they have in common.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn share_out(
+    triangles: &[[u32; 3]],
+    starts: [u32; 2],
+    edged: bool,
+    places: &[Vec3],
+    normals: &[[f32; 3]],
+    moments: &mut [(f32, f32)],
+) {
+    type Short = [f32; 3];
+    let sub = |a: Short, b: Short| -> Short { core::array::from_fn(|i| a[i] - b[i]) };
+    let dot = |a: Short, b: Short| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    for t in triangles {
+        let [a, b, c] = t.map(|v| places[v as usize]);
+        let [na, nb, nc] = t.map(|v| normals[v as usize]);
+        let edge = |p: Vec3, q: Vec3| -> Short { core::array::from_fn(|i| (q[i] - p[i]) as f32) };
+        let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
+        // A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature.
+        if edged && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+            continue;
+        }
+        let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
+        let n = [
+            ca[1] * ab[2] - ca[2] * ab[1],
+            ca[2] * ab[0] - ca[0] * ab[2],
+            ca[0] * ab[1] - ca[1] * ab[0],
+        ];
+        let volume = above * 0.5 * dot(n, n).sqrt();
+        let facing = t.map(|v| match v {
+            v if v < starts[0] => n[0],
+            v if v < starts[1] => n[1],
+            _ => n[2],
+        });
+        let sum = dot(facing, facing);
+        if sum > 0.0 {
+            let share = volume / sum;
+            for (&v, facing) in t.iter().zip(facing) {
+                let m = &mut moments[v as usize];
+                m.0 += share * facing * facing;
+                m.1 += 0.5 * facing;
+            }
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! The vertices of plain cells: which grid edges have one, and where on its edge it lies.
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+
+use super::{BATCH, Nodes, Numbers, Scratch, Vertex};
+use crate::extract::signs::{Signs, below};
+use crate::field::Field;
+use crate::math::unit;
+
+/// Lists the vertices of plain cells, face by face.
+pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
+    let Scratch {
+        signs,
+        numbers,
+        vertices,
+        ..
+    } = s;
+    vertices.clear();
+    numbers.resize_with(signs.negative.len(), Numbers::default);
+    let any_knot = signs.knotted.iter().any(|w| *w != 0);
+    for (face, numbers) in numbers.iter_mut().enumerate() {
+        list_face(signs, numbers, vertices, nodes, face, any_knot);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
+fn list_face(
+    signs: &Signs,
+    numbers: &mut Numbers,
+    vertices: &mut Vec<Vertex>,
+    nodes: &Nodes,
+    face: usize,
+    any_knot: bool,
+) {
+    let [nx, ny, nz] = nodes.shape;
+    let inner = below(nx - 1);
+    let n = &signs.negative[face];
+    for axis in 0..3 {
+        numbers.crossed[axis].clear();
+        numbers.offset[axis].clear();
+        for k in 0..nz {
+            for j in 0..ny {
+                let row = k * ny + j;
+                let w = n[row];
+                let change = match axis {
+                    0 => (w ^ (w >> 1)) & inner,
+                    1 if j + 1 < ny => w ^ n[row + 1],
+                    2 if k + 1 < nz => w ^ n[row + ny],
+                    _ => 0,
+                };
+                let used = change & signs.edges_of(&signs.plain[face], axis, j, k);
+                numbers.crossed[axis].push(used);
+                numbers.offset[axis].push(vertices.len() as u32);
+                let fixed = if any_knot {
+                    signs.edges_of(&signs.knotted, axis, j, k)
+                } else {
+                    0
+                };
+                let mut bits = used;
+                while bits != 0 {
+                    let i = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let node = [i, j, k];
+                    vertices.push(Vertex {
+                        node: node.map(|n| n as u8),
+                        axis: axis as u8,
+                        face: face as u8,
+                        up: w >> i & 1 == 1,
+                        fixed: fixed >> i & 1 == 1,
+                        t: 1.0,
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// A bracket of a root along an edge: positions and values at its solid and void end, and the next guess.
+#[derive(Clone, Copy)]
+struct Root {
+    vertex: u32,
+    solid: (f64, f64),
+    void: (f64, f64),
+    t: f64,
+}
+
+impl Root {
+    /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess.
+    #[inline]
+    fn narrow(&mut self, value: f64, slope: f64) -> f64 {
+        *(if value <= 0.0 {
+            &mut self.solid
+        } else {
+            &mut self.void
+        }) = (self.t, value);
+        let ((lo, a), (hi, b)) = (self.solid, self.void);
+        let newton = self.t - value / slope;
+        let next = if newton >= lo && newton <= hi {
+            newton
+        } else {
+            lo - (hi - lo) * a / (b - a)
+        };
+        let step = next - self.t;
+        self.t = next;
+        step.abs()
+    }
+}
+
+/// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
+const SETTLED: f64 = 1e-3;
+/// Most rounds of the iteration.
+const ROUNDS: usize = 6;
+
+/// Finds where a face crosses the edges of its vertices, and its normals there.
+pub(super) fn solve(
+    s: &mut Scratch,
+    nodes: &Nodes,
+    f: &dyn Field,
+    face: usize,
+    which: Range<usize>,
+) {
+    let Scratch {
+        samples,
+        points,
+        values,
+        gradients,
+        vertices,
+        normals,
+        ..
+    } = s;
+    normals.resize(vertices.len(), [0.0; 3]);
+    let samples = &samples[face];
+    let mut roots = Vec::with_capacity(BATCH);
+    for from in which.clone().step_by(BATCH) {
+        roots.clear();
+        for (i, v) in (from..which.end)
+            .zip(&vertices[from..which.end])
+            .take(BATCH)
+        {
+            let low = v.low(nodes);
+            let high = low + nodes.stride[usize::from(v.axis)];
+            let (a, b) = if v.up { (low, high) } else { (high, low) };
+            let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
+            roots.push(Root {
+                vertex: i as u32,
+                solid: (0.0, a),
+                void: (1.0, b),
+                t: -a / (b - a),
+            });
+        }
+        for round in 0..ROUNDS {
+            points.clear();
+            let place = |r: &Root| vertices[r.vertex as usize].at(nodes, r.t);
+            points.extend(roots.iter().map(place));
+            values.resize(roots.len(), 0.0);
+            gradients.resize(roots.len(), [0.0; 3]);
+            f.gradients(points, values, gradients);
+            let mut open = 0;
+            for n in 0..roots.len() {
+                let mut r = roots[n];
+                let v = &mut vertices[r.vertex as usize];
+                let slope = gradients[n][usize::from(v.axis)] * v.reach(nodes);
+                if r.narrow(values[n], slope) > SETTLED && round + 1 < ROUNDS {
+                    roots[open] = r;
+                    open += 1;
+                } else {
+                    v.t = r.t as f32;
+                    normals[r.vertex as usize] = unit(gradients[n]).map(|x| x as f32);
+                }
+            }
+            roots.truncate(open);
+            if roots.is_empty() {
+                break;
+            }
+        }
+    }
+}
