@@ -149,12 +149,20 @@ pub(super) fn grade(
                 stops: stops(&below("stops"), &r.stops)?,
             })
         }
-        GradeKind::Grid(g) => samples::grid(g, &format!("{path}.grid"), place, allowed, complement),
+        GradeKind::Grid(g) => {
+            let at = format!("{path}.grid");
+            let of = samples::grid(g, &at, place)?;
+            samples::grade(of, &g.remap, &at, place, allowed, complement)
+        }
         GradeKind::Points(p) => {
-            samples::points(p, &format!("{path}.points"), place, allowed, complement)
+            let at = format!("{path}.points");
+            let of = samples::points(p, &at, place)?;
+            samples::grade(of, &p.remap, &at, place, allowed, complement)
         }
         GradeKind::Field(f) => {
-            samples::field(f, &format!("{path}.field"), place, allowed, complement)
+            let at = format!("{path}.field");
+            let of = samples::field(f, &at, place)?;
+            samples::grade(of, &f.remap, &at, place, allowed, complement)
         }
         GradeKind::Formula(text) => {
             let place = format!("{path}.formula");

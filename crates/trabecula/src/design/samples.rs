@@ -83,8 +83,8 @@ fn extension(path: &str) -> String {
     path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase()
 }
 
-/// The samples of a grade, checked against what is allowed in the region; `1 − value` if `complement`.
-fn finish(
+/// The grade of samples, checked against what is allowed in the region; `1 − value` if `complement`.
+pub(super) fn grade(
     samples: Samples,
     remap: &[[f64; 2]],
     path: &str,
@@ -121,13 +121,7 @@ fn finish(
     Ok(grade)
 }
 
-pub(super) fn grid(
-    spec: &GridSpec,
-    path: &str,
-    place: &Place,
-    allowed: Allowed,
-    complement: bool,
-) -> Result<Grade, DesignError> {
+pub(super) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let file = bytes(&spec.path, &at, place)?;
     let wrong =
@@ -223,7 +217,7 @@ pub(super) fn grid(
         );
         return Err(DesignError::new(at, message).found(&spec.path));
     }
-    finish(samples, &spec.remap, path, place, allowed, complement)
+    Ok(samples)
 }
 
 fn percent(share: f64) -> String {
@@ -234,13 +228,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-pub(super) fn points(
-    spec: &PointsSpec,
-    path: &str,
-    place: &Place,
-    allowed: Allowed,
-    complement: bool,
-) -> Result<Grade, DesignError> {
+pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let file = bytes(&spec.path, &at, place)?;
     let wrong =
@@ -253,14 +241,13 @@ pub(super) fn points(
         );
         return Err(DesignError::new(format!("{path}.neighbours"), message));
     }
-    let samples = Samples::scattered(
+    Samples::scattered(
         &places,
         &values,
         spec.neighbours as usize,
         &place.region.bounds(),
     )
-    .map_err(wrong)?;
-    finish(samples, &spec.remap, path, place, allowed, complement)
+    .map_err(wrong)
 }
 
 /// Rows of x, y, z, value, apart by commas, semicolons or spaces; one line of words before them is passed over.
@@ -304,13 +291,7 @@ fn table(text: &str) -> Result<(Vec<Vec3>, Vec<f64>), Fault> {
     Ok((places, values))
 }
 
-pub(super) fn field(
-    spec: &FieldSpec,
-    path: &str,
-    place: &Place,
-    allowed: Allowed,
-    complement: bool,
-) -> Result<Grade, DesignError> {
+pub(super) fn field(spec: &FieldSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.component");
     let made = components(spec, path, place, |array| {
         match (spec.component, array.components) {
@@ -336,8 +317,7 @@ pub(super) fn field(
         }
     })?;
     let one = made.into_iter().next();
-    let samples = one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))?;
-    finish(samples, &spec.remap, path, place, allowed, complement)
+    one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
 }
 
 /// The components of a vector (three) or a symmetric tensor (six, in the order 11, 22, 33, 23, 13, 12).
