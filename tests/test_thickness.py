@@ -8,19 +8,9 @@ import warnings
 import numpy as np
 import pytest
 import trabecula as lt
+from conftest import CUBE
 
-WALL = """schema = 1
-units = "mm"
-[region.box]
-size = [8, 8, 8]
-[lattice.core]
-cell = "gyroid"
-part = "sheet"
-[lattice.core.map.affine]
-wavelength = 4.0
-[lattice.core.level]
-thickness = 0.4
-"""
+WALL = CUBE.replace("fraction = 0.3", "thickness = 0.4")
 
 
 def wall(level, cell="gyroid", size=8, **map_settings):

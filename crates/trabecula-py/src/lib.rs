@@ -11,10 +11,19 @@ mod mesh;
 mod run;
 mod solid;
 
+/// Rotations and translations.
+type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
+/// Title, edges, shares, marks.
+type Histogram = (String, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
+/// For each part, intervals of the fraction.
+type Connected = Vec<(&'static str, Vec<[f64; 2]>)>;
+
 /// The compiled core of `trabecula`.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
+
+    use crate::{Connected, Histogram, Operations};
 
     #[pymodule_export]
     use crate::design::Design;
@@ -53,10 +62,9 @@ mod _core {
 
     /// Histograms one above the other as PNG bytes: (title, edges, shares, marks).
     #[pyfunction]
-    #[allow(clippy::type_complexity)]
     fn charts<'py>(
         py: Python<'py>,
-        charts: Vec<(String, Vec<f64>, Vec<f64>, Vec<(String, f64)>)>,
+        charts: Vec<Histogram>,
         width: usize,
         height: usize,
     ) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {
@@ -85,8 +93,7 @@ mod _core {
 
     /// A space group: its number, its name, and its operations as rotations and translations (in parts of 24).
     #[pyfunction]
-    #[allow(clippy::type_complexity)] // what Python gets, and nothing else uses
-    fn group(symbol: &str) -> PyResult<(Option<u16>, String, Vec<([[i32; 3]; 3], [i32; 3])>)> {
+    fn group(symbol: &str) -> PyResult<(Option<u16>, String, Operations)> {
         let group = trabecula::symmetry::Group::named(symbol).map_err(crate::error::fault)?;
         let operations = group.operations.iter();
         let operations = operations.map(|o| (o.rotation, o.translation)).collect();
@@ -110,11 +117,7 @@ mod _core {
 
     /// What a named cell can tell: its range, and for each part the fractions in which it is one piece in space.
     #[pyfunction]
-    #[allow(clippy::type_complexity)]
-    fn cell_facts(
-        py: Python<'_>,
-        name: &str,
-    ) -> PyResult<((f64, f64), Vec<(&'static str, Vec<[f64; 2]>)>)> {
+    fn cell_facts(py: Python<'_>, name: &str) -> PyResult<((f64, f64), Connected)> {
         use trabecula::cell::{Cell, Part, Series};
         let known = trabecula::cell::named(name).ok_or_else(|| {
             pyo3::exceptions::PyKeyError::new_err(format!("no cell is named {name}"))

@@ -18,6 +18,9 @@ use crate::file;
 use crate::run::run;
 use crate::solid::Region;
 
+/// Volume, a point inside, corners of the bounds.
+type Void = (f64, [f64; 3], ([f64; 3], [f64; 3]));
+
 /// A triangle mesh.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Mesh {
@@ -164,8 +167,7 @@ impl Mesh {
     }
 
     /// The closed voids, the largest first: volume (mm³), a point inside, lower and upper corner of the bounds (mm).
-    #[allow(clippy::type_complexity)]
-    fn voids(&self, py: Python<'_>) -> PyResult<Vec<(f64, [f64; 3], ([f64; 3], [f64; 3]))>> {
+    fn voids(&self, py: Python<'_>) -> PyResult<Vec<Void>> {
         let found = run(py, None, None, |_| measure::cavities(&self.surface.mesh))?;
         let plain = |c: &measure::Cavity| (c.volume, c.point, (c.bounds.min, c.bounds.max));
         Ok(found.iter().map(plain).collect())

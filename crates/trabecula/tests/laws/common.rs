@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use trabecula::cell::{Cell, Part, Series, named};
+use proptest::prelude::*;
+use trabecula::cell::{Cell, Part, Series, catalogue, named};
 use trabecula::extract::Surface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
@@ -23,6 +24,26 @@ pub fn ball(center: Vec3, radius: f64) -> Region {
 
 pub fn cuboid(min: Vec3, max: Vec3) -> Region {
     Arc::new(Cuboid::new(min, max).expect("box"))
+}
+
+/// The box from `min` to `max` as twelve triangles.
+pub fn box_mesh(min: Vec3, max: Vec3) -> Mesh {
+    let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 1 { max[a] } else { min[a] });
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    Mesh {
+        vertices: (0..8).map(corner).collect(),
+        triangles: quads
+            .iter()
+            .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .collect(),
+    }
 }
 
 /// Regions of all kinds, by three numbers about one.
@@ -71,6 +92,41 @@ pub fn lattice_at(
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
     Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
+}
+
+/// What a lattice is made of.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    name: &'static str,
+    part: Part,
+    fraction: f64,
+    wavelength: Vec3,
+    rotate: Vec3,
+}
+
+impl Drawn {
+    pub fn lattice(&self) -> Arc<dyn Field> {
+        lattice(
+            self.name,
+            self.part,
+            self.fraction,
+            self.wavelength,
+            self.rotate,
+        )
+    }
+}
+
+prop_compose! {
+    /// Any named cell, part and fraction, stretched and turned.
+    pub fn drawn()(
+        cell in prop::sample::select(catalogue()),
+        part in prop::sample::select(vec![Part::Sheet, Part::Lower, Part::Upper]),
+        fraction in 0.03..0.97f64,
+        rotate in prop::array::uniform3(-180.0..180.0f64),
+        wavelength in prop::array::uniform3(0.5..1.5f64),
+    ) -> Drawn {
+        Drawn { name: cell.name, part, fraction, wavelength, rotate }
+    }
 }
 
 pub fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {

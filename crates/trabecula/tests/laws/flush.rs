@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::common::{Random, cases, fault, lattice};
+use crate::common::{Random, box_mesh, cases, fault, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
 use trabecula::math::{Mat3, Vec3, add, apply, rotation, scale};
-use trabecula::mesh::Mesh;
 use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
     Union,
@@ -34,20 +33,8 @@ fn number(some: &mut Random, from: usize, below: usize) -> f64 {
 
 /// A box as a mesh.
 fn mesh_box(lo: Vec3, hi: Vec3, frame: &Frame) -> Region {
-    let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { hi[a] } else { lo[a] });
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let halves = |q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
-    let mesh = Mesh {
-        vertices: (0..8).map(|i| frame.place(corner(i))).collect(),
-        triangles: quads.iter().flat_map(halves).collect(),
-    };
+    let mut mesh = box_mesh(lo, hi);
+    mesh.vertices.iter_mut().for_each(|v| *v = frame.place(*v));
     Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("mesh"))
 }
 

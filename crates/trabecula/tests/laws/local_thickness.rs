@@ -7,11 +7,13 @@ use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::math::{Vec3, apply, rotation};
+use trabecula::math::{Vec3, add, apply, rotation};
 use trabecula::measure::{Spread, size, thickness, usual_step, voxels_for};
 use trabecula::mesh::Mesh;
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
+
+use crate::common::box_mesh;
 
 fn bare(mesh: Mesh) -> Surface {
     Surface {
@@ -26,24 +28,8 @@ fn wall(mesh: Mesh, step: f64) -> Spread {
         .wall
 }
 
-/// A box as twelve triangles.
 fn block(min: Vec3, size: Vec3) -> Mesh {
-    let corner = |i: usize| core::array::from_fn(|a| min[a] + size[a] * (i >> a & 1) as f64);
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    Mesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect(),
-    }
+    box_mesh(min, add(min, size))
 }
 
 fn turned(mut mesh: Mesh, degrees: Vec3) -> Mesh {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Part, catalogue};
+use trabecula::cell::Part;
 use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
@@ -15,7 +15,7 @@ use trabecula::mesh::Mesh;
 use trabecula::region::{Cuboid, Cylinder, Region};
 use trabecula::simplify::{Goal, Report, simplify};
 
-use crate::common::{ball, check, lattice, lattice_at, region, solid};
+use crate::common::{ball, check, drawn, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
@@ -349,20 +349,15 @@ proptest! {
     fn random_solids_keep_every_guarantee(
         kind in 0..7usize,
         shape in (0.5..1.5f64, -0.4..0.4f64, 0.2..1.0f64),
-        cell in 0..10usize,
-        part in prop::sample::select(vec![Part::Sheet, Part::Lower, Part::Upper]),
-        fraction in 0.03..0.97f64,
-        rotate in prop::array::uniform3(-180.0..180.0f64),
-        wavelength in prop::array::uniform3(0.5..1.5f64),
+        drawn in drawn(),
         edge in 0.05..0.3f64,
         tolerance in 0.002..0.3f64,
         share in 0.05..0.9f64,
     ) {
-        let name = catalogue()[cell].name;
         let region = region(kind, shape.0, shape.1, shape.2);
-        let field = lattice(name, part, fraction, wavelength, rotate);
+        let field = drawn.lattice();
         let s = surface(&solid(region, Some(field)), edge, &Silent).expect("surface");
-        let text = format!("{name} {part:?} {fraction} region {kind} {shape:?} edge {edge}");
+        let text = format!("{drawn:?} region {kind} {shape:?} edge {edge}");
         held(&format!("{text} tolerance {tolerance}"), &s, within(tolerance));
         let target = ((s.mesh.triangles.len() as f64 * share) as usize).max(4);
         held(&format!("{text} down to {target}"), &s, down_to(target));

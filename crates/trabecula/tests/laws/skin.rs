@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trabecula::cell::{Part, catalogue};
+use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface, voxels};
 use trabecula::face::Body;
 use trabecula::field::Field;
@@ -17,7 +17,7 @@ use trabecula::region::{
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
-use crate::common::{ball, check, cuboid, lattice};
+use crate::common::{ball, check, cuboid, drawn, lattice};
 
 /// A lattice with nothing solid.
 struct Nothing;
@@ -516,18 +516,14 @@ proptest! {
     fn random_solids_keep_every_guarantee(
         kind in 0..5usize,
         numbers in (0.5..1.5f64, -0.4..0.4f64, 0.2..1.0f64),
-        cell in 0..10usize,
-        part in prop::sample::select(vec![Part::Sheet, Part::Lower, Part::Upper]),
-        fraction in 0.03..0.97f64,
-        rotate in prop::array::uniform3(-180.0..180.0f64),
-        wavelength in prop::array::uniform3(0.5..1.5f64),
+        drawn in drawn(),
         edge in 0.04..0.3f64,
         thickness in (0.02..0.3f64, -0.1..0.1f64, any::<bool>()),
         open in any::<bool>(),
         boss in (0..5usize, 0.3..0.8f64, -0.3..0.3f64, 0.2..0.6f64, any::<bool>()),
     ) {
         let (region, _) = shape(kind, numbers.0, numbers.1, numbers.2);
-        let what = format!("{kind} {numbers:?} {cell} {part:?} {fraction} {edge} {thickness:?} {open} {boss:?}");
+        let what = format!("{kind} {numbers:?} {drawn:?} {edge} {thickness:?} {open} {boss:?}");
         let (w, slope, graded) = thickness;
         let grade = if graded {
             let stops = vec![[-1.6, (w - 1.6 * slope).max(0.01)], [1.6, (w + 1.6 * slope).max(0.01)]];
@@ -541,7 +537,7 @@ proptest! {
         if boss.4 {
             bodies.push(zone(&shape(boss.0, boss.1, boss.2, boss.3).0));
         }
-        let field = lattice(catalogue()[cell].name, part, fraction, wavelength, rotate);
+        let field = drawn.lattice();
         let s = surface(&filled(&region, field, bodies), edge, &Silent).expect("surface");
         check(&what, &s);
     }

@@ -16,7 +16,7 @@ use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
 };
 
-use crate::common::{ball, cases, check, lattice, lattice_at, region, solid};
+use crate::common::{ball, cases, check, drawn, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
@@ -414,17 +414,12 @@ proptest! {
     fn random_solids_keep_every_guarantee(
         kind in 0..7usize,
         shape in (0.5..1.5f64, -0.4..0.4f64, 0.2..1.0f64),
-        cell in 0..10usize,
-        part in prop::sample::select(vec![Part::Sheet, Part::Lower, Part::Upper]),
-        fraction in 0.03..0.97f64,
-        rotate in prop::array::uniform3(-180.0..180.0f64),
-        wavelength in prop::array::uniform3(0.5..1.5f64),
+        drawn in drawn(),
         edge in 0.04..0.3f64,
     ) {
-        let name = catalogue()[cell].name;
         let region = region(kind, shape.0, shape.1, shape.2);
         let text = format!("region {kind} {shape:?}");
-        let field = lattice(name, part, fraction, wavelength, rotate);
+        let field = drawn.lattice();
         let design = solid(region.clone(), Some(field));
         let s = match surface(&design, edge, &Silent) {
             // So little may be there that no node of the grid meets it.
@@ -435,7 +430,7 @@ proptest! {
             }
             made => made.expect("surface"),
         };
-        check(&format!("{name} {part:?} {fraction} {text} edge {edge}"), &s);
+        check(&format!("{drawn:?} {text} edge {edge}"), &s);
         let full = surface(&solid(region, None), edge, &Silent).expect("surface");
         check(&format!("full {text} edge {edge}"), &full);
         prop_assert!(s.mesh.volume() <= full.mesh.volume() * (1.0 + 0.5 * edge) + 1e-9);

@@ -1,31 +1,9 @@
 use super::tree::normal;
 use super::*;
 use crate::math::add;
+pub(super) use crate::mesh::samples::cuboid;
 use crate::region::tests::{check_shape, random};
 use std::collections::HashMap;
-
-/// The box from `lo` to `hi` of twelve triangles.
-pub(super) fn cuboid(lo: Vec3, hi: Vec3) -> Mesh {
-    let vertices = (0..8)
-        .map(|i| [0, 1, 2].map(|a| if i >> a & 1 == 1 { hi[a] } else { lo[a] }))
-        .collect();
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-        .collect();
-    Mesh {
-        vertices,
-        triangles,
-    }
-}
 
 /// An icosphere of 20·4ⁿ triangles, its radius waved by `wave`.
 pub(super) fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
