@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::distortion::{self, Distortion};
+use super::distortion::{self, Distortion, Misfit};
 use super::frame::{Orientation, place};
 use super::grid::Grid;
 use super::poisson::Poisson;
@@ -13,7 +13,9 @@ use super::spline::{self, Spline};
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub};
+use crate::math::{
+    Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
+};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -55,6 +57,7 @@ pub struct Settings<'a> {
 /// A solved map.
 pub struct Phase {
     spline: Spline,
+    wanted: Wanted,
     shift: Vec3,
     wavelength: [f64; 2],
     mean: Vec3,
@@ -111,9 +114,10 @@ impl Phase {
         let found: Vec<_> = (looked.par_iter().zip(&jacobians))
             .map(|(&n, j)| {
                 let wanted = [k[0][n], k[1][n], k[2][n]];
-                distortion::compare(j, &wanted, distortion::curl(&grid, &k, n))
+                distortion::compare(j, &wanted)
             })
             .collect();
+        let curl = (looked.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
         let range = wavelength
             .iter()
             .flatten()
@@ -127,7 +131,7 @@ impl Phase {
         let distortion = Distortion {
             density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
             least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
-            ..Distortion::of(&found, turn)
+            ..Distortion::of(&found, curl.collect(), turn)
         };
         if !settings.folds {
             refuse_folds(&grid, &spline, &distortion, &inside)?;
@@ -144,6 +148,7 @@ impl Phase {
         ];
         Ok(Phase {
             spline,
+            wanted: wanted.clone(),
             shift,
             wavelength: range,
             mean: if within.is_empty() {
@@ -171,6 +176,26 @@ impl Phase {
     /// How far the map is from what was asked for.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
+    }
+
+    /// How far the map is from what was asked for at points (mm) within the box. What was asked for is taken there itself,
+    /// with the signs and axes that are nearest to the map's.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, vectors without a direction.
+    pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
+        let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
+        let own = |j: &Mat3| transpose(&j.map(unit));
+        let like: Vec<Mat3> = jacobians.iter().map(own).collect();
+        let frames = self.wanted.orientation.frames_near(points, &like)?;
+        let wavelength = wavelengths(&self.wanted.wavelength, points)?;
+        let of = jacobians.iter().zip(frames.iter().zip(&wavelength));
+        Ok(of
+            .map(|(j, (f, w))| {
+                let k = transpose(f);
+                distortion::compare(j, &[0, 1, 2].map(|i| scale(k[i], 1.0 / w[i])))
+            })
+            .collect())
     }
 
     /// The Jacobians at the nodes in the region where cells are largest and smallest.

@@ -410,3 +410,38 @@ fn errors_go_where_they_weigh_least() {
         assert_eq!(fault.expect("refused").at, "weight", "{bad}");
     }
 }
+
+/// At the nodes, a misfit is what the solution was judged by; between them, stresses find their own signs and axes.
+#[test]
+fn misfits_at_nodes_are_those_of_the_report() {
+    let b = bounds([0.0; 3], [24.0, 24.0, 6.0]);
+    // A tensor whose first direction is turned as the angles are: s cos 2a etc., with a third value apart.
+    let stress = ["cos(0.1*x)", "-cos(0.1*x)", "3", "0", "0", "sin(0.1*x)"].map(formula);
+    let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
+    let laid = Wanted {
+        orientation: Orientation::Stress(stress),
+        ..turned.clone()
+    };
+    for wanted in [turned, laid] {
+        let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
+        let grid = *map.spline.grid();
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let found = map.misfits(&nodes).expect("misfits");
+        let most = |f: &dyn Fn(&Misfit) -> f64| found.iter().map(f).fold(0.0, f64::max);
+        let d = map.distortion();
+        // The report looks at every node of a grid as small as this; angles are good to √ε.
+        assert!(grid.len() < LOOKS);
+        let shear = most(&|m| m.shear);
+        assert!(
+            (shear - d.shear.max).abs() < 1e-5,
+            "{shear} {}",
+            d.shear.max
+        );
+        for i in 0..3 {
+            let angle = most(&|m| m.angle[i]);
+            let any = (0..3).any(|k| (angle - d.angle[k].max).abs() < 1e-5);
+            assert!(any, "{angle} {:?}", d.angle);
+        }
+        assert!((most(&|m| m.density) - d.density[1]).abs() < 1e-9);
+    }
+}
