@@ -24,3 +24,4 @@ pub mod simplify;
 pub mod skin;
 pub mod solid;
 pub mod symmetry;
+pub mod tets;
