@@ -25,3 +25,4 @@ pub mod skin;
 pub mod solid;
 pub mod symmetry;
 pub mod tets;
+pub mod tiling;
