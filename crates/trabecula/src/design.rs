@@ -18,6 +18,7 @@ mod sample;
 mod samples;
 mod schema;
 mod skin;
+mod tiling;
 #[cfg(test)]
 mod tests;
 
@@ -31,6 +32,7 @@ use crate::cell::Cell;
 use crate::lattice::Lattice;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
+use crate::tiling::Tiling;
 
 pub use data::*;
 pub use error::{DesignError, nearest};
@@ -93,6 +95,8 @@ pub struct Built {
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The lattices over tetrahedral meshes, by name.
+    pub tilings: Vec<(String, Arc<Tiling>)>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.

@@ -86,6 +86,19 @@ impl Stencil {
         Ok(stencil)
     }
 
+    /// The same cell less a constant: its surface f = 0 is this one's f = `level`.
+    ///
+    /// # Errors
+    /// As [`Series::about`].
+    pub fn about(&self, level: f64) -> Result<Stencil, Fault> {
+        Ok(Stencil {
+            series: self.series.about(level)?,
+            corners: self.corners,
+            volume: OnceLock::new(),
+            connect: Default::default(),
+        })
+    }
+
     /// The greatest difference of f between points that differ in the order of their coordinates.
     fn asymmetry(&self) -> f64 {
         let swaps = [[1, 0, 2, 3], [0, 2, 1, 3], [0, 1, 3, 2]];

@@ -19,6 +19,38 @@ pub enum MapSpec {
     Cylinder(CylinderMapSpec),
     /// Wrapped about a centre: cells along the radius, round the axis, from pole to pole.
     Sphere(SphereMapSpec),
+    /// A tetrahedral cell in each tetrahedron of a mesh of the part; goes with a tetrahedral cell.
+    Tets(Box<TetsSpec>),
+}
+
+/// A tetrahedral mesh: made for the region with a size, or read from a file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TetsSpec {
+    /// Edge of the tetrahedra (mm); may vary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<GradeSpec>,
+    /// Path of a tetrahedral mesh, relative to the design file; the part is then where the tetrahedra are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach beyond
+    /// themselves and are mixed with their neighbours, from 0 (creases) to 0.2.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub overlap: f64,
+    /// How the surface is made.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub road: Road,
+}
+
+/// How the surface of a tetrahedral lattice is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Road {
+    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones or overlap.
+    #[default]
+    Explicit,
+    /// On a grid over the part, like other lattices.
+    Implicit,
 }
 
 /// A rigid rotation of the scaled lattice.

@@ -5,7 +5,7 @@ use crate::design::data::*;
 use crate::design::node::{At, Fields, Later};
 use crate::fault::counted;
 
-const LATER: [Later; 1] = [("tets", "use affine or phase")];
+const LATER: [Later; 0] = [];
 
 /// Ways to say how cells are turned, of which one is given.
 const TURNS: [&str; 7] = [
@@ -21,11 +21,14 @@ const TURNS: [&str; 7] = [
 pub(super) fn map(at: &At) -> Read<MapSpec> {
     let (kind, at) = at.kind(
         "map",
-        &["affine", "spartan", "phase", "cylinder", "sphere"],
+        &["affine", "spartan", "phase", "cylinder", "sphere", "tets"],
         &LATER,
     )?;
     if kind == "phase" {
         return Ok(MapSpec::Phase(Box::new(phase(&at)?)));
+    }
+    if kind == "tets" {
+        return Ok(MapSpec::Tets(Box::new(tets(&at)?)));
     }
     if kind == "cylinder" {
         let f = at.fields(
@@ -88,6 +91,17 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         offset,
         skew: f.read("skew", SkewSpec::default(), skew)?,
     }))
+}
+
+fn tets(at: &At) -> Read<TetsSpec> {
+    let f = at.fields("a tetrahedral mesh", &["size", "path", "overlap", "road"], &[])?;
+    let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
+    Ok(TetsSpec {
+        size: f.read("size", None, |at| grade(at).map(Some))?,
+        path: f.read("path", None, |at| at.text("a path").map(|p| Some(p.to_string())))?,
+        overlap: f.read("overlap", 0.0, At::number)?,
+        road: f.read("road", Road::Explicit, |at| at.word("road", &roads))?,
+    })
 }
 
 fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
