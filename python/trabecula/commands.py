@@ -58,8 +58,24 @@ def check(args) -> None:
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
         whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
         print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+        if it.get("tets"):
+            tell_tets(it["tets"])
         if it.get("distortion"):
             tell_distortion(it["distortion"])
+
+
+def tell_tets(t: dict) -> None:
+    """The mesh under a tetrahedral lattice, its walls and its creases."""
+    print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
+    ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
+    print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
+    if t["thickness"]:
+        w = t["thickness"]
+        print(f"  walls      {figure(w['mean'])} mm on average, 90 % between {figure(w['low'])} and {figure(w['high'])} mm")
+    if t["creases"]:
+        c = t["creases"]
+        smooth = " (before smoothing)" if t["overlap"] else ""
+        print(f"  creases    {c['mean']:.0f}° on average, {c['max']:.0f}° at most at the faces of tetrahedra{smooth}")
 
 
 def tell_distortion(d: dict) -> None:
@@ -290,6 +306,8 @@ def flaws(mesh: Mesh) -> str:
 
 def cells(args) -> None:
     """``trabecula cells``."""
+    if args.tet:
+        return tet_cells(args)
     listed = _core.cells()
     if args.name:
         known_cell(args.name, [c[0] for c in listed])
@@ -319,6 +337,31 @@ def cells(args) -> None:
             text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
             print(f"  {part:7} in one piece at fractions {text}")
         print(f"  source  {it['source']}")
+
+
+def tet_cells(args) -> None:
+    """``trabecula cells --tet``."""
+    names = _core.tet_cells()
+    if args.name:
+        known_cell(args.name, names)
+        names = [args.name]
+    facts = [json.loads(_core.tet_cell_facts(name)) for name in names]
+    if args.json:
+        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+    for it in facts:
+        terms = ", ".join(
+            f"{t['amplitude']:g} {t['component'].title()} ({' '.join(str(h) for h in t['hkl'])})" for t in it["terms"]
+        )
+        dual = ", dual" if it["dual"] else ""
+        print(f"{it['name']}  ({it['title']})")
+        print(f"  series  group {it['group']}: {terms}")
+        print(f"  tetrahedron of edge {it['edge']:.4f} cells about {it['site'][0]:g} {it['site'][1]:g} {it['site'][2]:g}{dual}")
+        print(f"  part    {it['part']} at fraction {it['fraction']:g} (iso {it['iso']:.4f})")
+        ports = "1 port" if it["ports"] == 1 else f"{it['ports']} ports"
+        print(f"  faces   {ports} on each, {100 * it['face_fraction']:.1f} % of it")
+        for part, whole in it["connected_fraction"].items():
+            text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
+            print(f"  {part:7} in one piece that reaches all faces at fractions {text}")
 
 
 def render(args) -> None:

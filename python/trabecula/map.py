@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "cylinder", "phase", "spartan", "sphere"]
+__all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "tets"]
 
 
 def affine(
@@ -95,3 +95,18 @@ def sphere(
 ) -> dict:
     """Shells of cells about a centre, ``around`` (even) of them round the equator and half as many from pole to pole."""
     return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
+
+
+def tets(
+    size: float | dict | None = None,
+    path: str | None = None,
+    overlap: float | None = None,
+    road: str | None = None,
+) -> dict:
+    """A tetrahedral cell in each tetrahedron of a mesh: one made for the region with edges of ``size`` (mm, may vary), or the
+    one at ``path``, where the part then is.
+
+    ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
+    tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
+    """
+    return {"tets": settings(size=size, path=path, overlap=overlap, road=road)}

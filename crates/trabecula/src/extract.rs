@@ -484,6 +484,18 @@ fn finish<W: Store>(
     })
 }
 
+/// The surface of a ready tetrahedral cell at its own fraction, in a regular tetrahedron of edge 1 mm cut into `steps` steps.
+///
+/// # Errors
+/// Steps below 4 or above 64.
+pub fn stencil(
+    ready: &crate::cell::tet::Ready,
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Surface, Stopped> {
+    tets::stencil(ready, steps, progress)
+}
+
 /// Occupancy on a grid of cubic voxels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Voxels {

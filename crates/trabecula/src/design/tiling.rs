@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::build::{Place, amount_key, finite, gaps, orbit_terms};
+use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::report::Varied;
-use super::{Design, Loader, Warning};
+use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series};
 use crate::fault::number;
@@ -16,7 +16,7 @@ use crate::io;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region, Repair};
 use crate::symmetry::Group;
-use crate::tets::TetMesh;
+use crate::tets::{TetMesh, background};
 use crate::tiling::{Amount, Level, Tiling};
 
 /// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
@@ -79,28 +79,48 @@ pub(super) fn domain<'a>(
     }))
 }
 
-/// The tetrahedral mesh.
+/// The tetrahedral mesh: from a file, or made for the region.
 fn mesh(
     spec: &TetsSpec,
     path: &str,
-    _space: &Region,
+    space: &Region,
     loader: &dyn Loader,
 ) -> Result<TetMesh, DesignError> {
-    let Some(file) = &spec.path else {
-        let message = "give path, a tetrahedral mesh";
-        return Err(DesignError::new(path, message));
+    let (file, size) = match (&spec.path, &spec.size) {
+        (Some(file), None) => (file, None),
+        (None, Some(size)) => (&String::new(), Some(size)),
+        _ => {
+            let message = "give one of size, the edge of the tetrahedra in mm, and path, a tetrahedral mesh";
+            return Err(DesignError::new(path, message));
+        }
     };
+    if let Some(size) = size {
+        let at = format!("{path}.size");
+        let points = sample::inside(space, LOOKS).0;
+        let place = Place {
+            path: path.to_string(),
+            region: space,
+            points: &points,
+            filled: &[],
+            loader,
+        };
+        let size = grade(size, &at, &place, Allowed::Positive("size"), false)?;
+        let made = background(&**space, &space.bounds(), &size, &points);
+        return Ok(made.map_err(|f| DesignError::fault(path, f))?.0);
+    }
     let at = format!("{path}.path");
     let bytes = loader.load(file).map_err(|m| DesignError::new(&at, m))?;
     let data = io::read_vtk(&bytes).map_err(|f| DesignError::fault(&at, f))?;
     let io::Shape::Mesh { points, tets, .. } = data.shape else {
         return Err(DesignError::new(at, "the file holds a grid, not a mesh"));
     };
-    Ok(TetMesh {
+    let read = TetMesh {
         nodes: points,
         tets,
         zones: Vec::new(),
-    })
+    };
+    let checked = read.checked().map_err(|f| DesignError::fault(&at, f))?;
+    Ok(checked.0)
 }
 
 /// The cell that a table describes.

@@ -17,7 +17,7 @@ mod template;
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
@@ -26,12 +26,13 @@ use super::islands::{Islands, Pieces};
 use super::{
     Estimate, Progress, Sifting, Stopped, Store, Summary, Surface, finish, not_empty, only, sift,
 };
-use crate::cell::tet::{Grid, Nodes};
+use crate::cell::tet::{Grid, Nodes, Ready};
 use crate::fault::{Fault, number};
 use crate::io::stl;
 use crate::map::Tets;
 use crate::map::tets::NONE;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::tets::TetMesh;
 use crate::tiling::{Level, Tiling};
 use census::Links;
 use piece::{Core, Levels, MARGIN, Piece, Scratch};
@@ -272,18 +273,32 @@ impl<'a> Work<'a> {
     ) -> Result<(), Stopped> {
         let total = self.tiling.map.len();
         let batch = CHUNK * 4 * rayon::current_num_threads();
-        for first in (0..total).step_by(batch) {
+        let make = |first: usize| -> Vec<Chunk> {
             let end = total.min(first + batch);
             let starts: Vec<usize> = (first..end).step_by(CHUNK).collect();
-            let made: Vec<Chunk> = starts
+            starts
                 .par_iter()
                 .map_init(Scratch::default, |scratch, &i| {
                     self.chunk(i..end.min(i + CHUNK), scratch, stl)
                 })
-                .collect();
-            for (start, chunk) in starts.into_iter().zip(made) {
-                take(start, chunk)?;
-            }
+                .collect()
+        };
+        let mut made = make(0);
+        for first in (0..total).step_by(batch) {
+            let end = total.min(first + batch);
+            let mut next = Vec::new();
+            // While some are taken, the next are made.
+            let taken = rayon::in_place_scope(|scope| {
+                if end < total {
+                    scope.spawn(|_| next = make(end));
+                }
+                (first..end)
+                    .step_by(CHUNK)
+                    .zip(std::mem::take(&mut made))
+                    .try_for_each(|(start, chunk)| take(start, chunk))
+            });
+            taken?;
+            made = next;
             if !progress.step(end as u64, total as u64) {
                 return Err(Stopped::Interrupted);
             }
@@ -434,6 +449,25 @@ pub(super) fn stream_stl<W: Store>(
     not_empty(triangles, edge)?;
     let found = links.census().judge(islands).map_err(Stopped::Refused)?;
     finish(found, triangles, sifts.then_some(&sifting), out)
+}
+
+/// A ready cell in a single regular tetrahedron.
+pub(super) fn stencil(
+    ready: &Ready,
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Surface, Stopped> {
+    let stencil = ready.stencil().map_err(Stopped::Refused)?;
+    let h = 0.5f64.sqrt() / 2.0;
+    let mesh = TetMesh {
+        nodes: vec![[h, -h, -h], [-h, h, -h], [-h, -h, h], [h, h, h]],
+        tets: vec![[0, 1, 2, 3]],
+        zones: Vec::new(),
+    };
+    let map = Tets::new(&mesh, 0.0).map_err(Stopped::Refused)?;
+    let level = Level::Same(stencil.iso(ready.part, ready.fraction));
+    let tiling = Tiling::new(Arc::new(map), Arc::new(stencil), ready.part, level);
+    Ok(surface(&tiling, 1.0 / steps as f64, Islands::Keep, progress)?.0)
 }
 
 /// What a spacing will take: counted where all pieces are the same, else found on some of them.

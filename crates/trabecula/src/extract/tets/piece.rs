@@ -175,7 +175,6 @@ pub(super) struct Scratch {
     /// Union-find of vertices by the surface; of vertices, then nodes, by the solid.
     surface: Vec<u32>,
     inner: Vec<u32>,
-    order: Vec<u32>,
 }
 
 impl Piece {
