@@ -47,8 +47,8 @@ pub struct TetReport {
     pub mesher: String,
     /// Shapes and sizes.
     pub quality: Quality,
-    /// How it fits the region.
-    pub fit: Fit,
+    /// How it fits the region, if it is of one.
+    pub fit: Option<Fit>,
 }
 
 impl Tets {
@@ -87,6 +87,12 @@ impl Tets {
             e.line = e.line.or_else(|| lines.line(&e.path));
             e
         })
+    }
+
+    /// The tetrahedral mesh in a file, of no region.
+    pub fn in_file(file: &TetFileSpec, loader: &dyn Loader) -> Result<Tets, DesignError> {
+        let (mesh, checked) = from_file(file, "", loader)?;
+        told(mesh, &checked, file.path.clone(), None, "", "")
     }
 
     /// The figures and the warnings as JSON.
@@ -153,20 +159,38 @@ pub(super) fn tets(
             }
         }
         TetsSpec::File(file) => {
-            let (mesh, checked) = from_file(file, place)?;
+            let (mesh, checked) = from_file(file, &place.path, place.loader)?;
             (mesh, None, checked, file.path.clone())
         }
     };
-    let Some(quality) = mesh.quality() else {
-        return Err(DesignError::new(&place.path, "the mesh has no tetrahedron"));
-    };
     let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
+    let todo = match spec {
+        TetsSpec::Made(_) => {
+            "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one"
+        }
+        TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
+    };
+    told(mesh, &checked, mesher, Some(fit), &place.path, todo)
+}
+
+/// The mesh with its figures, and warnings at `path`; `todo` against what is lost.
+fn told(
+    mesh: TetMesh,
+    checked: &Checked,
+    mesher: String,
+    fit: Option<Fit>,
+    path: &str,
+    todo: &str,
+) -> Result<Tets, DesignError> {
+    let Some(quality) = mesh.quality() else {
+        return Err(DesignError::new(path, "the mesh has no tetrahedron"));
+    };
     let report = TetReport {
         mesher,
         quality,
         fit,
     };
-    let warnings = warnings(&report, &checked, spec, place);
+    let warnings = warnings(&report, checked, path, todo);
     Ok(Tets {
         mesh,
         report,
@@ -201,11 +225,19 @@ fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Mesh, DesignE
     }
 }
 
-fn from_file(file: &TetFileSpec, place: &Place) -> Result<(TetMesh, Checked), DesignError> {
-    let at = format!("{}.path", place.path);
+fn from_file(
+    file: &TetFileSpec,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<(TetMesh, Checked), DesignError> {
+    let at = if path.is_empty() {
+        String::new()
+    } else {
+        format!("{path}.path")
+    };
     let wrong = |f: Fault| {
         if f.at == "split" {
-            return DesignError::fault(&place.path, f);
+            return DesignError::fault(path, f);
         }
         DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
     };
@@ -215,8 +247,7 @@ fn from_file(file: &TetFileSpec, place: &Place) -> Result<(TetMesh, Checked), De
         .map_or("", |(_, e)| e)
         .to_lowercase();
     let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
-        let bytes = place
-            .loader
+        let bytes = loader
             .load(&file.path)
             .map_err(|m| DesignError::new(&at, m).found(&file.path))?;
         let data = io::read_vtk(&bytes).map_err(wrong)?;
@@ -235,8 +266,7 @@ fn from_file(file: &TetFileSpec, place: &Place) -> Result<(TetMesh, Checked), De
             .map(|a| a.values.iter().map(|v| *v as u32).collect());
         (elements, zones.unwrap_or_default())
     } else {
-        place
-            .loader
+        loader
             .elements(&file.path)
             .map_err(|m| DesignError::new(&at, m).found(&file.path))?
     };
@@ -253,16 +283,16 @@ fn from_file(file: &TetFileSpec, place: &Place) -> Result<(TetMesh, Checked), De
 }
 
 /// What may not be meant.
-fn warnings(report: &TetReport, checked: &Checked, spec: &TetsSpec, place: &Place) -> Vec<Warning> {
+fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut say = |message: String| {
         out.push(Warning {
-            path: place.path.clone(),
+            path: path.to_string(),
             message,
         });
     };
     let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
-    let (q, fit) = (&report.quality, &report.fit);
+    let q = &report.quality;
     if checked.turned {
         say(
             "every tetrahedron was numbered the other way round (negative volume), and was turned"
@@ -289,6 +319,7 @@ fn warnings(report: &TetReport, checked: &Checked, spec: &TetsSpec, place: &Plac
             180.0 - SLIVER
         ));
     }
+    let Some(fit) = &report.fit else { return out };
     if fit.mended > 0.0 {
         say(format!(
             "{:.3} mm³ were left out where the boundary would have met itself: the region is thin there for tetrahedra of this \
@@ -297,12 +328,6 @@ fn warnings(report: &TetReport, checked: &Checked, spec: &TetsSpec, place: &Plac
         ));
     }
     if fit.lost > LOST {
-        let todo = match spec {
-            TetsSpec::Made(_) => {
-                "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one"
-            }
-            TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
-        };
         say(format!(
             "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
             100.0 * fit.lost,
