@@ -344,3 +344,130 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
     }
     out
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A unit cube of one hexahedron, or of six tetrahedra, the first as given.
+    struct Files;
+
+    const HEAD: &str = "# vtk DataFile Version 3.0\ncube\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n\
+                        0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\n";
+
+    impl Loader for Files {
+        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+            let tets = |first: &str| {
+                format!(
+                    "{HEAD}CELLS 6 30\n4 {first}\n4 0 3 2 7\n4 0 2 6 7\n4 0 6 4 7\n4 0 4 5 7\n4 0 5 1 7\n\
+                     CELL_TYPES 6\n10 10 10 10 10 10\nCELL_DATA 6\nSCALARS zone int 1\nLOOKUP_TABLE default\n1 1 1 2 2 2\n"
+                )
+            };
+            match path {
+                "hex.vtk" => {
+                    Ok(format!("{HEAD}CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n").into())
+                }
+                "tets.vtk" => Ok(tets("0 1 3 7").into()),
+                "turned.vtk" => Ok(tets("1 0 3 7").into()),
+                _ => Err(format!("{path} does not exist")),
+            }
+        }
+    }
+
+    fn made(table: &str) -> Result<Tets, DesignError> {
+        let text = format!(
+            "[region.box]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n[lattice.core]\ncell.tet.name = \"any\"\n\
+             [lattice.core.map.tets]\n{table}\n"
+        );
+        Tets::in_design(&Node::from_toml(&text).unwrap(), None, &Files)
+    }
+
+    #[test]
+    fn meshes_are_made_and_read() {
+        let it = made("size = 0.3").unwrap();
+        assert!((it.report.quality.volume - 1.0).abs() < 1e-12 && it.warnings.is_empty());
+        assert!(it.report.fit.unwrap().lost == 0.0);
+        let it = made("path = \"tets.vtk\"").unwrap();
+        assert_eq!(
+            (it.mesh.tets.len(), it.mesh.zones.as_slice()),
+            (6, &[1, 1, 1, 2, 2, 2][..])
+        );
+        let it = made("path = \"hex.vtk\"\nsplit = true").unwrap();
+        assert!((it.mesh.volume() - 1.0).abs() < 1e-12 && it.mesh.tets.len() == 12);
+        let it = made("path = \"tets.vtk\"\nunit = \"cm\"").unwrap();
+        assert!(
+            it.warnings
+                .iter()
+                .any(|w| w.message.contains("off the region")),
+            "{:?}",
+            it.warnings
+        );
+        let graded = "size = { linear = { along = [1, 0, 0], stops = [[0, 0.1], [1, 0.3]] } }";
+        assert!(made(graded).unwrap().report.quality.tets > 500);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place() {
+        let wrong = |table: &str, path: &str, line: Option<usize>, words: &str| {
+            let e = made(table).unwrap_err();
+            let below = format!("lattice.core.map.tets{path}");
+            assert_eq!((e.path.as_str(), e.line), (below.as_str(), line), "{e}");
+            assert!(e.message.contains(words), "{e}");
+        };
+        wrong("", "", Some(6), "\"size\" is missing");
+        wrong("size = -1", ".size", Some(7), "size is -1 mm");
+        wrong(
+            "size = 1\npath = \"tets.vtk\"",
+            ".path",
+            Some(8),
+            "found both",
+        );
+        wrong(
+            "size = 1\nsplit = true",
+            ".split",
+            Some(8),
+            "there is no path",
+        );
+        wrong(
+            "size = 1\nmesher = \"ftetwlid\"",
+            ".mesher",
+            Some(8),
+            "did you mean \"ftetwild\"?",
+        );
+        wrong(
+            "size = 1\nmesher = \"ftetwild\"",
+            ".mesher",
+            Some(8),
+            "not available here",
+        );
+        wrong("size = 1\nmesh = 3", ".mesh", Some(8), "did you mean");
+        wrong("size = 1e-4", ".size", Some(7), "use a greater one");
+        wrong(
+            "path = \"none.vtk\"",
+            ".path",
+            Some(7),
+            "none.vtk does not exist",
+        );
+        wrong("path = \"cube.inp\"", ".path", Some(7), "only vtu and vtk");
+        wrong(
+            "path = \"hex.vtk\"",
+            ".split",
+            None,
+            "1 hexahedron beside 0 tetrahedra; give split = true",
+        );
+        wrong(
+            "path = \"turned.vtk\"",
+            ".path",
+            Some(7),
+            "1 of 6 tetrahedra are inverted",
+        );
+        let none = "[region.sphere]\nradius = 1\n[lattice.core.map.affine]\nwavelength = 1";
+        let e = Tets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();
+        assert!(
+            e.message
+                .contains("no lattice of the design has a tetrahedral mesh"),
+            "{e}"
+        );
+    }
+}
