@@ -10,6 +10,7 @@ mod machine;
 mod mesh;
 mod run;
 mod solid;
+mod tets;
 
 /// Rotations and translations.
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
@@ -31,6 +32,8 @@ mod _core {
     use crate::mesh::Mesh;
     #[pymodule_export]
     use crate::solid::{Region, Solid, Voxels};
+    #[pymodule_export]
+    use crate::tets::TetMesh;
 
     #[pymodule_init]
     fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, map, region, sample, samples, skin, tiling};
+use super::{Built, Design, Loader, Tiled, Warning, level, map, region, sample, samples, skin, tiling};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -85,7 +85,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         );
         return Err(DesignError::new("region", message));
     }
-    let domain = tiling::domain(d, &space, loader)?;
+    let domain = tiling::domain(d, &space, loader, &mut notes.warnings)?;
     let space = domain.as_ref().map_or(space, |d| d.region.clone());
     let bounds = space.bounds();
     let (mut points, _) = sample::inside(&space, LOOKS);
@@ -127,11 +127,15 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let (tiling, explicit) = tiling::lattice(&domain, &place, &mut warnings)?;
         let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
         solid.tiling = explicit.then(|| tiling.clone());
-        let name = domain.name.to_string();
+        let tiled = Tiled {
+            name: domain.name.to_string(),
+            tiling,
+            mesh: domain.report,
+        };
         return Ok(Built {
             solid: filled.into_iter().fold(solid, Solid::with),
             lattices,
-            tilings: vec![(name, tiling)],
+            tilings: vec![tiled],
             skin: thinnest,
             warnings,
             repairs,

@@ -96,6 +96,18 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     })
 }
 
+/// The region in a design whose other keys are left alone.
+pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
+    let missing = "say where the part may be, such as [region.box] with size = [20, 20, 20]";
+    match entry(&At::root(node), "region")? {
+        Some(at) => region(&at),
+        None => Err(DesignError::new(
+            "region",
+            format!("\"region\" is missing: {missing}"),
+        )),
+    }
+}
+
 /// The region in a design, or in a tree that says nothing else.
 pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
     let at = At::root(node);
@@ -111,6 +123,34 @@ pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
     )?)
+}
+
+/// The entry of a table with other keys, which are left alone.
+fn entry<'a>(at: &At<'a>, key: &str) -> Read<Option<At<'a>>> {
+    let entries = at.entries(&format!("a table with {key}"))?;
+    Ok(entries.into_iter().find(|(k, _)| *k == key).map(|e| e.1))
+}
+
+/// The tetrahedral mesh in a design, whose other keys are left alone, and the path of its table; the name of its lattice if
+/// it is to be that of one.
+pub(super) fn tets_in(node: &Node, lattice: Option<&str>) -> Read<(String, TetsSpec)> {
+    let at = At::root(node);
+    let lattices = match entry(&at, "lattice")? {
+        Some(of) => of.entries("lattices by name, such as [lattice.core]")?,
+        None => Vec::new(),
+    };
+    for (name, at) in lattices {
+        if lattice.is_some_and(|wanted| wanted != name) {
+            continue;
+        }
+        if let Some(map) = entry(&at, "map")?
+            && let Some(tets) = entry(&map, "tets")?
+        {
+            return Ok((tets.path.clone(), map::tets(&tets)?));
+        }
+    }
+    let message = "no lattice of the design has a tetrahedral mesh; give one, such as [lattice.core.map.tets] with size = 5";
+    Err(DesignError::new("lattice", message))
 }
 
 fn three(at: &At) -> Read<[f64; 3]> {

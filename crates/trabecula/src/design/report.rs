@@ -2,12 +2,11 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Built, build::LOOKS, sample};
+use super::{Built, Tiled, build::LOOKS, sample};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
-use crate::tiling::Tiling;
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,8 +125,8 @@ pub(super) fn report(built: &Built) -> Json {
         }
         lattices.insert(name.clone(), entry);
     }
-    for (name, tiling) in &built.tilings {
-        lattices.insert(name.clone(), tiled(tiling));
+    for it in &built.tilings {
+        lattices.insert(it.name.clone(), tiled(it));
     }
     json!({
         "lattices": lattices,
@@ -141,7 +140,8 @@ pub(super) fn report(built: &Built) -> Json {
 }
 
 /// A lattice over a tetrahedral mesh.
-fn tiled(tiling: &Tiling) -> Json {
+fn tiled(it: &Tiled) -> Json {
+    let tiling = &it.tiling;
     let stencil = &tiling.cells[0].stencil;
     let part = tiling.part;
     let levels = tiling.levels();
@@ -163,6 +163,7 @@ fn tiled(tiling: &Tiling) -> Json {
         "connected_fraction": stencil.connected_fraction(part),
         "tets": {
             "count": tiling.map.len(),
+            "mesh": it.mesh,
             "edge": tiling.map.mean_edge(),
             "volume": volume,
             "solid_fraction": solid / volume,

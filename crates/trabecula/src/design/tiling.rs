@@ -7,16 +7,15 @@ use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::report::Varied;
+use super::tets::{self, TetReport};
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series};
 use crate::fault::number;
 use crate::grade::Grade;
-use crate::io;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region, Repair};
 use crate::symmetry::Group;
-use crate::tets::{TetMesh, background};
 use crate::tiling::{Amount, Level, Tiling};
 
 /// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
@@ -27,8 +26,10 @@ pub(super) struct Domain<'a> {
     pub name: &'a str,
     pub spec: &'a LatticeSpec,
     cell: &'a TetCellSpec,
-    tets: &'a TetsSpec,
+    joined: Joined,
     map: Arc<Tets>,
+    /// What is known of the mesh.
+    pub report: TetReport,
     /// The mesh's own boundary.
     pub region: Region,
 }
@@ -38,12 +39,13 @@ pub(super) fn domain<'a>(
     d: &'a Design,
     space: &Region,
     loader: &dyn Loader,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Option<Domain<'a>>, DesignError> {
     let found = d.lattice.iter().find_map(|(name, spec)| match &spec.map {
         MapSpec::Tets(t) => Some((name, spec, t)),
         _ => None,
     });
-    let Some((name, spec, tets)) = found else {
+    let Some((name, spec, spec_of_mesh)) = found else {
         return Ok(None);
     };
     let path = format!("lattice.{name}");
@@ -57,7 +59,11 @@ pub(super) fn domain<'a>(
         return Err(DesignError::new(format!("lattice.{other}"), message));
     }
     let path = format!("{path}.map.tets");
-    let overlap = finite(&format!("{path}.overlap"), tets.overlap)?;
+    let joined = match spec_of_mesh {
+        TetsSpec::Made(m) => m.joined,
+        TetsSpec::File(f) => f.joined,
+    };
+    let overlap = finite(&format!("{path}.overlap"), joined.overlap)?;
     if !(0.0..=OVERLAP).contains(&overlap) {
         let message = format!(
             "overlap is {}; it must be from 0 to {OVERLAP}",
@@ -65,62 +71,29 @@ pub(super) fn domain<'a>(
         );
         return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
     }
-    let mesh = mesh(tets, &path, space, loader)?;
-    let map = Tets::new(&mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
+    let (mut points, _) = sample::inside(space, LOOKS);
+    points.extend(sample::nodes(space));
+    let place = Place {
+        path: path.clone(),
+        region: space,
+        points: &points,
+        filled: &[],
+        loader,
+    };
+    let made = tets::tets(spec_of_mesh, &d.region, &place)?;
+    warnings.extend(made.warnings);
+    let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
     let region = MeshRegion::new(map.boundary(), Repair::Auto);
     let region = region.map_err(|f| DesignError::new(&path, format!("the boundary of the mesh: {}", f.message)))?;
     Ok(Some(Domain {
         name,
         spec,
         cell,
-        tets,
+        joined,
         map: Arc::new(map),
+        report: made.report,
         region: Arc::new(region),
     }))
-}
-
-/// The tetrahedral mesh: from a file, or made for the region.
-fn mesh(
-    spec: &TetsSpec,
-    path: &str,
-    space: &Region,
-    loader: &dyn Loader,
-) -> Result<TetMesh, DesignError> {
-    let (file, size) = match (&spec.path, &spec.size) {
-        (Some(file), None) => (file, None),
-        (None, Some(size)) => (&String::new(), Some(size)),
-        _ => {
-            let message = "give one of size, the edge of the tetrahedra in mm, and path, a tetrahedral mesh";
-            return Err(DesignError::new(path, message));
-        }
-    };
-    if let Some(size) = size {
-        let at = format!("{path}.size");
-        let points = sample::inside(space, LOOKS).0;
-        let place = Place {
-            path: path.to_string(),
-            region: space,
-            points: &points,
-            filled: &[],
-            loader,
-        };
-        let size = grade(size, &at, &place, Allowed::Positive("size"), false)?;
-        let made = background(&**space, &space.bounds(), &size, &points);
-        return Ok(made.map_err(|f| DesignError::fault(path, f))?.0);
-    }
-    let at = format!("{path}.path");
-    let bytes = loader.load(file).map_err(|m| DesignError::new(&at, m))?;
-    let data = io::read_vtk(&bytes).map_err(|f| DesignError::fault(&at, f))?;
-    let io::Shape::Mesh { points, tets, .. } = data.shape else {
-        return Err(DesignError::new(at, "the file holds a grid, not a mesh"));
-    };
-    let read = TetMesh {
-        nodes: points,
-        tets,
-        zones: Vec::new(),
-    };
-    let checked = read.checked().map_err(|f| DesignError::fault(&at, f))?;
-    Ok(checked.0)
 }
 
 /// The cell that a table describes.
@@ -215,8 +188,8 @@ pub(super) fn lattice(
     let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    let tets = domain.tets;
-    let explicit = tets.road == Road::Explicit && tets.overlap == 0.0 && place.filled.is_empty();
+    let joined = domain.joined;
+    let explicit = joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty();
     Ok((Arc::new(tiling), explicit))
 }
 

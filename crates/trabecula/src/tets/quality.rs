@@ -182,6 +182,19 @@ impl TetMesh {
         })
     }
 
+    /// The least dihedral angle (degrees) and the size (mm) of each tetrahedron.
+    pub fn shapes(&self) -> (Vec<f64>, Vec<f64>) {
+        let each = (0..self.tets.len()).into_par_iter().map(|i| {
+            let p = self.corners(i);
+            let most = dihedral_cosines(p).into_iter().fold(-1.0, f64::max);
+            (
+                most.clamp(-1.0, 1.0).acos().to_degrees(),
+                size_of(volume(p).abs()),
+            )
+        });
+        each.unzip()
+    }
+
     /// The middle of tetrahedron `i`: the mean of its corners.
     pub fn middle(&self, i: usize) -> Vec3 {
         scale(self.corners(i).into_iter().fold([0.0; 3], add), 0.25)

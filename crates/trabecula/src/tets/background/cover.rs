@@ -8,6 +8,13 @@ use super::stuff::values;
 use crate::field::Field;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 
+impl TetMesh {
+    /// How the mesh fits a region, by its signed distance and points in it.
+    pub fn fit(&self, region: &dyn Field, inside: &[Vec3]) -> Fit {
+        fit(self, region, inside, 0.0)
+    }
+}
+
 /// The fit of a mesh to a region, by points inside the region.
 pub(super) fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3], mended: f64) -> Fit {
     let boundary = mesh.boundary();
