@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
+    from .tets import TetMesh
     from .thickness import Thickness
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Lattice",
     "Mesh",
     "Solid",
+    "TetMesh",
     "Thickness",
     "Voxels",
     "__version__",
@@ -56,6 +58,7 @@ _HOMES = {
     "DesignWarning": "errors",
     "Mesh": "mesh",
     "Solid": "solid",
+    "TetMesh": "tets",
     "Thickness": "thickness",
     "Voxels": "solid",
     "spartan": "solid",

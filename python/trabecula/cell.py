@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
-from .given import plain
+from .given import plain, settings
 
-__all__ = ["file", "group", "names", "series", "term"]
+__all__ = ["file", "group", "names", "series", "term", "tet", "tet_names"]
 
 
 def names() -> list[str]:
@@ -60,6 +60,31 @@ def file(path: str, terms: int | None = None) -> dict:
     waves leave out: ``truncation`` in a solid's report.
     """
     return {"file": {"path": path} | ({} if terms is None else {"terms": terms})}
+
+
+def tet_names() -> list[str]:
+    """The names of the ready tetrahedral cells."""
+    from . import _core
+
+    return _core.tet_cells()
+
+
+def tet(
+    name: str | None = None,
+    *,
+    group: int | str | None = None,
+    terms: Iterable[dict] | None = None,
+    site: Sequence[float] | None = None,
+    dual: bool | None = None,
+    edge: float | None = None,
+) -> dict:
+    """A tetrahedral cell, for ``map.tets``: a ready one by its name, or your own.
+
+    Your own is what a regular tetrahedron of ``edge`` (in edges of the cubic cell) about ``site`` (turns) cuts out of the sum
+    of ``terms`` over ``group``, which must have full tetrahedral symmetry there; ``dual`` turns the tetrahedron upside down.
+    """
+    given = settings(name=name, group=group, site=site, dual=dual, edge=edge)
+    return {"tet": given | ({} if terms is None else {"terms": list(terms)})}
 
 
 def group(symbol: int | str) -> dict:

@@ -28,6 +28,9 @@ MESH_OUT = ("stl", "3mf", "ply", "obj")
 MESH_IN = (*MESH_OUT, "off")
 VOXELS_OUT = ("npy", "vti")
 SHOWN = ("angle", "spacing", "density")
+TETS_OUT = ("vtu", "msh", "inp", "med", "mesh")
+TETS_IN = (*TETS_OUT, "vtk", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
 
 
 class Parser(argparse.ArgumentParser):
@@ -219,6 +222,22 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
 
     p = command(
+        "tets",
+        "Make or check the tetrahedral mesh that carries a lattice; print its quality; write it.",
+        "FILE is a design with [lattice.NAME.map.tets], of which only the region and that table are read, or a file of\n"
+        "tetrahedra: vtu, vtk, or with the extra fe (pip install 'trabecula[fe]') msh, inp, med, mesh and others.\n\n"
+        "examples:\n  trabecula tets part.toml --json\n  trabecula tets part.toml -o part.vtu\n"
+        "  trabecula tets bracket.inp --unit m -o bracket.vtu",
+    )
+    p.add_argument("file", type=ending((*DESIGNS, *TETS_IN)), metavar="FILE", help="a design or a file of tetrahedra")
+    p.add_argument("-o", "--output", type=ending(TETS_OUT), metavar="OUT", help="the mesh to write (.vtu, .msh, .inp, .med, .mesh)")
+    p.add_argument("--lattice", metavar="NAME", help="the lattice whose mesh is meant (default: the first that has one)")
+    p.add_argument("--unit", choices=UNITS, help="the unit of a file's coordinates (default: mm)")
+    p.add_argument("--split", action="store_true", help="cut a file's hexahedra, wedges and pyramids into tetrahedra")
+    p.add_argument("--threads", type=count, metavar="N", help="threads (default: all); the result is the same")
+    p.add_argument("--json", action="store_true", help="print the figures as JSON on stdout")
+
+    p = command(
         "measure",
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
         "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
@@ -246,9 +265,10 @@ def parser() -> argparse.ArgumentParser:
         "cells",
         "List the named cells: formula, space group, range, fractions in one piece, source.",
         "In a formula s = sin 2πx and c = cos 2πx; s2x = sin 4πx. x, y, z are phases in turns.\n\n"
-        "examples:\n  trabecula cells\n  trabecula cells gyroid --json",
+        "examples:\n  trabecula cells\n  trabecula cells gyroid --json\n  trabecula cells --tet",
     )
     p.add_argument("name", nargs="?", metavar="NAME", help="one cell only, with all that is known of it")
+    p.add_argument("--tet", action="store_true", help="the ready tetrahedral cells instead, for maps over tetrahedra")
     p.add_argument("--json", action="store_true", help="print as JSON")
 
     p = command(

@@ -19,7 +19,7 @@ from .solid import Solid
 from .starter import STARTER
 from .words import Progress, figure, say, span
 
-__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "voxels"]
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "tets", "voxels"]
 
 DESIGNS = ("toml", "json")
 #: How far a solved map is from what was asked for: names on the scale of a picture.
@@ -60,8 +60,24 @@ def check(args) -> None:
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
         whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
         print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+        if it.get("tets"):
+            tell_tiling(it["tets"])
         if it.get("distortion"):
             tell_distortion(it["distortion"])
+
+
+def tell_tiling(t: dict) -> None:
+    """The mesh under a tetrahedral lattice, its walls and its creases."""
+    print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
+    ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
+    print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
+    if t["thickness"]:
+        w = t["thickness"]
+        print(f"  walls      {figure(w['mean'])} mm on average, 90 % between {figure(w['low'])} and {figure(w['high'])} mm")
+    if t["creases"]:
+        c = t["creases"]
+        smooth = " (before smoothing)" if t["overlap"] else ""
+        print(f"  creases    {c['mean']:.0f}° on average, {c['max']:.0f}° at most at the faces of tetrahedra{smooth}")
 
 
 def tell_distortion(d: dict) -> None:
@@ -292,6 +308,8 @@ def flaws(mesh: Mesh) -> str:
 
 def cells(args) -> None:
     """``trabecula cells``."""
+    if args.tet:
+        return tet_cells(args)
     listed = _core.cells()
     if args.name:
         known_cell(args.name, [c[0] for c in listed])
@@ -321,6 +339,77 @@ def cells(args) -> None:
             text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
             print(f"  {part:7} in one piece at fractions {text}")
         print(f"  source  {it['source']}")
+
+
+def tet_cells(args) -> None:
+    """``trabecula cells --tet``."""
+    names = _core.tet_cells()
+    if args.name:
+        known_cell(args.name, names)
+        names = [args.name]
+    facts = [json.loads(_core.tet_cell_facts(name)) for name in names]
+    if args.json:
+        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+    for it in facts:
+        terms = ", ".join(
+            f"{t['amplitude']:g} {t['component'].title()} ({' '.join(str(h) for h in t['hkl'])})" for t in it["terms"]
+        )
+        dual = ", dual" if it["dual"] else ""
+        print(f"{it['name']}  ({it['title']})")
+        print(f"  series  group {it['group']}: {terms}")
+        print(f"  tetrahedron of edge {it['edge']:.4f} cells about {it['site'][0]:g} {it['site'][1]:g} {it['site'][2]:g}{dual}")
+        print(f"  part    {it['part']} at fraction {it['fraction']:g} (iso {it['iso']:.4f})")
+        ports = "1 port" if it["ports"] == 1 else f"{it['ports']} ports"
+        print(f"  faces   {ports} on each, {100 * it['face_fraction']:.1f} % of it")
+        for part, whole in it["connected_fraction"].items():
+            text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
+            print(f"  {part:7} in one piece that reaches all faces at fractions {text}")
+
+
+def tets(args) -> None:
+    """``trabecula tets``."""
+    import numpy  # noqa: F401  wanted by all but vtu; see `interrupt` for why no import waits until then
+
+    from .tets import TetMesh
+
+    of_file = kind_of(args.file) not in DESIGNS
+    if of_file and args.lattice:
+        raise Refused("--lattice belongs to a design; a file of tetrahedra has none")
+    if not of_file and (args.unit or args.split):
+        raise Refused("--unit and --split belong to a file of tetrahedra; in a design they stand under map.tets")
+    if args.output:
+        check_place(args.output)
+        keep_file(args.file, args.output)
+    start = time.perf_counter()
+    made = TetMesh.read(args.file, args.unit, args.split) if of_file else TetMesh.of(args.file, args.lattice, args.threads)
+    report = made.report() | {"seconds": round(time.perf_counter() - start, 3)}
+    if args.output:
+        keep_file(os.path.join(os.path.dirname(os.path.abspath(args.file)), report["mesher"]), args.output)
+        made.write(args.output)
+    if args.json:
+        return print(json.dumps(report, indent=2))
+    tell_tets(report)
+    if args.output:
+        say(f"{args.output}: {report['quality']['tets']} tetrahedra, {report['seconds']:.2f} s")
+
+
+def tell_tets(report: dict) -> None:
+    """The figures of a tetrahedral mesh."""
+    q, fit = report["quality"], report["fit"]
+    extent = " × ".join(figure(b - a) for a, b in zip(*q["bounds"], strict=True))
+    size, angles, aspect = q["size"], q["dihedral"], q["aspect"]
+    print(f"tetrahedra  {q['tets']}, {q['nodes']} nodes, {counted(q['pieces'])}, by {report['mesher']}")
+    print(f"extent      {extent} mm, {figure(q['volume'])} mm³")
+    print(f"size        {figure(size['mean'])} mm on average, {figure(size['min'])} to {figure(size['max'])} mm")
+    print(
+        f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; 9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and "
+        f"{angles['max_p95']:.1f}°"
+    )
+    print(f"aspect      {aspect['mean']:.2f} on average, {aspect['max']:.2f} at most (1 is regular)")
+    print(f"slivers     {q['slivers']} below 10° or above 170°; {q['inverted']} inverted")
+    if fit:
+        print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {fit['deviation']:.2g} mm at most")
+        print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
 
 
 def render(args) -> None:
@@ -381,8 +470,13 @@ def keep_inputs(design: str, output: str) -> None:
     """Refuses an output that is the design, or a file that the design reads."""
     folder = os.path.dirname(os.path.abspath(design))
     for name in [design, *(os.path.join(folder, f) for f in read_by(design))]:
-        if os.path.exists(name) and os.path.exists(output) and os.path.samefile(name, output):
-            raise Refused(f"{output} is read by this design; name another output")
+        keep_file(name, output)
+
+
+def keep_file(name: str, output: str) -> None:
+    """Refuses an output that is this file, which is read."""
+    if os.path.exists(name) and os.path.exists(output) and os.path.samefile(name, output):
+        raise Refused(f"{output} is read by this design; name another output")
 
 
 def build(path: str, tell: bool = True) -> Solid:

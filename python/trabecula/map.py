@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "cylinder", "phase", "spartan", "sphere"]
+__all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "tets"]
 
 
 def affine(
@@ -98,3 +98,30 @@ def sphere(
 ) -> dict:
     """Shells of cells about a centre, ``around`` (even) of them round the equator and half as many from pole to pole."""
     return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
+
+
+def tets(
+    size: float | dict | None = None,
+    mesher: str | None = None,
+    limit: float | None = None,
+    *,
+    path: str | None = None,
+    unit: str | None = None,
+    split: bool | None = None,
+    overlap: float | None = None,
+    road: str | None = None,
+) -> dict:
+    """A cell in each tetrahedron of a mesh of the region, made or read.
+
+    Made: ``size`` is the edge (mm, a number or a grade) of a regular tetrahedron of the volume they are to have, ``mesher``
+    is "background" (ours, takes any region) or "ftetwild" (in the extra ``tets``, takes soups), ``limit`` the seconds that
+    the latter may take. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …), ``unit`` of its coordinates,
+    ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
+
+    ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
+    tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
+    """
+    given = settings(
+        size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road
+    )
+    return {"tets": given}

@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use trabecula::design::{self, Loader, Node, Value};
+use trabecula::io::Elements;
+use trabecula::mesh::Mesh;
+use trabecula::tets::TetMesh;
 
 use crate::error;
 use crate::run::run;
@@ -23,6 +26,20 @@ pub struct Folder(pub PathBuf);
 impl Loader for Folder {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
         crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
+    }
+
+    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+        crate::tets::elements(&self.0.join(Path::new(path)).to_string_lossy())
+    }
+
+    fn tetrahedra(
+        &self,
+        name: &str,
+        surface: &Mesh,
+        size: f64,
+        limit: f64,
+    ) -> Result<TetMesh, String> {
+        crate::tets::tetrahedra(name, surface, size, limit)
     }
 }
 

@@ -10,6 +10,7 @@ mod machine;
 mod mesh;
 mod run;
 mod solid;
+mod tets;
 
 /// Rotations and translations.
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
@@ -31,6 +32,8 @@ mod _core {
     use crate::mesh::Mesh;
     #[pymodule_export]
     use crate::solid::{Region, Solid, Voxels};
+    #[pymodule_export]
+    use crate::tets::TetMesh;
 
     #[pymodule_init]
     fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -137,6 +140,38 @@ mod _core {
                 parts.map(|(n, p)| (n, cell.connected_fraction(p))).to_vec(),
             )
         })
+    }
+
+    /// The ready tetrahedral cells.
+    #[pyfunction]
+    fn tet_cells() -> Vec<&'static str> {
+        let all = trabecula::cell::tet::ready_cells();
+        all.iter().map(|r| r.name).collect()
+    }
+
+    /// What a ready tetrahedral cell is, as JSON text: terms, place, part, fraction, ports, and for each part the fractions in
+    /// which it is one piece that reaches all faces.
+    #[pyfunction]
+    fn tet_cell_facts(py: Python<'_>, name: &str) -> PyResult<String> {
+        let ready = trabecula::cell::tet::ready(name).ok_or_else(|| {
+            pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}"))
+        })?;
+        let told = crate::run::run(py, None, None, |_| ready.facts())?;
+        told.map(|json| json.to_string())
+            .map_err(crate::error::fault)
+    }
+
+    /// The surface of a ready tetrahedral cell in the regular tetrahedron of edge 1 mm, in `steps` steps.
+    #[pyfunction]
+    fn tet_cell_mesh(py: Python<'_>, name: &str, steps: usize) -> PyResult<Mesh> {
+        let ready = trabecula::cell::tet::ready(name).ok_or_else(|| {
+            pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}"))
+        })?;
+        let made = crate::run::run(py, None, None, |p| {
+            trabecula::extract::stencil(ready, steps, p)
+        })?;
+        let surface = made.map_err(crate::error::stopped)?;
+        Ok(Mesh::new(surface, String::new()))
     }
 
     /// The levels (`to_iso`) of the solid fractions `values`, or the fractions of the levels, of a part of a cell.

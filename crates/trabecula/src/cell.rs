@@ -8,6 +8,7 @@ mod nearest;
 mod quantile;
 mod series;
 mod spline;
+pub mod tet;
 mod thickness;
 
 pub use connect::{Connectivity, connectivity};

@@ -18,8 +18,10 @@ mod sample;
 mod samples;
 mod schema;
 mod skin;
+mod tiling;
 #[cfg(test)]
 mod tests;
+mod tets;
 
 use std::sync::Arc;
 
@@ -28,14 +30,19 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
+use crate::io::Elements;
 use crate::lattice::Lattice;
+use crate::mesh::Mesh;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
+use crate::tets::TetMesh;
+use crate::tiling::Tiling;
 
 pub use data::*;
 pub use error::{DesignError, nearest};
 pub use node::{Lines, Node, Value};
 pub use schema::schema;
+pub use tets::{TetReport, Tets};
 
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -76,6 +83,25 @@ pub enum Units {
 pub trait Loader {
     /// The bytes of the file at `path`, or one sentence why not.
     fn load(&self, path: &str) -> Result<Vec<u8>, String>;
+
+    /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
+    /// each or for none; or one sentence why not.
+    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+        Err(format!("{path}: only vtu and vtk files are read here"))
+    }
+
+    /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this
+    /// time (s); or one sentence why not.
+    fn tetrahedra(
+        &self,
+        name: &str,
+        surface: &Mesh,
+        size: f64,
+        limit: f64,
+    ) -> Result<TetMesh, String> {
+        let _ = (surface, size, limit);
+        Err(format!("the mesher {name} is not available here"))
+    }
 }
 
 /// Something in a design that is allowed but may not be meant.
@@ -87,12 +113,24 @@ pub struct Warning {
     pub message: String,
 }
 
+/// A lattice over a tetrahedral mesh.
+pub struct Tiled {
+    /// Its name.
+    pub name: String,
+    /// The lattice.
+    pub tiling: Arc<Tiling>,
+    /// What is known of the mesh.
+    pub mesh: TetReport,
+}
+
 /// A built design.
 pub struct Built {
     /// The solid.
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The lattices over tetrahedral meshes, by name.
+    pub tilings: Vec<Tiled>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.

@@ -26,12 +26,13 @@ mod key;
 mod knot;
 mod sift;
 mod signs;
+mod tets;
 mod table;
 mod tile;
 
 use bodies::Bodies;
 use grid::Grid;
-use islands::{ByName, Census};
+use islands::{ByName, Census, Found};
 pub use islands::{Island, Islands, Pieces};
 pub use sift::Store;
 use tile::{Scratch, View};
@@ -105,6 +106,9 @@ pub struct Estimate {
 /// A spacing or region for which no grid can be made.
 pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
     const SAMPLES: usize = 24;
+    if let Some(tiling) = solid.explicit() {
+        return tets::estimate(tiling, edge);
+    }
     let grid = Grid::new(solid, edge)?;
     let total: usize = grid.tiles().iter().product();
     let sampled = total.min(SAMPLES);
@@ -305,6 +309,9 @@ pub fn surface_of(
     islands: Islands,
     progress: &dyn Progress,
 ) -> Result<(Surface, Pieces), Stopped> {
+    if let Some(tiling) = solid.explicit() {
+        return tets::surface(tiling, edge, islands, progress);
+    }
     let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
     let mut out = Surface::default();
@@ -406,6 +413,9 @@ pub fn stream_stl<W: Store>(
     out: &mut W,
     progress: &dyn Progress,
 ) -> Result<Summary, Stopped> {
+    if let Some(tiling) = solid.explicit() {
+        return tets::stream_stl(tiling, edge, islands, out, progress);
+    }
     let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
     let mut census = Census::default();
@@ -438,15 +448,26 @@ pub fn stream_stl<W: Store>(
     })?;
     not_empty(triangles, edge)?;
     let found = census.judge(islands).map_err(Stopped::Refused)?;
+    finish(found, triangles, sifts.then_some(&sifting), out)
+}
+
+/// Takes out of a stream of records what is not to stay, and writes its header.
+fn finish<W: Store>(
+    found: Found,
+    triangles: u64,
+    sifting: Option<&Sifting>,
+    out: &mut W,
+) -> Result<Summary, Stopped> {
+    let moved = |share: f64| sifting.is_none_or(|s| s.moved(share));
     if found.pieces.dropped > 0 {
         let runs = sift::runs(&found.parts);
-        let go_on = |record: u64| sifting.moved(record as f64 / triangles as f64);
+        let go_on = |record: u64| moved(record as f64 / triangles as f64);
         let (head, size) = (stl::HEADER as u64, stl::RECORD as u64);
         if !sift::sift(out, head, size, &runs, go_on).map_err(Stopped::Io)? {
             return Err(Stopped::Interrupted);
         }
     }
-    if sifts && !sifting.moved(1.0) {
+    if !moved(1.0) {
         return Err(Stopped::Interrupted);
     }
     let header = stl::header(found.sum.triangles as u32);
@@ -461,6 +482,18 @@ pub fn stream_stl<W: Store>(
         area_cut: found.sum.area[1],
         pieces: found.pieces,
     })
+}
+
+/// The surface of a ready tetrahedral cell at its own fraction, in a regular tetrahedron of edge 1 mm cut into `steps` steps.
+///
+/// # Errors
+/// Steps below 4 or above 64.
+pub fn stencil(
+    ready: &crate::cell::tet::Ready,
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Surface, Stopped> {
+    tets::stencil(ready, steps, progress)
 }
 
 /// Occupancy on a grid of cubic voxels.

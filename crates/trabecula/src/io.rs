@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::fault::Fault;
 use crate::mesh::Mesh;
 
+mod elements;
 mod join;
 mod npy;
 mod number;
@@ -18,10 +19,13 @@ mod text;
 mod threemf;
 mod vti;
 mod vtk;
+mod vtu;
 
+pub use elements::Elements;
 pub use npy::{read_npy, write_npy};
 pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
+pub use vtu::write_vtu;
 
 /// Extensions of the mesh formats that can be read.
 pub const READABLE: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];

@@ -24,3 +24,5 @@ pub mod simplify;
 pub mod skin;
 pub mod solid;
 pub mod symmetry;
+pub mod tets;
+pub mod tiling;

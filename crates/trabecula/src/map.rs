@@ -7,11 +7,13 @@ mod phase;
 mod poisson;
 mod round;
 mod spline;
+pub(crate) mod tets;
 
 pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;
+pub use tets::Tets;
 
 use std::sync::Arc;
 

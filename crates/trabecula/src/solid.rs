@@ -7,6 +7,7 @@ use crate::field::{Block, Field};
 use crate::flush;
 use crate::math::{Aabb, Interval, Vec3};
 use crate::region::Region;
+use crate::tiling::Tiling;
 
 /// What a design means: the part of the region in which the field is negative, or that is filled anyway.
 #[derive(Clone)]
@@ -19,6 +20,8 @@ pub struct Solid {
     pub filled: Vec<Body>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
+    /// The lattice over a tetrahedral mesh that all of this is, if its surface is to be made without a grid.
+    pub tiling: Option<Arc<Tiling>>,
 }
 
 impl Solid {
@@ -29,7 +32,13 @@ impl Solid {
             field,
             filled: Vec::new(),
             wavelength,
+            tiling: None,
         }
+    }
+
+    /// The lattice whose surface is made without a grid: the region being its mesh, and nothing else in it.
+    pub fn explicit(&self) -> Option<&Tiling> {
+        self.tiling.as_deref().filter(|_| self.filled.is_empty())
     }
 
     /// The same solid with one more body that is solid whatever the lattice says.

@@ -6,6 +6,7 @@
 
 mod hall;
 mod orbit;
+mod site;
 
 pub use orbit::Side;
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, map, region, sample, samples, skin};
+use super::{Built, Design, Loader, Tiled, Warning, level, map, region, sample, samples, skin, tiling};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -85,6 +85,9 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         );
         return Err(DesignError::new("region", message));
     }
+    let domain = tiling::domain(d, &space, loader, &mut notes.warnings)?;
+    let space = domain.as_ref().map_or(space, |d| d.region.clone());
+    let bounds = space.bounds();
     let (mut points, _) = sample::inside(&space, LOOKS);
     if points.is_empty() {
         let [x, y, z] = bounds.size().map(number);
@@ -113,6 +116,31 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         repairs,
     } = notes;
     let mut lattices = Vec::new();
+    if let Some(domain) = domain {
+        let place = Place {
+            path: format!("lattice.{}", domain.name),
+            region: &space,
+            points: &points,
+            filled: &filled,
+            loader,
+        };
+        let (tiling, explicit) = tiling::lattice(&domain, &place, &mut warnings)?;
+        let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
+        solid.tiling = explicit.then(|| tiling.clone());
+        let tiled = Tiled {
+            name: domain.name.to_string(),
+            tiling,
+            mesh: domain.report,
+        };
+        return Ok(Built {
+            solid: filled.into_iter().fold(solid, Solid::with),
+            lattices,
+            tilings: vec![tiled],
+            skin: thinnest,
+            warnings,
+            repairs,
+        });
+    }
     for (name, spec) in &d.lattice {
         let path = format!("lattice.{name}");
         let place = Place {
@@ -141,6 +169,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     Ok(Built {
         solid,
         lattices,
+        tilings: Vec::new(),
         skin: thinnest,
         warnings,
         repairs,
@@ -186,6 +215,10 @@ pub(super) fn cell<'a>(
         CellSpec::Kind(CellKind::File(f)) => {
             return Ok((None, samples::cell(f, &format!("{path}.file"), loader)?));
         }
+        CellSpec::Kind(CellKind::Tet(_)) => {
+            let message = "a tetrahedral cell goes with a map over a tetrahedral mesh ([lattice.NAME.map.tets])";
+            return Err(DesignError::new(format!("{path}.tet"), message));
+        }
         CellSpec::Kind(CellKind::Series(s)) => {
             let at = format!("{path}.series");
             for (i, t) in s.terms.iter().enumerate() {
@@ -226,7 +259,7 @@ fn plain_term(t: &TermSpec) -> Term {
 }
 
 /// The sum of a term over a space group. A phase mixes its two parts, each of them normalised.
-fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
+pub(super) fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
     let (s, c) = sin_cos_turns(t.phase);
     let (parts, word, other) = match t.component {
         Component::Re => ([(Side::Re, c), (Side::Im, -s)], "real", "im"),
@@ -252,7 +285,7 @@ fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
 }
 
 /// The key under which the amount stands.
-fn amount_key(spec: &LatticeSpec) -> &'static str {
+pub(super) fn amount_key(spec: &LatticeSpec) -> &'static str {
     match spec.level.amount {
         AmountSpec::Iso(_) => "iso",
         AmountSpec::Fraction(_) => "fraction",
@@ -310,7 +343,7 @@ fn check_solid(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(
 }
 
 /// What the ascending intervals `of` leave of [min, max].
-fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub(super) fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut left = Vec::new();
     let mut from = min;
     for &[lo, hi] in of {

@@ -236,6 +236,34 @@ pub enum CellKind {
     Series(SeriesSpec),
     /// Numbers or a mesh in a file: the largest waves of their Fourier transform.
     File(FileCellSpec),
+    /// A tetrahedral cell, for a map over a tetrahedral mesh.
+    Tet(TetCellSpec),
+}
+
+/// A tetrahedral cell: a ready one by its name, or what a regular tetrahedron cuts out of the series of a group.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TetCellSpec {
+    /// A ready cell; all else is then left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "schema::tet_cell_name")]
+    pub name: Option<String>,
+    /// A space group with a point of full tetrahedral symmetry: 215, 216, 217, 221, 224, 225, 227 or 229, named as for a series.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "schema::group")]
+    pub group: Option<String>,
+    /// The terms, each summed over the group.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<TermSpec>,
+    /// The tetrahedron's barycentre, in turns: a point of full tetrahedral symmetry; the group's first unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site: Option<[f64; 3]>,
+    /// The dual tetrahedron, turned upside down.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub dual: bool,
+    /// Edge of the tetrahedron, in edges of the cubic cell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edge: Option<f64>,
 }
 
 /// A cell from a file: numbers at the nodes of one period, without the repeated end, or a mesh of the solid in one cell.

@@ -27,6 +27,7 @@ pub(super) fn kind(spec: &MapSpec) -> &'static str {
         MapSpec::Phase(_) => "phase",
         MapSpec::Cylinder(_) => "cylinder",
         MapSpec::Sphere(_) => "sphere",
+        MapSpec::Tets(_) => "tets",
     }
 }
 
@@ -36,6 +37,11 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
         MapSpec::Affine(a) => (a.wavelength, a.rotate, a.offset),
         MapSpec::Spartan(s) => (s.wavelength, s.rotate, s.offset),
         MapSpec::Phase(p) => return phase(p, &path, place),
+        MapSpec::Tets(_) => {
+            let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
+                           face to face";
+            return Err(DesignError::new(path, message));
+        }
         MapSpec::Cylinder(c) => {
             let wavelength = match c.wavelength {
                 OneOrTwo::One(w) => [w; 2],

@@ -5,6 +5,7 @@ use super::data::*;
 use super::error::DesignError;
 use super::node::{At, Later, Node};
 use crate::cell::catalogue;
+use crate::cell::tet::ready_cells;
 use crate::fault::{self, counted};
 
 mod grade;
@@ -35,8 +36,7 @@ const LATER_TOP: [Later; 2] = [
     ),
     ("beams", "use a lattice"),
 ];
-const LATER_CELL: [Later; 3] = [
-    ("tet", "use a named cell or a series"),
+const LATER_CELL: [Later; 2] = [
     ("beams", "use a named cell or a series"),
     ("waves", "use a named cell or a series"),
 ];
@@ -96,6 +96,18 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     })
 }
 
+/// The region in a design whose other keys are left alone.
+pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
+    let missing = "say where the part may be, such as [region.box] with size = [20, 20, 20]";
+    match entry(&At::root(node), "region")? {
+        Some(at) => region(&at),
+        None => Err(DesignError::new(
+            "region",
+            format!("\"region\" is missing: {missing}"),
+        )),
+    }
+}
+
 /// The region in a design, or in a tree that says nothing else.
 pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
     let at = At::root(node);
@@ -111,6 +123,34 @@ pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
     )?)
+}
+
+/// The entry of a table with other keys, which are left alone.
+fn entry<'a>(at: &At<'a>, key: &str) -> Read<Option<At<'a>>> {
+    let entries = at.entries(&format!("a table with {key}"))?;
+    Ok(entries.into_iter().find(|(k, _)| *k == key).map(|e| e.1))
+}
+
+/// The tetrahedral mesh in a design, whose other keys are left alone, and the path of its table; the name of its lattice if
+/// it is to be that of one.
+pub(super) fn tets_in(node: &Node, lattice: Option<&str>) -> Read<(String, TetsSpec)> {
+    let at = At::root(node);
+    let lattices = match entry(&at, "lattice")? {
+        Some(of) => of.entries("lattices by name, such as [lattice.core]")?,
+        None => Vec::new(),
+    };
+    for (name, at) in lattices {
+        if lattice.is_some_and(|wanted| wanted != name) {
+            continue;
+        }
+        if let Some(map) = entry(&at, "map")?
+            && let Some(tets) = entry(&map, "tets")?
+        {
+            return Ok((tets.path.clone(), map::tets(&tets)?));
+        }
+    }
+    let message = "no lattice of the design has a tetrahedral mesh; give one, such as [lattice.core.map.tets] with size = 5";
+    Err(DesignError::new("lattice", message))
 }
 
 fn three(at: &At) -> Read<[f64; 3]> {
@@ -328,7 +368,7 @@ fn cell(at: &At) -> Read<CellSpec> {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
-    let (kind, at) = at.kind("cell", &["series", "file"], &LATER_CELL)?;
+    let (kind, at) = at.kind("cell", &["series", "file", "tet"], &LATER_CELL)?;
     if kind == "file" {
         let f = at.fields("a cell from a file", &["path", "terms"], &[])?;
         let path = f.need("path", "numbers (npy) or a mesh of one cell")?;
@@ -336,6 +376,9 @@ fn cell(at: &At) -> Read<CellSpec> {
             path: path.text("a path")?.to_string(),
             terms: f.read("terms", 200.0, At::number)?,
         })));
+    }
+    if kind == "tet" {
+        return Ok(CellSpec::Kind(CellKind::Tet(tet(&at)?)));
     }
     let f = at.fields("a series", &["terms", "group"], &[])?;
     let terms = f.need(
@@ -352,6 +395,34 @@ fn cell(at: &At) -> Read<CellSpec> {
         group,
         terms,
     })))
+}
+
+fn tet(at: &At) -> Read<TetCellSpec> {
+    let own = ["group", "terms", "site", "dual", "edge"];
+    let mut keys = vec!["name"];
+    keys.extend(own);
+    let f = at.fields("a tetrahedral cell", &keys, &[])?;
+    if let Some(name) = f.get("name") {
+        if let Some(other) = own.iter().find_map(|k| f.get(k)) {
+            let message = "a ready cell has its own group, terms, site and edge; give a name or these";
+            return Err(other.error(message));
+        }
+        let names: Vec<(&str, &str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
+        return Ok(TetCellSpec {
+            name: Some(name.word("tetrahedral cell", &names)?.to_string()),
+            ..TetCellSpec::default()
+        });
+    }
+    let terms = f.need("terms", "a list of { hkl = [h, k, l] }, or a ready cell's name")?;
+    let terms = terms.list("a list of terms")?;
+    Ok(TetCellSpec {
+        name: None,
+        group: Some(group(f.need("group", "a space group such as 221 or \"227:2\"")?)?),
+        terms: terms.iter().map(term).collect::<Read<Vec<_>>>()?,
+        site: f.read("site", None, |at| three(at).map(Some))?,
+        dual: f.read("dual", false, At::truth)?,
+        edge: Some(f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?.number()?),
+    })
 }
 
 /// A space group's symbol, which may be its number.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Built, build::LOOKS, sample};
+use super::{Built, Tiled, build::LOOKS, sample};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
@@ -107,7 +107,7 @@ pub(super) fn report(built: &Built) -> Json {
         let iso = Varied::of_iso(lattice, &points);
         let fraction = Varied::of_fraction(lattice, &points);
         let mut entry = json!({
-            "part": match lattice.part { Part::Sheet => "sheet", Part::Lower => "lower", Part::Upper => "upper" },
+            "part": word(lattice.part),
             "wavelength": lattice.map.wavelength(),
             // A wall of even thickness is not bounded by levels of f.
             "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
@@ -125,6 +125,9 @@ pub(super) fn report(built: &Built) -> Json {
         }
         lattices.insert(name.clone(), entry);
     }
+    for it in &built.tilings {
+        lattices.insert(it.name.clone(), tiled(it));
+    }
     json!({
         "lattices": lattices,
         "region": {
@@ -134,6 +137,51 @@ pub(super) fn report(built: &Built) -> Json {
         },
         "warnings": built.warnings,
     })
+}
+
+/// A lattice over a tetrahedral mesh.
+fn tiled(it: &Tiled) -> Json {
+    let tiling = &it.tiling;
+    let stencil = &tiling.cells[0].stencil;
+    let part = tiling.part;
+    let levels = tiling.levels();
+    let iso = Varied {
+        min: levels.lo,
+        max: levels.hi,
+    };
+    let share = iso.map(|t| stencil.fraction(part, t));
+    let (volume, solid) = tiling.volumes();
+    let spread = tiling.thickness();
+    json!({
+        "part": word(part),
+        "wavelength": tiling.wavelength(),
+        "iso": iso.json(),
+        "fraction": share.json(),
+        "porosity": share.map(|f| 1.0 - f).json(),
+        "thickness": spread.map(|s| json!([s.min, s.max])),
+        "folding": Json::Null,
+        "connected_fraction": stencil.connected_fraction(part),
+        "tets": {
+            "count": tiling.map.len(),
+            "mesh": it.mesh,
+            "edge": tiling.map.mean_edge(),
+            "volume": volume,
+            "solid_fraction": solid / volume,
+            "overlap": tiling.map.overlap(),
+            "thickness": spread.map(|s| json!({ "min": s.min, "low": s.low, "mean": s.mean, "high": s.high, "max": s.max })),
+            "ports": stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports,
+            "face_fraction": iso.map(|t| stencil.face_fraction(part, t)).json(),
+            "creases": tiling.creases().map(|c| json!({ "mean": c.mean, "max": c.max })),
+        },
+    })
+}
+
+fn word(part: Part) -> &'static str {
+    match part {
+        Part::Sheet => "sheet",
+        Part::Lower => "lower",
+        Part::Upper => "upper",
+    }
 }
 
 /// The thinnest wall or narrowest neck (mm), at five levels where the level varies; null where there is none.

@@ -428,7 +428,10 @@ fn components(
             .map(move |t| t[c])
     };
     let (points, tets, of) = match data.shape {
-        Shape::Mesh { points, tets, of } => (points, tets, of),
+        Shape::Mesh(elements) => {
+            let (tets, of) = elements.tets();
+            (elements.points, tets, of)
+        }
         Shape::Image {
             origin,
             step,

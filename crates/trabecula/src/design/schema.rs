@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::Design;
 use crate::cell::catalogue;
+use crate::cell::tet::ready_cells;
 
 /// The JSON Schema of a design (draft 2020-12).
 pub fn schema() -> Value {
@@ -16,6 +17,12 @@ pub fn schema() -> Value {
 /// A space group's number or symbol.
 pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "integer"] })
+}
+
+/// The names of the ready tetrahedral cells.
+pub(super) fn tet_cell_name(_: &mut SchemaGenerator) -> Schema {
+    let names: Vec<&str> = ready_cells().iter().map(|n| n.name).collect();
+    json_schema!({ "type": "string", "enum": names })
 }
 
 /// The names of the ready cells.

@@ -171,6 +171,16 @@ pub(super) struct Found {
 }
 
 impl Census {
+    /// Bodies that are joined already: those that are parts of one, and those of one piece of solid, by their lower roots.
+    pub fn joined(sums: Vec<Sum>, body: Vec<u32>, solid: Vec<u32>) -> Census {
+        Census {
+            sums,
+            body,
+            solid,
+            ..Census::default()
+        }
+    }
+
     /// Adds the bodies of the next tile.
     pub fn add(&mut self, tile: Bodies) -> Result<(), Fault> {
         let base = self.sums.len();

@@ -6,6 +6,7 @@ mod legacy;
 
 use std::io::Read;
 
+use super::elements::Elements;
 use super::text::shown;
 use super::threemf::xml::{Event, Scanner, attribute};
 use crate::fault::Fault;
@@ -37,14 +38,7 @@ pub enum Shape {
         nodes: [usize; 3],
     },
     /// Points and cells.
-    Mesh {
-        /// The points.
-        points: Vec<Vec3>,
-        /// Tetrahedra that the cells are cut into.
-        tets: Vec<[u32; 4]>,
-        /// The cell that each tetrahedron is of.
-        of: Vec<u32>,
-    },
+    Mesh(Elements),
 }
 
 /// What a file holds.
@@ -262,7 +256,12 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
                 types.len()
             )));
         }
-        mesh(&place, &connectivity, &offsets, &types)?
+        Shape::Mesh(Elements::of_numbers(
+            &place,
+            &connectivity,
+            &offsets,
+            &types,
+        )?)
     };
     check(&arrays, points, cells)?;
     Ok(Data { shape, arrays })
@@ -287,67 +286,6 @@ pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(),
         }
     }
     Ok(())
-}
-
-/// Points and cells as tetrahedra. Cells that are no volumes are left out; quadratic ones are taken by their corners.
-pub(super) fn mesh(
-    place: &[f64],
-    connectivity: &[f64],
-    offsets: &[f64],
-    types: &[f64],
-) -> Result<Shape, Fault> {
-    let points: Vec<Vec3> = place.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    if let Some(p) = points.iter().find(|p| p.iter().any(|c| !c.is_finite())) {
-        return Err(fault(format!(
-            "a point is at {p:?}; coordinates must be finite"
-        )));
-    }
-    let (mut tets, mut of) = (Vec::new(), Vec::new());
-    let mut from = 0;
-    for (cell, (end, kind)) in offsets.iter().zip(types).enumerate() {
-        let end = *end as usize;
-        let corners = connectivity
-            .get(from..end)
-            .ok_or_else(|| fault(format!("cell {cell} reaches beyond the connectivity")))?;
-        let cuts: &[[usize; 4]] = match *kind as u32 {
-            10 | 24 => &[[0, 1, 2, 3]],
-            11 => &[
-                [0, 1, 3, 7],
-                [0, 3, 2, 7],
-                [0, 2, 6, 7],
-                [0, 6, 4, 7],
-                [0, 4, 5, 7],
-                [0, 5, 1, 7],
-            ],
-            12 | 25 | 29 => &[
-                [0, 1, 2, 6],
-                [0, 2, 3, 6],
-                [0, 3, 7, 6],
-                [0, 7, 4, 6],
-                [0, 4, 5, 6],
-                [0, 5, 1, 6],
-            ],
-            13 | 26 => &[[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
-            14 | 27 => &[[0, 1, 2, 4], [0, 2, 3, 4]],
-            _ => &[],
-        };
-        for cut in cuts {
-            let mut tet = [0; 4];
-            for (t, c) in tet.iter_mut().zip(cut) {
-                let v = corners.get(*c).copied().unwrap_or(-1.0);
-                if !(v >= 0.0 && v < points.len() as f64) {
-                    return Err(fault(format!(
-                        "cell {cell} names a point that is not there"
-                    )));
-                }
-                *t = v as u32;
-            }
-            tets.push(tet);
-            of.push(cell as u32);
-        }
-        from = end;
-    }
-    Ok(Shape::Mesh { points, tets, of })
 }
 
 fn decode(r: &Raw, layout: &Layout) -> Result<Vec<f64>, Fault> {
@@ -505,9 +443,10 @@ mod tests {
     #[test]
     fn a_hexahedron_is_cut_into_its_whole_volume() {
         let data = read_vtk(HEX.as_bytes()).unwrap();
-        let Shape::Mesh { points, tets, of } = &data.shape else {
+        let Shape::Mesh(elements) = &data.shape else {
             panic!("mesh")
         };
+        let (points, (tets, of)) = (&elements.points, elements.tets());
         let volume: f64 = tets
             .iter()
             .map(|t| {

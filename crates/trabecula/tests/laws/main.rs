@@ -10,4 +10,5 @@ mod phase;
 mod simplify;
 mod skin;
 mod surface;
+mod tets;
 mod thickness;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FieldSpec, GradeSpec, OneOrThree, is_default};
+use super::{FieldSpec, GradeSpec, OneOrThree, Unit, is_default};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -19,6 +19,95 @@ pub enum MapSpec {
     Cylinder(CylinderMapSpec),
     /// Wrapped about a centre: cells along the radius, round the axis, from pole to pole.
     Sphere(SphereMapSpec),
+    /// Piecewise affine over a tetrahedral mesh of the region: a cell in each tetrahedron.
+    Tets(TetsSpec),
+}
+
+/// A tetrahedral mesh of the region: made, or from a file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum TetsSpec {
+    /// Made to a size.
+    Made(MadeTetsSpec),
+    /// From a file.
+    File(TetFileSpec),
+}
+
+/// A tetrahedral mesh that is made.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MadeTetsSpec {
+    /// Edge of a regular tetrahedron (mm) of the volume that tetrahedra are to have.
+    pub size: GradeSpec,
+    /// What makes it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub mesher: MesherSpec,
+    /// How long another mesher than the background one may take (s).
+    #[serde(default = "limit", skip_serializing_if = "is_limit")]
+    pub limit: f64,
+    /// How cells are joined.
+    #[serde(flatten)]
+    pub joined: Joined,
+}
+
+/// What makes a tetrahedral mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum MesherSpec {
+    /// A body-centred cubic lattice fitted to the region: nodes moved onto its surface, the rest cut. Takes any region.
+    #[default]
+    Background,
+    /// fTetWild (Hu et al. 2020), which takes soups of triangles; in the extra \"tets\" of the Python package.
+    FTetWild,
+}
+
+/// A tetrahedral mesh in a file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TetFileSpec {
+    /// Path of the file, relative to the design file: vtu, vtk; with the extra \"fe\" of the Python package also msh, inp, med,
+    /// mesh and others.
+    pub path: String,
+    /// Unit of the file's coordinates (mm unless given).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Whether hexahedra, wedges and pyramids are cut into tetrahedra that fit face to face; refused otherwise.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub split: bool,
+    /// How cells are joined.
+    #[serde(flatten)]
+    pub joined: Joined,
+}
+
+/// How the cells of tetrahedra are joined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Joined {
+    /// Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach beyond
+    /// themselves and are mixed with their neighbours, from 0 (creases) to 0.2.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub overlap: f64,
+    /// How the surface is made.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub road: Road,
+}
+
+/// How the surface of a tetrahedral lattice is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Road {
+    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones or overlap.
+    #[default]
+    Explicit,
+    /// On a grid over the part, like other lattices.
+    Implicit,
+}
+
+fn limit() -> f64 {
+    600.0
+}
+
+fn is_limit(v: &f64) -> bool {
+    *v == limit()
 }
 
 /// A rigid rotation of the scaled lattice.

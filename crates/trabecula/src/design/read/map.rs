@@ -2,10 +2,8 @@
 
 use super::{Read, grade, three};
 use crate::design::data::*;
-use crate::design::node::{At, Fields, Later};
+use crate::design::node::{At, Fields};
 use crate::fault::counted;
-
-const LATER: [Later; 1] = [("tets", "use affine or phase")];
 
 /// Ways to say how cells are turned, of which one is given.
 const TURNS: [&str; 7] = [
@@ -21,9 +19,12 @@ const TURNS: [&str; 7] = [
 pub(super) fn map(at: &At) -> Read<MapSpec> {
     let (kind, at) = at.kind(
         "map",
-        &["affine", "spartan", "phase", "cylinder", "sphere"],
-        &LATER,
+        &["affine", "spartan", "phase", "cylinder", "sphere", "tets"],
+        &[],
     )?;
+    if kind == "tets" {
+        return Ok(MapSpec::Tets(tets(&at)?));
+    }
     if kind == "phase" {
         return Ok(MapSpec::Phase(Box::new(phase(&at)?)));
     }
@@ -87,6 +88,56 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         rotate,
         offset,
         skew: f.read("skew", SkewSpec::default(), skew)?,
+    }))
+}
+
+/// What others call the meshers.
+const MESHERS: [(&str, &str); 3] = [
+    ("wildmeshing", "ftetwild"),
+    ("tetwild", "ftetwild"),
+    ("stuffing", "background"),
+];
+
+pub(super) fn tets(at: &At) -> Read<TetsSpec> {
+    let keys = ["size", "mesher", "limit", "path", "unit", "split", "overlap", "road"];
+    let f = at.fields("a map over tetrahedra", &keys, &[])?;
+    let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
+    let joined = Joined {
+        overlap: f.read("overlap", 0.0, At::number)?,
+        road: f.read("road", Road::Explicit, |at| at.word("road", &roads))?,
+    };
+    let found = |keys: &[&str]| keys.iter().find_map(|k| f.get(k));
+    let made = found(&["size", "mesher", "limit"]);
+    if let (Some(_), Some(path)) = (made, f.get("path")) {
+        return Err(path.error(
+            "a tetrahedral mesh is either made, with size, or read, from path; found both",
+        ));
+    }
+    if let Some(path) = f.get("path") {
+        return Ok(TetsSpec::File(TetFileSpec {
+            path: path.text("a path")?.to_string(),
+            unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
+            split: f.read("split", false, At::truth)?,
+            joined,
+        }));
+    }
+    if let Some(of_file) = found(&["unit", "split"]) {
+        return Err(of_file.error("this belongs to a mesh from a file, and there is no path"));
+    }
+    let meaning =
+        "the tetrahedra's edge in mm, a number or a grade (or give path, to a mesh of your own)";
+    let size = grade(f.need("size", meaning)?)?;
+    let meshers = [
+        ("background", MesherSpec::Background),
+        ("ftetwild", MesherSpec::FTetWild),
+    ];
+    Ok(TetsSpec::Made(MadeTetsSpec {
+        size,
+        mesher: f.read("mesher", MesherSpec::Background, |at| {
+            at.word_or("mesher", &meshers, &MESHERS)
+        })?,
+        limit: f.read("limit", 600.0, At::number)?,
+        joined,
     }))
 }
 

@@ -1,6 +1,6 @@
 //! The legacy format: a header of text, then text or big-endian numbers.
 
-use super::{Array, Data, Shape, check, fault, mesh, numbers};
+use super::{Array, Data, Elements, Shape, check, fault, numbers};
 use crate::fault::Fault;
 use crate::io::text::{parse, shown};
 
@@ -278,7 +278,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
                 )));
             }
             (
-                mesh(&place, &connectivity, &offsets, &types)?,
+                Shape::Mesh(Elements::of_numbers(
+                    &place,
+                    &connectivity,
+                    &offsets,
+                    &types,
+                )?),
                 place.len() / 3,
                 types.len(),
             )

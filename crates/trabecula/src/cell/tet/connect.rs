@@ -1,0 +1,168 @@
+//! In how many pieces a tetrahedral cell and its traces are, level by level.
+//!
+//! On a small simplex f is linear and the solid convex: it hangs together. So pieces are those of a graph of small
+//! tetrahedra, joined where they have solid on a common small triangle, and a simplex joins in at the least "depth" that f
+//! has in it. All levels are swept through at once, deepest first.
+
+use super::nodes::{Grid, Nodes};
+use super::{Count, Part, Stencil};
+
+/// Steps along the edge of the tetrahedron.
+const STEPS: usize = 48;
+
+/// How the number of pieces changes with the depth: lower f, upper −f, sheet |f|; solid is what lies below it.
+pub(super) struct Pieces {
+    upper: bool,
+    /// From this depth on there are so many pieces, ascending.
+    solid: Vec<(f64, usize)>,
+    trace: Vec<(f64, usize)>,
+    whole: Vec<[f64; 2]>,
+}
+
+/// The least depth on a simplex.
+fn least(part: Part, values: &[f64]) -> f64 {
+    let (lo, hi) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        });
+    match part {
+        Part::Lower => lo,
+        Part::Upper => -hi,
+        Part::Sheet => lo.max(-hi).max(0.0),
+    }
+}
+
+/// A graph whose nodes and links appear at a depth.
+#[derive(Default)]
+struct Sweep {
+    nodes: Vec<f64>,
+    links: Vec<(f64, u32, u32)>,
+}
+
+impl Sweep {
+    /// From which depth on there are how many pieces.
+    fn counts(mut self, slack: f64) -> Vec<(f64, usize)> {
+        let mut births = self.nodes.clone();
+        births.sort_unstable_by(f64::total_cmp);
+        self.links.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
+        fn find(root: &mut [u32], mut i: u32) -> u32 {
+            while root[i as usize] != i {
+                root[i as usize] = root[root[i as usize] as usize];
+                i = root[i as usize];
+            }
+            i
+        }
+        let mut out: Vec<(f64, usize)> = Vec::new();
+        let (mut born, mut joined, mut links) = (0, 0, self.links.iter().peekable());
+        loop {
+            let next = births.get(born).copied().unwrap_or(f64::INFINITY);
+            let next = links.peek().map_or(next, |l| next.min(l.0));
+            if next == f64::INFINITY {
+                return out;
+            }
+            // Equal depths at equivalent places differ in the last digits.
+            while births.get(born).is_some_and(|d| *d <= next + slack) {
+                born += 1;
+            }
+            while let Some((_, a, b)) = links.next_if(|l| l.0 <= next + slack) {
+                let (a, b) = (find(&mut root, *a), find(&mut root, *b));
+                if a != b {
+                    root[a.max(b) as usize] = a.min(b);
+                    joined += 1;
+                }
+            }
+            if out.last().is_none_or(|o| o.1 != born - joined) {
+                out.push((next, born - joined));
+            }
+        }
+    }
+}
+
+/// The number at a depth: solid is strictly below it.
+fn at(counts: &[(f64, usize)], depth: f64) -> usize {
+    let i = counts.partition_point(|c| c.0 < depth);
+    if i == 0 { 0 } else { counts[i - 1].1 }
+}
+
+impl Pieces {
+    pub fn new(stencil: &Stencil, part: Part) -> Pieces {
+        let nodes = Nodes::new(stencil, Grid { n: STEPS });
+        let v = |i: usize| nodes.values[i];
+        let mut solid = Sweep::default();
+        let mut open = std::collections::HashMap::new();
+        nodes.grid.each_tet(|p, _| {
+            let corners = p.map(|[i, j, k]| Grid::index(i, j, k));
+            let tet = solid.nodes.len() as u32;
+            solid.nodes.push(least(part, &corners.map(v)));
+            for without in 0..4 {
+                let mut of = [0; 3];
+                let others = (0..4).filter(|i| *i != without).map(|i| corners[i]);
+                of.iter_mut().zip(others).for_each(|(o, c)| *o = c);
+                of.sort_unstable();
+                if let Some(other) = open.remove(&of) {
+                    solid.links.push((least(part, &of.map(v)), other, tet));
+                } else {
+                    open.insert(of, tet);
+                }
+            }
+        });
+        // The face k = 0: nodes (a, b) are (a, b, 0).
+        let mut trace = Sweep::default();
+        let mut open = std::collections::HashMap::new();
+        nodes.grid.each_triangle(|p, _| {
+            let corners = p.map(|[a, b]| Grid::index(a, b, 0));
+            let triangle = trace.nodes.len() as u32;
+            trace.nodes.push(least(part, &corners.map(v)));
+            for (a, b) in [(0, 1), (1, 2), (0, 2)] {
+                let of = [corners[a], corners[b]];
+                if let Some(other) = open.remove(&of) {
+                    trace.links.push((least(part, &of.map(v)), other, triangle));
+                } else {
+                    open.insert(of, triangle);
+                }
+            }
+        });
+        let reach = trace.nodes.iter().copied().fold(f64::INFINITY, f64::min);
+        let slack = 1e-10 * stencil.series().amplitude();
+        let (solid, trace) = (solid.counts(slack), trace.counts(slack));
+        let most = nodes
+            .values
+            .iter()
+            .map(|v| match part {
+                Part::Lower => *v,
+                Part::Upper => -v,
+                Part::Sheet => v.abs(),
+            })
+            .fold(f64::NEG_INFINITY, f64::max);
+        let upper = part == Part::Upper;
+        let level = |d: f64| if upper { -d } else { d };
+        let mut whole = Vec::new();
+        for (i, (from, n)) in solid.iter().enumerate() {
+            let to = solid.get(i + 1).map_or(most, |s| s.0);
+            let from = from.max(reach);
+            if *n == 1 && from < to {
+                whole.push([level(from), level(to)]);
+            }
+        }
+        Pieces {
+            upper,
+            solid,
+            trace,
+            whole,
+        }
+    }
+
+    pub fn whole(&self) -> &[[f64; 2]] {
+        &self.whole
+    }
+
+    pub fn count(&self, iso: f64) -> Count {
+        let depth = if self.upper { -iso } else { iso };
+        Count {
+            pieces: at(&self.solid, depth),
+            ports: at(&self.trace, depth),
+        }
+    }
+}

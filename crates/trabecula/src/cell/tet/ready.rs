@@ -1,0 +1,374 @@
+//! The ready tetrahedral cells: networks and sheets over all eight groups that have a site of tetrahedral symmetry.
+//!
+//! Found by a sweep over groups, waves, sites, edges and duals; kept are those that are one piece over a wide range of
+//! fractions and meet the faces in clean ports. All figures are computed from the series.
+
+use std::f64::consts::TAU;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::super::{Part, Series, Term};
+use super::Stencil;
+use crate::fault::Fault;
+use crate::math::scale;
+use crate::symmetry::{Group, Side};
+
+use Side::{Im, Re};
+
+/// A ready tetrahedral cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Ready {
+    /// Name in designs.
+    pub name: &'static str,
+    /// What it looks like.
+    pub title: &'static str,
+    /// Space group, with the origin choice.
+    pub group: &'static str,
+    /// Waves: (h, k, l), part of the sum over the group, amplitude.
+    pub terms: &'static [([i32; 3], Side, f64)],
+    /// The barycentre, turns, the same along all axes.
+    pub site: f64,
+    /// Edge of the tetrahedron over √2, in cells.
+    pub edge_over_root: f64,
+    /// Equation 11 instead of 10.
+    pub dual: bool,
+    /// The part that it is made for.
+    pub part: Part,
+    /// A solid fraction at which that part is one piece.
+    pub fraction: f64,
+}
+
+static READY: [Ready; 20] = [
+    Ready {
+        name: "primitive",
+        title: "node with four arms, of the P surface",
+        group: "221",
+        terms: &[([1, 0, 0], Re, 1.0)],
+        site: 0.5,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.48,
+    },
+    Ready {
+        name: "primitive_sheet",
+        title: "the P surface's walls: a window to each face",
+        group: "221",
+        terms: &[([1, 0, 0], Re, 1.0)],
+        site: 0.5,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.44,
+    },
+    Ready {
+        name: "neovius_sheet",
+        title: "the Neovius surface's walls",
+        group: "221",
+        terms: &[([1, 0, 0], Re, 3.0), ([1, 1, 1], Re, 4.0)],
+        site: 0.5,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "diamond",
+        title: "node with four arms, of the D surface",
+        group: "227:2",
+        terms: &[([1, 1, 1], Re, 1.0)],
+        site: 0.125,
+        edge_over_root: 0.75,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "diamond_sheet",
+        title: "the D surface's walls",
+        group: "227:2",
+        terms: &[([1, 1, 1], Re, 1.0)],
+        site: 0.125,
+        edge_over_root: 0.75,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.22,
+    },
+    Ready {
+        name: "diamond_triple",
+        title: "node with three arms to each face",
+        group: "227:2",
+        terms: &[([1, 1, 1], Re, 1.0)],
+        site: 0.125,
+        edge_over_root: 1.0,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "diamond_cage",
+        title: "cage with three ports on each face",
+        group: "227:2",
+        terms: &[([1, 1, 1], Re, 1.0)],
+        site: 0.125,
+        edge_over_root: 0.75,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.44,
+    },
+    Ready {
+        name: "iwp",
+        title: "struts to the middles and corners of the faces",
+        group: "229",
+        terms: &[([1, 1, 0], Re, -1.0), ([2, 0, 0], Re, 1.0)],
+        site: 0.0,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.33,
+    },
+    Ready {
+        name: "i43m",
+        title: "node with four arms",
+        group: "217",
+        terms: &[([1, 1, 0], Re, -1.0), ([2, 1, 1], Im, 0.5)],
+        site: 0.0,
+        edge_over_root: 0.5,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.29,
+    },
+    Ready {
+        name: "i43m_sheet",
+        title: "walls",
+        group: "217",
+        terms: &[([2, 1, 1], Im, 1.0)],
+        site: 0.0,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "p43m",
+        title: "node with four arms",
+        group: "215",
+        terms: &[([1, 0, 0], Re, 1.0), ([1, 1, 1], Im, 1.0)],
+        site: 0.5,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.22,
+    },
+    Ready {
+        name: "p43m_sheet",
+        title: "walls",
+        group: "215",
+        terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Im, 1.0)],
+        site: 0.0,
+        edge_over_root: 1.0,
+        dual: true,
+        part: Part::Sheet,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "f43m",
+        title: "node with four arms",
+        group: "216",
+        terms: &[([1, 1, 1], Re, 1.0), ([1, 1, 1], Im, 0.5)],
+        site: 0.25,
+        edge_over_root: 0.75,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.2,
+    },
+    Ready {
+        name: "f43m_sheet",
+        title: "walls",
+        group: "216",
+        terms: &[([1, 1, 1], Re, 1.0), ([1, 1, 1], Im, -0.5)],
+        site: 0.25,
+        edge_over_root: 0.75,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "pn3m",
+        title: "struts to three points of each face",
+        group: "224:2",
+        terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Re, 1.0)],
+        site: 0.25,
+        edge_over_root: 1.0,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.3,
+    },
+    Ready {
+        name: "pn3m_dual",
+        title: "node with four arms",
+        group: "224:2",
+        terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Re, 1.0)],
+        site: 0.25,
+        edge_over_root: 0.5,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.34,
+    },
+    Ready {
+        name: "pn3m_sheet",
+        title: "walls",
+        group: "224:2",
+        terms: &[([1, 1, 0], Re, 1.0)],
+        site: 0.25,
+        edge_over_root: 0.75,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.25,
+    },
+    Ready {
+        name: "frd",
+        title: "node with four arms, of the F-RD surface",
+        group: "225",
+        terms: &[([1, 1, 1], Re, 4.0), ([2, 2, 0], Re, -1.0)],
+        site: 0.25,
+        edge_over_root: 0.5,
+        dual: true,
+        part: Part::Lower,
+        fraction: 0.22,
+    },
+    Ready {
+        name: "fm3m",
+        title: "frame along the edges",
+        group: "225",
+        terms: &[([1, 1, 1], Re, -4.0), ([2, 2, 0], Re, 1.0)],
+        site: 0.25,
+        edge_over_root: 0.5,
+        dual: false,
+        part: Part::Lower,
+        fraction: 0.17,
+    },
+    Ready {
+        name: "fm3m_sheet",
+        title: "three planes through the middle",
+        group: "225",
+        terms: &[([1, 1, 1], Re, 1.0)],
+        site: 0.25,
+        edge_over_root: 0.5,
+        dual: false,
+        part: Part::Sheet,
+        fraction: 0.3,
+    },
+];
+
+/// All ready cells.
+pub fn ready_cells() -> &'static [Ready] {
+    &READY
+}
+
+/// The ready cell of this name.
+pub fn ready(name: &str) -> Option<&'static Ready> {
+    READY.iter().find(|r| r.name == name)
+}
+
+/// The sum of waves over a group, each divided by its largest Fourier coefficient before its amplitude is applied.
+///
+/// # Errors
+/// As [`Group::orbit`] and [`Series::new`].
+pub(crate) fn series(group: &Group, terms: &[([i32; 3], Side, f64)]) -> Result<Series, Fault> {
+    let mut all = Vec::new();
+    for (hkl, side, amplitude) in terms {
+        let waves = group.orbit(*hkl, *side)?;
+        all.extend(waves.into_iter().map(|(hkl, cosine, sine)| Term {
+            hkl,
+            amplitude: amplitude * cosine.hypot(sine),
+            phase: (-sine).atan2(cosine) / TAU,
+        }));
+    }
+    Series::new(all)
+}
+
+impl Ready {
+    /// What it is and what is known of it, computed from the series.
+    ///
+    /// # Errors
+    /// None for those that are listed.
+    pub fn facts(&self) -> Result<Json, Fault> {
+        let stencil = self.stencil()?;
+        let terms = self.terms.iter().map(|(hkl, side, amplitude)| {
+            let part = match side {
+                Re => "re",
+                Im => "im",
+            };
+            json!({ "hkl": hkl, "component": part, "amplitude": amplitude })
+        });
+        let parts = [
+            ("sheet", Part::Sheet),
+            ("lower", Part::Lower),
+            ("upper", Part::Upper),
+        ];
+        let word = parts.iter().find(|p| p.1 == self.part).map_or("", |p| p.0);
+        let whole: Map<String, Json> = parts
+            .iter()
+            .map(|(word, part)| (word.to_string(), json!(stencil.connected_fraction(*part))))
+            .collect();
+        let iso = stencil.iso(self.part, self.fraction);
+        let range = stencil.range();
+        Ok(json!({
+            "name": self.name,
+            "title": self.title,
+            "group": self.group,
+            "terms": terms.collect::<Vec<Json>>(),
+            "site": [self.site, self.site, self.site],
+            "edge": self.edge(),
+            "dual": self.dual,
+            "part": word,
+            "fraction": self.fraction,
+            "iso": iso,
+            "ports": stencil.count(self.part, iso).ports,
+            "face_fraction": stencil.face_fraction(self.part, iso),
+            "range": [range.lo, range.hi],
+            "connected_fraction": whole,
+        }))
+    }
+
+    /// The edge of the tetrahedron, in edges of the cubic cell.
+    pub fn edge(&self) -> f64 {
+        self.edge_over_root * 2f64.sqrt()
+    }
+
+    /// The cell.
+    ///
+    /// # Errors
+    /// None for those that are listed.
+    pub fn stencil(&self) -> Result<Stencil, Fault> {
+        let group = Group::named(self.group)?;
+        let site = scale([1.0; 3], self.site);
+        Stencil::new(series(&group, self.terms)?, site, self.edge(), self.dual)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ready_cells_are_of_all_eight_groups_and_hold() {
+        let mut groups = std::collections::BTreeSet::new();
+        let mut kinds = [0; 2];
+        for r in ready_cells() {
+            let s = r.stencil().expect(r.name);
+            let whole = s.connected_fraction(r.part);
+            let holds = |i: &[f64; 2]| i[0] + 0.02 < r.fraction && r.fraction < i[1] - 0.02;
+            assert!(whole.iter().any(holds), "{}: {whole:?}", r.name);
+            let count = s.count(r.part, s.iso(r.part, r.fraction));
+            assert!(count.pieces == 1 && count.ports > 0, "{}: {count:?}", r.name);
+            groups.insert(Group::named(r.group).expect(r.name).number);
+            kinds[usize::from(r.part == Part::Sheet)] += 1;
+            assert_eq!(ready_cells().iter().filter(|o| o.name == r.name).count(), 1);
+        }
+        let eight = [215, 216, 217, 221, 224, 225, 227, 229];
+        assert!(groups.into_iter().flatten().eq(eight));
+        assert!(kinds[0] >= 7 && kinds[1] >= 7);
+    }
+}

@@ -1,0 +1,473 @@
+//! Tetrahedral meshes: made or read, checked, and judged before anything is made of them.
+
+use serde::Serialize;
+use serde_json::Value as Json;
+
+use super::build::{LOOKS, Place};
+use super::data::*;
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::{Loader, Node, Warning, read, region, sample};
+use crate::extract::{self, Silent, Stopped};
+use crate::fault::{Fault, counted, number};
+use crate::io::{self, Elements, Shape};
+use crate::math::{Vec3, scale};
+use crate::mesh::Mesh;
+use crate::solid::Solid;
+use crate::tets::{Checked, Fit, Quality, SLIVER, TetMesh, background};
+
+/// The share of the region that a mesh may leave out before it is warned of: curved faces are cut short by flat ones.
+const LOST: f64 = 0.02;
+/// Names under which programs write the zones of cells.
+const ZONES: [&str; 7] = [
+    "zone",
+    "gmsh:physical",
+    "medit:ref",
+    "cell_tags",
+    "MaterialIds",
+    "material",
+    "zones",
+];
+
+/// A tetrahedral mesh of a region, and what is to be told of it.
+#[derive(Clone, Debug)]
+pub struct Tets {
+    /// The mesh, checked.
+    pub mesh: TetMesh,
+    /// Its figures.
+    pub report: TetReport,
+    /// What may not be meant.
+    pub warnings: Vec<Warning>,
+}
+
+/// The figures of a tetrahedral mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct TetReport {
+    /// What made it: background, ftetwild, or the file's name.
+    pub mesher: String,
+    /// Shapes and sizes.
+    pub quality: Quality,
+    /// How it fits the region, if it is of one.
+    pub fit: Option<Fit>,
+}
+
+impl Tets {
+    /// The tetrahedral mesh of a lattice (by name, or the first that has one) in a design; its other keys are left alone.
+    pub fn in_design(
+        node: &Node,
+        lattice: Option<&str>,
+        loader: &dyn Loader,
+    ) -> Result<Tets, DesignError> {
+        let lines = node.lines();
+        let make = || {
+            let (path, spec) = read::tets_in(node, lattice)?;
+            let region_spec = read::region_of(node)?;
+            let mut notes = region::Notes::default();
+            let space = region::region(&region_spec, "region", loader, &mut notes)?;
+            let (mut points, _) = sample::inside(&space, LOOKS);
+            if points.is_empty() {
+                return Err(DesignError::new(
+                    "region",
+                    "the region is empty, or has no end",
+                ));
+            }
+            points.extend(sample::nodes(&space));
+            let place = Place {
+                path,
+                region: &space,
+                points: &points,
+                filled: &[],
+                loader,
+            };
+            let mut made = tets(&spec, &region_spec, &place)?;
+            made.warnings.splice(0..0, notes.warnings);
+            Ok(made)
+        };
+        make().map_err(|mut e: DesignError| {
+            e.line = e.line.or_else(|| lines.line(&e.path));
+            e
+        })
+    }
+
+    /// The tetrahedral mesh in a file, of no region.
+    pub fn in_file(file: &TetFileSpec, loader: &dyn Loader) -> Result<Tets, DesignError> {
+        let (mesh, checked) = from_file(file, "", loader)?;
+        told(mesh, &checked, file.path.clone(), None, "", "")
+    }
+
+    /// The figures and the warnings as JSON.
+    pub fn to_json(&self) -> Json {
+        let mut out = serde_json::to_value(&self.report).unwrap_or(Json::Null);
+        out["warnings"] = serde_json::to_value(&self.warnings).unwrap_or(Json::Null);
+        out
+    }
+}
+
+/// The tetrahedral mesh that `spec` asks for; `place.path` is that of its table.
+pub(super) fn tets(
+    spec: &TetsSpec,
+    space: &RegionSpec,
+    place: &Place,
+) -> Result<Tets, DesignError> {
+    let wrong = |f: Fault| DesignError::fault(&place.path, f);
+    // Points that lie on the surface tell nothing of what is lost.
+    let inside: Vec<Vec3> = {
+        let mut values = vec![0.0; place.points.len()];
+        place.region.values(place.points, &mut values);
+        let deep = place.points.iter().zip(&values).filter(|(_, v)| **v < 0.0);
+        deep.map(|(p, _)| *p).collect()
+    };
+    let bounds = place.region.bounds();
+    let (mesh, fit, checked, mesher) = match spec {
+        TetsSpec::Made(made) => {
+            let below = |key: &str| format!("{}.{key}", place.path);
+            let size = grade(
+                &made.size,
+                &below("size"),
+                place,
+                Allowed::Positive("size"),
+                false,
+            )?;
+            if made.mesher == MesherSpec::Background {
+                let (mesh, fit) =
+                    background(&**place.region, &bounds, &size, &inside).map_err(wrong)?;
+                (
+                    mesh,
+                    Some(fit),
+                    Checked::default(),
+                    "background".to_string(),
+                )
+            } else {
+                let Some(size) = size.constant() else {
+                    let message = "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
+                    return Err(DesignError::new(below("size"), message));
+                };
+                if !(made.limit > 0.0 && made.limit.is_finite()) {
+                    let message = format!(
+                        "limit is {} s; it must be a finite number greater than 0",
+                        number(made.limit)
+                    );
+                    return Err(DesignError::new(below("limit"), message));
+                }
+                let surface = surface(space, place, size)?;
+                let mesh = place
+                    .loader
+                    .tetrahedra("ftetwild", &surface, size, made.limit)
+                    .map_err(|m| DesignError::new(below("mesher"), m).found("ftetwild"))?;
+                let (mesh, checked) = mesh.checked().map_err(wrong)?;
+                (mesh, None, checked, "ftetwild".to_string())
+            }
+        }
+        TetsSpec::File(file) => {
+            let (mesh, checked) = from_file(file, &place.path, place.loader)?;
+            (mesh, None, checked, file.path.clone())
+        }
+    };
+    let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
+    let todo = match spec {
+        TetsSpec::Made(_) => {
+            "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one"
+        }
+        TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
+    };
+    told(mesh, &checked, mesher, Some(fit), &place.path, todo)
+}
+
+/// The mesh with its figures, and warnings at `path`; `todo` against what is lost.
+fn told(
+    mesh: TetMesh,
+    checked: &Checked,
+    mesher: String,
+    fit: Option<Fit>,
+    path: &str,
+    todo: &str,
+) -> Result<Tets, DesignError> {
+    let Some(quality) = mesh.quality() else {
+        return Err(DesignError::new(path, "the mesh has no tetrahedron"));
+    };
+    let report = TetReport {
+        mesher,
+        quality,
+        fit,
+    };
+    let warnings = warnings(&report, checked, path, todo);
+    Ok(Tets {
+        mesh,
+        report,
+        warnings,
+    })
+}
+
+/// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
+/// the region's.
+fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Mesh, DesignError> {
+    if let RegionSpec::Mesh(m) = space {
+        let path = "region.mesh.path";
+        let bytes = place
+            .loader
+            .load(&m.path)
+            .map_err(|e| DesignError::new(path, e).found(&m.path))?;
+        let kind = m.path.rsplit_once('.').map_or("", |(_, e)| e);
+        let loaded = io::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
+        let unit = m.unit.map_or(1.0, Unit::in_mm) * m.scale;
+        let mut mesh = loaded.mesh;
+        mesh.vertices.iter_mut().for_each(|p| *p = scale(*p, unit));
+        return Ok(mesh);
+    }
+    let solid = Solid::new(place.region.clone(), None, size);
+    match extract::surface(&solid, size / 4.0, &Silent) {
+        Ok(made) => Ok(made.mesh),
+        Err(Stopped::Refused(f)) => Err(DesignError::fault(&place.path, f)),
+        Err(_) => Err(DesignError::new(
+            &place.path,
+            "the region's surface could not be made",
+        )),
+    }
+}
+
+fn from_file(
+    file: &TetFileSpec,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<(TetMesh, Checked), DesignError> {
+    let at = if path.is_empty() {
+        String::new()
+    } else {
+        format!("{path}.path")
+    };
+    let wrong = |f: Fault| {
+        if f.at == "split" {
+            return DesignError::fault(path, f);
+        }
+        DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
+    };
+    let kind = file
+        .path
+        .rsplit_once('.')
+        .map_or("", |(_, e)| e)
+        .to_lowercase();
+    let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
+        let bytes = loader
+            .load(&file.path)
+            .map_err(|m| DesignError::new(&at, m).found(&file.path))?;
+        let data = io::read_vtk(&bytes).map_err(wrong)?;
+        let Shape::Mesh(elements) = data.shape else {
+            let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
+            return Err(DesignError::new(at, message).found(&file.path));
+        };
+        let named = |name: &&str| {
+            data.arrays
+                .iter()
+                .find(|a| a.of_cells && a.components == 1 && a.name == **name)
+        };
+        let zones = ZONES
+            .iter()
+            .find_map(|n| named(&n))
+            .map(|a| a.values.iter().map(|v| *v as u32).collect());
+        (elements, zones.unwrap_or_default())
+    } else {
+        loader
+            .elements(&file.path)
+            .map_err(|m| DesignError::new(&at, m).found(&file.path))?
+    };
+    elements.check().map_err(wrong)?;
+    let (mut mesh, of) = elements.tet_mesh(file.split).map_err(wrong)?;
+    if zones.len() == elements.kinds.len() {
+        mesh.zones = of.iter().map(|c| zones[*c as usize]).collect();
+    }
+    let unit = file.unit.map_or(1.0, Unit::in_mm);
+    if unit != 1.0 {
+        mesh.nodes.iter_mut().for_each(|p| *p = scale(*p, unit));
+    }
+    mesh.checked().map_err(wrong)
+}
+
+/// What may not be meant.
+fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Vec<Warning> {
+    let mut out = Vec::new();
+    let mut say = |message: String| {
+        out.push(Warning {
+            path: path.to_string(),
+            message,
+        });
+    };
+    let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
+    let q = &report.quality;
+    if checked.turned {
+        say(
+            "every tetrahedron was numbered the other way round (negative volume), and was turned"
+                .into(),
+        );
+    }
+    if q.pieces > 1 {
+        say(format!(
+            "the tetrahedra are {} pieces that share no faces: the lattice will fall apart there",
+            q.pieces
+        ));
+    }
+    if checked.pinched > 0 {
+        say(format!(
+            "the boundary meets itself in {}",
+            counted(checked.pinched, "edge")
+        ));
+    }
+    if q.slivers > 0 {
+        say(format!(
+            "{} of {} tetrahedra have a dihedral angle below {SLIVER}° or above {}° (slivers): cells are squashed there",
+            q.slivers,
+            q.tets,
+            180.0 - SLIVER
+        ));
+    }
+    let Some(fit) = &report.fit else { return out };
+    if fit.mended > 0.0 {
+        say(format!(
+            "{:.3} mm³ were left out where the boundary would have met itself: the region is thin there for tetrahedra of this \
+             size",
+            fit.mended
+        ));
+    }
+    if fit.lost > LOST {
+        say(format!(
+            "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
+            100.0 * fit.lost,
+            fit.lost_depth,
+            at(fit.lost_at)
+        ));
+    }
+    if fit.deviation > 0.5 * q.size.mean {
+        say(format!(
+            "the mesh's boundary is {:.3} mm off the region's surface at {}, more than half a tetrahedron",
+            fit.deviation,
+            at(fit.deviation_at)
+        ));
+    }
+    out
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A unit cube of one hexahedron, or of six tetrahedra, the first as given.
+    struct Files;
+
+    const HEAD: &str = "# vtk DataFile Version 3.0\ncube\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n\
+                        0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\n";
+
+    impl Loader for Files {
+        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+            let tets = |first: &str| {
+                format!(
+                    "{HEAD}CELLS 6 30\n4 {first}\n4 0 3 2 7\n4 0 2 6 7\n4 0 6 4 7\n4 0 4 5 7\n4 0 5 1 7\n\
+                     CELL_TYPES 6\n10 10 10 10 10 10\nCELL_DATA 6\nSCALARS zone int 1\nLOOKUP_TABLE default\n1 1 1 2 2 2\n"
+                )
+            };
+            match path {
+                "hex.vtk" => {
+                    Ok(format!("{HEAD}CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n").into())
+                }
+                "tets.vtk" => Ok(tets("0 1 3 7").into()),
+                "turned.vtk" => Ok(tets("1 0 3 7").into()),
+                _ => Err(format!("{path} does not exist")),
+            }
+        }
+    }
+
+    fn made(table: &str) -> Result<Tets, DesignError> {
+        let text = format!(
+            "[region.box]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n[lattice.core]\ncell.tet.name = \"any\"\n\
+             [lattice.core.map.tets]\n{table}\n"
+        );
+        Tets::in_design(&Node::from_toml(&text).unwrap(), None, &Files)
+    }
+
+    #[test]
+    fn meshes_are_made_and_read() {
+        let it = made("size = 0.3").unwrap();
+        assert!((it.report.quality.volume - 1.0).abs() < 1e-12 && it.warnings.is_empty());
+        assert!(it.report.fit.unwrap().lost == 0.0);
+        let it = made("path = \"tets.vtk\"").unwrap();
+        assert_eq!(
+            (it.mesh.tets.len(), it.mesh.zones.as_slice()),
+            (6, &[1, 1, 1, 2, 2, 2][..])
+        );
+        let it = made("path = \"hex.vtk\"\nsplit = true").unwrap();
+        assert!((it.mesh.volume() - 1.0).abs() < 1e-12 && it.mesh.tets.len() == 12);
+        let it = made("path = \"tets.vtk\"\nunit = \"cm\"").unwrap();
+        assert!(
+            it.warnings
+                .iter()
+                .any(|w| w.message.contains("off the region")),
+            "{:?}",
+            it.warnings
+        );
+        let graded = "size = { linear = { along = [1, 0, 0], stops = [[0, 0.1], [1, 0.3]] } }";
+        assert!(made(graded).unwrap().report.quality.tets > 500);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place() {
+        let wrong = |table: &str, path: &str, line: Option<usize>, words: &str| {
+            let e = made(table).unwrap_err();
+            let below = format!("lattice.core.map.tets{path}");
+            assert_eq!((e.path.as_str(), e.line), (below.as_str(), line), "{e}");
+            assert!(e.message.contains(words), "{e}");
+        };
+        wrong("", "", Some(6), "\"size\" is missing");
+        wrong("size = -1", ".size", Some(7), "size is -1 mm");
+        wrong(
+            "size = 1\npath = \"tets.vtk\"",
+            ".path",
+            Some(8),
+            "found both",
+        );
+        wrong(
+            "size = 1\nsplit = true",
+            ".split",
+            Some(8),
+            "there is no path",
+        );
+        wrong(
+            "size = 1\nmesher = \"ftetwlid\"",
+            ".mesher",
+            Some(8),
+            "did you mean \"ftetwild\"?",
+        );
+        wrong(
+            "size = 1\nmesher = \"ftetwild\"",
+            ".mesher",
+            Some(8),
+            "not available here",
+        );
+        wrong("size = 1\nmesh = 3", ".mesh", Some(8), "did you mean");
+        wrong("size = 1e-4", ".size", Some(7), "use a greater one");
+        wrong(
+            "path = \"none.vtk\"",
+            ".path",
+            Some(7),
+            "none.vtk does not exist",
+        );
+        wrong("path = \"cube.inp\"", ".path", Some(7), "only vtu and vtk");
+        wrong(
+            "path = \"hex.vtk\"",
+            ".split",
+            None,
+            "1 hexahedron beside 0 tetrahedra; give split = true",
+        );
+        wrong(
+            "path = \"turned.vtk\"",
+            ".path",
+            Some(7),
+            "1 of 6 tetrahedra are inverted",
+        );
+        let none = "[region.sphere]\nradius = 1\n[lattice.core.map.affine]\nwavelength = 1";
+        let e = Tets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();
+        assert!(
+            e.message
+                .contains("no lattice of the design has a tetrahedral mesh"),
+            "{e}"
+        );
+    }
+}

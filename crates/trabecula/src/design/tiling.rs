@@ -1,0 +1,309 @@
+//! Lattices over tetrahedral meshes: data to [`Tiling`], and what is to be said of one.
+
+use std::sync::Arc;
+
+use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
+use super::data::*;
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::report::Varied;
+use super::tets::{self, TetReport};
+use super::{Design, Loader, Warning, sample};
+use crate::cell::tet::{Stencil, ready};
+use crate::cell::{Part, Series};
+use crate::fault::number;
+use crate::grade::Grade;
+use crate::map::Tets;
+use crate::region::{MeshRegion, Region, Repair};
+use crate::symmetry::Group;
+use crate::tiling::{Amount, Level, Tiling};
+
+/// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
+const OVERLAP: f64 = 0.2;
+
+/// A tetrahedral mesh that the part is made of, and the lattice in it.
+pub(super) struct Domain<'a> {
+    pub name: &'a str,
+    pub spec: &'a LatticeSpec,
+    cell: &'a TetCellSpec,
+    joined: Joined,
+    map: Arc<Tets>,
+    /// What is known of the mesh.
+    pub report: TetReport,
+    /// The mesh's own boundary.
+    pub region: Region,
+}
+
+/// The mesh of a design that has one.
+pub(super) fn domain<'a>(
+    d: &'a Design,
+    space: &Region,
+    loader: &dyn Loader,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<Domain<'a>>, DesignError> {
+    let found = d.lattice.iter().find_map(|(name, spec)| match &spec.map {
+        MapSpec::Tets(t) => Some((name, spec, t)),
+        _ => None,
+    });
+    let Some((name, spec, spec_of_mesh)) = found else {
+        return Ok(None);
+    };
+    let path = format!("lattice.{name}");
+    let CellSpec::Kind(CellKind::Tet(cell)) = &spec.cell else {
+        let message = "a map over tetrahedra needs a cell that fits face to face: a tetrahedral one, such as \
+                       cell.tet.name = \"primitive\"";
+        return Err(DesignError::new(format!("{path}.cell"), message));
+    };
+    if let Some(other) = d.lattice.keys().find(|n| *n != name) {
+        let message = "a lattice over tetrahedra stands alone; keep one";
+        return Err(DesignError::new(format!("lattice.{other}"), message));
+    }
+    let path = format!("{path}.map.tets");
+    let joined = match spec_of_mesh {
+        TetsSpec::Made(m) => m.joined,
+        TetsSpec::File(f) => f.joined,
+    };
+    let overlap = finite(&format!("{path}.overlap"), joined.overlap)?;
+    if !(0.0..=OVERLAP).contains(&overlap) {
+        let message = format!(
+            "overlap is {}; it must be from 0 to {OVERLAP}",
+            number(overlap)
+        );
+        return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
+    }
+    let (mut points, _) = sample::inside(space, LOOKS);
+    points.extend(sample::nodes(space));
+    let place = Place {
+        path: path.clone(),
+        region: space,
+        points: &points,
+        filled: &[],
+        loader,
+    };
+    let made = tets::tets(spec_of_mesh, &d.region, &place)?;
+    warnings.extend(made.warnings);
+    let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
+    let region = MeshRegion::new(map.boundary(), Repair::Auto);
+    let region = region.map_err(|f| DesignError::new(&path, format!("the boundary of the mesh: {}", f.message)))?;
+    Ok(Some(Domain {
+        name,
+        spec,
+        cell,
+        joined,
+        map: Arc::new(map),
+        report: made.report,
+        region: Arc::new(region),
+    }))
+}
+
+/// The cell that a table describes.
+pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignError> {
+    let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
+    if let Some(name) = &spec.name {
+        let cell = ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
+        return cell.stencil().map_err(|f| wrong("", f));
+    }
+    let group = Group::named(spec.group.as_deref().unwrap_or_default());
+    let group = group.map_err(|f| wrong(".group", f))?;
+    let sites = group.tetrahedral_sites().map_err(|f| wrong("", f))?;
+    let mut all = Vec::new();
+    for (i, t) in spec.terms.iter().enumerate() {
+        finite(&format!("{path}.terms[{i}].amplitude"), t.amplitude)?;
+        finite(&format!("{path}.terms[{i}].phase"), t.phase)?;
+        let orbit = orbit_terms(&group, t);
+        all.extend(orbit.map_err(|f| wrong(&format!(".terms[{i}]"), f))?);
+    }
+    let series = Series::new(all).map_err(|f| wrong("", f))?;
+    let turns = |c: &[i32; 3]| c.map(|v| f64::from(v) / 24.0);
+    let site = match spec.site {
+        None => turns(&sites[0]),
+        Some(site) => {
+            let near = |c: &[i32; 3]| {
+                let c = turns(c);
+                (0..3).all(|a| {
+                    let d = site[a] - c[a];
+                    (d - d.round()).abs() < 1e-9
+                })
+            };
+            if !sites.iter().any(near) {
+                let name = |c: &[i32; 3]| format!("{:?}", turns(c));
+                let listed: Vec<String> = sites.iter().take(8).map(name).collect();
+                let more = if sites.len() > 8 { ", …" } else { "" };
+                let message = format!(
+                    "{site:?} is no point of full tetrahedral symmetry of {}; these are: {}{more}",
+                    group.name,
+                    listed.join(", ")
+                );
+                return Err(DesignError::new(format!("{path}.site"), message));
+            }
+            site
+        }
+    };
+    Stencil::new(series, site, spec.edge.unwrap_or(1.0), spec.dual).map_err(|f| wrong("", f))
+}
+
+/// The lattice, and whether its surface is made without a grid.
+pub(super) fn lattice(
+    domain: &Domain,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Arc<Tiling>, bool), DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let mut stencil = stencil(domain.cell, &below("cell.tet"))?;
+    let part: Part = domain.spec.part.into();
+    let spec = &domain.spec.level;
+    let path = below("level");
+    for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
+        if set {
+            let message = "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
+            return Err(DesignError::new(format!("{path}.{option}"), message));
+        }
+    }
+    let mid = finite(&format!("{path}.mid"), spec.mid)?;
+    if mid != 0.0 {
+        stencil = about(stencil, mid, part, &format!("{path}.mid"))?;
+    }
+    let key = amount_key(domain.spec);
+    let path = format!("{path}.{key}");
+    if key == "thickness" && part != Part::Sheet {
+        let message = "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
+        return Err(DesignError::new(path, message));
+    }
+    let (value, allowed, amount) = match &spec.amount {
+        AmountSpec::Iso(v) => (v, Allowed::Finite, Amount::Iso),
+        AmountSpec::Fraction(v) => (v, Allowed::Share("fraction"), Amount::Fraction),
+        AmountSpec::Porosity(v) => (v, Allowed::Share("porosity"), Amount::Fraction),
+        AmountSpec::Thickness(v) => {
+            let most = domain.map.mean_edge();
+            (v, Allowed::Length("thickness", most), Amount::Thickness)
+        }
+    };
+    let complement = key == "porosity";
+    let asked = grade(value, &path, place, allowed, complement)?;
+    let values = at_nodes(&asked, allowed, complement, &path, &domain.map)?;
+    if amount == Amount::Thickness && stencil.iso(Part::Sheet, 0.5) <= 0.0 {
+        return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
+    }
+    let level = Level::of(&domain.map, &stencil, part, amount, values);
+    let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
+    check(&tiling, &path)?;
+    warn(&tiling, &path, warnings);
+    let joined = domain.joined;
+    let explicit = joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty();
+    Ok((Arc::new(tiling), explicit))
+}
+
+/// The cell about another mid-surface.
+fn about(stencil: Stencil, mid: f64, part: Part, path: &str) -> Result<Stencil, DesignError> {
+    if part != Part::Sheet {
+        return Err(DesignError::new(path, "mid goes with part = \"sheet\""));
+    }
+    let range = stencil.range();
+    if !(range.lo < mid && mid < range.hi) {
+        let message = format!(
+            "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
+            range.lo, range.hi
+        );
+        return Err(DesignError::new(path, message).found(mid.to_string()));
+    }
+    stencil.about(mid).map_err(|f| DesignError::fault(path, f))
+}
+
+/// A number at the nodes of the mesh; one number, if it does not vary.
+fn at_nodes(
+    asked: &Grade,
+    allowed: Allowed,
+    complement: bool,
+    path: &str,
+    map: &Tets,
+) -> Result<Vec<f64>, DesignError> {
+    if let Some(v) = asked.constant() {
+        return Ok(vec![v]);
+    }
+    let mut values = vec![0.0; map.nodes().len()];
+    asked.values(map.nodes(), &mut values);
+    for (v, p) in values.iter().zip(map.nodes()) {
+        let own = if complement { 1.0 - v } else { *v };
+        let [x, y, z] = p;
+        allowed.check(path, own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
+    }
+    Ok(values)
+}
+
+/// Refuses a level at which nothing, or everything, is solid.
+fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
+    let levels = tiling.levels();
+    if !(levels.lo.is_finite() && levels.hi.is_finite()) {
+        return Err(DesignError::new(path, "the level is not a number somewhere in the mesh"));
+    }
+    if tiling.part == Part::Sheet && levels.lo <= 0.0 {
+        let message = format!(
+            "the half-level of a sheet, |f| ≤ t, goes down to {:.4}; it must be above 0 everywhere",
+            levels.lo
+        );
+        return Err(DesignError::new(path, message));
+    }
+    let stencil = &tiling.cells[0].stencil;
+    let shares = [levels.lo, levels.hi].map(|t| stencil.fraction(tiling.part, t));
+    let what = if shares.iter().all(|s| *s <= 0.0) {
+        "empty: nothing is solid"
+    } else if shares.iter().all(|s| *s >= 1.0) {
+        "solid everywhere: nothing is open"
+    } else {
+        return Ok(());
+    };
+    let range = stencil.range();
+    let message = format!(
+        "the lattice leaves the part {what}; the level t is {}, the cell's values run from {:.4} to {:.4} in the tetrahedron",
+        Varied {
+            min: levels.lo,
+            max: levels.hi
+        },
+        range.lo,
+        range.hi
+    );
+    Err(DesignError::new(path, message))
+}
+
+/// Warns of levels at which the cell falls apart, and of walls that are far from the thickness asked for.
+fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
+    let stencil = &tiling.cells[0].stencil;
+    let part = tiling.part;
+    let levels = tiling.levels();
+    let share = |t: f64| stencil.fraction(part, t);
+    let fraction = Varied::of(&[share(levels.lo), share(levels.hi)]);
+    let whole = stencil.connected_fraction(part);
+    if !gaps([fraction.min, fraction.max], &whole).is_empty() {
+        let count = stencil.count(part, 0.5 * (levels.lo + levels.hi));
+        let texts: Vec<String> = whole
+            .iter()
+            .map(|&[min, max]| Varied { min, max }.to_string())
+            .collect();
+        let limit = match texts.len() {
+            0 => "at no fraction is it one piece that reaches all faces".to_string(),
+            _ => format!("it is one piece that reaches all faces at fractions {}", texts.join(" and ")),
+        };
+        let message = format!(
+            "at solid fraction {fraction} the tetrahedral cell is in {} with {} on each face, so the lattice may fall apart; {limit}",
+            crate::fault::counted(count.pieces, "piece"),
+            crate::fault::counted(count.ports, "port"),
+        );
+        warnings.push(Warning {
+            path: path.to_string(),
+            message,
+        });
+    }
+    if path.ends_with("thickness") {
+        if let Some(s) = tiling.thickness() {
+            let message = format!(
+                "walls follow the tetrahedra: they are {:.4} mm thick on average, 90 % of them between {:.4} and {:.4} mm, all \
+                 between {:.4} and {:.4} mm",
+                s.mean, s.low, s.high, s.min, s.max
+            );
+            warnings.push(Warning {
+                path: path.to_string(),
+                message,
+            });
+        }
+    }
+}

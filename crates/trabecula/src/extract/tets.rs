@@ -1,0 +1,494 @@
+//! The explicit road: surfaces of lattices over tetrahedral meshes, without a grid.
+//!
+//! Every tetrahedron is cut into the same small steps, and the surface in it is that of `piece`. Where the level and the cell
+//! are the same everywhere, a piece is made once and placed in all tetrahedra.
+//!
+//! *Closed, oriented, manifold, embedded.* A tetrahedron takes its corners in the order of the mesh's nodes. On a common face
+//! two tetrahedra then have the same small triangles, values and slopes in all bits, hence the same corners of the surface;
+//! nothing is welded by comparing coordinates. The mesh's boundary is a manifold (`boundary` refuses others), and caps are
+//! polygons in its small triangles. Affine maps keep what is embedded.
+//!
+//! *After rounding to single precision.* Corners stay `MARGIN` of a step away from nodes, so parts of the surface that do not
+//! meet are apart by that much of a small tetrahedron's height. It is refused where rounding is not well below.
+
+mod census;
+mod piece;
+mod template;
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+
+use super::bodies::Sum;
+use super::islands::{Islands, Pieces};
+use super::{
+    Estimate, Progress, Sifting, Stopped, Store, Summary, Surface, finish, not_empty, only, sift,
+};
+use crate::cell::tet::{Grid, Nodes, Ready};
+use crate::fault::{Fault, number};
+use crate::io::stl;
+use crate::map::Tets;
+use crate::map::tets::NONE;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::tets::TetMesh;
+use crate::tiling::{Level, Tiling};
+use census::Links;
+use piece::{Core, Levels, MARGIN, Piece, Scratch};
+use template::Template;
+
+/// Tetrahedra done at once by a thread.
+const CHUNK: usize = 128;
+/// The least and the most steps along the edges of tetrahedra.
+const STEPS: [usize; 2] = [4, 64];
+
+/// What all tetrahedra have in common.
+struct Work<'a> {
+    tiling: &'a Tiling,
+    template: Template,
+    /// For each cell, its values at nodes, divided by its scale, and its slopes along edges.
+    cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)>,
+    /// The pieces for each set of capped faces, where all are the same.
+    same: [OnceLock<Piece>; 16],
+    middle: Vec3,
+}
+
+/// A piece of one tetrahedron.
+enum Of<'a> {
+    Same(&'a Piece),
+    Own(Box<Piece>),
+}
+
+impl std::ops::Deref for Of<'_> {
+    type Target = Piece;
+
+    fn deref(&self) -> &Piece {
+        match self {
+            Of::Same(p) => p,
+            Of::Own(p) => p,
+        }
+    }
+}
+
+/// What some tetrahedra came to.
+struct Chunk<'a> {
+    pieces: Vec<Of<'a>>,
+    sums: Vec<Sum>,
+    /// Binary STL records, where those are wanted; else the vertices' places.
+    records: Vec<u8>,
+    places: Vec<Vec3>,
+}
+
+/// The number of steps along the edge of a tetrahedron for a spacing of `edge` (mm).
+fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
+    let mean = tets.mean_edge();
+    let n = (mean / edge).round();
+    if !(edge > 0.0 && n <= STEPS[1] as f64) {
+        let message = format!(
+            "edge is {} mm; edges of tetrahedra are {mean:.3} mm long on average and are cut into at most {} steps: use {} mm or more",
+            number(edge),
+            STEPS[1],
+            number((1e4 * mean / STEPS[1] as f64).ceil() / 1e4)
+        );
+        return Err(Fault::new("edge", message));
+    }
+    let n = (n as usize).max(STEPS[0]);
+    for t in 0..tets.len() {
+        let c = tets.corners(t);
+        let largest = c.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+        let areas = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(|[i, j, k]| {
+            norm(cross(sub(c[j], c[i]), sub(c[k], c[i]))) / 2.0
+        });
+        let height = 3.0 * tets.volume(t) / areas.iter().fold(0.0f64, |m, a| m.max(*a));
+        // Half a unit in the last place along each axis, for both of two points, and as much again to be safe.
+        let rounding = 4.0 * 3f64.sqrt() * largest * f64::from(f32::EPSILON) / 2.0;
+        let apart = MARGIN * height / n as f64;
+        if apart < rounding {
+            let [x, y, z] = c[0];
+            let message = format!(
+                "the tetrahedron at ({x:.3}, {y:.3}, {z:.3}) mm is {height:.2e} mm high: in {n} steps its surface is lost in the rounding \
+                 of single precision; use a larger edge, or a mesh without such flat tetrahedra, or move the part nearer the origin"
+            );
+            return Err(Fault::new("edge", message));
+        }
+    }
+    Ok(n)
+}
+
+impl<'a> Work<'a> {
+    fn new(tiling: &'a Tiling, edge: f64) -> Result<Work<'a>, Fault> {
+        let grid = Grid {
+            n: steps(&tiling.map, edge)?,
+        };
+        census::manifold(&tiling.map)?;
+        let template = Template::new(grid);
+        let cells = tiling.cells.iter().map(|c| {
+            let mut nodes = Nodes::new(&c.stencil, grid);
+            let slopes = template.edges.iter().map(|[a, b]| {
+                let (a, b) = (*a as usize, *b as usize);
+                [nodes.slope(a, b) / c.scale, -nodes.slope(b, a) / c.scale]
+            });
+            let slopes = slopes.collect();
+            let values = nodes.values.iter().map(|v| v / c.scale).collect();
+            nodes.values = Vec::new();
+            (nodes, values, slopes)
+        });
+        Ok(Work {
+            tiling,
+            cells: cells.collect(),
+            template,
+            same: Default::default(),
+            middle: tiling.map.bounds().center(),
+        })
+    }
+
+    /// The faces on the boundary, a bit for each.
+    fn mask(&self, t: usize) -> u8 {
+        let across = self.tiling.map.across(t);
+        (0..4).fold(0, |m, i| m | u8::from(across[i] == NONE) << i)
+    }
+
+    fn piece(&self, t: usize, scratch: &mut Scratch) -> Of<'_> {
+        let mask = self.mask(t);
+        let (nodes, values, slopes) = &self.cells[0];
+        let cut = |core: &Core, scratch: &mut Scratch| {
+            Piece::new(nodes, &self.template, core, self.tiling.part, mask, scratch)
+        };
+        if let (Level::Same(level), false) = (&self.tiling.level, self.tiling.varies()) {
+            let levels = Levels::Same(*level);
+            return Of::Same(self.same[mask as usize].get_or_init(|| {
+                let core = Core {
+                    values,
+                    slopes,
+                    levels,
+                };
+                cut(&core, &mut Scratch::default())
+            }));
+        }
+        // What is linear in the tetrahedron, summed in the order of the mesh's nodes: a zero added changes no bit, so on a
+        // face all who have it get the same.
+        let ids = self.tiling.map.tet(t);
+        let n = nodes.grid.n as f64;
+        let linear = |of: &[f64]| -> Vec<f64> {
+            let v = ids.map(|i| of[i as usize]);
+            let at = |k: &[u16; 4]| (0..4).fold(0.0, |s, i| s + f64::from(k[i]) * v[i]) / n;
+            nodes.whole.iter().map(at).collect()
+        };
+        let levels = match &self.tiling.level {
+            Level::Same(v) => vec![*v; nodes.whole.len()],
+            Level::Nodes(of) => linear(of),
+        };
+        let levels = Levels::Each(&levels);
+        let mixed = self.tiling.cells.iter().any(|c| c.weights.is_some());
+        if !mixed {
+            let core = Core {
+                values,
+                slopes,
+                levels,
+            };
+            return Of::Own(Box::new(cut(&core, scratch)));
+        }
+        let mut sum = vec![0.0; values.len()];
+        let mut turns = vec![[0.0; 2]; slopes.len()];
+        for (c, (_, values, slopes)) in self.tiling.cells.iter().zip(&self.cells) {
+            let w = match &c.weights {
+                Some(w) => linear(w),
+                None => vec![1.0; values.len()],
+            };
+            for (s, (v, w)) in sum.iter_mut().zip(values.iter().zip(&w)) {
+                *s += v * w;
+            }
+            for ((s, g), [a, b]) in turns.iter_mut().zip(slopes).zip(&self.template.edges) {
+                let (a, b) = (*a as usize, *b as usize);
+                let step = w[b] - w[a];
+                s[0] += w[a] * g[0] + values[a] * step;
+                s[1] += w[b] * g[1] + values[b] * step;
+            }
+        }
+        let core = Core {
+            values: &sum,
+            slopes: &turns,
+            levels,
+        };
+        Of::Own(Box::new(cut(&core, scratch)))
+    }
+
+    /// Cuts some tetrahedra, places what comes of it and adds it up.
+    fn chunk(&self, range: Range<usize>, scratch: &mut Scratch, stl: bool) -> Chunk<'_> {
+        let mut out = Chunk {
+            pieces: Vec::with_capacity(range.len()),
+            sums: Vec::new(),
+            records: Vec::new(),
+            places: Vec::new(),
+        };
+        let mut places: Vec<Vec3> = Vec::new();
+        for t in range {
+            let piece = self.piece(t, scratch);
+            let corners = self.tiling.map.corners(t);
+            places.clear();
+            places.extend(piece.places.iter().map(|l| {
+                let ab = add(scale(corners[0], l[0]), scale(corners[1], l[1]));
+                add(add(ab, scale(corners[2], l[2])), scale(corners[3], l[3]))
+            }));
+            let first = out.sums.len();
+            out.sums.resize(first + piece.bounds.len(), Sum::NONE);
+            for (v, p) in places.iter().enumerate() {
+                let sum = &mut out.sums[first + piece.body[v] as usize];
+                sum.bounds = sum.bounds.with(*p);
+            }
+            if stl {
+                out.records.reserve(piece.triangles.len() * stl::RECORD);
+            }
+            let flipped = self.tiling.map.flipped(t);
+            let mut next = piece.triangles.iter();
+            for (body, count) in piece.bodies.iter().enumerate() {
+                let sum = &mut out.sums[first + body];
+                for (v, cap) in next.by_ref().take(*count as usize) {
+                    let [a, b, c] = turned(*v, flipped).map(|v| places[v as usize]);
+                    let n = cross(sub(b, a), sub(c, a));
+                    sum.triangles += 1;
+                    sum.volume += dot(sub(a, self.middle), n) / 6.0;
+                    sum.area[usize::from(*cap)] += norm(n) / 2.0;
+                    if stl {
+                        let corners = [a, b, c].map(|p| p.map(|x| x as f32));
+                        stl::push_record(&mut out.records, corners);
+                    }
+                }
+            }
+            if !stl {
+                out.places.extend_from_slice(&places);
+            }
+            out.pieces.push(piece);
+        }
+        out
+    }
+
+    /// Hands over all tetrahedra in order.
+    fn each<'s>(
+        &'s self,
+        progress: &dyn Progress,
+        stl: bool,
+        mut take: impl FnMut(usize, Chunk<'s>) -> Result<(), Stopped>,
+    ) -> Result<(), Stopped> {
+        let total = self.tiling.map.len();
+        let batch = CHUNK * 4 * rayon::current_num_threads();
+        let make = |first: usize| -> Vec<Chunk> {
+            let end = total.min(first + batch);
+            let starts: Vec<usize> = (first..end).step_by(CHUNK).collect();
+            starts
+                .par_iter()
+                .map_init(Scratch::default, |scratch, &i| {
+                    self.chunk(i..end.min(i + CHUNK), scratch, stl)
+                })
+                .collect()
+        };
+        let mut made = make(0);
+        for first in (0..total).step_by(batch) {
+            let end = total.min(first + batch);
+            let mut next = Vec::new();
+            // While some are taken, the next are made.
+            let taken = rayon::in_place_scope(|scope| {
+                if end < total {
+                    scope.spawn(|_| next = make(end));
+                }
+                (first..end)
+                    .step_by(CHUNK)
+                    .zip(std::mem::take(&mut made))
+                    .try_for_each(|(start, chunk)| take(start, chunk))
+            });
+            taken?;
+            made = next;
+            if !progress.step(end as u64, total as u64) {
+                return Err(Stopped::Interrupted);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[inline]
+fn turned([a, b, c]: [u32; 3], flipped: bool) -> [u32; 3] {
+    if flipped { [a, c, b] } else { [a, b, c] }
+}
+
+/// Where the vertices that tetrahedra share stand in the whole mesh: the first of those on each simplex of the tetrahedral
+/// mesh. They come in the same order in every tetrahedron.
+#[derive(Default)]
+struct Shared {
+    faces: HashMap<[u32; 3], u32>,
+    /// Corners on edges, and nodes of caps, which only tetrahedra with a boundary face have.
+    edges: [HashMap<[u32; 2], u32>; 2],
+    nodes: HashMap<u32, u32>,
+}
+
+impl Shared {
+    /// The number of each vertex of a piece; new ones are put to the mesh.
+    fn names(
+        &mut self,
+        ids: [u32; 4],
+        piece: &Piece,
+        places: &[Vec3],
+        vertices: &mut Vec<Vec3>,
+    ) -> Result<Vec<u32>, Stopped> {
+        if vertices.len() + places.len() > u32::MAX as usize {
+            let message = "more than 2^32 vertices; use a larger edge, or STL";
+            return Err(Stopped::Refused(Fault::new("edge", message)));
+        }
+        let mut counts = [[0u32; 16]; 2];
+        for (v, zero) in piece.zero.iter().enumerate() {
+            counts[usize::from(v >= piece.crossings)][usize::from(*zero)] += 1;
+        }
+        // For every simplex, where its vertices begin and whether they are new.
+        let mut next = [[(0, false); 16]; 2];
+        for (node, (counts, next)) in counts.iter().zip(&mut next).enumerate() {
+            for zero in (0..16).filter(|z| counts[*z] > 0) {
+                let new = vertices.len() as u32;
+                let mut on = (0..4).filter(|i| zero >> i & 1 == 0).map(|i| ids[i]);
+                let mut corner = || on.next().unwrap_or(NONE);
+                let first = match (zero as u32).count_ones() {
+                    3 => *self.nodes.entry(corner()).or_insert(new),
+                    2 => *self.edges[node]
+                        .entry([corner(), corner()])
+                        .or_insert(new),
+                    // A node of a cap inside a face is nobody else's; a face is looked up once more at most.
+                    1 if node == 0 => {
+                        let face = [corner(), corner(), corner()];
+                        let known = self.faces.remove(&face);
+                        known.unwrap_or_else(|| *self.faces.entry(face).or_insert(new))
+                    }
+                    _ => new,
+                };
+                if first == new {
+                    vertices.resize(vertices.len() + counts[zero] as usize, [0.0; 3]);
+                }
+                next[zero] = (first, first == new);
+            }
+        }
+        let name = |(v, (place, zero)): (usize, (&Vec3, &u8))| {
+            let next = &mut next[usize::from(v >= piece.crossings)][usize::from(*zero)];
+            let name = next.0;
+            if next.1 {
+                vertices[name as usize] = *place;
+            }
+            next.0 += 1;
+            name
+        };
+        let all = places.iter().zip(&piece.zero).enumerate();
+        Ok(all.map(name).collect())
+    }
+}
+
+/// The surface of a tiling, held in memory, with steps of about `edge` (mm): as [`super::surface_of`].
+pub(super) fn surface(
+    tiling: &Tiling,
+    edge: f64,
+    islands: Islands,
+    progress: &dyn Progress,
+) -> Result<(Surface, Pieces), Stopped> {
+    let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
+    let (mut out, mut links, mut shared) = (Surface::default(), Links::default(), Shared::default());
+    work.each(progress, false, |start, chunk| {
+        let (mut sums, mut places) = (&chunk.sums[..], &chunk.places[..]);
+        for (t, piece) in (start..).zip(&chunk.pieces) {
+            let (mine, rest) = places.split_at(piece.places.len());
+            places = rest;
+            let ids = tiling.map.tet(t);
+            let names = shared.names(ids, piece, mine, &mut out.mesh.vertices)?;
+            let flipped = tiling.map.flipped(t);
+            for (v, cap) in &piece.triangles {
+                let named = turned(*v, flipped).map(|v| names[v as usize]);
+                out.mesh.triangles.push(named);
+                out.cut.push(*cap);
+            }
+            let (of, rest) = sums.split_at(piece.bounds.len());
+            sums = rest;
+            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+        }
+        Ok(())
+    })?;
+    not_empty(out.mesh.triangles.len() as u64, edge)?;
+    let found = links.census().judge(islands).map_err(Stopped::Refused)?;
+    if found.pieces.dropped > 0 {
+        out = only(&out, &sift::runs(&found.parts));
+    }
+    Ok((out, found.pieces))
+}
+
+/// The surface of a tiling, streamed as binary STL: as [`super::stream_stl`]. Memory is bounded by the tetrahedra in flight and
+/// a few numbers for each.
+pub(super) fn stream_stl<W: Store>(
+    tiling: &Tiling,
+    edge: f64,
+    islands: Islands,
+    out: &mut W,
+    progress: &dyn Progress,
+) -> Result<Summary, Stopped> {
+    let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
+    let mut links = Links::default();
+    let mut bytes = 0u64;
+    out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
+    let sifting = Sifting(progress);
+    let sifts = islands == Islands::Drop;
+    let told: &dyn Progress = if sifts { &sifting } else { progress };
+    work.each(told, true, |start, chunk| {
+        bytes += chunk.records.len() as u64;
+        if bytes / stl::RECORD as u64 > u64::from(u32::MAX) {
+            let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
+            return Err(Stopped::Refused(Fault::new("edge", message)));
+        }
+        let mut sums = &chunk.sums[..];
+        for (t, piece) in (start..).zip(&chunk.pieces) {
+            let (of, rest) = sums.split_at(piece.bounds.len());
+            sums = rest;
+            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+        }
+        out.write_all(&chunk.records).map_err(Stopped::Io)
+    })?;
+    let triangles = bytes / stl::RECORD as u64;
+    not_empty(triangles, edge)?;
+    let found = links.census().judge(islands).map_err(Stopped::Refused)?;
+    finish(found, triangles, sifts.then_some(&sifting), out)
+}
+
+/// A ready cell in a single regular tetrahedron.
+pub(super) fn stencil(
+    ready: &Ready,
+    steps: usize,
+    progress: &dyn Progress,
+) -> Result<Surface, Stopped> {
+    let stencil = ready.stencil().map_err(Stopped::Refused)?;
+    let h = 0.5f64.sqrt() / 2.0;
+    let mesh = TetMesh {
+        nodes: vec![[h, -h, -h], [-h, h, -h], [-h, -h, h], [h, h, h]],
+        tets: vec![[0, 1, 2, 3]],
+        zones: Vec::new(),
+    };
+    let map = Tets::new(&mesh, 0.0).map_err(Stopped::Refused)?;
+    let level = Level::Same(stencil.iso(ready.part, ready.fraction));
+    let tiling = Tiling::new(Arc::new(map), Arc::new(stencil), ready.part, level);
+    Ok(surface(&tiling, 1.0 / steps as f64, Islands::Keep, progress)?.0)
+}
+
+/// What a spacing will take: counted where all pieces are the same, else found on some of them.
+pub(super) fn estimate(tiling: &Tiling, edge: f64) -> Result<Estimate, Fault> {
+    const SAMPLES: usize = 64;
+    let work = Work::new(tiling, edge)?;
+    let total = tiling.map.len();
+    let step = if tiling.varies() { total.div_ceil(SAMPLES) } else { 1 };
+    let mut scratch = Scratch::default();
+    let (mut count, mut looked) = (0.0, 0.0);
+    for t in (step / 2..total).step_by(step) {
+        count += work.piece(t, &mut scratch).triangles.len() as f64;
+        looked += 1.0;
+    }
+    let triangles = count * total as f64 / looked;
+    let n = work.cells[0].0.grid.n as u64;
+    Ok(Estimate {
+        cells: [n * total as u64, n, n],
+        triangles,
+        // Half as many vertices as triangles, of three f64 each.
+        memory: triangles * (12.0 + 12.0 + 1.0),
+        stl: stl::HEADER as f64 + triangles * stl::RECORD as f64,
+    })
+}

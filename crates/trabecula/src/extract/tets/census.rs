@@ -1,0 +1,211 @@
+//! What hangs together across tetrahedra: bodies of the surface by the corners on common faces, pieces of the solid by their
+//! traces, both told by order alone. A few numbers for each tetrahedron are held, and the runs on faces that wait for their
+//! other side.
+
+use std::collections::{HashMap, HashSet};
+
+use super::super::bodies::{Sum, find, unite};
+use super::super::islands::Census;
+use super::piece::{NONE as NOBODY, Piece, Run};
+use super::template::PAIRS;
+use crate::fault::Fault;
+use crate::map::Tets;
+use crate::map::tets::NONE;
+
+/// Bodies and pieces of the tetrahedra so far. Each tetrahedron adds its bodies, then its pieces of solid.
+#[derive(Default)]
+pub(super) struct Links {
+    sums: Vec<Sum>,
+    body: Vec<u32>,
+    solid: Vec<u32>,
+    /// Runs on faces, by the tetrahedron and the corner on their other side.
+    faces: HashMap<(u32, u8), Vec<Run>>,
+    /// Runs of caps on edges of the boundary, by their nodes.
+    rims: HashMap<[u32; 2], Vec<Run>>,
+    /// Edges and nodes whose vertices are counted.
+    edges: HashSet<[u32; 2]>,
+    nodes: HashSet<u32>,
+}
+
+impl Links {
+    /// Adds the next tetrahedron, with what its bodies add up to.
+    pub fn add(
+        &mut self,
+        map: &Tets,
+        t: usize,
+        mask: u8,
+        piece: &Piece,
+        sums: &[Sum],
+    ) -> Result<(), Fault> {
+        let base = self.sums.len();
+        let bodies = piece.bounds.len();
+        let end = base + bodies + piece.solids as usize;
+        if end >= NOBODY as usize {
+            let message = "the surface falls into more than 4e9 bodies; use fewer tetrahedra";
+            return Err(Fault::new("edge", message));
+        }
+        self.sums.extend(sums);
+        self.sums.resize(end, Sum::NONE);
+        self.body.extend(base as u32..end as u32);
+        self.solid.extend(base as u32..end as u32);
+        let surface = |s: u32| if s == NOBODY { s } else { base as u32 + s };
+        let inner = |s: u32| (base + bodies) as u32 + s;
+        for (b, solid) in piece.bounds.iter().enumerate() {
+            unite(&mut self.solid, (base + b) as u32, inner(*solid));
+        }
+        let named = |runs: &[Run]| -> Vec<Run> {
+            let one = |r: &Run| Run {
+                surface: surface(r.surface),
+                solid: inner(r.solid),
+                ..*r
+            };
+            runs.iter().map(one).collect()
+        };
+        let across = map.across(t);
+        for (face, other) in across.into_iter().enumerate() {
+            if other == NONE {
+                continue;
+            }
+            let runs = named(&piece.faces[face]);
+            match self.faces.remove(&(t as u32, face as u8)) {
+                Some(theirs) => self.join(&runs, &theirs),
+                None => {
+                    let back = map.across(other as usize).iter().position(|b| *b as usize == t);
+                    self.faces.insert((other, back.unwrap_or(0) as u8), runs);
+                }
+            }
+        }
+        let ids = map.tet(t);
+        // Whether vertices of caps on an edge of the boundary are ours to count.
+        let mut caps = [false; 6];
+        for (e, [a, b]) in PAIRS.iter().enumerate() {
+            let off = 15 ^ (1u8 << a | 1 << b);
+            match (mask & off).count_ones() {
+                0 => {}
+                // The edge's other face on the boundary is another tetrahedron's.
+                1 => {
+                    let runs = named(&piece.rims[e]);
+                    let key = [ids[*a], ids[*b]];
+                    match self.rims.remove(&key) {
+                        Some(theirs) => self.join(&runs, &theirs),
+                        None => {
+                            caps[e] = true;
+                            self.rims.insert(key, runs);
+                        }
+                    }
+                }
+                _ => caps[e] = true,
+            }
+        }
+        // Each vertex is counted in one tetrahedron.
+        let mut counts = [None; 16];
+        for (v, zero) in piece.zero.iter().enumerate() {
+            let corner = v < piece.crossings;
+            let on = |i: &usize| zero >> i & 1 == 0;
+            let mine = match zero.count_ones() {
+                0 => true,
+                1 => {
+                    let other = across[zero.trailing_zeros() as usize];
+                    other == NONE || other as usize > t
+                }
+                2 => {
+                    let mut of = (0..4).filter(on);
+                    let (a, b) = (of.next().unwrap_or(0), of.next().unwrap_or(0));
+                    if corner {
+                        *counts[usize::from(*zero)]
+                            .get_or_insert_with(|| self.edges.insert([ids[a], ids[b]]))
+                    } else {
+                        caps[super::template::pair(a, b)]
+                    }
+                }
+                _ => (0..4).find(on).is_some_and(|i| self.nodes.insert(ids[i])),
+            };
+            if mine {
+                self.sums[base + piece.body[v] as usize].vertices += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Joins what two tetrahedra have at the same points in the same order.
+    fn join(&mut self, a: &[Run], b: &[Run]) {
+        let (mut a, mut b) = (a.iter().copied(), b.iter().copied());
+        let (mut x, mut y) = (a.next(), b.next());
+        while let (Some(r), Some(s)) = (&mut x, &mut y) {
+            if r.surface != NOBODY && s.surface != NOBODY {
+                unite(&mut self.body, r.surface, s.surface);
+            }
+            unite(&mut self.solid, r.solid, s.solid);
+            let n = r.count.min(s.count);
+            (r.count, s.count) = (r.count - n, s.count - n);
+            let (next_x, next_y) = (r.count == 0, s.count == 0);
+            if next_x {
+                x = a.next();
+            }
+            if next_y {
+                y = b.next();
+            }
+        }
+        debug_assert!(x.is_none() && y.is_none(), "faces have the same points");
+    }
+
+    /// All bodies, joined.
+    pub fn census(self) -> Census {
+        Census::joined(self.sums, self.body, self.solid)
+    }
+}
+
+/// Refuses a mesh whose boundary is no manifold: where tetrahedra meet in an edge or a node alone, solids would touch there.
+pub(super) fn manifold(map: &Tets) -> Result<(), Fault> {
+    let boundary = map.boundary();
+    let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
+    for t in &boundary.triangles {
+        for i in 0..3 {
+            let (a, b) = (t[i], t[(i + 1) % 3]);
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    let at = |v: u32| {
+        let [x, y, z] = boundary.vertices[v as usize];
+        format!("({x:.4}, {y:.4}, {z:.4}) mm")
+    };
+    let touching = |what: &str, v: u32| {
+        let message = format!(
+            "tetrahedra meet in {what} alone, at {}: solids would touch there without being joined; mesh the part again, or \
+             leave out the tetrahedra on one side",
+            at(v)
+        );
+        Err(Fault::new("tets", message))
+    };
+    // The least of those found, so that the message does not depend on the order of a hash.
+    if let Some(e) = edges.iter().filter(|e| *e.1 != 2).map(|e| e.0).min() {
+        return touching("an edge", e[0]);
+    }
+    // The triangles about a vertex are one fan if joining them over their edges leaves one.
+    let mut root: Vec<u32> = (0..3 * boundary.triangles.len() as u32).collect();
+    let mut known: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut fans = vec![0i64; boundary.vertices.len()];
+    for (n, t) in boundary.triangles.iter().enumerate() {
+        for i in 0..3 {
+            fans[t[i] as usize] += 1;
+            let me = (3 * n + i) as u32;
+            for other in [t[(i + 1) % 3], t[(i + 2) % 3]] {
+                match known.remove(&(t[i], other)) {
+                    None => {
+                        known.insert((t[i], other), me);
+                    }
+                    Some(them) => {
+                        if find(&mut root, me) != find(&mut root, them) {
+                            unite(&mut root, me, them);
+                            fans[t[i] as usize] -= 1;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    match fans.iter().position(|f| *f > 1) {
+        Some(v) => touching("a node", v as u32),
+        None => Ok(()),
+    }
+}

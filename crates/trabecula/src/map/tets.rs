@@ -1,0 +1,423 @@
+//! Maps over a tetrahedral mesh: a place is a tetrahedron and barycentric coordinates in it, which are affine there and
+//! continuous everywhere (equations 12 and 13 of Chen et al.).
+
+use std::collections::{HashMap, VecDeque};
+
+use crate::fault::Fault;
+use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
+use crate::tets::TetMesh;
+
+/// No tetrahedron.
+pub const NONE: u32 = u32::MAX;
+
+/// The most boxes of the index.
+const MOST: f64 = 4e6;
+
+/// The corners of the face opposite each corner of a positive tetrahedron, counter-clockwise seen from outside.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// A tetrahedral mesh that places are found in.
+pub struct Tets {
+    nodes: Vec<Vec3>,
+    /// Nodes ascending, so that tetrahedra with a common face have its corners in the same order.
+    tets: Vec<[u32; 4]>,
+    /// Whether ascending order is negative.
+    flipped: Vec<bool>,
+    zones: Vec<u32>,
+    /// The tetrahedron across the face opposite each corner.
+    across: Vec<[u32; 4]>,
+    /// The gradients (per mm) of the first three barycentric coordinates.
+    slopes: Vec<Mat3>,
+    bounds: Aabb,
+    boxes: Boxes,
+    /// By how much of its barycentric coordinates a tetrahedron reaches beyond itself.
+    overlap: f64,
+}
+
+/// Which tetrahedra a box of a regular grid meets.
+struct Boxes {
+    min: Vec3,
+    edge: f64,
+    shape: [usize; 3],
+    /// The box whose list holds for each: its own, or the nearest with one.
+    owner: Vec<u32>,
+    first: Vec<u32>,
+    list: Vec<u32>,
+}
+
+impl Boxes {
+    fn place(&self, p: Vec3) -> [usize; 3] {
+        [0, 1, 2].map(|a| {
+            let i = ((p[a] - self.min[a]) / self.edge).floor();
+            (i.max(0.0) as usize).min(self.shape[a] - 1)
+        })
+    }
+
+    fn index(&self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.shape[1] + j) * self.shape[0] + i
+    }
+
+    fn of(&self, index: usize) -> &[u32] {
+        let o = self.owner[index] as usize;
+        &self.list[self.first[o] as usize..self.first[o + 1] as usize]
+    }
+}
+
+impl Tets {
+    /// A mesh whose tetrahedra are positive and meet face to face. With an `overlap` (below 1/4) tetrahedra are also found
+    /// a little outside, where all coordinates are above −overlap.
+    ///
+    /// # Errors
+    /// No tetrahedron, an inverted or flat one, a face of more than two tetrahedra.
+    pub fn new(mesh: &TetMesh, overlap: f64) -> Result<Tets, Fault> {
+        if mesh.tets.is_empty() {
+            return Err(Fault::new("tets", "the mesh has no tetrahedron"));
+        }
+        let mut tets = mesh.tets.clone();
+        let mut flipped = vec![false; tets.len()];
+        let mut slopes = Vec::with_capacity(tets.len());
+        let mut bounds = Aabb::EMPTY;
+        for (n, (t, flip)) in tets.iter_mut().zip(&mut flipped).enumerate() {
+            let at = |t: &[u32; 4]| t.map(|v| mesh.nodes[v as usize]);
+            let positive = volume(at(t)) > 0.0;
+            // Sorting four by adjacent swaps, each of which turns the orientation.
+            let mut swaps = 0;
+            for _ in 0..3 {
+                for i in 0..3 {
+                    if t[i] > t[i + 1] {
+                        t.swap(i, i + 1);
+                        swaps += 1;
+                    }
+                }
+            }
+            let corners = at(t);
+            let to = columns(&corners);
+            let m = inverse(&to);
+            if !positive || m.as_flattened().iter().any(|v| !v.is_finite()) {
+                let [x, y, z] = corners[0];
+                let message = format!(
+                    "tetrahedron {n}, at ({x:.4}, {y:.4}, {z:.4}) mm, is inverted or flat; mesh the part again"
+                );
+                return Err(Fault::new("tets", message));
+            }
+            *flip = swaps % 2 == 1;
+            slopes.push(m);
+            bounds = corners.iter().fold(bounds, |b, p| b.with(*p));
+        }
+        let across = across(&tets)?;
+        let mut out = Tets {
+            nodes: mesh.nodes.clone(),
+            zones: mesh.zones.clone(),
+            across,
+            flipped,
+            slopes,
+            bounds,
+            boxes: Boxes {
+                min: bounds.min,
+                edge: 1.0,
+                shape: [1; 3],
+                owner: Vec::new(),
+                first: Vec::new(),
+                list: Vec::new(),
+            },
+            overlap,
+            tets,
+        };
+        out.index();
+        Ok(out)
+    }
+
+    /// Sorts tetrahedra into boxes; empty boxes take the list of a nearest one.
+    fn index(&mut self) {
+        let size = self.bounds.size();
+        let wanted = (4.0 * self.tets.len() as f64).min(MOST);
+        let edge = (size.iter().product::<f64>() / wanted).cbrt();
+        let longest = size.iter().fold(0.0f64, |m, s| m.max(*s));
+        let edge = edge.max(longest / 1000.0);
+        let shape = size.map(|s| ((s / edge).ceil() as usize).max(1));
+        self.boxes.edge = edge;
+        self.boxes.shape = shape;
+        let total = shape.iter().product::<usize>();
+        let mut pairs: Vec<(u32, u32)> = Vec::new();
+        for t in 0..self.tets.len() {
+            let corners = self.grown(t);
+            let b = corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+            let (lo, hi) = (self.boxes.place(b.min), self.boxes.place(b.max));
+            let planes = planes(&corners);
+            for k in lo[2]..=hi[2] {
+                for j in lo[1]..=hi[1] {
+                    for i in lo[0]..=hi[0] {
+                        let at = [i, j, k];
+                        let middle: Vec3 =
+                            core::array::from_fn(|a| self.boxes.min[a] + (at[a] as f64 + 0.5) * edge);
+                        // The box lies outside a face if its nearest corner does; a little rounding is allowed for.
+                        let out = planes.iter().any(|(n, d)| {
+                            let reach = 0.500001 * edge * n.iter().map(|v| v.abs()).sum::<f64>();
+                            dot(*n, middle) - d > reach
+                        });
+                        if !out {
+                            pairs.push((self.boxes.index(at) as u32, t as u32));
+                        }
+                    }
+                }
+            }
+        }
+        pairs.sort_unstable();
+        let mut first = vec![0u32; total + 1];
+        for (b, _) in &pairs {
+            first[*b as usize + 1] += 1;
+        }
+        for i in 0..total {
+            first[i + 1] += first[i];
+        }
+        let mut owner = vec![NONE; total];
+        let mut queue = VecDeque::new();
+        for b in 0..total {
+            if first[b + 1] > first[b] {
+                owner[b] = b as u32;
+                queue.push_back(b);
+            }
+        }
+        while let Some(b) = queue.pop_front() {
+            let at = [b % shape[0], b / shape[0] % shape[1], b / shape[0] / shape[1]];
+            for a in 0..3 {
+                for up in [false, true] {
+                    if (up && at[a] + 1 == shape[a]) || (!up && at[a] == 0) {
+                        continue;
+                    }
+                    let mut n = at;
+                    n[a] = if up { at[a] + 1 } else { at[a] - 1 };
+                    let n = self.boxes.index(n);
+                    if owner[n] == NONE {
+                        owner[n] = owner[b];
+                        queue.push_back(n);
+                    }
+                }
+            }
+        }
+        self.boxes.owner = owner;
+        self.boxes.first = first;
+        self.boxes.list = pairs.into_iter().map(|p| p.1).collect();
+    }
+
+    /// The corners of a tetrahedron grown by the overlap.
+    fn grown(&self, t: usize) -> [Vec3; 4] {
+        let corners = self.corners(t);
+        let middle = scale(corners.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
+        let by = 1.0 + 4.0 * self.overlap;
+        corners.map(|p| add(middle, scale(sub(p, middle), by)))
+    }
+
+    /// Number of tetrahedra.
+    pub fn len(&self) -> usize {
+        self.tets.len()
+    }
+
+    /// Whether there is none; never.
+    pub fn is_empty(&self) -> bool {
+        self.tets.is_empty()
+    }
+
+    /// The nodes (mm).
+    pub fn nodes(&self) -> &[Vec3] {
+        &self.nodes
+    }
+
+    /// The nodes of a tetrahedron, ascending.
+    pub fn tet(&self, t: usize) -> [u32; 4] {
+        self.tets[t]
+    }
+
+    /// Whether its nodes in ascending order are in negative order.
+    pub fn flipped(&self, t: usize) -> bool {
+        self.flipped[t]
+    }
+
+    /// The zone of a tetrahedron; 0 where there are none.
+    pub fn zone(&self, t: usize) -> u32 {
+        self.zones.get(t).copied().unwrap_or(0)
+    }
+
+    /// The tetrahedron across the face opposite each corner, or [`NONE`].
+    pub fn across(&self, t: usize) -> [u32; 4] {
+        self.across[t]
+    }
+
+    /// The corners (mm) of a tetrahedron.
+    pub fn corners(&self, t: usize) -> [Vec3; 4] {
+        self.tets[t].map(|v| self.nodes[v as usize])
+    }
+
+    /// The gradients (per mm) of the first three barycentric coordinates; the fourth's is minus their sum.
+    pub fn slopes(&self, t: usize) -> &Mat3 {
+        &self.slopes[t]
+    }
+
+    /// Volume (mm³) of a tetrahedron.
+    pub fn volume(&self, t: usize) -> f64 {
+        volume(self.corners(t)).abs()
+    }
+
+    /// Bounds of the mesh.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// By how much tetrahedra reach beyond themselves.
+    pub fn overlap(&self) -> f64 {
+        self.overlap
+    }
+
+    /// The mean length of the edges of tetrahedra, mm.
+    pub fn mean_edge(&self) -> f64 {
+        let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+        let edges = (0..self.len()).flat_map(|t| {
+            let c = self.corners(t);
+            pairs.map(|[a, b]| norm(sub(c[a], c[b])))
+        });
+        edges.sum::<f64>() / (6 * self.len()) as f64
+    }
+
+    /// The boundary, counter-clockwise seen from outside.
+    pub fn boundary(&self) -> crate::mesh::Mesh {
+        let mut out = crate::mesh::Mesh::default();
+        let mut names: HashMap<u32, u32> = HashMap::new();
+        for t in 0..self.len() {
+            for (face, f) in FACES.iter().enumerate() {
+                if self.across[t][face] != NONE {
+                    continue;
+                }
+                let mut f = f.map(|i| self.tets[t][i]);
+                if self.flipped[t] {
+                    f.swap(1, 2);
+                }
+                let named = f.map(|v| {
+                    *names.entry(v).or_insert_with(|| {
+                        out.vertices.push(self.nodes[v as usize]);
+                        out.vertices.len() as u32 - 1
+                    })
+                });
+                out.triangles.push(named);
+            }
+        }
+        out
+    }
+
+    /// Barycentric coordinates of a point with respect to a tetrahedron.
+    #[inline]
+    pub fn bary(&self, t: usize, p: Vec3) -> [f64; 4] {
+        let d = sub(p, self.nodes[self.tets[t][3] as usize]);
+        let m = &self.slopes[t];
+        let l = [dot(m[0], d), dot(m[1], d), dot(m[2], d)];
+        [l[0], l[1], l[2], 1.0 - l[0] - l[1] - l[2]]
+    }
+
+    /// The tetrahedron that a point lies in, and its coordinates there; outside the mesh, one of those nearby, in whose
+    /// coordinates some are then negative.
+    pub fn locate(&self, p: Vec3) -> (usize, [f64; 4]) {
+        let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
+        for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
+            let l = self.bary(t as usize, p);
+            let least = l.iter().copied().fold(f64::INFINITY, f64::min);
+            if least > best.0 {
+                best = (least, t as usize, l);
+                if least >= 0.0 {
+                    break;
+                }
+            }
+        }
+        (best.1, best.2)
+    }
+
+    /// Calls `f` with every tetrahedron in whose overlap a point lies; with the one of `locate`, if there is none.
+    pub fn each_near(&self, p: Vec3, mut f: impl FnMut(usize, [f64; 4])) {
+        let mut none = true;
+        for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
+            let l = self.bary(t as usize, p);
+            if l.iter().all(|v| *v > -self.overlap) {
+                none = false;
+                f(t as usize, l);
+            }
+        }
+        if none {
+            let (t, l) = self.locate(p);
+            f(t, l);
+        }
+    }
+
+    /// Calls `f` with all tetrahedra, some of them several times, that points of a box may be found in; `false` if they are
+    /// too many to be worth it.
+    pub fn each_in(&self, b: &Aabb, most: usize, mut f: impl FnMut(usize)) -> bool {
+        let (lo, hi) = (self.boxes.place(b.min), self.boxes.place(b.max));
+        let boxes: usize = (0..3).map(|a| hi[a] - lo[a] + 1).product();
+        if boxes > most {
+            return false;
+        }
+        let mut left = most;
+        for k in lo[2]..=hi[2] {
+            for j in lo[1]..=hi[1] {
+                for i in lo[0]..=hi[0] {
+                    let of = self.boxes.of(self.boxes.index([i, j, k]));
+                    if of.len() > left {
+                        return false;
+                    }
+                    left -= of.len();
+                    of.iter().for_each(|t| f(*t as usize));
+                }
+            }
+        }
+        true
+    }
+}
+
+/// The signed volume of a tetrahedron, mm³.
+fn volume([a, b, c, d]: [Vec3; 4]) -> f64 {
+    dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0
+}
+
+/// The edges from the fourth corner as columns: what takes the first three coordinates to a place.
+fn columns(c: &[Vec3; 4]) -> Mat3 {
+    transpose(&[sub(c[0], c[3]), sub(c[1], c[3]), sub(c[2], c[3])])
+}
+
+/// Outward normals and offsets of the faces.
+fn planes(c: &[Vec3; 4]) -> [(Vec3, f64); 4] {
+    core::array::from_fn(|i| {
+        let [p, q, r] = FACES[i].map(|k| c[k]);
+        let n = cross(sub(q, p), sub(r, p));
+        // The corner opposite lies inside, whatever the order.
+        let n = if dot(n, sub(c[i], p)) > 0.0 { scale(n, -1.0) } else { n };
+        (n, dot(n, p))
+    })
+}
+
+/// The tetrahedron across each face.
+fn across(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, Fault> {
+    let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * tets.len());
+    for (n, t) in tets.iter().enumerate() {
+        for i in 0..4 {
+            let f: [u32; 3] = core::array::from_fn(|k| t[k + usize::from(k >= i)]);
+            faces.push((f, (4 * n + i) as u32));
+        }
+    }
+    faces.sort_unstable();
+    let mut out = vec![[NONE; 4]; tets.len()];
+    for same in faces.chunk_by(|a, b| a.0 == b.0) {
+        match same {
+            [_] => {}
+            [(_, a), (_, b)] => {
+                out[*a as usize / 4][*a as usize % 4] = b / 4;
+                out[*b as usize / 4][*b as usize % 4] = a / 4;
+            }
+            more => {
+                let message = format!(
+                    "the face of nodes {:?} belongs to {} tetrahedra; a face has one or two",
+                    more[0].0,
+                    more.len()
+                );
+                return Err(Fault::new("tets", message));
+            }
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,424 @@
+//! A lattice over a tetrahedral mesh: a tetrahedral cell in each of its tetrahedra, cut by a part at a level.
+//!
+//! The level is a number, or one for each node of the mesh and linear between them. Several cells make a transition: each
+//! has a weight at every node, their weighted sum is cut, and since weights are linear in tetrahedra it is continuous too.
+//!
+//! Continuous, but with a crease at every face: no choice of cell removes it, since the faces of the tetrahedron are
+//! mirrors of no group. With an overlap, tetrahedra reach a little beyond themselves and their functions are mixed there,
+//! which leaves no crease; the surface then moves by some of the overlap, but not where it meets the faces themselves.
+
+mod crease;
+mod level;
+
+use std::sync::Arc;
+
+use crate::cell::Part;
+use crate::cell::tet::{Bary, Stencil};
+use crate::field::Field;
+use crate::map::Tets;
+use crate::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
+
+pub use crease::Creases;
+pub use level::{Amount, Spread};
+
+/// A cell of a tiling.
+#[derive(Clone)]
+pub struct Share {
+    /// The cell.
+    pub stencil: Arc<Stencil>,
+    /// What its values are divided by, so that several cells have like values.
+    pub scale: f64,
+    /// Its weight at each node of the mesh; one everywhere if there is none.
+    pub weights: Option<Arc<Vec<f64>>>,
+}
+
+/// The level t.
+#[derive(Clone)]
+pub enum Level {
+    /// The same everywhere.
+    Same(f64),
+    /// At each node of the mesh, linear between them.
+    Nodes(Arc<Vec<f64>>),
+}
+
+/// A lattice over a tetrahedral mesh as a field: sheet |f| − t, lower f − t, upper t − f.
+#[derive(Clone)]
+pub struct Tiling {
+    /// The mesh.
+    pub map: Arc<Tets>,
+    /// The cells whose weighted sum f is.
+    pub cells: Vec<Share>,
+    /// The part.
+    pub part: Part,
+    /// The level of f.
+    pub level: Level,
+    /// For each tetrahedron, a bound of the steepness of f (per mm).
+    steep: Arc<Vec<f64>>,
+    /// Set for one of the two sides of a sheet: the part, lower or upper, whose inequality it is.
+    side: Option<Part>,
+}
+
+/// How f is known at a point.
+#[derive(Clone, Copy, Default)]
+struct Known {
+    f: f64,
+    slope: Vec3,
+    t: f64,
+    slope_t: Vec3,
+}
+
+/// The most tetrahedra that are looked at for a bound.
+const MOST: usize = 256;
+
+impl Tiling {
+    /// A single cell over a mesh.
+    pub fn new(map: Arc<Tets>, stencil: Arc<Stencil>, part: Part, level: Level) -> Tiling {
+        let cell = Share {
+            stencil,
+            scale: 1.0,
+            weights: None,
+        };
+        Tiling::of(map, vec![cell], part, level)
+    }
+
+    /// Several cells over a mesh.
+    pub fn of(map: Arc<Tets>, cells: Vec<Share>, part: Part, level: Level) -> Tiling {
+        // |∇f| ≤ Σ amplitude 2π|h| in phase, times the stretch of the map.
+        let steep = cells.iter().map(|c| {
+            let waves = c.stencil.series().terms().iter();
+            let sum: f64 = waves
+                .map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from)))
+                .sum();
+            core::f64::consts::TAU * sum / c.scale
+        });
+        let steep = steep.fold(0.0, f64::max);
+        let corners = cells[0].stencil.corners();
+        let along = [0, 1, 2].map(|i| crate::math::sub(corners[i], corners[3]));
+        // All tetrahedra of cells are regular: with edges of another length the stretch is that much more.
+        let size = |s: &Stencil| norm(crate::math::sub(s.corners()[0], s.corners()[3]));
+        let longest = cells.iter().map(|c| size(&c.stencil)).fold(0.0, f64::max);
+        let more = longest / size(&cells[0].stencil);
+        let of = |t: usize| {
+            let slopes = map.slopes(t);
+            // du/dx = Σ (p_i − p_4) ∇λ_iᵀ.
+            let j = core::array::from_fn(|a| {
+                core::array::from_fn(|b| (0..3).map(|i| along[i][a] * slopes[i][b]).sum())
+            });
+            steep * more * spectral_norm(&j)
+        };
+        let steep: Vec<f64> = (0..map.len()).map(of).collect();
+        Tiling {
+            map,
+            cells,
+            part,
+            level,
+            steep: Arc::new(steep),
+            side: None,
+        }
+    }
+
+    /// The level where barycentric coordinates in a tetrahedron are these.
+    fn level_at(&self, t: usize, l: Bary) -> f64 {
+        match &self.level {
+            Level::Same(v) => *v,
+            Level::Nodes(of) => self.linear(of, t, l),
+        }
+    }
+
+    fn linear(&self, of: &[f64], t: usize, l: Bary) -> f64 {
+        let n = self.map.tet(t);
+        (0..4).map(|i| l[i] * of[n[i] as usize]).sum()
+    }
+
+    /// The gradient (per mm) of what is linear in a tetrahedron.
+    fn linear_slope(&self, of: &[f64], t: usize) -> Vec3 {
+        let n = self.map.tet(t);
+        let v = n.map(|n| of[n as usize]);
+        let m = self.map.slopes(t);
+        (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], v[i] - v[3])))
+    }
+
+    /// f and t, and their gradients, at points in tetrahedra.
+    fn pieces(&self, at: &[(usize, Bary)]) -> Vec<Known> {
+        let mut out = vec![Known::default(); at.len()];
+        let places: Vec<Bary> = at.iter().map(|a| a.1).collect();
+        let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
+        for c in &self.cells {
+            c.stencil.gradients(&places, &mut v, &mut g);
+            for (i, (t, l)) in at.iter().enumerate() {
+                let m = self.map.slopes(*t);
+                let slope = (0..3).fold([0.0; 3], |s, k| add(s, scale(m[k], g[i][k])));
+                let k = &mut out[i];
+                let (f, slope) = (v[i] / c.scale, scale(slope, 1.0 / c.scale));
+                match &c.weights {
+                    None => (k.f, k.slope) = (k.f + f, add(k.slope, slope)),
+                    Some(w) => {
+                        let l = self.tamed(*l);
+                        let weight = self.linear(w, *t, l);
+                        let turn = scale(self.linear_slope(w, *t), f);
+                        k.f += weight * f;
+                        k.slope = add(k.slope, add(scale(slope, weight), turn));
+                    }
+                }
+            }
+        }
+        for (k, (t, l)) in out.iter_mut().zip(at) {
+            k.t = self.level_at(*t, self.tamed(*l));
+            if let Level::Nodes(of) = &self.level {
+                k.slope_t = self.linear_slope(of, *t);
+            }
+        }
+        out
+    }
+
+    /// Coordinates that are farther outside than the overlap, brought back: what is linear must not run away.
+    fn tamed(&self, l: Bary) -> Bary {
+        if l.iter().all(|v| *v >= -self.map.overlap() - 1e-9) {
+            return l;
+        }
+        let l = l.map(|v| v.max(0.0));
+        let sum: f64 = l.iter().sum();
+        l.map(|v| v / sum)
+    }
+
+    fn known(&self, points: &[Vec3]) -> Vec<Known> {
+        let overlap = self.map.overlap();
+        if overlap <= 0.0 {
+            let at: Vec<(usize, Bary)> = points.iter().map(|p| self.map.locate(*p)).collect();
+            return self.pieces(&at);
+        }
+        let (mut at, mut ends) = (Vec::new(), Vec::with_capacity(points.len()));
+        for p in points {
+            self.map.each_near(*p, |t, l| at.push((t, l)));
+            ends.push(at.len());
+        }
+        let each = self.pieces(&at);
+        let mut first = 0;
+        let mean = |end: &usize| {
+            let here = first..*end;
+            first = *end;
+            if here.len() == 1 {
+                return each[here.start];
+            }
+            // Σ w k / Σ w with w = Π b(λ_i), b rising smoothly from 0 at −overlap to 1 at overlap.
+            let (mut sum, mut weight, mut slope) = (Known::default(), 0.0, [0.0; 3]);
+            let mut crossed = [0.0; 2].map(|_: f64| [0.0; 3]);
+            for i in here {
+                let (t, l) = at[i];
+                let (w, dw) = self.bump(t, l);
+                let k = &each[i];
+                sum.f += w * k.f;
+                sum.t += w * k.t;
+                sum.slope = add(sum.slope, scale(k.slope, w));
+                sum.slope_t = add(sum.slope_t, scale(k.slope_t, w));
+                crossed[0] = add(crossed[0], scale(dw, k.f));
+                crossed[1] = add(crossed[1], scale(dw, k.t));
+                weight += w;
+                slope = add(slope, dw);
+            }
+            let mean = |v: f64, s: Vec3, cross: Vec3| {
+                let v = v / weight;
+                (v, scale(add(add(s, cross), scale(slope, -v)), 1.0 / weight))
+            };
+            let (f, slope) = mean(sum.f, sum.slope, crossed[0]);
+            let (t, slope_t) = mean(sum.t, sum.slope_t, crossed[1]);
+            Known {
+                f,
+                slope,
+                t,
+                slope_t,
+            }
+        };
+        ends.iter().map(mean).collect()
+    }
+
+    /// The weight of a tetrahedron at a point, and its gradient.
+    fn bump(&self, t: usize, l: Bary) -> (f64, Vec3) {
+        let d = self.map.overlap();
+        let rise = |v: f64| {
+            let z = ((v + d) / (2.0 * d)).clamp(0.0, 1.0);
+            let up = z * z * z * (10.0 + z * (6.0 * z - 15.0));
+            (up, 30.0 * z * z * (1.0 - z) * (1.0 - z) / (2.0 * d))
+        };
+        let b = l.map(rise);
+        let w = b.iter().map(|v| v.0).product();
+        let m = self.map.slopes(t);
+        let last = scale(add(add(m[0], m[1]), m[2]), -1.0);
+        let slopes = [m[0], m[1], m[2], last];
+        let one = |i: usize| {
+            let others: f64 = (0..4).filter(|k| *k != i).map(|k| b[k].0).product();
+            scale(slopes[i], b[i].1 * others)
+        };
+        (w, (0..4).fold([0.0; 3], |s, i| add(s, one(i))))
+    }
+
+    /// Fills f and t at points (mm).
+    pub fn cores(&self, points: &[Vec3], f: &mut [f64], t: &mut [f64]) {
+        for ((f, t), k) in f.iter_mut().zip(t).zip(self.known(points)) {
+            (*f, *t) = (k.f, k.t);
+        }
+    }
+
+    fn folded(&self) -> bool {
+        self.part == Part::Sheet && self.side.is_none()
+    }
+
+    /// The sign of f and that of t in the value; f by its magnitude for a whole sheet.
+    fn signs(&self) -> (f64, f64) {
+        match (self.part, self.side) {
+            (Part::Sheet, Some(Part::Upper)) => (-1.0, -1.0),
+            (Part::Upper, _) => (-1.0, 1.0),
+            _ => (1.0, -1.0),
+        }
+    }
+
+    /// Whether the level or the weights vary.
+    pub fn varies(&self) -> bool {
+        matches!(self.level, Level::Nodes(_)) || self.cells.iter().any(|c| c.weights.is_some())
+    }
+
+    /// The least and greatest level.
+    pub fn levels(&self) -> Interval {
+        match &self.level {
+            Level::Same(t) => Interval::new(*t, *t),
+            Level::Nodes(of) => self.used(of),
+        }
+    }
+
+    /// The range over the nodes that tetrahedra use.
+    fn used(&self, of: &[f64]) -> Interval {
+        let all = (0..self.map.len()).flat_map(|t| self.map.tet(t));
+        let (lo, hi) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n| {
+            let v = of[n as usize];
+            (l.min(v), h.max(v))
+        });
+        Interval::new(lo, hi)
+    }
+
+    /// The volume of the mesh (mm³), and the solid's: Σ fraction · |T|, exact where the level is the same everywhere.
+    pub fn volumes(&self) -> (f64, f64) {
+        let fraction = |t: f64| {
+            let c = &self.cells[0];
+            c.stencil.fraction(self.part, t * c.scale)
+        };
+        let same = match &self.level {
+            Level::Same(t) => Some(fraction(*t)),
+            Level::Nodes(_) => None,
+        };
+        let (mut all, mut solid) = (0.0, 0.0);
+        for t in 0..self.map.len() {
+            let v = self.map.volume(t);
+            all += v;
+            let share = same.unwrap_or_else(|| {
+                let corner = |i: usize| {
+                    let mut l = [0.0; 4];
+                    l[i] = 1.0;
+                    fraction(self.level_at(t, l))
+                };
+                // Corners and the middle: exact for what is quadratic in the level.
+                let ends: f64 = (0..4).map(corner).sum();
+                (ends + 16.0 * fraction(self.level_at(t, [0.25; 4]))) / 20.0
+            });
+            solid += share * v;
+        }
+        (all, solid)
+    }
+
+    /// The length of a cell's period in tetrahedra of mean edge, mm.
+    pub fn wavelength(&self) -> f64 {
+        let s = &self.cells[0].stencil;
+        let edge = norm(crate::math::sub(s.corners()[0], s.corners()[1]));
+        self.map.mean_edge() / edge
+    }
+}
+
+impl Field for Tiling {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let ((s, c), folded) = (self.signs(), self.folded());
+        for (o, k) in out.iter_mut().zip(self.known(points)) {
+            *o = s * if folded { k.f.abs() } else { k.f } + c * k.t;
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let ((s, c), folded) = (self.signs(), self.folded());
+        let both = values.iter_mut().zip(gradients);
+        for ((v, g), k) in both.zip(self.known(points)) {
+            let s = if folded && k.f < 0.0 { -s } else { s };
+            *v = s * k.f + c * k.t;
+            *g = add(scale(k.slope, s), scale(k.slope_t, c));
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let most: f64 = self
+            .cells
+            .iter()
+            .map(|c| c.stencil.series().amplitude() / c.scale)
+            .fold(0.0, f64::max);
+        // What is linear reaches beyond the nodes' values by the overlap.
+        let beyond = 8.0 * self.map.overlap();
+        let spread = |i: Interval| {
+            let by = beyond * (i.hi - i.lo);
+            Interval::new(i.lo - by, i.hi + by)
+        };
+        let weighted = self.cells.iter().any(|c| c.weights.is_some());
+        let most = most * if weighted { 1.0 + 2.0 * beyond } else { 1.0 };
+        let all = Interval::new(-most, most);
+        let nothing = Interval::new(f64::INFINITY, f64::NEG_INFINITY);
+        let (mut f, mut t) = (nothing, nothing);
+        let (middle, reach) = (b.center(), norm(b.size()) / 2.0);
+        let mut near: Vec<usize> = Vec::new();
+        if b.is_finite() && self.map.each_in(b, MOST, |t| near.push(t)) {
+            near.sort_unstable();
+            near.dedup();
+            let at: Vec<(usize, Bary)> = near.iter().map(|t| (*t, self.map.bary(*t, middle))).collect();
+            let here = if weighted { Vec::new() } else { self.pieces(&at) };
+            for (i, n) in near.iter().enumerate() {
+                f = f.union(match here.get(i) {
+                    None => all,
+                    Some(k) => {
+                        let by = self.steep[*n] * reach;
+                        Interval::new((k.f - by).max(-most), (k.f + by).min(most))
+                    }
+                });
+                if let Level::Nodes(of) = &self.level {
+                    let v = self.map.tet(*n).map(|n| of[n as usize]);
+                    let (lo, hi) = v.iter().fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
+                    t = t.union(spread(Interval::new(lo, hi)));
+                }
+            }
+        } else {
+            f = all;
+        }
+        let t = match &self.level {
+            Level::Same(v) => Interval::new(*v, *v),
+            Level::Nodes(_) if t.lo <= t.hi => t,
+            Level::Nodes(_) => spread(self.levels()),
+        };
+        match (self.part, self.side) {
+            (Part::Sheet, Some(Part::Upper)) => -f - t,
+            (Part::Sheet, None) => f.abs() - t,
+            (Part::Upper, _) => t - f,
+            _ => f - t,
+        }
+    }
+
+    fn parts(&self) -> Vec<Arc<dyn Field>> {
+        if !self.folded() {
+            return Vec::new();
+        }
+        let side = |part| {
+            let side = Some(part);
+            Arc::new(Tiling {
+                side,
+                ..self.clone()
+            }) as Arc<dyn Field>
+        };
+        vec![side(Part::Lower), side(Part::Upper)]
+    }
+
+    fn slope(&self) -> f64 {
+        self.steep.iter().copied().fold(0.0, f64::max)
+    }
+}

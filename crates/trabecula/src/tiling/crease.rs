@@ -1,0 +1,99 @@
+//! The creases of a lattice over a tetrahedral mesh: how much its surface bends at the faces between tetrahedra.
+
+use super::Tiling;
+use crate::cell::Part;
+use crate::cell::tet::{Bary, Grid};
+use crate::map::tets::NONE;
+use crate::math::{Vec3, add, dot, norm, scale};
+
+/// Steps along the edge of a face on which traces are looked at.
+const STEPS: usize = 24;
+/// The most faces that are looked at.
+const FACES: usize = 20_000;
+
+/// The angles (degrees) between the two sides of the surface at the faces between tetrahedra.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Creases {
+    /// The mean along all traces.
+    pub mean: f64,
+    /// The greatest.
+    pub max: f64,
+}
+
+impl Tiling {
+    /// The creases without overlap, at the mean level where it varies. `None` for transitions, and where no face is met.
+    pub fn creases(&self) -> Option<Creases> {
+        let [cell] = &self.cells[..] else { return None };
+        let levels = self.levels();
+        let t = 0.5 * (levels.lo + levels.hi) * cell.scale;
+        let sides = match self.part {
+            Part::Sheet => vec![-t, t],
+            _ => vec![t],
+        };
+        let traces: Vec<[f64; 3]> = sides.iter().flat_map(|t| self.trace(*t)).collect();
+        if traces.is_empty() {
+            return None;
+        }
+        let map = &self.map;
+        // ∂f/∂λ is (g, 0): with zero for the corner opposite, in every tetrahedron that has the face.
+        let normal = |tet: usize, opposite: usize, g: &[f64; 3]| -> Vec3 {
+            let m = map.slopes(tet);
+            let last = scale(add(add(m[0], m[1]), m[2]), -1.0);
+            let m = [m[0], m[1], m[2], last];
+            (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i + usize::from(i >= opposite)], g[i])))
+        };
+        let (mut sum, mut count, mut max) = (0.0, 0.0, 0.0f64);
+        let step = (2 * map.len()).div_ceil(FACES);
+        for tet in (0..map.len()).step_by(step) {
+            for (face, other) in map.across(tet).into_iter().enumerate() {
+                if other == NONE || (step == 1 && (other as usize) < tet) {
+                    continue;
+                }
+                let other = other as usize;
+                let back = map.across(other).iter().position(|t| *t as usize == tet);
+                let Some(back) = back else { continue };
+                for g in &traces {
+                    let (a, b) = (normal(tet, face, g), normal(other, back, g));
+                    let c = dot(a, b) / (norm(a) * norm(b));
+                    let angle = c.clamp(-1.0, 1.0).acos().to_degrees();
+                    if angle.is_finite() {
+                        (sum, count, max) = (sum + angle, count + 1.0, max.max(angle));
+                    }
+                }
+            }
+        }
+        (count > 0.0).then(|| Creases {
+            mean: sum / count,
+            max,
+        })
+    }
+
+    /// ∂f/∂λ of the first three coordinates at points where f = t on the face on which the fourth is zero.
+    fn trace(&self, t: f64) -> Vec<[f64; 3]> {
+        let stencil = &self.cells[0].stencil;
+        let n = STEPS;
+        let place = |a: usize, b: usize| -> Bary {
+            let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
+            [k[0], k[1], k[2], 0.0]
+        };
+        let at: Vec<Bary> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
+        let v = stencil.values(&at);
+        let mut found: Vec<Bary> = Vec::new();
+        Grid { n }.each_triangle(|c, up| {
+            let c = c.map(|[a, b]| a * (a + 1) / 2 + b);
+            // Triangles of one kind have every edge once.
+            for (a, b) in [(0, 1), (1, 2), (0, 2)].into_iter().filter(|_| up) {
+                let (x, y) = (v[c[a]] - t, v[c[b]] - t);
+                if (x < 0.0) != (y < 0.0) {
+                    let s = x / (x - y);
+                    found.push(core::array::from_fn(|i| {
+                        at[c[a]][i] + s * (at[c[b]][i] - at[c[a]][i])
+                    }));
+                }
+            }
+        });
+        let (mut v, mut g) = (vec![0.0; found.len()], vec![[0.0; 4]; found.len()]);
+        stencil.gradients(&found, &mut v, &mut g);
+        g.into_iter().map(|g| [g[0], g[1], g[2]]).collect()
+    }
+}

@@ -1,0 +1,234 @@
+//! Tetrahedral meshes of regions: conforming, one closed sheet around, angles bounded, volumes that converge.
+
+use std::sync::Arc;
+
+use crate::common::{Random, ball, cases, cuboid, fault, region};
+use trabecula::field::Field;
+use trabecula::grade::Grade;
+use trabecula::math::{Aabb, Interval, Vec3, dot, scale};
+use trabecula::region::{Difference, Region};
+use trabecula::tets::{ANGLES, Fit, TetMesh, background};
+
+/// Points inside a field's bounds where it is negative.
+fn inside(field: &dyn Field, bounds: &Aabb) -> Vec<Vec3> {
+    let mut some = Random(3);
+    let place = |_| core::array::from_fn(|a| bounds.min[a] + bounds.size()[a] * some.share());
+    let points: Vec<Vec3> = (0..20_000).map(place).collect();
+    let mut values = vec![0.0; points.len()];
+    field.values(&points, &mut values);
+    let kept = points.iter().zip(values).filter(|(_, v)| *v < 0.0);
+    kept.map(|(p, _)| *p).collect()
+}
+
+fn mesh(region: &Region, size: &Grade) -> (TetMesh, Fit) {
+    let bounds = region.bounds();
+    background(&**region, &bounds, size, &inside(&**region, &bounds)).expect("mesh")
+}
+
+/// Conforming, positive, and bounded by one closed sheet that does not meet itself.
+fn sound(what: &str, mesh: &TetMesh) {
+    let (same, found) = mesh
+        .clone()
+        .checked()
+        .unwrap_or_else(|f| panic!("{what}: {f}"));
+    assert_eq!(&same, mesh, "{what}");
+    assert_eq!(
+        (found.turned, found.pinched, found.unused),
+        (false, 0, 0),
+        "{what}"
+    );
+    if let Some(why) = fault(&mesh.boundary()) {
+        panic!("{what}: {why}");
+    }
+}
+
+fn angles(what: &str, mesh: &TetMesh) -> [f64; 2] {
+    let d = mesh.quality().expect(what).dihedral;
+    // Cosines of such angles, to rounding, give them to far better than this.
+    assert!(
+        d.min > ANGLES[0] - 1e-6 && d.max < ANGLES[1] + 1e-6,
+        "{what}: {} to {}",
+        d.min,
+        d.max
+    );
+    [d.min, d.max]
+}
+
+#[test]
+fn random_regions_get_sound_meshes_of_bounded_angles_on_their_surface() {
+    let mut some = Random(11);
+    let mut worst = [180.0f64, 0.0];
+    for i in 0..cases(21) as usize {
+        let [r, s, t] = [0; 3].map(|_| some.between(0.8, 1.2));
+        let space = region(i % 7, r, s, t);
+        let size = some.between(0.12, 0.4);
+        let what = format!("kind {} {r} {s} {t}, size {size}", i % 7);
+        let (mesh, fit) = mesh(&space, &Grade::Constant(size));
+        sound(&what, &mesh);
+        let [a, b] = angles(&what, &mesh);
+        worst = [worst[0].min(a), worst[1].max(b)];
+        if fit.mended == 0.0 {
+            let boundary = mesh.boundary();
+            // Found to 1e-10 of an edge, or placed on an edge of the region, where signed distances of combinations bend.
+            let far = boundary
+                .vertices
+                .iter()
+                .map(|p| space.value(*p).abs())
+                .fold(0.0, f64::max);
+            assert!(far < 0.02 * size, "{what}: {far} off");
+        }
+        // A chord of length l is at most l²/8R off a curve of radius R; edges and corners are met to a tetrahedron.
+        assert!(fit.deviation < size, "{what}: {fit:?}");
+        assert!(fit.lost < 0.1, "{what}: {fit:?}");
+    }
+    eprintln!("dihedral angles from {:.2} to {:.2}", worst[0], worst[1]);
+}
+
+/// A sum of waves: any surface at all, not a distance.
+struct Waves(Vec<(Vec3, f64)>);
+
+impl Field for Waves {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        for (o, p) in out.iter_mut().zip(points) {
+            *o = self
+                .0
+                .iter()
+                .map(|(k, phase)| (dot(*k, *p) + phase).sin())
+                .sum();
+        }
+    }
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.values(points, values);
+        for (g, p) in gradients.iter_mut().zip(points) {
+            *g = [0.0; 3];
+            for (k, phase) in &self.0 {
+                let d = scale(*k, (dot(*k, *p) + phase).cos());
+                (0..3).for_each(|a| g[a] += d[a]);
+            }
+        }
+    }
+    fn bound(&self, _: &Aabb) -> Interval {
+        let most = self.0.len() as f64;
+        Interval::new(-most, most)
+    }
+}
+
+#[test]
+fn the_bounds_of_angles_hold_for_any_surface() {
+    let mut some = Random(5);
+    let bounds = Aabb {
+        min: [-2.0; 3],
+        max: [2.0; 3],
+    };
+    for i in 0..cases(12) {
+        let waves = (0..5)
+            .map(|_| (some.point(5.0), some.between(0.0, 6.3)))
+            .collect();
+        let field = Waves(waves);
+        let (mesh, _) = background(
+            &field,
+            &bounds,
+            &Grade::Constant(0.4),
+            &inside(&field, &bounds),
+        )
+        .expect("mesh");
+        sound(&format!("waves {i}"), &mesh);
+        angles(&format!("waves {i}"), &mesh);
+    }
+}
+
+#[test]
+fn the_volume_converges_at_second_order() {
+    let error = |size: f64| {
+        let (mesh, _) = mesh(&ball([0.1, 0.2, 0.3], 1.0), &Grade::Constant(size));
+        (mesh.volume() / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs()
+    };
+    let (coarse, fine) = (error(0.2), error(0.1));
+    // Four at second order; the lattice falls differently each time.
+    assert!(coarse / fine > 3.0 && fine < 0.004, "{coarse} {fine}");
+}
+
+#[test]
+fn a_box_is_met_exactly() {
+    let space = cuboid([0.0; 3], [3.0, 2.0, 1.0]);
+    let (mesh, fit) = mesh(&space, &Grade::Constant(0.23));
+    sound("box", &mesh);
+    // Sums of some thousands of volumes, each to rounding.
+    assert!((mesh.volume() - 6.0).abs() < 1e-9);
+    assert!(fit.deviation < 1e-9 && fit.lost == 0.0, "{fit:?}");
+    let q = mesh.quality().expect("quality");
+    assert!(
+        q.dihedral.min > 44.9 && q.dihedral.max < 90.1,
+        "{:?}",
+        q.dihedral
+    );
+}
+
+#[test]
+fn a_grade_of_sizes_is_followed() {
+    let mut spaces = vec![cuboid([0.0; 3], [2.0; 3]), ball([1.0; 3], 1.0)];
+    spaces.push(Arc::new(
+        Difference::new(vec![spaces[0].clone(), ball([1.0; 3], 0.5)]).expect("difference"),
+    ));
+    for space in spaces {
+        let size = Grade::linear([1.0, 0.0, 0.0], vec![[0.0, 0.06], [2.0, 0.3]]).expect("grade");
+        let (mesh, fit) = mesh(&space, &size);
+        sound("graded", &mesh);
+        assert!(fit.lost < 0.02);
+        let (_, sizes) = mesh.shapes();
+        let middles: Vec<Vec3> = (0..mesh.tets.len()).map(|i| mesh.middle(i)).collect();
+        let mut wanted = vec![0.0; middles.len()];
+        size.values(&middles, &mut wanted);
+        let mut ratio: Vec<f64> = sizes.iter().zip(&wanted).map(|(s, w)| s / w).collect();
+        ratio.sort_by(f64::total_cmp);
+        // Bisected until at most a sixth root of two (1.12) above; half a step below in the mean, and whole neighbours.
+        let at = |share: f64| ratio[(share * (ratio.len() - 1) as f64) as usize];
+        assert!((0.6..1.05).contains(&at(0.5)), "{}", at(0.5));
+        assert!(at(0.95) < 1.2 && at(1.0) < 1.9, "{} {}", at(0.95), at(1.0));
+        let q = mesh.quality().expect("quality");
+        assert!(
+            q.dihedral.min > 5.0 && q.slivers < q.tets / 1000,
+            "{:?}",
+            q.dihedral
+        );
+        assert!(q.size.max / q.size.min > 3.0);
+    }
+}
+
+#[test]
+fn thin_walls_are_told() {
+    let shell = |wall: f64| -> Region {
+        let parts = vec![ball([0.0; 3], 1.0), ball([0.0; 3], 1.0 - wall)];
+        Arc::new(Difference::new(parts).expect("shell"))
+    };
+    let (thin, points) = (shell(0.08), |r: &Region| inside(&**r, &r.bounds()));
+    match background(
+        &*thin,
+        &thin.bounds(),
+        &Grade::Constant(0.2),
+        &points(&thin),
+    ) {
+        Err(f) => assert!(f.message.contains("smaller"), "{f}"),
+        Ok((mesh, fit)) => {
+            sound("thin", &mesh);
+            assert!(fit.lost > 0.05, "{fit:?}");
+        }
+    }
+    let (mesh, fit) = mesh(&shell(0.3), &Grade::Constant(0.1));
+    sound("shell", &mesh);
+    assert!(fit.lost < 0.02 && mesh.pieces().0 == 1, "{fit:?}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_mesh() {
+    let space = region(5, 1.0, 0.9, 1.1);
+    let size = Grade::linear([0.0, 1.0, 0.0], vec![[-1.0, 0.1], [1.0, 0.2]]).expect("grade");
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("pool");
+        pool.install(|| mesh(&space, &size))
+    };
+    assert_eq!(with(1), with(3));
+}

@@ -1,0 +1,154 @@
+"""Tetrahedral meshes: the domain of a lattice that follows the part's own shape."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from . import _core
+from .design import Design
+from .errors import DesignError, DesignWarning
+from .given import whole
+from .input import read_text
+from .mesh import Mesh, Picture
+from .output import extension, whole_file
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["READS", "WRITES", "TetMesh"]
+
+READS = ("vtu", "vtk", "msh", "inp", "med", "mesh", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+WRITES = ("vtu", "msh", "inp", "med", "mesh")
+
+
+class TetMesh(Picture):
+    """A tetrahedral mesh, checked: conforming, every tetrahedron of positive volume.
+
+    Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``.
+    """
+
+    def __init__(self, core: _core.TetMesh):
+        self._core = core
+
+    @staticmethod
+    def of(design: Design | dict | str | os.PathLike[str], lattice: str | None = None, threads: int | None = None) -> TetMesh:
+        """The tetrahedral mesh that a design's ``map.tets`` asks for: of the lattice of this name, or of the first that has
+        one. A design may also be the path of its file, or plain data; keys other than the region and the mesh are left
+        alone. The same for any number of ``threads``.
+
+        Raises DesignError for anything wrong, and warns (DesignWarning) of what may not be meant: thin walls that are lost,
+        slivers, several pieces.
+        """
+        threads = None if threads is None else whole("threads", threads, 1, 4096)
+        if isinstance(design, Design):
+            data, folder = design.to_dict(), design.folder or os.getcwd()
+            return told(_core.TetMesh.from_data(data, folder, lattice, threads))
+        if isinstance(design, dict):
+            return told(_core.TetMesh.from_data(design, os.getcwd(), lattice, threads))
+        name = os.fsdecode(design)
+        kind = extension(name, ("toml", "json"))
+        folder = os.path.dirname(os.path.abspath(name))
+        return told(_core.TetMesh.from_text(read_text(name), kind == "json", name, folder, lattice, threads))
+
+    @staticmethod
+    def read(path: str | os.PathLike[str], unit: str | None = None, split: bool = False) -> TetMesh:
+        """Reads a file of tetrahedra: vtu or vtk; with the extra ``fe`` also msh, inp, med, mesh and others.
+
+        ``unit`` is that of its coordinates ("mm" unless given). Hexahedra, wedges and pyramids are refused unless ``split``,
+        which cuts them into tetrahedra that fit face to face.
+
+        Raises ValueError for what is no conforming mesh: inverted or flat tetrahedra, hanging nodes, nodes in one place.
+        """
+        name = os.path.abspath(os.fsdecode(path))
+        extension(name, READS)
+        try:
+            return told(_core.TetMesh.read(name, os.getcwd(), unit, split))
+        except DesignError as error:
+            raise ValueError(str(error)) from None
+
+    def __repr__(self) -> str:
+        nodes, tets = self.counts
+        return f"<trabecula.TetMesh {tets} tetrahedra, {nodes} nodes>"
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of nodes and tetrahedra."""
+        return self._core.counts
+
+    @cached_property
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes, (n, 3), mm."""
+        return self._core.nodes
+
+    @cached_property
+    def tets(self) -> NDArray[np.uint32]:
+        """The nodes of each tetrahedron, (m, 4), of positive volume: (b − a) × (c − a) · (d − a) > 0."""
+        return self._core.tets
+
+    @cached_property
+    def zones(self) -> NDArray[np.uint32]:
+        """The zone of each tetrahedron, a number of the mesher's own; empty where there are none."""
+        return self._core.zones
+
+    @cached_property
+    def least_dihedral(self) -> NDArray[np.float64]:
+        """The least dihedral angle of each tetrahedron, degrees; 70.5 in a regular one."""
+        return self._core.shapes()[0]
+
+    @cached_property
+    def sizes(self) -> NDArray[np.float64]:
+        """The size of each tetrahedron: the edge (mm) of a regular one of its volume."""
+        return self._core.shapes()[1]
+
+    @property
+    def warnings(self) -> list[dict[str, str]]:
+        """What may not be meant, as {path, message}."""
+        return [{"path": p, "message": m} for p, m in self._core.warnings]
+
+    def report(self) -> dict[str, Any]:
+        """The figures: ``quality`` (numbers, sizes, dihedral angles, aspect, slivers, inverted, pieces), ``fit`` to the region
+        (deviation, what is lost; None without one), ``mesher``, ``warnings``.
+        """
+        return json.loads(self._core.report())
+
+    @property
+    def volume(self) -> float:
+        """Volume, mm³."""
+        return self.report()["quality"]["volume"]
+
+    def boundary(self) -> Mesh:
+        """The boundary as a triangle mesh."""
+        return Mesh(self._core.boundary())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the mesh: vtu (with ``least_dihedral`` and ``size`` of each tetrahedron); with the extra ``fe`` msh, inp, med,
+        mesh.
+        """
+        kind = extension(path, WRITES)
+        if kind == "vtu":
+            with whole_file(path) as temporary:
+                self._core.write_vtu(temporary)
+            return
+        from . import elements
+
+        elements.needed()
+        with whole_file(path) as temporary:
+            elements.write(temporary, kind, self.nodes, self.tets, self.zones)
+
+    def _picture(self) -> Mesh:
+        return self.boundary()
+
+
+def told(core: _core.TetMesh) -> TetMesh:
+    """The mesh, its warnings said."""
+    made = TetMesh(core)
+    for path, message in core.warnings:
+        warnings.warn(f"{path}: {message}" if path else message, DesignWarning, stacklevel=3)
+    return made
