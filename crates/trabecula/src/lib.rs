@@ -12,6 +12,7 @@ pub mod fault;
 pub mod field;
 mod flush;
 pub mod grade;
+pub mod graph;
 pub mod io;
 pub mod lattice;
 pub mod map;
