@@ -17,14 +17,15 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from . import cell, grade, level, map, region
-    from .design import Design, Lattice, load, skin
+    from . import beams, cell, grade, level, map, region
+    from .design import Beams, Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
     from .thickness import Thickness
 
 __all__ = [
+    "Beams",
     "Design",
     "DesignError",
     "DesignWarning",
@@ -34,6 +35,7 @@ __all__ = [
     "Thickness",
     "Voxels",
     "__version__",
+    "beams",
     "cell",
     "fraction",
     "grade",
@@ -48,6 +50,7 @@ __all__ = [
 
 # Names are fetched on first use, so that the command's help does not wait for numpy.
 _HOMES = {
+    "Beams": "design",
     "Design": "design",
     "Lattice": "design",
     "load": "design",
@@ -63,7 +66,7 @@ _HOMES = {
     "fraction": "solid",
     "__version__": "_core",
 }
-_MODULES = ("cell", "grade", "level", "map", "region")
+_MODULES = ("beams", "cell", "grade", "level", "map", "region")
 
 
 def __getattr__(name: str) -> Any:

@@ -3,6 +3,7 @@
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
+mod beams;
 mod build;
 mod data;
 mod error;
@@ -28,6 +29,7 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
+use crate::graph::Truss;
 use crate::lattice::Lattice;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
@@ -40,6 +42,7 @@ pub use schema::schema;
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["lattice"] }, { "required": ["beams"] }]))]
 pub struct Design {
     /// Version of this format; 1.
     #[schemars(range(min = 1, max = 1))]
@@ -50,8 +53,13 @@ pub struct Design {
     /// Where the part may be.
     pub region: RegionSpec,
     /// What fills the region: one lattice, under a name of your own.
+    #[serde(default, skip_serializing_if = "Lattices::is_empty")]
     #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
     pub lattice: Lattices,
+    /// What fills the region instead of a lattice: one graph of beams, under a name of your own.
+    #[serde(default, skip_serializing_if = "BeamsSpecs::is_empty")]
+    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    pub beams: BeamsSpecs,
     /// What closes the region's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
@@ -93,6 +101,8 @@ pub struct Built {
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The graphs of beams in it, by name.
+    pub beams: Vec<(String, Arc<Truss>)>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.
@@ -110,6 +120,7 @@ impl Design {
             units: Units::Mm,
             region,
             lattice,
+            beams: BeamsSpecs::new(),
             skin: None,
             keep: Keeps::new(),
             lines: Lines::default(),

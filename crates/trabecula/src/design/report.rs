@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Built, build::LOOKS, sample};
+use super::{Built, beams, build::LOOKS, sample};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
@@ -125,8 +125,18 @@ pub(super) fn report(built: &Built) -> Json {
         }
         lattices.insert(name.clone(), entry);
     }
+    let share = (!built.beams.is_empty()).then(|| expected(built).0);
+    let beams: serde_json::Map<String, Json> = (built.beams.iter())
+        .map(|(name, truss)| {
+            (
+                name.clone(),
+                beams::report(truss, share.unwrap_or_default()),
+            )
+        })
+        .collect();
     json!({
         "lattices": lattices,
+        "beams": beams,
         "region": {
             "bounds": [bounds.min, bounds.max],
             "volume": volume,

@@ -18,6 +18,12 @@ pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "integer"] })
 }
 
+/// The names of the ready cells of beams.
+pub(super) fn beam_cell(_: &mut SchemaGenerator) -> Schema {
+    let names: Vec<&str> = crate::graph::catalogue().iter().map(|u| u.name).collect();
+    json_schema!({ "type": "string", "enum": names })
+}
+
 /// The names of the ready cells.
 pub(super) fn cell_name(_: &mut SchemaGenerator) -> Schema {
     let names: Vec<&str> = catalogue().iter().map(|n| n.name).collect();

@@ -1,0 +1,390 @@
+//! Beams: data to a graph and its field, and what is to be said of it.
+
+use std::sync::Arc;
+
+use serde_json::{Value as Json, json};
+
+use super::Warning;
+use super::build::{LOOKS, Place};
+use super::data::*;
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::level::check_varied;
+use super::{map, sample, samples};
+use crate::fault::{Fault, counted, number};
+use crate::field::Field;
+use crate::grade::Grade;
+use crate::graph::{self, Cleaned, Nodes, Profile, Radii, Trim, Truss, Union, Wire, sized};
+use crate::math::{Aabb, Vec3, norm};
+
+/// Ends of beams within this share of the region's size of its surface lie on it.
+const ON: f64 = 1e-9;
+/// Nodes within this share of the mean length of struts are one.
+const ONE: f64 = 1e-6;
+/// An angle between beams (degrees) below which it is warned of.
+const NARROW: f64 = 15.0;
+
+/// The graph and its field.
+pub(super) fn beams(
+    spec: &BeamsSpec,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Arc<Truss>, Arc<dyn Field>), DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let fault = |f: Fault| DesignError::fault(&place.path, f);
+    let radii = radii(spec, place)?;
+    let bounds = place.region.bounds();
+    let across = norm(bounds.size());
+    let reach = reach(&radii, &bounds, place);
+    let (mut wire, mut own, mut cleaned, wavelength) = match (&spec.cell, &spec.map) {
+        (Some(name), Some(map)) => {
+            let unit = graph::named(name).ok_or_else(|| {
+                let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
+                DesignError::unknown(&below("cell"), "cell of beams", name, &names)
+            })?;
+            let net = unit.net().map_err(fault)?;
+            let at = Place {
+                path: below("map"),
+                ..*place
+            };
+            let spec = map;
+            let map = map::map(spec, &at)?;
+            map::warn(&map, spec, &place.path, warnings);
+            let wire = graph::fill(&net, &map, &bounds, reach)
+                .map_err(|f| DesignError::fault(&below("map"), f))?;
+            (wire, Vec::new(), Cleaned::default(), map.wavelength())
+        }
+        _ => {
+            let (mut wire, mut own) = tables(spec, place)?;
+            // A node that no strut ends in is told, and goes.
+            let mean = mean_length(&wire);
+            let cleaned = wire.clean(merging(spec, mean, place)?, &mut own);
+            check_left(&wire, "struts", place)?;
+            tell_cleaned(&cleaned, &place.path, warnings);
+            (wire, own, cleaned, mean)
+        }
+    };
+    let given = own.clone();
+    let nodes = wire.nodes.len();
+    let trim = match spec.trim {
+        TrimSpec::Cut => Trim::Cut,
+        TrimSpec::Drop => Trim::Drop,
+        TrimSpec::Snap => Trim::Snap,
+    };
+    let space: &dyn Field = &**place.region;
+    let slack = ON * across;
+    let reach = given
+        .iter()
+        .copied()
+        .filter(|r| r.is_finite())
+        .fold(reach, f64::max);
+    let trimmed = trim.apply(&mut wire, space, reach, slack, &mut own);
+    debug_assert!(own.is_empty() || own.len() == wire.nodes.len());
+    check_left(&wire, if nodes == 0 { "map" } else { "trim" }, place)?;
+    if spec.cell.is_some() {
+        cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
+        check_left(&wire, "map", place)?;
+    }
+    let held = |p: Vec3| space.value(p) >= -slack;
+    if spec.dangling == DanglingSpec::Drop {
+        cleaned.dangling = wire.drop_dangling(&held, &mut own);
+        check_left(&wire, "dangling", place)?;
+    }
+    let graph = sized(&wire, &own, &radii).map_err(fault)?;
+    graph.check().map_err(fault)?;
+    let Some(field) = Union::new(&graph) else {
+        return Err(DesignError::new(
+            &place.path,
+            "there are no beams in the region",
+        ));
+    };
+    let truss = Truss {
+        facts: wire.facts(),
+        cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
+        graph,
+        wavelength,
+        cleaned,
+        trimmed,
+        dangling: wire.dangling(&held),
+    };
+    let field: Arc<dyn Field> = Arc::new(field);
+    check_open(&*field, place)?;
+    warn(&truss, &place.path, warnings);
+    Ok((Arc::new(truss), field))
+}
+
+fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
+    let varied = |spec: &Option<GradeSpec>, key: &'static str| {
+        let Some(spec) = spec else { return Ok(None) };
+        let path = format!("{}.{key}", place.path);
+        let allowed = Allowed::Positive(key);
+        let made = grade(spec, &path, place, allowed, false)?;
+        if let Grade::Formula(_) = &made {
+            check_varied(&made, &format!("{path}.formula"), allowed, false, place)?;
+        }
+        Ok(Some(made))
+    };
+    let positive = |v: f64, kind: &str| {
+        let path = format!("{}.profile.{kind}", place.path);
+        Allowed::Positive(if kind == "waist" { "waist" } else { "lambda" }).check(&path, v, "")
+    };
+    let profile = match spec.profile {
+        None => None,
+        Some(ProfileSpec::Cone) => Some(Profile::Cone),
+        Some(ProfileSpec::Cylinder) => Some(Profile::Cylinder),
+        Some(ProfileSpec::Waist(v)) => Some(Profile::Waist(positive(v, "waist")?)),
+        Some(ProfileSpec::Lambda(v)) => Some(Profile::Lambda(positive(v, "lambda")?)),
+    };
+    Ok(Radii {
+        radius: varied(&spec.radius, "radius")?,
+        hub: varied(&spec.hub, "hub")?,
+        profile,
+    })
+}
+
+/// A bound of the radius of balls in the region: what lies farther from it has no part in it.
+fn reach(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
+    let most = |g: &Grade| match g.bound(bounds).hi {
+        v if v.is_finite() => v,
+        _ => {
+            let mut values = vec![0.0; place.points.len()];
+            g.values(place.points, &mut values);
+            2.0 * values.into_iter().fold(0.0, f64::max)
+        }
+    };
+    let of = [&radii.radius, &radii.hub].into_iter().flatten();
+    of.map(most).fold(0.0, f64::max).min(norm(bounds.size()))
+}
+
+fn mean_length(wire: &Wire) -> f64 {
+    let total: f64 = wire.struts.iter().map(|s| wire.length(*s)).sum();
+    total / wire.struts.len().max(1) as f64
+}
+
+fn merging(spec: &BeamsSpec, mean: f64, place: &Place) -> Result<f64, DesignError> {
+    match spec.merge {
+        None => Ok(ONE * mean),
+        Some(v) if v >= 0.0 && v.is_finite() => Ok(v),
+        Some(v) => {
+            let message = format!(
+                "merge is {} mm; it must be a finite number, 0 or more",
+                number(v)
+            );
+            Err(DesignError::new(format!("{}.merge", place.path), message).found(number(v)))
+        }
+    }
+}
+
+/// Refuses a frame of which nothing is left.
+fn check_left(wire: &Wire, key: &str, place: &Place) -> Result<(), DesignError> {
+    if !wire.struts.is_empty() {
+        return Ok(());
+    }
+    let message = match key {
+        "dangling" => "no beam is left once those with a free end are dropped: none of them lies on a closed way".into(),
+        "struts" => "no beam has two different ends".to_string(),
+        _ => {
+            let b = place.region.bounds();
+            let corner = |v: Vec3| v.map(number).join(", ");
+            format!(
+                "no beam lies in the region, which reaches from ({}) to ({}) mm",
+                corner(b.min),
+                corner(b.max)
+            )
+        }
+    };
+    Err(DesignError::new(format!("{}.{key}", place.path), message))
+}
+
+/// Nodes and struts of the user's own.
+fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>), DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let read = |path: &str, key: &str| samples::bytes(path, &below(key), place);
+    let wrong = |path: &str, key: &str, f: Fault| {
+        DesignError::new(below(key), format!("{path}: {}", f.message)).found(path)
+    };
+    let nodes = match &spec.nodes {
+        Some(NodesSpec::Path(path)) => {
+            let text = read(path, "nodes")?;
+            graph::nodes(&String::from_utf8_lossy(&text)).map_err(|f| wrong(path, "nodes", f))?
+        }
+        Some(NodesSpec::Rows(rows)) => given(rows, &below("nodes"))?,
+        None => Nodes::default(),
+    };
+    let wire = match &spec.struts {
+        Some(StrutsSpec::Path(path)) => {
+            let text = read(path, "struts")?;
+            let text = String::from_utf8_lossy(&text);
+            graph::struts(&text, &nodes).map_err(|f| wrong(path, "struts", f))?
+        }
+        Some(StrutsSpec::Rows(rows)) => {
+            for (i, n) in rows
+                .iter()
+                .enumerate()
+                .flat_map(|(i, r)| r.iter().map(move |n| (i, n)))
+            {
+                if *n as usize >= nodes.places.len() {
+                    let message = format!(
+                        "there is no node {n}; there are {}, counted from 0",
+                        counted(nodes.places.len(), "node")
+                    );
+                    let at = format!("{}[{i}]", below("struts"));
+                    return Err(DesignError::new(at, message).found(n.to_string()));
+                }
+            }
+            Wire {
+                nodes: nodes.places.clone(),
+                struts: rows.clone(),
+            }
+        }
+        None => Wire::default(),
+    };
+    if spec.radius.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
+        let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
+        return Err(DesignError::new(&place.path, message));
+    }
+    Ok((wire, nodes.radii))
+}
+
+/// Nodes that stand in the design.
+fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> {
+    let mut nodes = Nodes::default();
+    for (i, row) in rows.iter().enumerate() {
+        let (at, radius) = match *row {
+            RowSpec::Place(p) => (p, None),
+            RowSpec::Ball([x, y, z, r]) => ([x, y, z], Some(r)),
+        };
+        let path = format!("{path}[{i}]");
+        for v in at {
+            super::build::finite(&path, v)?;
+        }
+        if let Some(r) = radius {
+            Allowed::Positive("radius").check(&path, r, "")?;
+        }
+        nodes.places.push(at);
+        nodes.radii.push(radius.unwrap_or(f64::NAN));
+        nodes.names.insert(i.to_string(), i as u32);
+    }
+    if nodes.radii.iter().all(|r| r.is_nan()) {
+        nodes.radii.clear();
+    }
+    Ok(nodes)
+}
+
+/// Refuses beams that leave the region empty or fill it.
+fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignError> {
+    let share = |points: &[Vec3]| {
+        let mut values = vec![0.0; points.len()];
+        field.values(points, &mut values);
+        values.iter().filter(|v| **v <= 0.0).count() as f64 / points.len().max(1) as f64
+    };
+    let mixed = |v: f64| v > 0.0 && v < 1.0;
+    if mixed(share(place.points)) {
+        return Ok(());
+    }
+    match share(&sample::inside(place.region, 50 * LOOKS).0) {
+        v if v >= 1.0 => Err(DesignError::new(
+            format!("{}.radius", place.path),
+            "the beams are so thick that the region is solid everywhere: nothing is open",
+        )),
+        // A few thin beams may be missed by every look.
+        _ => Ok(()),
+    }
+}
+
+fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
+    let told: Vec<String> = [
+        (c.merged, "node", "merged into another at the same place"),
+        (c.short, "strut", "of no length left out"),
+        (
+            c.duplicates,
+            "strut",
+            "left out because another joins the same nodes",
+        ),
+        (c.isolated, "node", "left out because no strut ends there"),
+    ]
+    .into_iter()
+    .filter(|t| t.0 > 0)
+    .map(|(n, what, done)| format!("{} {done}", counted(n, what)))
+    .collect();
+    if !told.is_empty() {
+        warnings.push(Warning {
+            path: path.into(),
+            message: told.join(", "),
+        });
+    }
+}
+
+fn warn(truss: &Truss, path: &str, warnings: &mut Vec<Warning>) {
+    let mut say = |message: String| {
+        warnings.push(Warning {
+            path: path.into(),
+            message,
+        });
+    };
+    let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
+    if truss.dangling > 0 && truss.cleaned.dangling == 0 {
+        say(format!(
+            "{} inside the region with a single beam; dangling = \"drop\" leaves such beams out",
+            counted(truss.dangling, "node")
+        ));
+    }
+    if let Some((n, p)) = truss.graph.swallowed() {
+        say(format!(
+            "{} lie within another one of the same hub, the first about {}",
+            counted(n, "beam"),
+            at(p)
+        ));
+    } else if let Some((angle, p)) = truss.facts.angle.filter(|a| a.0 < NARROW) {
+        say(format!(
+            "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
+            at(p)
+        ));
+    }
+}
+
+/// The figures of a graph; `fraction` is the solid share of the region.
+pub(super) fn report(truss: &Truss, fraction: f64) -> Json {
+    let range = |of: &mut dyn Iterator<Item = f64>| {
+        let [low, high] = of.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+            [a.min(v), b.max(v)]
+        });
+        json!([low, high])
+    };
+    let (facts, graph) = (&truss.facts, &truss.graph);
+    let valence: serde_json::Map<String, Json> = (facts.valence.iter())
+        .map(|(v, n)| (v.to_string(), json!(n)))
+        .collect();
+    let thin = (0..graph.beams.len())
+        .map(|b| graph.thinnest(b))
+        .fold(f64::INFINITY, f64::min);
+    json!({
+        "cell": truss.cell,
+        "wavelength": truss.wavelength,
+        "hubs": graph.hubs.len(),
+        "beams": graph.beams.len(),
+        "fraction": fraction,
+        "porosity": 1.0 - fraction,
+        "thickness": 2.0 * thin,
+        "hub_radius": range(&mut graph.hubs.iter().map(|h| h.radius)),
+        "length": facts.length,
+        "total_length": facts.total,
+        "valence": valence,
+        "smallest_angle": facts.angle.map(|a| a.0),
+        "smallest_angle_at": facts.angle.map(|a| a.1),
+        "pieces": facts.pieces,
+        "dangling": truss.dangling,
+        "cleaned": {
+            "merged": truss.cleaned.merged,
+            "zero_length": truss.cleaned.short,
+            "duplicates": truss.cleaned.duplicates,
+            "isolated": truss.cleaned.isolated,
+            "dangling": truss.cleaned.dangling,
+        },
+        "trimmed": {
+            "outside": truss.trimmed.outside,
+            "dropped": truss.trimmed.dropped,
+            "snapped": truss.trimmed.snapped,
+        },
+    })
+}
