@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
-use trabecula::graph::Truss;
+use trabecula::truss::Truss;
 use trabecula::io;
 use trabecula::region::Repaired;
 

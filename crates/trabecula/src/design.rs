@@ -29,10 +29,10 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
-use crate::graph::Truss;
 use crate::lattice::Lattice;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
+use crate::truss::Truss;
 
 pub use data::*;
 pub use error::{DesignError, nearest};

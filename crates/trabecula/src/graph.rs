@@ -1,23 +1,21 @@
 //! Beams as a graph: hub balls, and beams between them.
 
 mod catalogue;
+mod check;
 mod clean;
 mod fill;
 mod radii;
 mod table;
 mod trim;
-mod truss;
-mod union;
 mod wire;
 
 pub use catalogue::{Link, Net, Unit, catalogue, named};
 pub use clean::Cleaned;
 pub use fill::{MOST, expected, fill};
+pub(crate) use radii::place;
 pub use radii::{Radii, sized};
 pub use table::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
-pub use truss::Truss;
-pub use union::Union;
 pub use wire::{Facts, Wire};
 
 use crate::math::Vec3;

@@ -26,3 +26,4 @@ pub mod simplify;
 pub mod skin;
 pub mod solid;
 pub mod symmetry;
+pub mod truss;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde_json::{Value as Json, json};
 
 use super::Warning;
@@ -14,8 +15,11 @@ use super::{map, sample, samples};
 use crate::fault::{Fault, counted, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::graph::{self, Cleaned, Nodes, Profile, Radii, Trim, Truss, Union, Wire, sized};
-use crate::math::{Aabb, Vec3, norm};
+use crate::graph::{self, Cleaned, Graph, Nodes, Profile, Radii, Trim, Wire, sized};
+use crate::math::{Aabb, Vec3, norm, sub};
+use crate::quador::pencil::Pencil;
+use crate::quador::{Fillet, Quadors};
+use crate::truss::Truss;
 
 /// Ends of beams within this share of the region's size of its surface lie on it.
 const ON: f64 = 1e-9;
@@ -24,93 +28,175 @@ const ONE: f64 = 1e-6;
 /// An angle between beams (degrees) below which it is warned of.
 const NARROW: f64 = 15.0;
 
-/// The graph and its field.
+/// The beams of a design, filling the region.
 pub(super) fn beams(
     spec: &BeamsSpec,
     place: &Place,
     warnings: &mut Vec<Warning>,
-) -> Result<(Arc<Truss>, Arc<dyn Field>), DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
+) -> Result<Arc<Truss>, DesignError> {
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
-    let bounds = place.region.bounds();
-    let across = norm(bounds.size());
-    let reach = reach(&radii, &bounds, place);
-    let (mut wire, mut own, mut cleaned, wavelength) = match (&spec.cell, &spec.map) {
-        (Some(name), Some(map)) => {
-            let unit = graph::named(name).ok_or_else(|| {
-                let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
-                DesignError::unknown(&below("cell"), "cell of beams", name, &names)
-            })?;
-            let net = unit.net().map_err(fault)?;
-            let at = Place {
-                path: below("map"),
-                ..*place
-            };
-            let spec = map;
-            let map = map::map(spec, &at)?;
-            map::warn(&map, spec, &place.path, warnings);
-            let wire = graph::fill(&net, &map, &bounds, reach)
-                .map_err(|f| DesignError::fault(&below("map"), f))?;
-            (wire, Vec::new(), Cleaned::default(), map.wavelength())
-        }
-        _ => {
-            let (mut wire, mut own) = tables(spec, place)?;
-            // A node that no strut ends in is told, and goes.
-            let mean = mean_length(&wire);
-            let cleaned = wire.clean(merging(spec, mean, place)?, &mut own);
-            check_left(&wire, "struts", place)?;
-            tell_cleaned(&cleaned, &place.path, warnings);
-            (wire, own, cleaned, mean)
-        }
-    };
-    let given = own.clone();
-    let nodes = wire.nodes.len();
+    let Frame {
+        mut wire,
+        mut own,
+        wavelength,
+        reach,
+    } = frame(spec, &radii, place, warnings)?;
+    let mut cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
+    check_left(&wire, "", place)?;
+    if spec.cell.is_none() {
+        tell_cleaned(&cleaned, &place.path, warnings);
+    }
     let trim = match spec.trim {
         TrimSpec::Cut => Trim::Cut,
         TrimSpec::Drop => Trim::Drop,
         TrimSpec::Snap => Trim::Snap,
     };
     let space: &dyn Field = &**place.region;
-    let slack = ON * across;
-    let reach = given
-        .iter()
-        .copied()
-        .filter(|r| r.is_finite())
-        .fold(reach, f64::max);
+    let slack = ON * norm(place.region.bounds().size());
     let trimmed = trim.apply(&mut wire, space, reach, slack, &mut own);
-    debug_assert!(own.is_empty() || own.len() == wire.nodes.len());
-    check_left(&wire, if nodes == 0 { "map" } else { "trim" }, place)?;
-    if spec.cell.is_some() {
-        cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
-        check_left(&wire, "map", place)?;
-    }
+    check_left(&wire, "trim", place)?;
     let held = |p: Vec3| space.value(p) >= -slack;
     if spec.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", place)?;
     }
     let graph = sized(&wire, &own, &radii).map_err(fault)?;
-    graph.check().map_err(fault)?;
-    let Some(field) = Union::new(&graph) else {
-        return Err(DesignError::new(
-            &place.path,
-            "there are no beams in the region",
-        ));
-    };
+    check_beams(&graph, spec).map_err(fault)?;
+    let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
+    let inside = |p: Vec3| space.value(p) <= slack;
+    let rounded = (0..quadors.len())
+        .into_par_iter()
+        .filter(|i| inside(quadors.center(*i)))
+        .map(|i| quadors.fillet_radius(i))
+        .filter(|r| r.is_finite())
+        .map(|r| [r, r])
+        .reduce_with(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let truss = Truss {
-        facts: wire.facts(),
+        facts: wire.facts(&inside),
+        fillet: rounded.filter(|_| spec.fillet != FilletSpec::None),
         cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
         graph,
+        quadors: Arc::new(quadors),
         wavelength,
         cleaned,
         trimmed,
         dangling: wire.dangling(&held),
     };
-    let field: Arc<dyn Field> = Arc::new(field);
-    check_open(&*field, place)?;
-    warn(&truss, &place.path, warnings);
-    Ok((Arc::new(truss), field))
+    check_open(&*truss.quadors, place)?;
+    warn(&truss, spec, &place.path, warnings);
+    Ok(Arc::new(truss))
+}
+
+/// A frame before it is cleaned and trimmed.
+struct Frame {
+    wire: Wire,
+    /// Radii that nodes have of their own, NaN where they have none; empty if none has.
+    own: Vec<f64>,
+    wavelength: f64,
+    /// How far from the region a beam may lie and yet have a part in it, mm.
+    reach: f64,
+}
+
+fn frame(
+    spec: &BeamsSpec,
+    radii: &Radii,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<Frame, DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let bounds = place.region.bounds();
+    let thick = thickest(radii, &bounds, place);
+    // Fillets end halfway along the beams: all those of a hub so near count for what is in the region.
+    let reach = |longest: f64| match spec.fillet {
+        FilletSpec::None => thick,
+        _ => thick.max(0.5 * longest),
+    };
+    let (Some(name), Some(map)) = (&spec.cell, &spec.map) else {
+        let (wire, own) = tables(spec, place)?;
+        let longest = wire
+            .struts
+            .iter()
+            .map(|s| wire.length(*s))
+            .fold(0.0, f64::max);
+        let largest = own
+            .iter()
+            .copied()
+            .filter(|r| r.is_finite())
+            .fold(0.0, f64::max);
+        return Ok(Frame {
+            wavelength: mean_length(&wire),
+            reach: reach(longest).max(largest),
+            wire,
+            own,
+        });
+    };
+    let unit = graph::named(name).ok_or_else(|| {
+        let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
+        DesignError::unknown(&below("cell"), "cell of beams", name, &names)
+    })?;
+    let net = unit.net().map_err(|f| DesignError::fault(&place.path, f))?;
+    let at = Place {
+        path: below("map"),
+        ..*place
+    };
+    let made = map::map(map, &at)?;
+    map::warn(&made, map, &place.path, warnings);
+    let longest = net
+        .lengths([made.longest(); 3])
+        .into_iter()
+        .fold(0.0, f64::max);
+    let reach = reach(longest);
+    let wire = graph::fill(&net, &made, &bounds, reach)
+        .map_err(|f| DesignError::fault(&below("map"), f))?;
+    Ok(Frame {
+        wire,
+        own: Vec::new(),
+        wavelength: made.wavelength(),
+        reach,
+    })
+}
+
+fn fillet(spec: FilletSpec) -> Fillet {
+    match spec {
+        FilletSpec::None => Fillet::None,
+        FilletSpec::Auto => Fillet::Auto,
+        FilletSpec::Radius(r) => Fillet::Radius(r),
+        FilletSpec::Tau(t) => Fillet::Tau(t),
+        FilletSpec::Alpha(a) => Fillet::Alpha(a),
+        FilletSpec::Beta(b) => Fillet::Beta(b),
+    }
+}
+
+/// Refuses beams that no quadric makes, with the place of the first and how many there are.
+fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> {
+    let wrong: Vec<(usize, Fault)> = (graph.beams.par_iter().enumerate())
+        .filter_map(|(i, b)| {
+            let [a, z] = b.ends.map(|n| graph.hubs[n as usize]);
+            let length = norm(sub(z.center, a.center));
+            let made = Pencil::new(length, [a.radius, z.radius], b.profile);
+            made.err().map(|f| (i, f))
+        })
+        .collect();
+    let Some((first, fault)) = wrong.first() else {
+        return Ok(());
+    };
+    let [from, to] = graph.beams[*first]
+        .ends
+        .map(|n| graph::place(graph.hubs[n as usize].center));
+    let more = match wrong.len() {
+        1 => String::new(),
+        n => format!(" ({} in all)", counted(n, "such beam")),
+    };
+    // What stands in the design is the profile, or else the radii.
+    let key = match (spec.profile, &spec.hub) {
+        (Some(_), _) if fault.at == "profile" => "profile",
+        (_, Some(_)) => "hub",
+        _ if spec.radius.is_some() => "radius",
+        _ => "nodes",
+    };
+    let message = format!("the beam from {from} to {to}: {}{more}", fault.message);
+    Err(Fault::new(key, message))
 }
 
 fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
@@ -142,8 +228,8 @@ fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
     })
 }
 
-/// A bound of the radius of balls in the region: what lies farther from it has no part in it.
-fn reach(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
+/// A bound of the radius of balls in the region.
+fn thickest(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
     let most = |g: &Grade| match g.bound(bounds).hi {
         v if v.is_finite() => v,
         _ => {
@@ -315,7 +401,7 @@ fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     }
 }
 
-fn warn(truss: &Truss, path: &str, warnings: &mut Vec<Warning>) {
+fn warn(truss: &Truss, spec: &BeamsSpec, path: &str, warnings: &mut Vec<Warning>) {
     let mut say = |message: String| {
         warnings.push(Warning {
             path: path.into(),
@@ -327,6 +413,38 @@ fn warn(truss: &Truss, path: &str, warnings: &mut Vec<Warning>) {
         say(format!(
             "{} inside the region with a single beam; dangling = \"drop\" leaves such beams out",
             counted(truss.dangling, "node")
+        ));
+    }
+    if let Some(worst) = truss
+        .quadors
+        .shortfalls()
+        .iter()
+        .min_by(|a, b| a.radius.total_cmp(&b.radius))
+    {
+        let asked = match spec.fillet {
+            FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
+            _ => "the fillet asked for".into(),
+        };
+        say(format!(
+            "{} cannot have {asked} and {} the largest that fits; the tightest has {:.3} mm, at {}",
+            counted(truss.quadors.shortfalls().len(), "hub"),
+            if truss.quadors.shortfalls().len() == 1 {
+                "has"
+            } else {
+                "have"
+            },
+            worst.radius,
+            at(truss.quadors.center(worst.hub))
+        ));
+    }
+    if let (false, Some(o)) = (
+        spec.fillet == FilletSpec::None,
+        truss.quadors.overlaps().first(),
+    ) {
+        say(format!(
+            "{} of beams still overlap halfway along, the first at {}: no fillet is made between them; make them thinner",
+            counted(truss.quadors.overlaps().len(), "pair"),
+            at(truss.quadors.center(o.hub))
         ));
     }
     if let Some((n, p)) = truss.graph.swallowed() {
@@ -355,14 +473,16 @@ pub(super) fn report(truss: &Truss, fraction: f64) -> Json {
     let valence: serde_json::Map<String, Json> = (facts.valence.iter())
         .map(|(v, n)| (v.to_string(), json!(n)))
         .collect();
+    let quadors = &truss.quadors;
     let thin = (0..graph.beams.len())
-        .map(|b| graph.thinnest(b))
+        .map(|b| quadors.pencil(b).waist())
         .fold(f64::INFINITY, f64::min);
+    let inside: usize = facts.valence.values().sum();
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
-        "hubs": graph.hubs.len(),
-        "beams": graph.beams.len(),
+        "hubs": inside,
+        "beams": graph.beams.len() - truss.trimmed.beside,
         "fraction": fraction,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * thin,
@@ -370,6 +490,7 @@ pub(super) fn report(truss: &Truss, fraction: f64) -> Json {
         "length": facts.length,
         "total_length": facts.total,
         "valence": valence,
+        "fillet_radius": truss.fillet,
         "smallest_angle": facts.angle.map(|a| a.0),
         "smallest_angle_at": facts.angle.map(|a| a.1),
         "pieces": facts.pieces,

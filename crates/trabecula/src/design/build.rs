@@ -140,8 +140,8 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
-        let (truss, field) = beams::beams(spec, &place, &mut warnings)?;
-        fields.push((field, truss.wavelength));
+        let truss = beams::beams(spec, &place, &mut warnings)?;
+        fields.push((truss.quadors.clone(), truss.wavelength));
         trusses.push((name.clone(), truss));
     }
     let mut fields = fields.into_iter();

@@ -114,7 +114,7 @@ mod tests {
             let mut wire = fill(&net, &affine(4.0), &bounds, 0.0).expect("frame");
             let done = wire.clean(1e-9, &mut Vec::new());
             assert_eq!(done, Default::default(), "{}", unit.name);
-            let facts = wire.facts();
+            let facts = wire.facts(&|_| true);
             let mut lengths = net.lengths([4.0; 3]);
             lengths.sort_by(f64::total_cmp);
             assert!((facts.length[0] - lengths[0]).abs() < 1e-9, "{}", unit.name);

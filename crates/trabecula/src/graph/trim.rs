@@ -25,6 +25,8 @@ pub struct Trimmed {
     pub dropped: usize,
     /// Struts that were shortened to the surface.
     pub snapped: usize,
+    /// Struts that stay though their axes do not enter the region.
+    pub beside: usize,
 }
 
 /// Steps along a strut at least: beyond it a bay of the region is overlooked.
@@ -53,10 +55,14 @@ impl Trim {
         match self {
             Trim::Cut => struts.retain(|s| {
                 let at = s.map(|n| nodes[n as usize]);
-                let near = s.iter().any(|n| depth[*n as usize] <= reach)
-                    || least(region, at, reach) <= reach;
-                done.outside += usize::from(!near);
-                near
+                let nearest = if s.iter().any(|n| inside(*n)) {
+                    0.0
+                } else {
+                    least(region, at, slack)
+                };
+                done.outside += usize::from(nearest > reach);
+                done.beside += usize::from(nearest <= reach && nearest > slack);
+                nearest <= reach
             }),
             Trim::Drop => struts.retain(|s| {
                 let at = s.map(|n| nodes[n as usize]);

@@ -16,7 +16,7 @@ pub struct Wire {
 /// What is told of a wire frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// How many nodes have how many struts.
+    /// How many nodes have how many struts, of those inside.
     pub valence: BTreeMap<usize, usize>,
     /// Shortest and longest strut, mm.
     pub length: [f64; 2],
@@ -101,8 +101,8 @@ impl Wire {
         }
     }
 
-    /// What is told of the frame.
-    pub fn facts(&self) -> Facts {
+    /// What is told of the frame; nodes are counted where they are `inside`.
+    pub fn facts(&self, inside: &impl Fn(Vec3) -> bool) -> Facts {
         let stars = Stars::of(self);
         let mut facts = Facts {
             length: [f64::INFINITY, 0.0],
@@ -117,6 +117,9 @@ impl Wire {
         let mut steepest = -1.0;
         let mut rays: Vec<Vec3> = Vec::new();
         for (n, place) in self.nodes.iter().enumerate() {
+            if !inside(*place) {
+                continue;
+            }
             let star = stars.at(n);
             *facts.valence.entry(star.len()).or_default() += 1;
             rays.clear();
@@ -183,7 +186,7 @@ mod tests {
             ],
             struts: vec![[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [5, 6]],
         };
-        let facts = wire.facts();
+        let facts = wire.facts(&|_| true);
         assert_eq!(facts.valence, BTreeMap::from([(1, 3), (2, 3), (3, 1)]));
         assert_eq!((facts.length, facts.pieces), ([1.0, 3.0], 2));
         assert!((facts.total - 12.0).abs() < 1e-12);

@@ -164,6 +164,10 @@ impl Field for Quadors {
             .fold(cap, |least, i| least.min(self.hub_bound(i as usize, b)))
     }
 
+    fn edged(&self) -> bool {
+        self.sharp
+    }
+
     fn slope(&self) -> f64 {
         let thick = self
             .balls

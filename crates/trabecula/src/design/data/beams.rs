@@ -39,6 +39,9 @@ pub struct BeamsSpec {
     /// given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<ProfileSpec>,
+    /// How beams are rounded into one another.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub fillet: FilletSpec,
     /// What becomes of beams that leave the region.
     #[serde(default, skip_serializing_if = "is_default")]
     pub trim: TrimSpec,
@@ -92,6 +95,25 @@ pub enum ProfileSpec {
     Waist(f64),
     /// By the parameter of the pencil of quadrics: 1 for a cylinder or paraboloid, less for a barrel, more for a waist.
     Lambda(f64),
+}
+
+/// How beams are rounded into one another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum FilletSpec {
+    /// Not: they meet in creases.
+    #[default]
+    None,
+    /// As far as each hub allows.
+    Auto,
+    /// With this radius (mm) in the tightest place; where it cannot be had, with the largest that can, and a warning.
+    Radius(f64),
+    /// By τ, from 0 up to 1, exclusive: nearly 1 is a small fillet.
+    Tau(f64),
+    /// By α, above 0 and up to ½: a larger one is a larger fillet; τ = (1 − 4α²)/(1 + 4α²).
+    Alpha(f64),
+    /// By β = 1/(4α), from ½ on: a larger one is a smaller fillet.
+    Beta(f64),
 }
 
 /// What becomes of beams that leave the region.

@@ -6,8 +6,9 @@ use crate::design::node::At;
 use crate::fault::{counted, number};
 use crate::graph::catalogue;
 
-const KEYS: [&str; 10] = [
-    "cell", "map", "nodes", "struts", "radius", "hub", "profile", "trim", "dangling", "merge",
+const KEYS: [&str; 11] = [
+    "cell", "map", "nodes", "struts", "radius", "hub", "profile", "fillet", "trim", "dangling",
+    "merge",
 ];
 
 /// What others call the cells.
@@ -79,6 +80,7 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
         radius: maybe("radius")?,
         hub: maybe("hub")?,
         profile: f.get("profile").map(profile).transpose()?,
+        fillet: f.read("fillet", FilletSpec::None, fillet)?,
         trim: f.read("trim", TrimSpec::Cut, |at| at.word("trim", &trims))?,
         dangling: f.read("dangling", DanglingSpec::Keep, |at| at.word("word", &loose))?,
         merge: f.get("merge").map(At::number).transpose()?,
@@ -155,6 +157,26 @@ fn profile(at: &At) -> Read<ProfileSpec> {
         ProfileSpec::Waist(v)
     } else {
         ProfileSpec::Lambda(v)
+    })
+}
+
+fn fillet(at: &At) -> Read<FilletSpec> {
+    if at.is_text() {
+        let words = [("none", FilletSpec::None), ("auto", FilletSpec::Auto)];
+        return at.word("fillet", &words);
+    }
+    if at.is_number() {
+        return Err(at.error(
+            "a bare number says not what it is; for a radius in mm write fillet = { radius = 0.5 }",
+        ));
+    }
+    let (kind, at) = at.kind("fillet", &["radius", "tau", "alpha", "beta"], &[])?;
+    let v = at.number()?;
+    Ok(match kind {
+        "radius" => FilletSpec::Radius(v),
+        "tau" => FilletSpec::Tau(v),
+        "alpha" => FilletSpec::Alpha(v),
+        _ => FilletSpec::Beta(v),
     })
 }
 

@@ -1,31 +1,8 @@
-//! A graph with all that is told of it.
+//! A graph as a frame, and what in it cannot be meant.
 
-use super::clean::Cleaned;
-use super::radii::place;
-use super::trim::Trimmed;
-use super::wire::{Facts, Stars, Wire};
+use super::wire::{Stars, Wire};
 use super::{Graph, Profile};
-use crate::fault::{Fault, number};
 use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
-
-/// A graph of beams in a region, and how it came about.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Truss {
-    /// The graph.
-    pub graph: Graph,
-    /// The unit cell that it was made of, if it was.
-    pub cell: Option<&'static str>,
-    /// A length to which grids are fitted, mm: the least wavelength of the map, or the mean length of struts.
-    pub wavelength: f64,
-    /// What is told of the frame.
-    pub facts: Facts,
-    /// What was taken out of it.
-    pub cleaned: Cleaned,
-    /// What was trimmed.
-    pub trimmed: Trimmed,
-    /// Nodes inside the region with a single strut.
-    pub dangling: usize,
-}
 
 impl Graph {
     /// The frame of the graph.
@@ -59,60 +36,6 @@ impl Graph {
             Profile::Cone | Profile::Cylinder | Profile::Lambda(_) => f64::INFINITY,
         };
         ends[0].min(ends[1]).min(middle)
-    }
-
-    /// Refuses beams that cannot be: one ball within the other, a cylinder between balls that are not equal. The place of
-    /// the first is told, and how many there are.
-    ///
-    /// # Errors
-    /// As said.
-    pub fn check(&self) -> Result<(), Fault> {
-        let mut first = None;
-        let mut count = 0;
-        for b in &self.beams {
-            let [p, q] = b.ends.map(|n| self.hubs[n as usize]);
-            let length = norm(sub(q.center, p.center));
-            let (r, s) = (p.radius, q.radius);
-            let wrong = if length <= (r - s).abs() {
-                Some((
-                    "hub",
-                    format!(
-                        "the hub of radius {} mm at {} lies within the one of radius {} mm at {}: hubs must be farther apart \
-                     than their radii differ",
-                        number(r.min(s)),
-                        place(if r < s { p.center } else { q.center }),
-                        number(r.max(s)),
-                        place(if r < s { q.center } else { p.center }),
-                    ),
-                ))
-            } else if b.profile == Profile::Cylinder && (r - s).abs() > 1e-9 * r.max(s) {
-                Some((
-                    "profile",
-                    format!(
-                        "no cylinder is tangent to hubs of radius {} mm at {} and {} mm at {}; use \"cone\", or leave the \
-                     profile out",
-                        number(r),
-                        place(p.center),
-                        number(s),
-                        place(q.center)
-                    ),
-                ))
-            } else {
-                None
-            };
-            if let Some(wrong) = wrong {
-                count += 1;
-                first.get_or_insert(wrong);
-            }
-        }
-        match first {
-            None => Ok(()),
-            Some((at, message)) if count == 1 => Err(Fault::new(at, message)),
-            Some((at, message)) => Err(Fault::new(
-                at,
-                format!("{message} (and {} more like it)", count - 1),
-            )),
-        }
     }
 
     /// Beams that lie within another one of the same hub: how many, and where the first is.
@@ -166,30 +89,6 @@ mod tests {
                 .collect(),
             beams: beams.iter().map(|e| Beam { ends: *e, profile }).collect(),
         }
-    }
-
-    #[test]
-    fn beams_that_cannot_be_are_refused_with_their_place() {
-        let nested = line(&[[0.0, 1.0], [0.5, 0.2]], &[[0, 1]], Profile::Cone);
-        assert!(
-            nested
-                .check()
-                .is_err_and(|f| f.at == "hub" && f.message.contains("(0.5, 0, 0)"))
-        );
-        let uneven = line(
-            &[[0.0, 1.0], [5.0, 0.2], [9.0, 1.0]],
-            &[[0, 1], [1, 2]],
-            Profile::Cylinder,
-        );
-        assert!(
-            uneven
-                .check()
-                .is_err_and(|f| f.at == "profile" && f.message.contains("1 more"))
-        );
-        assert_eq!(
-            line(&[[0.0, 1.0], [5.0, 0.2]], &[[0, 1]], Profile::Cone).check(),
-            Ok(())
-        );
     }
 
     #[test]
