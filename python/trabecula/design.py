@@ -46,7 +46,8 @@ class Beams:
     ``nodes`` is an array (n, 3), or (n, 4) with hub radii, mm, or the path of a table (csv) of id, x, y, z and perhaps r;
     ``struts`` an array (m, 2) of numbers of nodes, or the path of a table of pairs of ids. ``radius`` is a beam's at mid
     length and ``hub`` that of the balls in which beams meet (mm, numbers or grades). ``profile`` is "cone", "cylinder",
-    {"waist": mm} or {"lambda": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within
+    {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v}, {"alpha": v},
+    {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within
     ``merge`` (mm) are one.
     """
 
@@ -57,6 +58,7 @@ class Beams:
     nodes: Any = None
     struts: Any = None
     profile: str | dict | None = None
+    fillet: str | dict | None = None
     trim: str | None = None
     dangling: str | None = None
     merge: float | None = None

@@ -2,7 +2,6 @@
 
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -12,9 +11,9 @@ use rayon::prelude::*;
 use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
-use trabecula::truss::Truss;
 use trabecula::io;
 use trabecula::region::Repaired;
+use trabecula::truss::Beams;
 
 use crate::design::Folder;
 use crate::error;
@@ -164,8 +163,12 @@ impl Solid {
     /// The graphs of beams: name, centres and radii of hubs, the hubs that each beam joins.
     #[getter]
     fn beams<'py>(&self, py: Python<'py>) -> PyResult<Vec<Graph<'py>>> {
-        let graph = |(name, truss): &(String, Arc<Truss>)| {
-            let (hubs, beams) = (&truss.graph.hubs, &truss.graph.beams);
+        let graph = |(name, beams): &(String, Beams)| {
+            let graph = match beams {
+                Beams::Truss(truss) => truss.graph.clone(),
+                Beams::Pattern(laid) => laid.pattern().expanded().map_err(error::fault)?,
+            };
+            let (hubs, beams) = (&graph.hubs, &graph.beams);
             let centers: Vec<f64> = hubs.iter().flat_map(|h| h.center).collect();
             let radii: Vec<f64> = hubs.iter().map(|h| h.radius).collect();
             let ends: Vec<u32> = beams.iter().flat_map(|b| b.ends).collect();

@@ -12,6 +12,7 @@ mod json;
 mod level;
 mod map;
 mod node;
+mod pattern;
 mod read;
 mod region;
 mod report;
@@ -32,7 +33,7 @@ use crate::cell::Cell;
 use crate::lattice::Lattice;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
-use crate::truss::Truss;
+use crate::truss::Beams;
 
 pub use data::*;
 pub use error::{DesignError, nearest};
@@ -101,8 +102,8 @@ pub struct Built {
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
-    /// The graphs of beams in it, by name.
-    pub beams: Vec<(String, Arc<Truss>)>,
+    /// The beams in it, by name.
+    pub beams: Vec<(String, Beams)>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.

@@ -19,6 +19,7 @@ pub mod map;
 pub mod math;
 pub mod measure;
 pub mod mesh;
+pub mod pattern;
 pub mod quador;
 pub mod region;
 pub mod render;

@@ -276,6 +276,11 @@ impl Quadors {
         self.balls[i].center
     }
 
+    /// Number of beams.
+    pub fn beams(&self) -> usize {
+        self.ends.len()
+    }
+
     /// The quadric of a beam.
     pub fn pencil(&self, beam: usize) -> &Pencil {
         &self.pencils[beam]

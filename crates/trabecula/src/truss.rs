@@ -2,8 +2,37 @@
 
 use std::sync::Arc;
 
+use crate::field::Field;
 use crate::graph::{Cleaned, Facts, Graph, Trimmed};
+use crate::pattern::Laid;
 use crate::quador::Quadors;
+
+/// Beams as they fill a region.
+#[derive(Clone)]
+pub enum Beams {
+    /// A graph.
+    Truss(Arc<Truss>),
+    /// A program of repeats.
+    Pattern(Arc<Laid>),
+}
+
+impl Beams {
+    /// The solid.
+    pub fn field(&self) -> Arc<dyn Field> {
+        match self {
+            Beams::Truss(t) => t.quadors.clone(),
+            Beams::Pattern(p) => p.clone(),
+        }
+    }
+
+    /// A length to which grids are fitted, mm.
+    pub fn wavelength(&self) -> f64 {
+        match self {
+            Beams::Truss(t) => t.wavelength,
+            Beams::Pattern(p) => p.wavelength(),
+        }
+    }
+}
 
 /// Beams in a region.
 #[derive(Clone, Debug)]

@@ -11,6 +11,7 @@ use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
+use super::pattern;
 use super::{map, sample, samples};
 use crate::fault::{Fault, counted, number};
 use crate::field::Field;
@@ -19,7 +20,7 @@ use crate::graph::{self, Cleaned, Graph, Nodes, Profile, Radii, Trim, Wire, size
 use crate::math::{Aabb, Vec3, norm, sub};
 use crate::quador::pencil::Pencil;
 use crate::quador::{Fillet, Quadors};
-use crate::truss::Truss;
+use crate::truss::{Beams, Truss};
 
 /// Ends of beams within this share of the region's size of its surface lie on it.
 const ON: f64 = 1e-9;
@@ -33,7 +34,10 @@ pub(super) fn beams(
     spec: &BeamsSpec,
     place: &Place,
     warnings: &mut Vec<Warning>,
-) -> Result<Arc<Truss>, DesignError> {
+) -> Result<Beams, DesignError> {
+    if let Some(pattern) = &spec.pattern {
+        return pattern::laid(spec, pattern, place).map(|p| Beams::Pattern(Arc::new(p)));
+    }
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
     let Frame {
@@ -84,8 +88,8 @@ pub(super) fn beams(
         dangling: wire.dangling(&held),
     };
     check_open(&*truss.quadors, place)?;
-    warn(&truss, spec, &place.path, warnings);
-    Ok(Arc::new(truss))
+    warn(&truss, spec, place, warnings);
+    Ok(Beams::Truss(Arc::new(truss)))
 }
 
 /// A frame before it is cleaned and trimmed.
@@ -157,7 +161,7 @@ fn frame(
     })
 }
 
-fn fillet(spec: FilletSpec) -> Fillet {
+pub(super) fn fillet(spec: FilletSpec) -> Fillet {
     match spec {
         FilletSpec::None => Fillet::None,
         FilletSpec::Auto => Fillet::Auto,
@@ -333,7 +337,7 @@ fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>), DesignErr
 }
 
 /// Nodes that stand in the design.
-fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> {
+pub(super) fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> {
     let mut nodes = Nodes::default();
     for (i, row) in rows.iter().enumerate() {
         let (at, radius) = match *row {
@@ -358,7 +362,7 @@ fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> {
 }
 
 /// Refuses beams that leave the region empty or fill it.
-fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignError> {
+pub(super) fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignError> {
     let share = |points: &[Vec3]| {
         let mut values = vec![0.0; points.len()];
         field.values(points, &mut values);
@@ -401,10 +405,10 @@ fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     }
 }
 
-fn warn(truss: &Truss, spec: &BeamsSpec, path: &str, warnings: &mut Vec<Warning>) {
+fn warn(truss: &Truss, spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>) {
     let mut say = |message: String| {
         warnings.push(Warning {
-            path: path.into(),
+            path: place.path.clone(),
             message,
         });
     };
@@ -415,35 +419,29 @@ fn warn(truss: &Truss, spec: &BeamsSpec, path: &str, warnings: &mut Vec<Warning>
             counted(truss.dangling, "node")
         ));
     }
-    if let Some(worst) = truss
-        .quadors
-        .shortfalls()
-        .iter()
-        .min_by(|a, b| a.radius.total_cmp(&b.radius))
-    {
+    let inside = |hub: usize| place.region.value(truss.quadors.center(hub)) <= 0.0;
+    let short: Vec<_> = (truss.quadors.shortfalls().iter())
+        .filter(|s| inside(s.hub))
+        .collect();
+    if let Some(worst) = short.iter().min_by(|a, b| a.radius.total_cmp(&b.radius)) {
         let asked = match spec.fillet {
             FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
             _ => "the fillet asked for".into(),
         };
         say(format!(
-            "{} cannot have {asked} and {} the largest that fits; the tightest has {:.3} mm, at {}",
-            counted(truss.quadors.shortfalls().len(), "hub"),
-            if truss.quadors.shortfalls().len() == 1 {
-                "has"
-            } else {
-                "have"
-            },
+            "{} cannot have {asked}, only the largest that fits; the tightest has {:.3} mm, at {}",
+            counted(short.len(), "hub"),
             worst.radius,
             at(truss.quadors.center(worst.hub))
         ));
     }
-    if let (false, Some(o)) = (
-        spec.fillet == FilletSpec::None,
-        truss.quadors.overlaps().first(),
-    ) {
+    let over: Vec<_> = (truss.quadors.overlaps().iter())
+        .filter(|o| inside(o.hub))
+        .collect();
+    if let (false, Some(o)) = (spec.fillet == FilletSpec::None, over.first()) {
         say(format!(
             "{} of beams still overlap halfway along, the first at {}: no fillet is made between them; make them thinner",
-            counted(truss.quadors.overlaps().len(), "pair"),
+            counted(over.len(), "pair"),
             at(truss.quadors.center(o.hub))
         ));
     }
@@ -461,32 +459,32 @@ fn warn(truss: &Truss, spec: &BeamsSpec, path: &str, warnings: &mut Vec<Warning>
     }
 }
 
-/// The figures of a graph; `fraction` is the solid share of the region.
-pub(super) fn report(truss: &Truss, fraction: f64) -> Json {
-    let range = |of: &mut dyn Iterator<Item = f64>| {
-        let [low, high] = of.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+/// The figures of beams; `fraction` is the solid share of the region.
+pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
+    let truss = match beams {
+        Beams::Truss(truss) => truss,
+        Beams::Pattern(laid) => return pattern::report(laid, fraction),
+    };
+    let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
+    let [least, most] = (graph.hubs.iter().map(|h| h.radius))
+        .fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
             [a.min(v), b.max(v)]
         });
-        json!([low, high])
-    };
-    let (facts, graph) = (&truss.facts, &truss.graph);
     let valence: serde_json::Map<String, Json> = (facts.valence.iter())
         .map(|(v, n)| (v.to_string(), json!(n)))
         .collect();
-    let quadors = &truss.quadors;
     let thin = (0..graph.beams.len())
         .map(|b| quadors.pencil(b).waist())
         .fold(f64::INFINITY, f64::min);
-    let inside: usize = facts.valence.values().sum();
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
-        "hubs": inside,
-        "beams": graph.beams.len() - truss.trimmed.beside,
+        "hubs": facts.valence.values().sum::<usize>(),
+        "beams": facts.struts,
         "fraction": fraction,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * thin,
-        "hub_radius": range(&mut graph.hubs.iter().map(|h| h.radius)),
+        "hub_radius": [least, most],
         "length": facts.length,
         "total_length": facts.total,
         "valence": valence,

@@ -128,7 +128,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         map::warn(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
-    let mut trusses = Vec::new();
+    let mut graphs = Vec::new();
     let mut fields: Vec<(Arc<dyn Field>, f64)> = (lattices.iter())
         .map(|(_, l)| (l.clone() as Arc<dyn Field>, l.map.wavelength()))
         .collect();
@@ -140,9 +140,9 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
-        let truss = beams::beams(spec, &place, &mut warnings)?;
-        fields.push((truss.quadors.clone(), truss.wavelength));
-        trusses.push((name.clone(), truss));
+        let made = beams::beams(spec, &place, &mut warnings)?;
+        fields.push((made.field(), made.wavelength()));
+        graphs.push((name.clone(), made));
     }
     let mut fields = fields.into_iter();
     let Some((field, wavelength)) = fields.next() else {
@@ -161,7 +161,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     Ok(Built {
         solid,
         lattices,
-        beams: trusses,
+        beams: graphs,
         skin: thinnest,
         warnings,
         repairs,

@@ -127,12 +127,7 @@ pub(super) fn report(built: &Built) -> Json {
     }
     let share = (!built.beams.is_empty()).then(|| expected(built).0);
     let beams: serde_json::Map<String, Json> = (built.beams.iter())
-        .map(|(name, truss)| {
-            (
-                name.clone(),
-                beams::report(truss, share.unwrap_or_default()),
-            )
-        })
+        .map(|(name, made)| (name.clone(), beams::report(made, share.unwrap_or_default())))
         .collect();
     json!({
         "lattices": lattices,

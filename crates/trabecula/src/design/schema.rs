@@ -18,6 +18,14 @@ pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "integer"] })
 }
 
+/// The struts of a pattern.
+pub(super) fn pattern_struts(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "array",
+        "items": { "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 5 },
+    })
+}
+
 /// The names of the ready cells of beams.
 pub(super) fn beam_cell(_: &mut SchemaGenerator) -> Schema {
     let names: Vec<&str> = crate::graph::catalogue().iter().map(|u| u.name).collect();

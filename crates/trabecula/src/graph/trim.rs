@@ -25,8 +25,6 @@ pub struct Trimmed {
     pub dropped: usize,
     /// Struts that were shortened to the surface.
     pub snapped: usize,
-    /// Struts that stay though their axes do not enter the region.
-    pub beside: usize,
 }
 
 /// Steps along a strut at least: beyond it a bay of the region is overlooked.
@@ -58,10 +56,9 @@ impl Trim {
                 let nearest = if s.iter().any(|n| inside(*n)) {
                     0.0
                 } else {
-                    least(region, at, slack)
+                    least(region, at, reach)
                 };
                 done.outside += usize::from(nearest > reach);
-                done.beside += usize::from(nearest <= reach && nearest > slack);
                 nearest <= reach
             }),
             Trim::Drop => struts.retain(|s| {

@@ -1,6 +1,8 @@
 //! A wire frame: nodes and struts without radii, and what is told of one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
 
 use crate::math::{Vec3, dot, norm, sub, unit};
 
@@ -18,9 +20,11 @@ pub struct Wire {
 pub struct Facts {
     /// How many nodes have how many struts, of those inside.
     pub valence: BTreeMap<usize, usize>,
-    /// Shortest and longest strut, mm.
+    /// How many struts have an end inside.
+    pub struts: usize,
+    /// Shortest and longest of them, mm.
     pub length: [f64; 2],
-    /// Length of all struts, mm.
+    /// Their length in all, mm.
     pub total: f64,
     /// The least angle between two struts of a node (degrees), and the node's place.
     pub angle: Option<(f64, Vec3)>,
@@ -101,15 +105,22 @@ impl Wire {
         }
     }
 
-    /// What is told of the frame; nodes are counted where they are `inside`.
-    pub fn facts(&self, inside: &impl Fn(Vec3) -> bool) -> Facts {
-        let stars = Stars::of(self);
+    /// What is told of the part of the frame that is `inside`: its nodes, and the struts that have one of them.
+    pub fn facts(&self, inside: &(impl Fn(Vec3) -> bool + Sync)) -> Facts {
+        let within: Vec<bool> = self.nodes.par_iter().map(|p| inside(*p)).collect();
+        let has = |s: &&[u32; 2]| s.iter().any(|n| within[*n as usize]);
+        let part = Wire {
+            nodes: self.nodes.clone(),
+            struts: self.struts.iter().filter(has).copied().collect(),
+        };
+        let stars = Stars::of(&part);
         let mut facts = Facts {
+            struts: part.struts.len(),
             length: [f64::INFINITY, 0.0],
-            pieces: self.pieces(),
+            pieces: part.pieces(),
             ..Facts::default()
         };
-        for strut in &self.struts {
+        for strut in &part.struts {
             let l = self.length(*strut);
             facts.length = [facts.length[0].min(l), facts.length[1].max(l)];
             facts.total += l;
@@ -117,14 +128,14 @@ impl Wire {
         let mut steepest = -1.0;
         let mut rays: Vec<Vec3> = Vec::new();
         for (n, place) in self.nodes.iter().enumerate() {
-            if !inside(*place) {
+            if !within[n] {
                 continue;
             }
             let star = stars.at(n);
             *facts.valence.entry(star.len()).or_default() += 1;
             rays.clear();
             rays.extend(star.iter().map(|s| {
-                let [a, b] = self.struts[*s as usize];
+                let [a, b] = part.struts[*s as usize];
                 let other = if a as usize == n { b } else { a };
                 unit(sub(self.nodes[other as usize], *place))
             }));
@@ -144,10 +155,11 @@ impl Wire {
         facts
     }
 
-    /// How many pieces hang together, by struts.
+    /// How many pieces hang together, by struts; nodes without struts are none.
     fn pieces(&self) -> usize {
         let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        let mut pieces = self.nodes.len();
+        let ends: BTreeSet<u32> = self.struts.iter().flatten().copied().collect();
+        let mut pieces = ends.len();
         for [a, b] in &self.struts {
             let (a, b) = (find(&mut root, *a), find(&mut root, *b));
             if a != b {

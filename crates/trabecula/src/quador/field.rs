@@ -86,8 +86,24 @@ impl Quadors {
         })
     }
 
+    /// A hub's share of the field at a point: the field is the least of them and the cap.
+    pub(crate) fn share(&self, i: usize, p: Vec3) -> f64 {
+        let ball = &self.balls[i];
+        let (hub, x) = (self.hub(i), sub(p, ball.center));
+        let v = self.length(hub.value(x)).max(hub.beyond(x).0);
+        match ball.bounds.distance(p) {
+            away if away > 0.0 => v.max(away),
+            _ => v,
+        }
+    }
+
+    /// The box that holds a hub and its stubs up to their cuts.
+    pub(crate) fn hold(&self, i: usize) -> Aabb {
+        self.balls[i].bounds
+    }
+
     /// The range of a hub's share of the field over a box.
-    fn hub_bound(&self, i: usize, b: &Aabb) -> Interval {
+    pub(crate) fn hub_bound(&self, i: usize, b: &Aabb) -> Interval {
         let ball = &self.balls[i];
         let hub = self.hub(i);
         let half = scale(b.size(), 0.5);

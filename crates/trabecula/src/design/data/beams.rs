@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{GradeSpec, MapSpec, is_default};
+use super::{GradeSpec, MapSpec, is_default, is_one, one};
 use crate::design::schema;
 
 /// Named graphs of beams.
@@ -28,6 +28,9 @@ pub struct BeamsSpec {
     /// The nodes that each beam joins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub struts: Option<StrutsSpec>,
+    /// A program of repeats, instead of a cell or a graph.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern: Option<PatternSpec>,
     /// Radius of a beam at mid length (mm), taken there. It may be left out where all hubs have radii.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<GradeSpec>,
@@ -81,6 +84,41 @@ pub enum StrutsSpec {
     Path(String),
     /// Pairs of node ids, whole numbers from 0.
     Rows(Vec<[u32; 2]>),
+}
+
+/// A graph that is repeated by up to three steps: what is at [i, j, k] is the first step done i times, then the second j
+/// times, then the third k times. It is not written out, however often it is repeated.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PatternSpec {
+    /// Rows of x, y, z (mm) and perhaps a hub's radius (mm), at [0, 0, 0]; their ids are 0, 1, 2 …
+    pub nodes: Vec<RowSpec>,
+    /// Rows of two ids and how many repeats on, along each step, the second node lies (0 unless given).
+    #[schemars(schema_with = "schema::pattern_struts")]
+    pub struts: Vec<[i32; 5]>,
+    /// One to three steps.
+    #[schemars(length(min = 1, max = 3))]
+    pub repeat: Vec<RepeatSpec>,
+}
+
+/// A step of a pattern: scaled and turned about a point, then moved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RepeatSpec {
+    /// How often what is repeated is there, the original counted.
+    pub count: f64,
+    /// By how much each is moved from the last (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub by: [f64; 3],
+    /// Angles about x, y, z (degrees): z is turned first, then y, then x.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotate: [f64; 3],
+    /// How many times as large each is as the last.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+    /// The point about which it is turned and scaled (mm).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub about: [f64; 3],
 }
 
 /// Which quadric a beam is.

@@ -1,14 +1,14 @@
 //! Beams: tree to data.
 
-use super::{Read, grade, map};
+use super::{Read, grade, map, three};
 use crate::design::data::*;
 use crate::design::node::At;
 use crate::fault::{counted, number};
 use crate::graph::catalogue;
 
-const KEYS: [&str; 11] = [
-    "cell", "map", "nodes", "struts", "radius", "hub", "profile", "fillet", "trim", "dangling",
-    "merge",
+const KEYS: [&str; 12] = [
+    "cell", "map", "nodes", "struts", "pattern", "radius", "hub", "profile", "fillet", "trim",
+    "dangling", "merge",
 ];
 
 /// What others call the cells.
@@ -35,15 +35,28 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
     let f = at.fields("beams", &KEYS, &[])?;
     let cell = f.get("cell").map(cell).transpose()?;
     let own = f.get("nodes").or(f.get("struts"));
+    let pattern = f.get("pattern").map(pattern).transpose()?;
+    if pattern.is_some() {
+        for key in [
+            "cell", "map", "nodes", "struts", "trim", "dangling", "merge",
+        ] {
+            if let Some(other) = f.get(key) {
+                let message = format!(
+                    "a pattern has its own nodes and struts, and is cut by the region; leave {key} out"
+                );
+                return Err(other.error(message));
+            }
+        }
+    }
     match (&cell, own) {
         (Some(_), Some(own)) => {
             return Err(
                 own.error("beams are either a cell on a map, or nodes and struts; found both")
             );
         }
+        (None, None) if pattern.is_some() => {}
         (None, None) => {
-            let message =
-                "no graph given; give cell (such as \"octet\") and map, or nodes and struts";
+            let message = "no graph given; give cell (such as \"octet\") and map, nodes and struts, or a pattern";
             return Err(f.at.error(message));
         }
         (None, Some(_)) => {
@@ -77,6 +90,7 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
         map: f.get("map").map(map).transpose()?,
         nodes: f.get("nodes").map(nodes).transpose()?,
         struts: f.get("struts").map(struts).transpose()?,
+        pattern,
         radius: maybe("radius")?,
         hub: maybe("hub")?,
         profile: f.get("profile").map(profile).transpose()?,
@@ -104,7 +118,14 @@ fn nodes(at: &At) -> Read<NodesSpec> {
     if at.is_text() {
         return Ok(NodesSpec::Path(at.text("a path")?.to_string()));
     }
-    let rows = at.list("the path of a table, or rows of x, y, z in mm")?;
+    Ok(NodesSpec::Rows(places(
+        at,
+        "the path of a table, or rows of x, y, z in mm",
+    )?))
+}
+
+fn places(at: &At, what: &str) -> Read<Vec<RowSpec>> {
+    let rows = at.list(what)?;
     let row = |at: &At| match at.list("x, y, z and perhaps a radius, mm")?.len() {
         4 => Ok(RowSpec::Ball(at.numbers("x, y, z, radius")?)),
         _ => Ok(RowSpec::Place(
@@ -115,7 +136,72 @@ fn nodes(at: &At) -> Read<NodesSpec> {
     if rows.is_empty() {
         return Err(at.error("no nodes given"));
     }
-    Ok(NodesSpec::Rows(rows))
+    Ok(rows)
+}
+
+fn pattern(at: &At) -> Read<PatternSpec> {
+    let f = at.fields("a pattern", &["nodes", "struts", "repeat"], &[])?;
+    let nodes = places(
+        f.need("nodes", "rows of x, y, z and perhaps a radius, mm")?,
+        "rows of x, y, z and perhaps a radius, mm",
+    )?;
+    let struts = f.need(
+        "struts",
+        "rows of two ids and the repeats between them, such as [0, 0, 1, 0, 0]",
+    )?;
+    let row = |at: &At| {
+        let what = "two ids and up to three repeats, such as [0, 0, 1, 0, 0]";
+        let items = at.list(what)?;
+        if !(2..=5).contains(&items.len()) {
+            return Err(at.error(format!(
+                "expected {what}, found {}",
+                counted(items.len(), "value")
+            )));
+        }
+        let mut row = [0; 5];
+        for (i, (r, item)) in row.iter_mut().zip(&items).enumerate() {
+            let v = item.number()?;
+            if v.fract() != 0.0 || v.abs() > 1e6 || (i < 2 && v < 0.0) {
+                return Err(item.error(format!("expected a whole number, found {}", number(v))));
+            }
+            *r = v as i32;
+        }
+        Ok(row)
+    };
+    let rows = struts.list("rows of two ids and the repeats between them")?;
+    let made = rows.iter().map(row).collect::<Read<Vec<_>>>()?;
+    if made.is_empty() {
+        return Err(struts.error("no struts given"));
+    }
+    let steps = f.need(
+        "repeat",
+        "one to three steps, such as { count = 12, rotate = [0, 0, 30] }",
+    )?;
+    let items = steps.list("one to three steps, such as [{ count = 12, rotate = [0, 0, 30] }]")?;
+    if !(1..=3).contains(&items.len()) {
+        return Err(steps.error(format!(
+            "expected one to three steps, found {}",
+            items.len()
+        )));
+    }
+    Ok(PatternSpec {
+        nodes,
+        struts: made,
+        repeat: items.iter().map(repeat).collect::<Read<Vec<_>>>()?,
+    })
+}
+
+fn repeat(at: &At) -> Read<RepeatSpec> {
+    let f = at.fields("a step", &["count", "by", "rotate", "scale", "about"], &[])?;
+    Ok(RepeatSpec {
+        count: f
+            .need("count", "how often, the original counted")?
+            .number()?,
+        by: f.read("by", [0.0; 3], three)?,
+        rotate: f.read("rotate", [0.0; 3], three)?,
+        scale: f.read("scale", 1.0, At::number)?,
+        about: f.read("about", [0.0; 3], three)?,
+    })
 }
 
 fn struts(at: &At) -> Read<StrutsSpec> {
