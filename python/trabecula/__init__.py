@@ -17,8 +17,8 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from . import cell, grade, level, map, region
-    from .design import Design, Lattice, load, skin
+    from . import beams, cell, grade, level, map, region
+    from .design import Beams, Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .thickness import Thickness
 
 __all__ = [
+    "Beams",
     "Design",
     "DesignError",
     "DesignWarning",
@@ -36,6 +37,7 @@ __all__ = [
     "Thickness",
     "Voxels",
     "__version__",
+    "beams",
     "cell",
     "fraction",
     "grade",
@@ -50,6 +52,7 @@ __all__ = [
 
 # Names are fetched on first use, so that the command's help does not wait for numpy.
 _HOMES = {
+    "Beams": "design",
     "Design": "design",
     "Lattice": "design",
     "load": "design",
@@ -66,7 +69,7 @@ _HOMES = {
     "fraction": "solid",
     "__version__": "_core",
 }
-_MODULES = ("cell", "grade", "level", "map", "region")
+_MODULES = ("beams", "cell", "grade", "level", "map", "region")
 
 
 def __getattr__(name: str) -> Any:

@@ -265,10 +265,11 @@ def parser() -> argparse.ArgumentParser:
         "cells",
         "List the named cells: formula, space group, range, fractions in one piece, source.",
         "In a formula s = sin 2πx and c = cos 2πx; s2x = sin 4πx. x, y, z are phases in turns.\n\n"
-        "examples:\n  trabecula cells\n  trabecula cells gyroid --json\n  trabecula cells --tet",
+        "examples:\n  trabecula cells\n  trabecula cells gyroid --json\n  trabecula cells --tet\n  trabecula cells --beams",
     )
     p.add_argument("name", nargs="?", metavar="NAME", help="one cell only, with all that is known of it")
     p.add_argument("--tet", action="store_true", help="the ready tetrahedral cells instead, for maps over tetrahedra")
+    p.add_argument("--beams", action="store_true", help="the unit cells of beams: group, nodes, valence, Maxwell's count")
     p.add_argument("--json", action="store_true", help="print as JSON")
 
     p = command(

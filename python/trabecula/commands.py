@@ -8,7 +8,7 @@ import time
 import warnings
 from difflib import get_close_matches
 
-from . import _core, cell
+from . import _core, beams, cell
 from .design import load
 from .errors import DesignError, DesignWarning
 from .input import read_text
@@ -64,6 +64,29 @@ def check(args) -> None:
             tell_tiling(it["tets"])
         if it.get("distortion"):
             tell_distortion(it["distortion"])
+    for name, it in report["beams"].items():
+        tell_beams(name, it)
+
+
+def tell_beams(name: str, it: dict) -> None:
+    """What a graph of beams is."""
+    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
+    low, high = it["length"]
+    print(f"  length     {span(low if low == high else [low, high])} mm, {figure(it['total_length'])} mm in all")
+    print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
+    least, most = it["hub_radius"]
+    print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
+    print(f"  valence    {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}")
+    if it["smallest_angle"] is not None:
+        x, y, z = map(figure, it["smallest_angle_at"])
+        print(f"  angle      {it['smallest_angle']:.1f}° at least, at ({x}, {y}, {z}) mm")
+    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+    done = {"cleaned": it["cleaned"], "trimmed": it["trimmed"]}
+    for what, counts in done.items():
+        told = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
+        if told:
+            print(f"  {what}    {', '.join(told)}")
+    print(f"  pieces     {it['pieces']}; {it['dangling']} nodes with a free end")
 
 
 def tell_tiling(t: dict) -> None:
@@ -310,6 +333,8 @@ def cells(args) -> None:
     """``trabecula cells``."""
     if args.tet:
         return tet_cells(args)
+    if args.beams:
+        return beam_cells(args)
     listed = _core.cells()
     if args.name:
         known_cell(args.name, [c[0] for c in listed])
@@ -410,6 +435,22 @@ def tell_tets(report: dict) -> None:
     if fit:
         print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {fit['deviation']:.2g} mm at most")
         print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
+def beam_cells(args) -> None:
+    """``trabecula cells --beams``."""
+    facts = beams.cells()
+    if args.name:
+        known_cell(args.name, [it["name"] for it in facts])
+        facts = [it for it in facts if it["name"] == args.name]
+    if args.json:
+        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+    for it in facts:
+        print(f"{it['name']}  ({it['title']})")
+        print(f"  group    {it['group']}")
+        print(f"  cell     {len(it['nodes'])} nodes, {len(it['struts'])} beams of {figure(it['length'])} edges in all")
+        print(f"  valence  {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}")
+        print(f"  Maxwell  {it['maxwell']:+d}")
+        if it["aspect"] != [1.0, 1.0, 1.0]:
+            print(f"  edges    in the ratio {' : '.join(figure(v) for v in it['aspect'])} for its usual shape")
 
 
 def render(args) -> None:
@@ -463,7 +504,8 @@ def files_of(tree) -> list[str]:
 def read_by(design: str) -> list[str]:
     """The files that a design reads."""
     data = load(design).to_dict()
-    return files_of([data.get("region"), *(data.get("keep") or {}).values()])
+    tables = [b[k] for b in (data.get("beams") or {}).values() for k in ("nodes", "struts") if isinstance(b.get(k), str)]
+    return files_of([data.get("region"), *(data.get("keep") or {}).values()]) + tables
 
 
 def keep_inputs(design: str, output: str) -> None:

@@ -6,19 +6,19 @@ import json
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from . import _core
 from .errors import DesignError, DesignWarning
-from .given import copied
+from .given import copied, settings
 from .input import read_text
 from .output import extension, whole_file
 
 if TYPE_CHECKING:
     from .solid import Solid
 
-__all__ = ["Design", "Lattice", "load", "skin"]
+__all__ = ["Beams", "Design", "Lattice", "load", "skin"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,35 @@ class Lattice:
         return {"cell": self.cell, "part": self.part, "map": self.map, "level": self.level}
 
 
+@dataclass(frozen=True)
+class Beams:
+    """A graph of beams: a unit cell (``beams.names()``) on a ``map``, or ``nodes`` and ``struts`` of your own.
+
+    ``nodes`` is an array (n, 3), or (n, 4) with hub radii, mm, or the path of a table (csv) of id, x, y, z and perhaps r;
+    ``struts`` an array (m, 2) of numbers of nodes, or the path of a table of pairs of ids. ``radius`` is a beam's at mid
+    length and ``hub`` that of the balls in which beams meet (mm, numbers or grades). ``profile`` is "cone", "cylinder",
+    {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v}, {"alpha": v},
+    {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within
+    ``merge`` (mm) are one.
+    """
+
+    cell: str | None = None
+    map: dict | None = None
+    radius: float | dict | None = None
+    hub: float | dict | None = None
+    nodes: Any = None
+    struts: Any = None
+    profile: str | dict | None = None
+    fillet: str | dict | None = None
+    trim: str | None = None
+    dangling: str | None = None
+    merge: float | None = None
+
+    def to_dict(self) -> dict:
+        """The beams as plain data."""
+        return settings(**{f.name: getattr(self, f.name) for f in fields(self)})
+
+
 def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
     """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
 
@@ -56,27 +85,26 @@ def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> d
 class Design:
     """A lattice part, as data.
 
-    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``).
+    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``);
+    ``beams``, instead of a lattice, is {name: Beams}, or one Beams (named ``core``).
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid as far as the region goes.
     Nothing is checked before ``build``, the last line that can raise.
     """
 
     region: dict
-    lattice: Mapping[str, Lattice | dict] | Lattice
+    lattice: Mapping[str, Lattice | dict] | Lattice | None = None
     units: str = "mm"
     schema: int = 1
     skin: dict | None = None
     keep: Mapping[str, dict] | None = None
+    beams: Mapping[str, Beams | dict] | Beams | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
     _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
 
     def to_dict(self) -> dict:
         """The design as plain data: what stands in its file."""
-        lattices = {"core": self.lattice} if isinstance(self.lattice, Lattice) else self.lattice
-        if isinstance(lattices, Mapping):
-            lattices = {k: v.to_dict() if isinstance(v, Lattice) else v for k, v in lattices.items()}
-        data = {"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices}
-        more = {"skin": self.skin, "keep": self.keep}
+        data = {"schema": self.schema, "units": self.units, "region": self.region}
+        more = {"lattice": _by_name(self.lattice), "beams": _by_name(self.beams), "skin": self.skin, "keep": self.keep}
         return copied(data | {k: v for k, v in more.items() if v is not None})
 
     def __eq__(self, other: object) -> bool:
@@ -130,6 +158,14 @@ class Design:
             out.write(text)
 
 
+def _by_name(given: Any) -> Any:
+    """Lattices or beams as plain data by name."""
+    made = {"core": given} if isinstance(given, (Lattice, Beams)) else given
+    if isinstance(made, Mapping):
+        made = {k: v.to_dict() if isinstance(v, (Lattice, Beams)) else v for k, v in made.items()}
+    return made
+
+
 def load(path: str | os.PathLike[str]) -> Design:
     """Reads a design file (TOML, or JSON if the name ends so).
 
@@ -139,9 +175,12 @@ def load(path: str | os.PathLike[str]) -> Design:
     kind = extension(name, ("toml", "json"))
     read = _core.Design.from_text(read_text(name), kind == "json", name)
     data: dict[str, Any] = json.loads(read.to_json())
-    lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
+    lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None
+    beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
     folder = os.path.dirname(os.path.abspath(name))
-    design = Design(data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), folder=folder)
+    design = Design(
+        data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), beams, folder=folder
+    )
     object.__setattr__(design, "_read", read)
     return design
 
@@ -149,6 +188,10 @@ def load(path: str | os.PathLike[str]) -> Design:
 def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
     """The design with every relative mesh path turned."""
     data["region"] = _moved(data["region"], turn)
+    for graph in (data.get("beams") or {}).values():
+        for key in ("nodes", "struts"):
+            if isinstance(graph, dict) and isinstance(graph.get(key), str) and not os.path.isabs(graph[key]):
+                graph[key] = turn(graph[key])
     if isinstance(data.get("keep"), dict):
         data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
     return data

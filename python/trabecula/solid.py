@@ -73,8 +73,16 @@ class Solid(Picture):
         """
         return dict(self._core.repairs)
 
+    @property
+    def beams(self) -> dict[str, dict[str, NDArray]]:
+        """The graphs of beams by name: ``centers`` (n, 3) and ``radii`` (n,) of hubs, mm, and ``struts`` (m, 2), the hubs
+        that each beam joins.
+        """
+        return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
+
     def report(self) -> dict:
-        """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``.
+        """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``, and
+        ``beams.NAME`` with counts, lengths, valences, the smallest angle and what was cleaned and trimmed.
 
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
         and the warnings. Where the level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which
@@ -131,8 +139,10 @@ class Solid(Picture):
 
     @cached_property
     def _thinnest(self) -> dict[str, float]:
-        """The thinnest wall or neck of each lattice, mm, where there is one."""
-        all_ = {name: it["thickness"] for name, it in self.report()["lattices"].items()}
+        """The thinnest wall or neck of each lattice or graph of beams, mm, by its path, where there is one."""
+        report = self.report()
+        kinds = {"lattice": report["lattices"], "beams": report["beams"]}
+        all_ = {f"{kind}.{name}": it["thickness"] for kind, of in kinds.items() for name, it in of.items()}
         ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
         return {name: t for name, t in ends.items() if t}
 
@@ -152,7 +162,7 @@ class Solid(Picture):
         for name, thin in {} if self._is_fine(spacing) else self._thinnest.items():
             if thin < 1.5 * spacing:
                 warnings.warn(
-                    f"lattice.{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
+                    f"{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
                     f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
                     DesignWarning,
                     stacklevel=3,

@@ -18,13 +18,25 @@ type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
 type Histogram = (String, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
 /// For each part, intervals of the fraction.
 type Connected = Vec<(&'static str, Vec<[f64; 2]>)>;
+/// Name, title, group, aspect; nodes and beams of a cell; its valences; Maxwell's count; length of the beams.
+type BeamCell = (
+    &'static str,
+    &'static str,
+    &'static str,
+    [f64; 3],
+    Vec<[f64; 3]>,
+    Vec<([usize; 2], [i32; 3])>,
+    Vec<usize>,
+    i64,
+    f64,
+);
 
 /// The compiled core of `trabecula`.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
 
-    use crate::{Connected, Histogram, Operations};
+    use crate::{BeamCell, Connected, Histogram, Operations};
 
     #[pymodule_export]
     use crate::design::Design;
@@ -116,6 +128,22 @@ mod _core {
             .iter()
             .map(|n| (n.name, n.title, n.formula, n.group, n.source))
             .collect()
+    }
+
+    /// The cells of beams: name, title, group, aspect, nodes, beams (two nodes and the second one's cell), the valence of
+    /// each node, Maxwell's count, and the length of all beams in a cell with edges as the aspect says.
+    #[pyfunction]
+    fn beam_cells() -> PyResult<Vec<BeamCell>> {
+        let told = |u: &trabecula::graph::Unit| {
+            let net = u.net().map_err(crate::error::fault)?;
+            let links = net.beams.iter().map(|b| (b.ends, b.shift)).collect();
+            let length = net.lengths(u.aspect).iter().sum();
+            let (valences, maxwell) = (net.valences(), net.maxwell());
+            Ok((
+                u.name, u.title, u.group, u.aspect, net.nodes, links, valences, maxwell, length,
+            ))
+        };
+        trabecula::graph::catalogue().iter().map(told).collect()
     }
 
     /// What a named cell can tell: its range, and for each part the fractions in which it is one piece in space.

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,6 +14,7 @@ use trabecula::field::Field;
 use trabecula::io;
 use trabecula::map::{Map, Misfit};
 use trabecula::region::Repaired;
+use trabecula::truss::Beams;
 
 use crate::design::Folder;
 use crate::error;
@@ -39,6 +40,14 @@ impl Solid {
         }
     }
 }
+
+/// Name, centres (n, 3), radii (n,), ends (m, 2).
+type Graph<'py> = (
+    String,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<u32>>,
+);
 
 /// Points of Python (n, 3) as the core's.
 fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
@@ -150,6 +159,28 @@ impl Solid {
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
     fn expected(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
         run(py, None, None, |_| self.built.expected())
+    }
+
+    /// The graphs of beams: name, centres and radii of hubs, the hubs that each beam joins.
+    #[getter]
+    fn beams<'py>(&self, py: Python<'py>) -> PyResult<Vec<Graph<'py>>> {
+        let graph = |(name, beams): &(String, Beams)| {
+            let graph = match beams {
+                Beams::Truss(truss) => truss.graph.clone(),
+                Beams::Pattern(laid) => laid.pattern().expanded().map_err(error::fault)?,
+            };
+            let (hubs, beams) = (&graph.hubs, &graph.beams);
+            let centers: Vec<f64> = hubs.iter().flat_map(|h| h.center).collect();
+            let radii: Vec<f64> = hubs.iter().map(|h| h.radius).collect();
+            let ends: Vec<u32> = beams.iter().flat_map(|b| b.ends).collect();
+            Ok((
+                name.clone(),
+                centers.into_pyarray(py).reshape([hubs.len(), 3])?,
+                radii.into_pyarray(py),
+                ends.into_pyarray(py).reshape([beams.len(), 2])?,
+            ))
+        };
+        self.built.beams.iter().map(graph).collect()
     }
 
     /// Values at points (n, 3): negative in the solid.

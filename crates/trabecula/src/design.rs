@@ -3,6 +3,7 @@
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
+mod beams;
 mod build;
 mod data;
 mod error;
@@ -11,6 +12,7 @@ mod json;
 mod level;
 mod map;
 mod node;
+mod pattern;
 mod read;
 mod region;
 mod report;
@@ -18,10 +20,10 @@ mod sample;
 mod samples;
 mod schema;
 mod skin;
-mod tiling;
 #[cfg(test)]
 mod tests;
 mod tets;
+mod tiling;
 
 use std::sync::Arc;
 
@@ -37,6 +39,7 @@ use crate::region::{Region, Repaired};
 use crate::solid::Solid;
 use crate::tets::TetMesh;
 use crate::tiling::Tiling;
+use crate::truss::Beams;
 
 pub use data::*;
 pub use error::{DesignError, nearest};
@@ -47,6 +50,7 @@ pub use tets::{TetReport, Tets};
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["lattice"] }, { "required": ["beams"] }]))]
 pub struct Design {
     /// Version of this format; 1.
     #[schemars(range(min = 1, max = 1))]
@@ -57,8 +61,13 @@ pub struct Design {
     /// Where the part may be.
     pub region: RegionSpec,
     /// What fills the region: one lattice, under a name of your own.
+    #[serde(default, skip_serializing_if = "Lattices::is_empty")]
     #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
     pub lattice: Lattices,
+    /// What fills the region instead of a lattice: one graph of beams, under a name of your own.
+    #[serde(default, skip_serializing_if = "BeamsSpecs::is_empty")]
+    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    pub beams: BeamsSpecs,
     /// What closes the region's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
@@ -131,6 +140,8 @@ pub struct Built {
     pub lattices: Vec<(String, Arc<Lattice>)>,
     /// The lattices over tetrahedral meshes, by name.
     pub tilings: Vec<Tiled>,
+    /// The beams in it, by name.
+    pub beams: Vec<(String, Beams)>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.
@@ -148,6 +159,7 @@ impl Design {
             units: Units::Mm,
             region,
             lattice,
+            beams: BeamsSpecs::new(),
             skin: None,
             keep: Keeps::new(),
             lines: Lines::default(),

@@ -87,6 +87,11 @@ pub trait Field: Send + Sync {
         1.0
     }
 
+    /// Whether the zero set may have edges, as those of unions and distances have: they are no curvature.
+    fn edged(&self) -> bool {
+        false
+    }
+
     /// The value at one point (mm).
     fn value(&self, p: Vec3) -> f64 {
         let mut v = [0.0];

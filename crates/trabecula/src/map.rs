@@ -3,6 +3,7 @@
 mod distortion;
 mod frame;
 mod grid;
+mod inverse;
 mod phase;
 mod poisson;
 mod round;

@@ -79,10 +79,10 @@ impl Solid {
                 lattice.push(Tree::Face(faces.len()));
                 faces.push(Face {
                     slope: part.slope(),
+                    edged: part.edged(),
                     field: part,
                     plane: None,
                     cut: false,
-                    edged: false,
                 });
             }
             if any.is_empty() {

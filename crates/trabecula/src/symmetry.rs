@@ -11,6 +11,7 @@ mod site;
 pub use orbit::Side;
 
 use crate::fault::Fault;
+use crate::math::Vec3;
 
 /// Parts of a period in which translations are counted.
 const WHOLE: i32 = 24;
@@ -28,6 +29,17 @@ pub struct Operation {
 }
 
 impl Operation {
+    /// R u + t / 24.
+    pub fn apply(&self, u: Vec3) -> Vec3 {
+        let part = |i: usize| f64::from(self.translation[i]) / f64::from(WHOLE);
+        let turned = |i: usize| {
+            (0..3)
+                .map(|k| f64::from(self.rotation[i][k]) * u[k])
+                .sum::<f64>()
+        };
+        [0, 1, 2].map(|i| turned(i) + part(i))
+    }
+
     /// This operation after another.
     fn after(&self, first: &Operation) -> Operation {
         let (r, s) = (&self.rotation, &first.rotation);

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Tiled, Warning, level, map, region, sample, samples, skin, tiling};
+use super::{
+    Built, Design, Loader, Tiled, Warning, beams, level, map, region, sample, samples, skin, tiling,
+};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -136,6 +138,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             solid: filled.into_iter().fold(solid, Solid::with),
             lattices,
             tilings: vec![tiled],
+            beams: Vec::new(),
             skin: thinnest,
             warnings,
             repairs,
@@ -156,20 +159,41 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         map::warn(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
-    let Some((_, first)) = lattices.first() else {
+    let mut graphs = Vec::new();
+    let mut fields: Vec<(Arc<dyn Field>, f64)> = (lattices.iter())
+        .map(|(_, l)| (l.clone() as Arc<dyn Field>, l.map.wavelength()))
+        .collect();
+    for (name, spec) in &d.beams {
+        let place = Place {
+            path: format!("beams.{name}"),
+            region: &space,
+            points: &points,
+            filled: &filled,
+            loader,
+        };
+        let made = beams::beams(spec, &place, &mut warnings)?;
+        fields.push((made.field(), made.wavelength()));
+        graphs.push((name.clone(), made));
+    }
+    let mut fields = fields.into_iter();
+    let Some((field, wavelength)) = fields.next() else {
         return Err(DesignError::new("lattice", "no lattice given; give one"));
     };
-    if let Some((name, _)) = lattices.get(1) {
+    if fields.next().is_some() {
+        let names = d.lattice.keys().map(|n| format!("lattice.{n}"));
+        let second = names
+            .chain(d.beams.keys().map(|n| format!("beams.{n}")))
+            .nth(1);
         let message = "several lattices need a blend, which comes in a later version; keep one";
-        return Err(DesignError::new(format!("lattice.{name}"), message));
+        return Err(DesignError::new(second.unwrap_or_default(), message));
     }
-    let lattice: Arc<dyn Field> = first.clone();
-    let solid = Solid::new(space.clone(), Some(lattice), first.map.wavelength());
+    let solid = Solid::new(space.clone(), Some(field), wavelength);
     let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built {
         solid,
         lattices,
         tilings: Vec::new(),
+        beams: graphs,
         skin: thinnest,
         warnings,
         repairs,

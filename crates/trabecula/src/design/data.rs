@@ -7,9 +7,11 @@ use serde::Serialize;
 
 use super::schema;
 
+mod beams;
 mod grade;
 mod map;
 
+pub use beams::*;
 pub use grade::*;
 pub use map::*;
 

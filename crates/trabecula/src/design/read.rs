@@ -8,6 +8,7 @@ use crate::cell::catalogue;
 use crate::cell::tet::ready_cells;
 use crate::fault::{self, counted};
 
+mod beams;
 mod grade;
 mod map;
 
@@ -29,22 +30,18 @@ const REGIONS: [&str; 9] = [
     "difference",
     "offset",
 ];
-const LATER_TOP: [Later; 2] = [
-    (
-        "blend",
-        "one lattice fills the whole region; leave the blend out and keep one lattice",
-    ),
-    ("beams", "use a lattice"),
-];
-const LATER_CELL: [Later; 2] = [
-    ("beams", "use a named cell or a series"),
-    ("waves", "use a named cell or a series"),
-];
+const LATER_TOP: [Later; 1] = [(
+    "blend",
+    "one lattice fills the whole region; leave the blend out and keep one lattice",
+)];
+const LATER_CELL: [Later; 1] = [("waves", "use a named cell or a series")];
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
         "a design",
-        &["schema", "units", "region", "lattice", "skin", "keep"],
+        &[
+            "schema", "units", "region", "lattice", "beams", "skin", "keep",
+        ],
         &LATER_TOP,
     )?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
@@ -68,12 +65,23 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
     )?)?;
-    let missing = "say what fills the region, such as [lattice.core] with cell = \"gyroid\"";
-    let entries = f
-        .need("lattice", missing)?
-        .entries("lattices by name, such as [lattice.core]")?;
-    if entries.is_empty() {
+    let missing = "say what fills the region, such as [lattice.core] with cell = \"gyroid\", or [beams.core] with cell = \"octet\"";
+    let beams = f.read("beams", BeamsSpecs::new(), beams::all)?;
+    let lattice_at = match f.get("lattice") {
+        None if !beams.is_empty() => None,
+        _ => Some(f.need("lattice", missing)?),
+    };
+    let entries = lattice_at.map_or(Ok(Vec::new()), |at| {
+        at.entries("lattices by name, such as [lattice.core]")
+    })?;
+    if entries.is_empty() && beams.is_empty() {
         return Err(DesignError::new("lattice", missing));
+    }
+    if let (Some((name, _)), Some(other)) = (entries.first(), beams.keys().next()) {
+        let message = format!(
+            "a lattice and beams ({name}, {other}) need a blend to say where each is; blends come in a later version, so keep one"
+        );
+        return Err(f.need("beams", "")?.error(message));
     }
     if let [(a, _), (b, at), ..] = entries.as_slice() {
         let message = format!(
@@ -90,6 +98,7 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         units: super::Units::Mm,
         region: spec,
         lattice: lattices,
+        beams,
         skin: f.read("skin", None, |at| skin(at).map(Some))?,
         keep: f.read("keep", Keeps::new(), keeps)?,
         lines: node.lines(),
@@ -114,7 +123,7 @@ pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
     if at
         .entries("a design or a region")?
         .iter()
-        .any(|(key, _)| *key == "lattice")
+        .any(|(key, _)| ["lattice", "beams"].contains(key))
     {
         return Ok(design(node)?.region);
     }
@@ -366,6 +375,13 @@ pub(super) fn cell_in(node: &Node) -> Read<CellSpec> {
 fn cell(at: &At) -> Read<CellSpec> {
     if at.is_text() {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
+        let word = at.text("a name")?;
+        if crate::graph::named(word).is_some() && crate::cell::named(word).is_none() {
+            let message = format!(
+                "{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\""
+            );
+            return Err(at.error(message));
+        }
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
     let (kind, at) = at.kind("cell", &["series", "file", "tet"], &LATER_CELL)?;
@@ -404,7 +420,8 @@ fn tet(at: &At) -> Read<TetCellSpec> {
     let f = at.fields("a tetrahedral cell", &keys, &[])?;
     if let Some(name) = f.get("name") {
         if let Some(other) = own.iter().find_map(|k| f.get(k)) {
-            let message = "a ready cell has its own group, terms, site and edge; give a name or these";
+            let message =
+                "a ready cell has its own group, terms, site and edge; give a name or these";
             return Err(other.error(message));
         }
         let names: Vec<(&str, &str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
@@ -413,15 +430,23 @@ fn tet(at: &At) -> Read<TetCellSpec> {
             ..TetCellSpec::default()
         });
     }
-    let terms = f.need("terms", "a list of { hkl = [h, k, l] }, or a ready cell's name")?;
+    let terms = f.need(
+        "terms",
+        "a list of { hkl = [h, k, l] }, or a ready cell's name",
+    )?;
     let terms = terms.list("a list of terms")?;
     Ok(TetCellSpec {
         name: None,
-        group: Some(group(f.need("group", "a space group such as 221 or \"227:2\"")?)?),
+        group: Some(group(
+            f.need("group", "a space group such as 221 or \"227:2\"")?,
+        )?),
         terms: terms.iter().map(term).collect::<Read<Vec<_>>>()?,
         site: f.read("site", None, |at| three(at).map(Some))?,
         dual: f.read("dual", false, At::truth)?,
-        edge: Some(f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?.number()?),
+        edge: Some(
+            f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?
+                .number()?,
+        ),
     })
 }
 

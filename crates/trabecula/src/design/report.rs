@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Built, Tiled, build::LOOKS, sample};
+use super::{Built, Tiled, beams, build::LOOKS, sample};
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
@@ -128,8 +128,13 @@ pub(super) fn report(built: &Built) -> Json {
     for it in &built.tilings {
         lattices.insert(it.name.clone(), tiled(it));
     }
+    let share = (!built.beams.is_empty()).then(|| expected(built).0);
+    let beams: serde_json::Map<String, Json> = (built.beams.iter())
+        .map(|(name, made)| (name.clone(), beams::report(made, share.unwrap_or_default())))
+        .collect();
     json!({
         "lattices": lattices,
+        "beams": beams,
         "region": {
             "bounds": [bounds.min, bounds.max],
             "volume": volume,

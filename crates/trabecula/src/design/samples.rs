@@ -18,7 +18,7 @@ use crate::region::{MeshRegion, Repair, Shape as _};
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
 
-fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {
+pub(super) fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {
     place
         .loader
         .load(path)

@@ -25,6 +25,20 @@ pub(super) fn tet_cell_name(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": "string", "enum": names })
 }
 
+/// The struts of a pattern.
+pub(super) fn pattern_struts(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "array",
+        "items": { "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 5 },
+    })
+}
+
+/// The names of the ready cells of beams.
+pub(super) fn beam_cell(_: &mut SchemaGenerator) -> Schema {
+    let names: Vec<&str> = crate::graph::catalogue().iter().map(|u| u.name).collect();
+    json_schema!({ "type": "string", "enum": names })
+}
+
 /// The names of the ready cells.
 pub(super) fn cell_name(_: &mut SchemaGenerator) -> Schema {
     let names: Vec<&str> = catalogue().iter().map(|n| n.name).collect();

@@ -84,7 +84,8 @@ pub(super) fn domain<'a>(
     warnings.extend(made.warnings);
     let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
     let region = MeshRegion::new(map.boundary(), Repair::Auto);
-    let region = region.map_err(|f| DesignError::new(&path, format!("the boundary of the mesh: {}", f.message)))?;
+    let region = region
+        .map_err(|f| DesignError::new(&path, format!("the boundary of the mesh: {}", f.message)))?;
     Ok(Some(Domain {
         name,
         spec,
@@ -100,7 +101,8 @@ pub(super) fn domain<'a>(
 pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignError> {
     let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
     if let Some(name) = &spec.name {
-        let cell = ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
+        let cell =
+            ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
         return cell.stencil().map_err(|f| wrong("", f));
     }
     let group = Group::named(spec.group.as_deref().unwrap_or_default());
@@ -155,7 +157,8 @@ pub(super) fn lattice(
     let path = below("level");
     for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
         if set {
-            let message = "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
+            let message =
+                "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
             return Err(DesignError::new(format!("{path}.{option}"), message));
         }
     }
@@ -166,7 +169,8 @@ pub(super) fn lattice(
     let key = amount_key(domain.spec);
     let path = format!("{path}.{key}");
     if key == "thickness" && part != Part::Sheet {
-        let message = "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
+        let message =
+            "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
         return Err(DesignError::new(path, message));
     }
     let (value, allowed, amount) = match &spec.amount {
@@ -189,7 +193,8 @@ pub(super) fn lattice(
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
     let joined = domain.joined;
-    let explicit = joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty();
+    let explicit =
+        joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty();
     Ok((Arc::new(tiling), explicit))
 }
 
@@ -234,7 +239,10 @@ fn at_nodes(
 fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
     let levels = tiling.levels();
     if !(levels.lo.is_finite() && levels.hi.is_finite()) {
-        return Err(DesignError::new(path, "the level is not a number somewhere in the mesh"));
+        return Err(DesignError::new(
+            path,
+            "the level is not a number somewhere in the mesh",
+        ));
     }
     if tiling.part == Part::Sheet && levels.lo <= 0.0 {
         let message = format!(
@@ -281,7 +289,10 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
             .collect();
         let limit = match texts.len() {
             0 => "at no fraction is it one piece that reaches all faces".to_string(),
-            _ => format!("it is one piece that reaches all faces at fractions {}", texts.join(" and ")),
+            _ => format!(
+                "it is one piece that reaches all faces at fractions {}",
+                texts.join(" and ")
+            ),
         };
         let message = format!(
             "at solid fraction {fraction} the tetrahedral cell is in {} with {} on each face, so the lattice may fall apart; {limit}",

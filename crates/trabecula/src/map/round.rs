@@ -1,5 +1,6 @@
 //! Maps that wrap a lattice round an axis or a centre, with a whole number of cells around, so that it closes.
 
+use super::inverse::{corners, whole};
 use crate::fault::{Fault, number};
 use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
 
@@ -134,6 +135,57 @@ impl Round {
         } else {
             [r / self.wavelength[0], round, l[2] / self.wavelength[1]]
         }
+    }
+
+    /// The position (mm) that has the phases u, if there is one: radii are not negative, and end at the poles.
+    pub fn position(&self, u: Vec3) -> Option<Vec3> {
+        let r = u[0] * self.wavelength[0];
+        let angle = |u: f64| u * core::f64::consts::TAU / self.around;
+        let (s, c) = angle(u[1]).sin_cos();
+        let slack = 1e-9 * self.wavelength[0];
+        let local = if self.sphere {
+            let down = angle(u[2]);
+            if !(-1e-9..=core::f64::consts::PI + 1e-9).contains(&down) {
+                return None;
+            }
+            [r * down.sin() * c, r * down.sin() * s, r * down.cos()]
+        } else {
+            [r * c, r * s, u[2] * self.wavelength[1]]
+        };
+        let along = |a: usize| scale(self.frame[a], local[a]);
+        (r >= -slack).then(|| add(self.center, add(along(0), add(along(1), along(2)))))
+    }
+
+    /// Least and greatest cell along each phase that may have a part in the box, neighbours included.
+    pub(super) fn cells(&self, b: &Aabb) -> [[i32; 2]; 3] {
+        let places = corners(b).map(|p| self.local(p));
+        let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| {
+            places.iter().map(v).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let away = |l: &(Vec3, f64)| if self.sphere { l.1.hypot(l.0[2]) } else { l.1 };
+        let far = most(&away);
+        let near = away(&self.local(b.center())) - 0.5 * norm(b.size());
+        let radial = [
+            whole(near / self.wavelength[0]).max(1) - 1,
+            whole(far / self.wavelength[0]) + 1,
+        ];
+        let last = if self.sphere {
+            [0, self.around() / 2 - 1]
+        } else {
+            let (low, high) = (-most(&|l| -l.0[2]), most(&|l| l.0[2]));
+            [low, high].map(|z| whole(z / self.wavelength[1]))
+        };
+        let last = if self.sphere {
+            last
+        } else {
+            [last[0] - 1, last[1] + 1]
+        };
+        [radial, [0, self.around() - 1], last]
+    }
+
+    /// How many cells there are round the axis.
+    pub(super) fn around(&self) -> i32 {
+        self.around as i32
     }
 
     /// du/dx, turns per mm. Within a billionth of a wavelength of the axis, that at this distance.

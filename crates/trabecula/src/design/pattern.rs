@@ -1,0 +1,141 @@
+//! Patterns of beams: data to a program of repeats.
+
+use serde_json::{Value as Json, json};
+
+use super::beams::{check_open, fillet, given};
+use super::build::{Place, finite};
+use super::data::*;
+use super::error::DesignError;
+use super::grade::Allowed;
+use crate::fault::number;
+use crate::graph::{Hub, Profile};
+use crate::pattern::{Laid, Pattern, Similarity, Strut};
+
+/// Most repeats of a step: every one is kept as a turn, a scale and a shift.
+const COUNT: f64 = 1e6;
+
+/// The pattern of a design, filling the region.
+pub(super) fn laid(spec: &BeamsSpec, of: &PatternSpec, place: &Place) -> Result<Laid, DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let single = |given: &Option<GradeSpec>, key: &'static str| match given {
+        None => Ok(None),
+        Some(GradeSpec::Constant(v)) => Allowed::Positive(key).check(&below(key), *v, "").map(Some),
+        Some(_) => {
+            let message =
+                "in a pattern it is one number, at the first place; it scales with the repeats";
+            Err(DesignError::new(below(key), message))
+        }
+    };
+    let (radius, hub) = (single(&spec.radius, "radius")?, single(&spec.hub, "hub")?);
+    let at = below("pattern");
+    let nodes = given(&of.nodes, &format!("{at}.nodes"))?;
+    let mut hubs = Vec::new();
+    for (i, center) in nodes.places.iter().enumerate() {
+        let own = nodes.radii.get(i).copied().filter(|r| !r.is_nan());
+        let Some(radius) = own.or(hub).or(radius) else {
+            let message = "it has no radius of its own, and no radius of beams is given; give one";
+            return Err(DesignError::new(format!("{at}.nodes[{i}]"), message));
+        };
+        hubs.push(Hub {
+            center: *center,
+            radius,
+        });
+    }
+    let profile = match (spec.profile, radius) {
+        (Some(ProfileSpec::Cylinder), _) => Profile::Cylinder,
+        (Some(ProfileSpec::Waist(v)), _) => Profile::Waist(v),
+        (Some(ProfileSpec::Lambda(v)), _) => Profile::Lambda(v),
+        (None, Some(r)) => Profile::Mid(r),
+        (Some(ProfileSpec::Cone), _) | (None, None) => Profile::Cone,
+    };
+    let strut = |s: &[i32; 5]| Strut {
+        ends: [s[0] as u32, s[1] as u32],
+        by: [s[2], s[3], s[4]],
+        profile,
+    };
+    let mut steps = [(Similarity::STILL, 1); 3];
+    for (i, (step, repeat)) in steps.iter_mut().zip(&of.repeat).enumerate() {
+        let at = |key: &str| format!("{at}.repeat[{i}].{key}");
+        for (key, three) in [
+            ("rotate", repeat.rotate),
+            ("about", repeat.about),
+            ("by", repeat.by),
+        ] {
+            for v in three {
+                finite(&at(key), v)?;
+            }
+        }
+        if !(repeat.count >= 1.0 && repeat.count.fract() == 0.0 && repeat.count <= COUNT) {
+            let message = format!(
+                "count is {}; it must be a whole number from 1 to {}",
+                number(repeat.count),
+                number(COUNT)
+            );
+            return Err(DesignError::new(at("count"), message).found(number(repeat.count)));
+        }
+        if !(repeat.scale >= 0.1 && repeat.scale <= 10.0) {
+            let message = format!(
+                "scale is {}; from one repeat to the next it must be from 0.1 to 10",
+                number(repeat.scale)
+            );
+            return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
+        }
+        let all = repeat.scale.powf(repeat.count - 1.0);
+        if !(1e-6..=1e6).contains(&all) {
+            let message = format!(
+                "the last repeat is {} times as large as the first; it must be from 1e-6 to 1e6 times",
+                number(all)
+            );
+            return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
+        }
+        *step = (
+            Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by),
+            repeat.count as u32,
+        );
+    }
+    let pattern = Pattern {
+        nodes: hubs,
+        struts: of.struts.iter().map(strut).collect(),
+        steps,
+    };
+    pattern.check().map_err(|f| DesignError::fault(&at, f))?;
+    let laid = Laid::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
+    let region = place.region.bounds();
+    if laid.bounds().intersection(region).is_empty() {
+        let (b, r) = (laid.bounds(), region);
+        let corner = |v: [f64; 3]| v.map(number).join(", ");
+        let message = format!(
+            "no beam lies in the region: the pattern reaches from ({}) to ({}) mm, the region from ({}) to ({}) mm",
+            corner(b.min),
+            corner(b.max),
+            corner(r.min),
+            corner(r.max)
+        );
+        return Err(DesignError::new(at, message));
+    }
+    check_open(&laid, place)?;
+    Ok(laid)
+}
+
+/// The figures of a pattern.
+pub(super) fn report(laid: &Laid, fraction: f64) -> Json {
+    let pattern = laid.pattern();
+    let (hubs, beams) = pattern.counts();
+    let radii = pattern.nodes.iter().map(|h| h.radius);
+    let range = radii.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+        [a.min(v), b.max(v)]
+    });
+    let scales = laid.scales();
+    json!({
+        "cell": null,
+        "wavelength": laid.wavelength(),
+        "repeats": pattern.steps.map(|s| s.1),
+        "hubs": hubs,
+        "beams": beams,
+        "kinds": laid.kinds().1.len(),
+        "fraction": fraction,
+        "porosity": 1.0 - fraction,
+        "thickness": 2.0 * laid.thinnest(),
+        "hub_radius": [range[0] * scales[0], range[1] * scales[1]],
+    })
+}

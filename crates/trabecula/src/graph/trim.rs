@@ -1,0 +1,184 @@
+//! A wire frame cut to a region.
+
+use super::wire::Wire;
+use crate::field::Field;
+use crate::math::{Vec3, add, scale, sub};
+
+/// What becomes of struts that leave the region.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trim {
+    /// They stay, and are cut by the region's surface.
+    #[default]
+    Cut,
+    /// They go.
+    Drop,
+    /// They end on the surface.
+    Snap,
+}
+
+/// What was trimmed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Trimmed {
+    /// Struts that have no part in the region.
+    pub outside: usize,
+    /// Struts left out because they leave the region.
+    pub dropped: usize,
+    /// Struts that were shortened to the surface.
+    pub snapped: usize,
+}
+
+/// Steps along a strut at least: beyond it a bay of the region is overlooked.
+const STEPS: f64 = 256.0;
+/// How near the surface (of the strut's length) a crossing is found.
+const NEAR: f64 = 1e-10;
+
+impl Trim {
+    /// Trims a frame to a region, given by its signed distance (steeper nowhere than 1). Struts within `reach` (mm) of
+    /// the region, a ball's radius, count as having a part in it. Ends within `slack` (mm) outside count as inside.
+    /// `radii` of the nodes, if not empty, is kept in step.
+    pub fn apply(
+        self,
+        wire: &mut Wire,
+        region: &dyn Field,
+        reach: f64,
+        slack: f64,
+        radii: &mut Vec<f64>,
+    ) -> Trimmed {
+        let mut done = Trimmed::default();
+        let mut depth = vec![0.0; wire.nodes.len()];
+        region.values(&wire.nodes, &mut depth);
+        let inside = |n: u32| depth[n as usize] <= slack;
+        let nodes = wire.nodes.clone();
+        let mut struts = std::mem::take(&mut wire.struts);
+        match self {
+            Trim::Cut => struts.retain(|s| {
+                let at = s.map(|n| nodes[n as usize]);
+                let nearest = if s.iter().any(|n| inside(*n)) {
+                    0.0
+                } else {
+                    least(region, at, reach)
+                };
+                done.outside += usize::from(nearest > reach);
+                nearest <= reach
+            }),
+            Trim::Drop => struts.retain(|s| {
+                let at = s.map(|n| nodes[n as usize]);
+                let keep = s.iter().all(|n| inside(*n)) && leaves(region, at, slack).is_none();
+                done.dropped += usize::from(!keep);
+                keep
+            }),
+            Trim::Snap => {
+                let mut kept = Vec::with_capacity(struts.len());
+                for s in struts {
+                    match s.map(inside) {
+                        [false, false] => done.outside += 1,
+                        ends => {
+                            let [from, to] = if ends[0] { s } else { [s[1], s[0]] };
+                            let at = [nodes[from as usize], nodes[to as usize]];
+                            match leaves(region, at, slack) {
+                                None => kept.push(s),
+                                Some(_) if ends == [true; 2] => done.dropped += 1,
+                                Some(t) => {
+                                    let end = add(at[0], scale(sub(at[1], at[0]), t));
+                                    kept.push([from, wire.nodes.len() as u32]);
+                                    wire.nodes.push(end);
+                                    if !radii.is_empty() {
+                                        let [a, b] = [from, to].map(|n| radii[n as usize]);
+                                        radii.push(a + t * (b - a));
+                                    }
+                                    done.snapped += 1;
+                                }
+                            }
+                        }
+                    }
+                }
+                struts = kept;
+            }
+        }
+        wire.struts = struts;
+        wire.keep(radii);
+        done
+    }
+}
+
+/// The least distance along a segment, or some distance not above `enough`.
+fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
+    let along = sub(b, a);
+    let length = crate::math::norm(along);
+    let (mut t, mut least) = (0.0, f64::INFINITY);
+    while t < 1.0 {
+        let d = region.value(add(a, scale(along, t)));
+        least = least.min(d);
+        if least <= enough {
+            break;
+        }
+        // Nothing nearer than this within the distance that is missing.
+        t += ((d - enough) / length).max(1.0 / STEPS);
+    }
+    least
+}
+
+/// How far along a segment (0 to 1) that begins inside it first leaves the region.
+fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
+    let along = sub(b, a);
+    let length = crate::math::norm(along);
+    let value = |t: f64| region.value(add(a, scale(along, t))) - slack;
+    let mut t = 0.0;
+    loop {
+        let next = (t + (-value(t) / length).max(1.0 / STEPS)).min(1.0);
+        if value(next) > 0.0 {
+            let (mut low, mut high) = (t, next);
+            while high - low > NEAR {
+                let middle = 0.5 * (low + high);
+                if value(middle) > 0.0 {
+                    high = middle;
+                } else {
+                    low = middle;
+                }
+            }
+            return Some(low);
+        }
+        if next >= 1.0 {
+            return None;
+        }
+        t = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::norm;
+    use crate::region::Sphere;
+
+    fn comb() -> Wire {
+        let nodes = (-6..=6).map(|i| [f64::from(i), 0.5, 0.0]).collect();
+        Wire {
+            nodes,
+            struts: (0..12).map(|i| [i, i + 1]).collect(),
+        }
+    }
+
+    #[test]
+    fn struts_are_cut_dropped_or_end_on_the_surface() {
+        let ball = Sphere::new([0.0; 3], 3.6).expect("ball");
+        let mut cut = comb();
+        let done = Trim::Cut.apply(&mut cut, &ball, 0.3, 0.0, &mut Vec::new());
+        assert_eq!((cut.struts.len(), done.outside), (8, 4));
+        let mut dropped = comb();
+        let done = Trim::Drop.apply(&mut dropped, &ball, 0.3, 0.0, &mut Vec::new());
+        assert_eq!((dropped.struts.len(), done.dropped), (6, 6));
+        let mut snapped = comb();
+        let done = Trim::Snap.apply(&mut snapped, &ball, 0.3, 0.0, &mut Vec::new());
+        assert_eq!(
+            (snapped.struts.len(), done.snapped, done.outside),
+            (8, 2, 4)
+        );
+        let on = snapped
+            .nodes
+            .iter()
+            .filter(|p| (norm(**p) - 3.6).abs() < 1e-9);
+        assert_eq!(on.count(), 2);
+        assert_eq!(snapped.nodes.len(), 9);
+    }
+}

@@ -1,0 +1,190 @@
+//! Phase to position: where the nodes of a graph on the torus come to lie.
+
+use std::collections::BTreeMap;
+
+use super::{Map, Phase};
+use crate::math::{Aabb, Vec3, add, apply, determinant, inverse, norm, scale, sub};
+
+/// Steps of Newton's method, after which a phase counts as not found.
+const STEPS: usize = 40;
+/// How near (turns) a phase is met.
+const NEAR: f64 = 1e-11;
+/// Looks on a wavelength for the cells that a solved map has in a box.
+const FINE: f64 = 2.0;
+
+impl Map {
+    /// The position (mm) that has the phase u, if there is one. A solved map has it looked for from `near` on, and gives
+    /// the one that is found.
+    pub fn position(&self, u: Vec3, near: Vec3) -> Option<Vec3> {
+        match self {
+            Map::Affine(a) => {
+                let x = apply(&inverse(&a.matrix), sub(u, a.shift));
+                x.iter().all(|v| v.is_finite()).then_some(x)
+            }
+            Map::Round(r) => r.position(u),
+            Map::Phase(p) => found(p, u, near),
+        }
+    }
+
+    /// The cells that may have a part in the box, or a neighbour that has, each with a place near it.
+    pub fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
+        let ranges = match self {
+            Map::Affine(_) => {
+                let mut u = [[0.0; 3]; 8];
+                self.phases(&corners(b), &mut u);
+                let box_ = u.iter().fold(Aabb::EMPTY, |b, u| b.with(*u));
+                core::array::from_fn(|a| [whole(box_.min[a]) - 1, whole(box_.max[a]) + 1])
+            }
+            Map::Round(r) => r.cells(b),
+            Map::Phase(p) => return seeds(p, b),
+        };
+        let count = |a: usize| ranges[a][0]..=ranges[a][1];
+        let reach = self.affine().map(|a| {
+            // A cell and its neighbours lie within so many of the longest diagonals.
+            let edges = inverse(&a.matrix);
+            let edge = |i: usize| norm([edges[0][i], edges[1][i], edges[2][i]]);
+            1.5 * (edge(0) + edge(1) + edge(2))
+        });
+        let mut cells = Vec::new();
+        for k in count(2) {
+            for j in count(1) {
+                for i in count(0) {
+                    let middle = [i, j, k].map(|c| f64::from(c) + 0.5);
+                    let near = self.position(middle, b.center()).unwrap_or(b.center());
+                    if reach.is_none_or(|r| b.distance(near) <= r) {
+                        cells.push(([i, j, k], near));
+                    }
+                }
+            }
+        }
+        cells
+    }
+
+    /// One name for the cells that are one and the same: round an axis they close.
+    pub fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
+        match self {
+            Map::Round(r) => [cell[0], cell[1].rem_euclid(r.around()), cell[2]],
+            Map::Affine(_) | Map::Phase(_) => cell,
+        }
+    }
+}
+
+/// The whole number below, within what a cell may be called.
+pub(super) fn whole(v: f64) -> i32 {
+    v.floor().clamp(-1e9, 1e9) as i32
+}
+
+pub(super) fn corners(b: &Aabb) -> [Vec3; 8] {
+    core::array::from_fn(|i| {
+        core::array::from_fn(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] })
+    })
+}
+
+/// Newton's method, no step longer than a wavelength.
+fn found(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
+    let longest = map.wavelength()[1];
+    let mut x = near;
+    let mut at = [[0.0; 3]];
+    for _ in 0..STEPS {
+        map.phases(&[x], &mut at);
+        let miss = sub(u, at[0]);
+        if norm(miss) < NEAR {
+            return Some(x);
+        }
+        let j = map.jacobian(x);
+        if determinant(&j) <= 0.0 {
+            return None;
+        }
+        let step = apply(&inverse(&j), miss);
+        let long = norm(step);
+        x = add(x, scale(step, (longest / long).min(1.0)));
+    }
+    None
+}
+
+/// The cells of a solved map that have a place in the box, and those about them.
+fn seeds(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
+    let step = map.wavelength()[0] / FINE;
+    let count = b.size().map(|s| (s / step).ceil().max(1.0) as usize);
+    let at = |i: usize, a: usize| b.min[a] + b.size()[a] * i as f64 / count[a] as f64;
+    let mut nearest: BTreeMap<[i32; 3], (f64, Vec3)> = BTreeMap::new();
+    let mut u = vec![[0.0; 3]; count[0] + 1];
+    for k in 0..=count[2] {
+        for j in 0..=count[1] {
+            let row: Vec<Vec3> = (0..=count[0])
+                .map(|i| [at(i, 0), at(j, 1), at(k, 2)])
+                .collect();
+            map.phases(&row, &mut u);
+            for (p, u) in row.iter().zip(&u) {
+                let off = norm(u.map(|v| v - v.floor() - 0.5));
+                let best = nearest.entry(u.map(whole)).or_insert((off, *p));
+                if off < best.0 {
+                    *best = (off, *p);
+                }
+            }
+        }
+    }
+    let own: Vec<([i32; 3], Vec3)> = nearest.iter().map(|(c, s)| (*c, s.1)).collect();
+    for (cell, place) in own {
+        for n in 0..27 {
+            let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+            let beside = core::array::from_fn(|a| cell[a] + by[a]);
+            nearest.entry(beside).or_insert((f64::INFINITY, place));
+        }
+    }
+    nearest.into_iter().map(|(c, s)| (c, s.1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grade::{Formula, Grade};
+    use crate::map::{Affine, Orientation, Round, Settings, Wanted};
+    use std::sync::Arc;
+
+    #[test]
+    fn positions_have_the_phases_that_were_asked_for() {
+        let bounds = Aabb {
+            min: [-10.0; 3],
+            max: [10.0; 3],
+        };
+        let turn = Grade::Formula(Formula::parse("3*x").expect("formula"));
+        let still = Grade::Constant(0.0);
+        let wave = Grade::Constant(3.0);
+        let wanted = Wanted {
+            wavelength: [wave.clone(), wave.clone(), wave],
+            orientation: Orientation::Angles([still.clone(), still, turn]),
+            offset: [0.2, 0.3, -0.1],
+        };
+        let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
+        let round = |sphere: bool| {
+            let (c, axis, radii) = ([1.0, 2.0, -1.0], [0.2, 0.3, 1.0], [1.0, 5.0, 9.0]);
+            if sphere {
+                Round::sphere(c, axis, 2.0, 12.0, radii)
+            } else {
+                Round::cylinder(c, axis, [2.0, 3.0], 12.0, radii)
+            }
+            .expect("map")
+        };
+        let affine = Affine::spartan([2.0, 3.0, 4.0], [10.0, 20.0, 30.0], [0.5; 3]).expect("map");
+        for map in [
+            Map::Affine(affine),
+            Map::Phase(Arc::new(phase)),
+            Map::Round(round(false)),
+            Map::Round(round(true)),
+        ] {
+            let cells = map.cells(&bounds);
+            for i in 1..200 {
+                let p = [0.8191725, 0.6710436, 0.5497005]
+                    .map(|s| 18.0 * (s * f64::from(i)).fract() - 9.0);
+                let mut u = [[0.0; 3]];
+                map.phases(&[p], &mut u);
+                let home = map.canonical(u[0].map(whole));
+                assert!(cells.iter().any(|c| c.0 == home), "{home:?}");
+                let near = add(p, [0.3, -0.2, 0.4]);
+                let found = map.position(u[0], near).expect("a position");
+                assert!(norm(sub(found, p)) < 1e-7, "{p:?} {found:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,580 @@
+//! A pattern as a field, without its beams being written out.
+
+use super::{MOST, Pattern, Similarity, Strut};
+use crate::fault::{Fault, number};
+use crate::field::Field;
+use crate::graph::Graph;
+use crate::math::{Aabb, IDENTITY, Interval, Vec3, add, apply, norm, scale, sub};
+use crate::quador::{Fillet, Quadors};
+
+/// Which hubs along a step differ: the first and the last few, and one for all between; or every one.
+#[derive(Clone, Copy, Debug)]
+struct Classes {
+    count: usize,
+    /// How many at either end have less neighbours; none if every one differs.
+    ends: Option<usize>,
+}
+
+impl Classes {
+    fn len(&self) -> usize {
+        match self.ends {
+            Some(m) if self.count > 2 * m + 1 => 2 * m + 1,
+            _ => self.count,
+        }
+    }
+
+    /// The class of an index.
+    fn of(&self, i: usize) -> usize {
+        match self.ends {
+            Some(m) if self.count > 2 * m + 1 => {
+                if i < m {
+                    i
+                } else if i >= self.count - m {
+                    i + 2 * m + 1 - self.count
+                } else {
+                    m
+                }
+            }
+            _ => i,
+        }
+    }
+
+    /// The first index of a class, and how many there are of it.
+    fn members(&self, class: usize) -> (usize, usize) {
+        match self.ends {
+            Some(m) if self.count > 2 * m + 1 => {
+                if class < m {
+                    (class, 1)
+                } else if class == m {
+                    (m, self.count - 2 * m)
+                } else {
+                    (class + self.count - (2 * m + 1), 1)
+                }
+            }
+            _ => (class, 1),
+        }
+    }
+}
+
+/// A hub that stands for all of its class.
+struct Kind {
+    /// Its number in the quadors.
+    hub: usize,
+    /// How far it lies there from where it is at [0, 0, 0], so that no two kinds lie in one place.
+    aside: Vec3,
+}
+
+/// A pattern laid out in space: membership and distance without visiting every beam.
+pub struct Laid {
+    pattern: Pattern,
+    classes: [Classes; 3],
+    /// The different hubs, each with its neighbours.
+    quadors: Quadors,
+    /// By class of k, j, i, and node.
+    kinds: Vec<Kind>,
+    /// Powers of U, V, W, undone.
+    undone: [Vec<Similarity>; 3],
+    /// For each class of j, for each i, what holds its hubs, pulled back by Wᵏ Vʲ.
+    rows: Vec<Vec<Aabb>>,
+    /// For each class of j what holds a row, pulled back by Wᵏ Vʲ.
+    lines: Vec<Aabb>,
+    /// What holds any of the lines, and any row's first.
+    widest: Aabb,
+    first: Aabb,
+    /// What holds a layer, pulled back by Wᵏ.
+    layer: Aabb,
+    bounds: Aabb,
+    /// Values beyond this (mm, at scale 1) are not told apart.
+    cap: f64,
+    /// The least scale.
+    least: f64,
+}
+
+impl Laid {
+    /// Lays a pattern out.
+    ///
+    /// # Errors
+    /// What makes no pattern; beams that cannot be; too many different hubs.
+    pub fn new(pattern: Pattern, fillet: Fillet) -> Result<Laid, Fault> {
+        pattern.check()?;
+        let [u, v, w] = pattern.steps.map(|s| s.0);
+        let size = pattern
+            .nodes
+            .iter()
+            .map(|h| norm(h.center))
+            .fold(0.0, f64::max);
+        let free = [
+            u.commutes(&v, size) && u.commutes(&w, size) && v.commutes(&w, size),
+            v.commutes(&w, size),
+            true,
+        ];
+        let classes: [Classes; 3] = core::array::from_fn(|a| Classes {
+            count: pattern.steps[a].1 as usize,
+            ends: free[a].then(|| {
+                let most = pattern.struts.iter().map(|s| s.by[a].unsigned_abs()).max();
+                most.unwrap_or(0) as usize
+            }),
+        });
+        let different =
+            classes.iter().map(|c| c.len() as f64).product::<f64>() * pattern.nodes.len() as f64;
+        if different > MOST {
+            let message = format!(
+                "{} hubs of this pattern differ from each other; at most {} are made: turn and scale about one axis, or \
+                 repeat less often",
+                number(different),
+                number(MOST)
+            );
+            return Err(Fault::new("repeat", message));
+        }
+        let (mut graph, mut kinds, mut right) = (Graph::default(), Vec::new(), 0.0);
+        for c in 0..classes[2].len() {
+            for b in 0..classes[1].len() {
+                for a in 0..classes[0].len() {
+                    let at = [(0, a), (1, b), (2, c)].map(|(s, n)| classes[s].members(n).0 as u32);
+                    for n in 0..pattern.nodes.len() {
+                        let first = graph.hubs.len() as u32;
+                        let mut star = pattern.star(n as u32, at);
+                        let b = star.bounds();
+                        let aside = [right - b.min[0], 0.0, 0.0];
+                        right += b.size()[0];
+                        star.hubs
+                            .iter_mut()
+                            .for_each(|h| h.center = add(h.center, aside));
+                        kinds.push(Kind {
+                            hub: first as usize,
+                            aside,
+                        });
+                        graph.hubs.extend(star.hubs);
+                        graph.beams.extend(star.beams.into_iter().map(|mut b| {
+                            b.ends = b.ends.map(|e| e + first);
+                            b
+                        }));
+                    }
+                }
+            }
+        }
+        let quadors = Quadors::new(&graph, fillet)?;
+        let undone: [Vec<Similarity>; 3] = core::array::from_fn(|a| {
+            let (step, count) = pattern.steps[a];
+            step.inverse().powers(count as usize)
+        });
+        let smallest = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1).min(1.0);
+        let least = pattern.steps.iter().map(smallest).product();
+        let thick =
+            pattern.nodes.iter().map(|h| h.radius).sum::<f64>() / pattern.nodes.len() as f64;
+        let mut laid = Laid {
+            classes,
+            kinds,
+            undone,
+            rows: Vec::new(),
+            lines: Vec::new(),
+            widest: Aabb::EMPTY,
+            first: Aabb::EMPTY,
+            layer: Aabb::EMPTY,
+            bounds: Aabb::EMPTY,
+            cap: 2.0 * thick,
+            least,
+            quadors,
+            pattern,
+        };
+        laid.hold();
+        Ok(laid)
+    }
+
+    /// The boxes in which what is near is looked for.
+    fn hold(&mut self) {
+        let [lu, lv, lw] = self.classes.map(|c| c.len());
+        let nodes = self.pattern.nodes.len();
+        let u = self.pattern.steps[0].0.powers(self.classes[0].count);
+        let v = self.pattern.steps[1].0.powers(self.classes[1].count);
+        for b in 0..lv {
+            let mut row = vec![Aabb::EMPTY; self.classes[0].count];
+            for (i, held) in row.iter_mut().enumerate() {
+                let a = self.classes[0].of(i);
+                for c in 0..lw {
+                    for n in 0..nodes {
+                        let kind = &self.kinds[((c * lv + b) * lu + a) * nodes + n];
+                        let own = self.quadors.hold(kind.hub).grown(self.cap);
+                        let home = Aabb {
+                            min: sub(own.min, kind.aside),
+                            max: sub(own.max, kind.aside),
+                        };
+                        *held = held.union(carried(&u[i], &home));
+                    }
+                }
+            }
+            self.lines
+                .push(row.iter().fold(Aabb::EMPTY, |all, b| all.union(*b)));
+            self.rows.push(row);
+        }
+        self.widest = self.lines.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
+        // Every hub of a row, brought back to its first place.
+        for row in &self.rows {
+            for (b, undone) in row.iter().zip(&self.undone[0]) {
+                self.first = self.first.union(carried(undone, b));
+            }
+        }
+        for (j, v) in v.iter().enumerate() {
+            self.layer = self
+                .layer
+                .union(carried(v, &self.lines[self.classes[1].of(j)]));
+        }
+        let w = self.pattern.steps[2].0.powers(self.classes[2].count);
+        self.bounds = w
+            .iter()
+            .fold(Aabb::EMPTY, |all, w| all.union(carried(w, &self.layer)));
+    }
+
+    /// Calls `found` with each kind of hub that may lie near a box, the box as that kind sees it, and how much larger the
+    /// hub is; until it says that it has enough.
+    fn near(&self, p: &Aabb, found: &mut impl FnMut(&Kind, Aabb, f64) -> bool) {
+        let nodes = self.pattern.nodes.len();
+        let [lu, lv, _] = self.classes.map(|c| c.len());
+        let [u, v, w] = &self.pattern.steps;
+        let meets = |b: &Aabb, held: &Aabb| !b.intersection(*held).is_empty();
+        for k in span(w, p, &self.layer) {
+            let in_layer = carried(&self.undone[2][k], p);
+            if !meets(&in_layer, &self.layer) {
+                continue;
+            }
+            let c = self.classes[2].of(k);
+            for j in span(v, &in_layer, &self.widest) {
+                let b = self.classes[1].of(j);
+                let in_line = carried(&self.undone[1][j], &in_layer);
+                if !meets(&in_line, &self.lines[b]) {
+                    continue;
+                }
+                for i in span(u, &in_line, &self.first) {
+                    if !meets(&in_line, &self.rows[b][i]) {
+                        continue;
+                    }
+                    let home = carried(&self.undone[0][i], &in_line);
+                    let undone = [(0, i), (1, j), (2, k)].map(|(a, n)| self.undone[a][n].scale);
+                    let s = 1.0 / undone.iter().product::<f64>();
+                    let first = ((c * lv + b) * lu + self.classes[0].of(i)) * nodes;
+                    for kind in &self.kinds[first..first + nodes] {
+                        let seen = Aabb {
+                            min: add(home.min, kind.aside),
+                            max: add(home.max, kind.aside),
+                        };
+                        if !found(kind, seen, s) {
+                            return;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn at(&self, p: Vec3) -> f64 {
+        let mut least = self.cap * self.least;
+        self.near(&Aabb { min: p, max: p }, &mut |kind, q, s| {
+            least = least.min(self.quadors.share(kind.hub, q.min) * s);
+            true
+        });
+        least
+    }
+
+    /// Whether a point is in the solid.
+    pub fn contains(&self, p: Vec3) -> bool {
+        let mut inside = false;
+        self.near(&Aabb { min: p, max: p }, &mut |kind, q, _| {
+            inside = self
+                .quadors
+                .hub(kind.hub)
+                .holds(sub(q.min, self.quadors.center(kind.hub)));
+            !inside
+        });
+        inside
+    }
+
+    /// The pattern.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// The different hubs, each with its neighbours, and which hubs count, each with the sum of s³ over its class, s being
+    /// how much larger a member is than the one that is there.
+    pub fn kinds(&self) -> (&Quadors, Vec<(usize, f64)>) {
+        let nodes = self.pattern.nodes.len();
+        let [lu, lv, _] = self.classes.map(|c| c.len());
+        let sum = |step: usize, class: usize| {
+            let s = self.pattern.steps[step].0.scale.powi(3);
+            let n = self.classes[step].members(class).1;
+            if s == 1.0 {
+                n as f64
+            } else {
+                (s.powi(n as i32) - 1.0) / (s - 1.0)
+            }
+        };
+        let each = self.kinds.iter().enumerate().map(|(m, kind)| {
+            let class = m / nodes;
+            let (a, b, c) = (class % lu, class / lu % lv, class / (lu * lv));
+            (kind.hub, sum(0, a) * sum(1, b) * sum(2, c))
+        });
+        (&self.quadors, each.collect())
+    }
+
+    /// The least and the greatest scale.
+    pub fn scales(&self) -> [f64; 2] {
+        let last = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1);
+        let each = self.pattern.steps.iter().map(last);
+        [self.least, each.map(|s| s.max(1.0)).product()]
+    }
+
+    /// The mean length of beams where they are smallest, mm.
+    pub fn wavelength(&self) -> f64 {
+        let pattern = &self.pattern;
+        let length = |s: &Strut| {
+            // Back where it would lie before the first repeat.
+            let back = s.by.map(|n| n.max(0).unsigned_abs());
+            let from = s.by.map(|n| (-n).max(0).unsigned_abs());
+            let [a, b] = s.ends.map(|n| pattern.nodes[n as usize].center);
+            let (p, q) = (pattern.at(from), pattern.at(back));
+            norm(sub(q.apply(b), p.apply(a))) / p.scale.max(q.scale)
+        };
+        let mean = pattern.struts.iter().map(length).sum::<f64>() / pattern.struts.len() as f64;
+        mean * self.least
+    }
+
+    /// The radius of the thinnest beam, mm.
+    pub fn thinnest(&self) -> f64 {
+        let thin = (0..self.quadors.beams()).map(|b| self.quadors.pencil(b).waist());
+        thin.fold(f64::INFINITY, f64::min) * self.least
+    }
+
+    /// What holds the solid, mm.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+}
+
+/// The box that holds a box carried by a similarity.
+fn carried(by: &Similarity, b: &Aabb) -> Aabb {
+    if b.is_empty() {
+        return *b;
+    }
+    let (middle, half) = (by.apply(b.center()), scale(b.size(), 0.5 * by.scale));
+    let reach = apply(&by.turn.map(|row| row.map(f64::abs)), half);
+    Aabb {
+        min: sub(middle, reach),
+        max: add(middle, reach),
+    }
+}
+
+/// The repeats n for which a part of p, n steps undone, may lie in b: by division where a step only moves, else all.
+fn span((step, count): &(Similarity, u32), p: &Aabb, b: &Aabb) -> std::ops::Range<usize> {
+    let count = *count as usize;
+    if step.turn != IDENTITY || step.scale != 1.0 {
+        return 0..count;
+    }
+    let (mut low, mut high) = (0.0f64, count as f64 - 1.0);
+    for a in 0..3 {
+        let t = step.shift[a];
+        if t == 0.0 {
+            if p.max[a] < b.min[a] || p.min[a] > b.max[a] {
+                return 0..0;
+            }
+            continue;
+        }
+        let (from, to) = ((p.min[a] - b.max[a]) / t, (p.max[a] - b.min[a]) / t);
+        // One more on either side, for rounding.
+        low = low.max(from.min(to).floor());
+        high = high.min(from.max(to).ceil());
+    }
+    if low > high {
+        return 0..0;
+    }
+    low as usize..high as usize + 1
+}
+
+/// Hubs that the bound of a box looks at one by one.
+const LOOKED: usize = 96;
+
+impl Field for Laid {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        for (o, p) in out.iter_mut().zip(points) {
+            *o = self.at(*p);
+        }
+    }
+
+    // By differences: hubs are met under many similarities, and the gradient only guides.
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let step = 1e-4 * self.cap * self.least;
+        for (i, p) in points.iter().enumerate() {
+            values[i] = self.at(*p);
+            for a in 0..3 {
+                let (mut low, mut high) = (*p, *p);
+                low[a] -= step;
+                high[a] += step;
+                gradients[i][a] = (self.at(high) - self.at(low)) / (2.0 * step);
+            }
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let cap = self.cap * self.least;
+        let mut range = Interval::new(cap, cap);
+        let mut looked = 0;
+        self.near(b, &mut |kind, q, s| {
+            let own = self.quadors.hub_bound(kind.hub, &q);
+            range = range.min(Interval::new(own.lo * s, own.hi * s));
+            looked += 1;
+            looked < LOOKED
+        });
+        if looked == LOOKED {
+            range.lo = f64::NEG_INFINITY;
+        }
+        range
+    }
+
+    fn slope(&self) -> f64 {
+        self.quadors.slope()
+    }
+
+    fn edged(&self) -> bool {
+        self.quadors.edged()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::{Hub, Profile};
+
+    fn places() -> impl Iterator<Item = Vec3> {
+        (1..4000).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract()))
+    }
+
+    fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
+        let strut = |by| Strut {
+            ends: [0, 0],
+            by,
+            profile: Profile::Mid(0.2),
+        };
+        Pattern {
+            nodes: vec![Hub {
+                center,
+                radius: 0.25,
+            }],
+            struts: vec![
+                strut([1, 0, 0]),
+                strut([0, 1, 0]),
+                strut([0, 0, 1]),
+                strut([1, -1, 0]),
+            ],
+            steps,
+        }
+    }
+
+    /// Translations, a swirl about an axis with rings along it, a shrinking spiral, and one in which no two commute.
+    fn samples() -> [Pattern; 4] {
+        let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+        let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
+        let shrink = Similarity::new(0.9, [0.0, 0.0, 20.0], [0.0; 3], [0.0; 3]);
+        [
+            pattern(
+                [
+                    (by([1.5, 0.0, 0.0]), 6),
+                    (by([0.3, 1.4, 0.0]), 5),
+                    (by([0.0, 0.2, 1.6]), 4),
+                ],
+                [0.0; 3],
+            ),
+            pattern(
+                [
+                    (by([1.5, 0.0, 0.0]), 4),
+                    (turn(24.0), 12),
+                    (by([0.0, 0.0, 1.6]), 5),
+                ],
+                [4.0, 0.0, 0.0],
+            ),
+            pattern(
+                [(turn(20.0), 9), (shrink, 6), (by([0.0, 0.0, 1.6]), 3)],
+                [6.0, 0.0, 0.0],
+            ),
+            pattern(
+                [
+                    (by([1.5, 0.0, 0.0]), 4),
+                    (
+                        Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]),
+                        5,
+                    ),
+                    (
+                        Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]),
+                        4,
+                    ),
+                ],
+                [3.0, 0.0, 0.0],
+            ),
+        ]
+    }
+
+    #[test]
+    fn a_pattern_is_what_it_is_written_out() {
+        for (n, pattern) in samples().into_iter().enumerate() {
+            for fillet in [Fillet::None, Fillet::Tau(0.8)] {
+                let graph = pattern.expanded().expect("small");
+                let (hubs, beams) = pattern.counts();
+                assert_eq!(
+                    (graph.hubs.len() as f64, graph.beams.len() as f64),
+                    (hubs, beams)
+                );
+                let whole = Quadors::new(&graph, fillet).expect("quadors");
+                let laid = Laid::new(pattern.clone(), fillet).expect("laid");
+                let b = whole.bounds();
+                let (mut inside, mut out) = (0, 0);
+                for t in places() {
+                    let p = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
+                    let is = whole.contains(p);
+                    assert_eq!(laid.contains(p), is, "{n} {p:?}");
+                    let (v, own) = (laid.value(p), whole.value(p));
+                    // Both fields have the sign of the solid, but for what rounding leaves on its surface.
+                    if own.abs() > 1e-9 {
+                        assert_eq!(v < 0.0, own < 0.0, "{n} {p:?} {v} {own}");
+                    }
+                    inside += usize::from(is);
+                    out += usize::from(!is);
+                }
+                assert!(inside > 20 && out > 200, "{n}: {inside} {out}");
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_hold_the_values() {
+        for pattern in samples() {
+            let laid = Laid::new(pattern, Fillet::Tau(0.8)).expect("laid");
+            let all = laid.bounds();
+            for (i, t) in places().take(300).enumerate() {
+                let p: Vec3 = core::array::from_fn(|a| all.min[a] + t[a] * all.size()[a]);
+                let b = Aabb { min: p, max: p }.grown(0.05 * (1 + i % 7) as f64);
+                let range = laid.bound(&b);
+                for t in places().take(30) {
+                    let q: Vec3 = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
+                    let v = laid.value(q);
+                    assert!(
+                        range.lo - 1e-12 <= v && v <= range.hi + 1e-12,
+                        "{v} {range:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn different_hubs_are_few_where_steps_commute() {
+        let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+        let steps = [
+            (by([1.5, 0.0, 0.0]), 1000),
+            (by([0.0, 1.5, 0.0]), 1000),
+            (by([0.0, 0.0, 1.5]), 1000),
+        ];
+        let laid = Laid::new(pattern(steps, [0.0; 3]), Fillet::None).expect("laid");
+        let (_, kinds) = laid.kinds();
+        assert_eq!(kinds.len(), 27);
+        assert_eq!(kinds.iter().map(|k| k.1).sum::<f64>(), 1e9);
+        assert!(laid.contains([750.0, 751.5, 750.7]) && !laid.contains([750.7, 750.7, 750.7]));
+        assert_eq!(laid.pattern().counts().0, 1e9);
+    }
+}

@@ -1,0 +1,130 @@
+//! Boxes in a uniform grid: which of them hold a point.
+
+use crate::math::{Aabb, Vec3};
+
+/// Boxes by the cells of a grid that they touch.
+#[derive(Clone, Debug, Default)]
+pub struct Index {
+    origin: Vec3,
+    /// Cells for a mm, along each axis.
+    per: Vec3,
+    cells: [usize; 3],
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Index {
+    /// An index of boxes, about four cells for each.
+    pub fn new(boxes: impl Iterator<Item = Aabb> + Clone) -> Index {
+        let (mut all, mut count) = (Aabb::EMPTY, 0usize);
+        for b in boxes.clone() {
+            all = all.union(b);
+            count += 1;
+        }
+        if count == 0 {
+            return Index::default();
+        }
+        let size = all.size().map(|s| s.max(1e-9));
+        let edge = (size[0] * size[1] * size[2] / (4.0 * count as f64)).cbrt();
+        let cells = size.map(|s| ((s / edge).ceil() as usize).clamp(1, 1024));
+        let per = [0, 1, 2].map(|a| cells[a] as f64 / size[a]);
+        let mut out = Index {
+            origin: all.min,
+            per,
+            cells,
+            starts: vec![0; cells.iter().product::<usize>() + 1],
+            items: Vec::new(),
+        };
+        for b in boxes.clone() {
+            let (lo, hi) = out.range(&b);
+            out.each_cell(lo, hi, &mut |c, starts: &mut Vec<u32>| starts[c + 1] += 1);
+        }
+        for i in 1..out.starts.len() {
+            out.starts[i] += out.starts[i - 1];
+        }
+        let mut items = vec![0; out.starts[out.starts.len() - 1] as usize];
+        let mut next = out.starts.clone();
+        for (i, b) in boxes.enumerate() {
+            let (lo, hi) = out.range(&b);
+            for z in lo[2]..=hi[2] {
+                for y in lo[1]..=hi[1] {
+                    for x in lo[0]..=hi[0] {
+                        let slot = &mut next[out.cell([x, y, z])];
+                        items[*slot as usize] = i as u32;
+                        *slot += 1;
+                    }
+                }
+            }
+        }
+        out.items = items;
+        out
+    }
+
+    fn each_cell(
+        &mut self,
+        lo: [usize; 3],
+        hi: [usize; 3],
+        f: &mut impl FnMut(usize, &mut Vec<u32>),
+    ) {
+        for z in lo[2]..=hi[2] {
+            for y in lo[1]..=hi[1] {
+                for x in lo[0]..=hi[0] {
+                    let c = self.cell([x, y, z]);
+                    f(c, &mut self.starts);
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn cell(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.cells[1] + y) * self.cells[0] + x
+    }
+
+    #[inline]
+    fn step(&self, a: usize, v: f64) -> usize {
+        // A cast takes what is below the grid, or no number, to its first cell.
+        (((v - self.origin[a]) * self.per[a]) as usize).min(self.cells[a] - 1)
+    }
+
+    fn range(&self, b: &Aabb) -> ([usize; 3], [usize; 3]) {
+        (
+            [0, 1, 2].map(|a| self.step(a, b.min[a])),
+            [0, 1, 2].map(|a| self.step(a, b.max[a])),
+        )
+    }
+
+    /// The boxes in the cell of a point: all that may hold it. Nothing is missed outside the grid either, where there are none.
+    #[inline]
+    pub fn near(&self, p: Vec3) -> &[u32] {
+        if self.items.is_empty() {
+            return &[];
+        }
+        let c = self.cell([0, 1, 2].map(|a| self.step(a, p[a])));
+        &self.items[self.starts[c] as usize..self.starts[c + 1] as usize]
+    }
+
+    /// The boxes that may touch a box, in order and once each, unless its cells list more than `most`.
+    pub fn touching(&self, b: &Aabb, most: usize) -> Option<Vec<u32>> {
+        let mut out = Vec::new();
+        if self.items.is_empty() {
+            return Some(out);
+        }
+        let (lo, hi) = self.range(b);
+        for z in lo[2]..=hi[2] {
+            for y in lo[1]..=hi[1] {
+                let row = self.cell([lo[0], y, z]);
+                let end = row + hi[0] - lo[0] + 1;
+                out.extend_from_slice(
+                    &self.items[self.starts[row] as usize..self.starts[end] as usize],
+                );
+                if out.len() > 32 * most {
+                    return None;
+                }
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+        (out.len() <= most).then_some(out)
+    }
+}

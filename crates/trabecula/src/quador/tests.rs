@@ -1,0 +1,411 @@
+use super::*;
+use crate::field::Field;
+use crate::graph::{self, Beam, Profile};
+use crate::math::{add, dot, norm, scale, unit};
+
+/// Numbers between 0 and 1 that are the same every time.
+pub(super) struct Random(pub u64);
+
+impl Random {
+    pub(super) fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(super) fn direction(&mut self) -> Vec3 {
+        loop {
+            let v = [0; 3].map(|_| 2.0 * self.next() - 1.0);
+            if dot(v, v) < 1.0 && dot(v, v) > 0.01 {
+                return unit(v);
+            }
+        }
+    }
+}
+
+/// A hub at the origin and one hub at the end of each beam.
+pub(super) fn star(
+    radius: f64,
+    ends: &[(Vec3, f64, f64)],
+    profile: impl Fn(usize) -> Profile,
+) -> Graph {
+    let mut hubs = vec![graph::Hub {
+        center: [0.0; 3],
+        radius,
+    }];
+    let mut beams = Vec::new();
+    for (i, &(along, length, r)) in ends.iter().enumerate() {
+        hubs.push(graph::Hub {
+            center: scale(along, length),
+            radius: r,
+        });
+        beams.push(Beam {
+            ends: [0, i as u32 + 1],
+            profile: profile(i),
+        });
+    }
+    Graph { hubs, beams }
+}
+
+/// A hub of `n` beams, no two closer than about 40 degrees for few beams, less for many.
+pub(super) fn random_star(random: &mut Random, n: usize) -> Graph {
+    let least = (0.9f64).min((2.4 / n as f64).sqrt());
+    let mut axes: Vec<Vec3> = Vec::new();
+    while axes.len() < n {
+        let u = random.direction();
+        if axes.iter().all(|v| dot(*v, u) < least.cos()) {
+            axes.push(u);
+        }
+    }
+    let ends: Vec<_> = axes
+        .into_iter()
+        .map(|u| (u, 4.0 + 3.0 * random.next(), 0.3 + 0.3 * random.next()))
+        .collect();
+    let mid: Vec<f64> = ends.iter().map(|_| 0.25 + 0.2 * random.next()).collect();
+    star(0.4 + 0.2 * random.next(), &ends, |i| Profile::Mid(mid[i]))
+}
+
+/// The axes, both ways.
+pub(super) fn six() -> Vec<Vec3> {
+    (0..6)
+        .map(|i| {
+            let mut v = [0.0; 3];
+            v[i % 3] = if i < 3 { 1.0 } else { -1.0 };
+            v
+        })
+        .collect()
+}
+
+/// N by trying every set of stubs.
+fn brute(hub: &Hub, x: Vec3) -> f64 {
+    let n = hub.stubs.len();
+    let g: Vec<f64> = hub.stubs.iter().map(|s| s.g.at(x)).collect();
+    let tau = |i: usize, j: usize| {
+        if i == j {
+            1.0
+        } else {
+            hub.stubs[i].share * hub.stubs[j].share
+        }
+    };
+    let mut best: f64 = 0.0;
+    for set in 1u32..1 << n {
+        let of: Vec<usize> = (0..n).filter(|i| set >> i & 1 == 1).collect();
+        // R y = g on the set, by elimination.
+        let m = of.len();
+        let mut a: Vec<Vec<f64>> = of
+            .iter()
+            .map(|&i| of.iter().map(|&j| tau(i, j)).chain([g[i]]).collect())
+            .collect();
+        for c in 0..m {
+            for r in c + 1..m {
+                let f = a[r][c] / a[c][c];
+                for k in c..=m {
+                    a[r][k] -= f * a[c][k];
+                }
+            }
+        }
+        let mut y = vec![0.0; m];
+        for r in (0..m).rev() {
+            y[r] = (a[r][m] - (r + 1..m).map(|k| a[r][k] * y[k]).sum::<f64>()) / a[r][r];
+        }
+        if y.iter().all(|v| *v >= 0.0) {
+            best = best.max(of.iter().zip(&y).map(|(&i, y)| y * g[i]).sum());
+        }
+    }
+    best
+}
+
+#[test]
+fn the_fillet_is_the_greatest_over_all_sets_of_stubs() {
+    let mut random = Random(1);
+    for n in 1..=8 {
+        for fillet in [
+            Fillet::Auto,
+            Fillet::Tau(0.6),
+            Fillet::Alpha(0.1),
+            Fillet::None,
+        ] {
+            let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
+            let mut hub = q.hub(0);
+            hub.sharp = fillet == Fillet::None;
+            for _ in 0..200 {
+                let x = scale(random.direction(), 3.0 * random.next());
+                let want = if hub.sharp {
+                    hub.stubs
+                        .iter()
+                        .map(|s| s.g.at(x).max(0.0).powi(2))
+                        .fold(0.0, f64::max)
+                } else {
+                    brute(&hub, x)
+                };
+                let got = hub.grown(x);
+                assert!(
+                    (got.value - want).abs() < 1e-12 * (1.0 + want),
+                    "{n} {fillet:?}: {got:?} {want}"
+                );
+                assert!((hub.grown_value(x) - want).abs() < 1e-12 * (1.0 + want));
+            }
+        }
+    }
+}
+
+#[test]
+fn two_stubs_give_the_quadric_of_the_note() {
+    // Unit cylinders along x and y, alpha = 1/4: Q = z² − 1 − 0.5625 (x² + y²) + 1.875 xy between its planes.
+    let ends = [([1.0, 0.0, 0.0], 20.0, 1.0), ([0.0, 1.0, 0.0], 20.0, 1.0)];
+    let graph = star(1.0, &ends, |_| Profile::Cylinder);
+    let q = Quadors::new(&graph, Fillet::Alpha(0.25)).expect("a star");
+    assert!(q.shortfalls().is_empty());
+    let hub = q.hub(0);
+    for (x, n) in [
+        (
+            [1.154_700_538_379_251_7, 1.154_700_538_379_251_7, 0.0],
+            [0.5f64.sqrt(), 0.5f64.sqrt(), 0.0],
+        ),
+        ([5.0 / 3.0, 1.0, 0.0], [0.0, 1.0, 0.0]),
+        ([1.0, 0.6, 0.8], [0.0, 0.6, 0.8]),
+    ] {
+        let (v, g) = hub.gradient(x);
+        assert!(
+            v.abs() < 1e-14 && norm(sub(unit(g), n)) < 1e-14,
+            "{x:?}: {v} {g:?}"
+        );
+    }
+    let (x, radius) = hub.crotch(0, 1, 0.6).expect("they meet");
+    assert!(
+        (x[0] - 1.154_700_538_379_251_7).abs() < 1e-14
+            && (radius - 0.408_248_290_463_863_1).abs() < 1e-14
+    );
+    // Asking for that radius gives that fillet.
+    let again = Quadors::new(&graph, Fillet::Radius(radius)).expect("a star");
+    assert!(
+        (again.hub(0).stubs[0].share.powi(2) - 0.6).abs() < 1e-12 && again.shortfalls().is_empty()
+    );
+    // The third cylinder closes the corner at 0.7817 on the diagonal.
+    let ends: Vec<_> = six()[..3].iter().map(|&u| (u, 20.0, 1.0)).collect();
+    let q =
+        Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.6)).expect("a star");
+    assert!(q.hub(0).value([0.781_735_959_970_571_5; 3]).abs() < 1e-14);
+}
+
+#[test]
+fn the_hub_is_once_differentiable() {
+    let mut random = Random(5);
+    for n in 2..=14 {
+        let q = Quadors::new(&random_star(&mut random, n), Fillet::Auto).expect("a star");
+        let hub = q.hub(0);
+        for _ in 0..50 {
+            // Along a segment, where the set of stubs changes the gradient does not jump.
+            let (mut a, mut b) = (
+                scale(random.direction(), 2.0 * random.next()),
+                scale(random.direction(), 2.0 * random.next()),
+            );
+            if hub.grown(a).active == hub.grown(b).active {
+                continue;
+            }
+            for _ in 0..50 {
+                let m = scale(add(a, b), 0.5);
+                if hub.grown(m).active == hub.grown(a).active {
+                    a = m
+                } else {
+                    b = m
+                }
+            }
+            let (u, v) = (hub.gradient(a).1, hub.gradient(b).1);
+            assert!(
+                norm(sub(u, v)) < 1e-10 * (1.0 + norm(u)),
+                "valence {n}: {u:?} {v:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn fillets_end_before_the_beams_are_parted() {
+    let mut random = Random(9);
+    for n in 2..=12 {
+        for fillet in [Fillet::Auto, Fillet::Tau(0.5), Fillet::Radius(0.6)] {
+            let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
+            if !q.overlaps().is_empty() {
+                continue;
+            }
+            let hub = q.hub(0);
+            for (i, s) in hub.stubs.iter().enumerate() {
+                let side = unit(crate::math::cross(s.axis, [0.3, 0.5, 0.81]));
+                let other = crate::math::cross(s.axis, side);
+                for k in 0..64 {
+                    let z = s.split * (1.0 + 1e-9);
+                    let (sin, cos) = (f64::from(k) / 64.0 * core::f64::consts::TAU).sin_cos();
+                    let rho = s.squared(z).sqrt();
+                    let x = add(
+                        scale(s.axis, z),
+                        add(scale(side, rho * cos), scale(other, rho * sin)),
+                    );
+                    assert_eq!(hub.grown(x).active, 1 << i, "{n} {fillet:?}");
+                    assert!(hub.value(x).abs() < 1e-12 * z * z);
+                }
+            }
+        }
+    }
+}
+
+/// A small lattice: `n`³ cubic cells of edge 10 with hubs of slightly random place and radius.
+pub(super) fn cubic(n: usize, jitter: f64) -> Graph {
+    let mut random = Random(11);
+    let m = n + 1;
+    let id = |x: usize, y: usize, z: usize| ((z * m + y) * m + x) as u32;
+    let (mut hubs, mut beams) = (Vec::new(), Vec::new());
+    for z in 0..m {
+        for y in 0..m {
+            for x in 0..m {
+                let center = [x, y, z].map(|v| 10.0 * v as f64 + jitter * (random.next() - 0.5));
+                hubs.push(graph::Hub {
+                    center,
+                    radius: 1.0 + 0.2 * jitter * random.next(),
+                });
+                for (e, to) in [(x, [x + 1, y, z]), (y, [x, y + 1, z]), (z, [x, y, z + 1])] {
+                    if e < n {
+                        beams.push(Beam {
+                            ends: [id(x, y, z), id(to[0], to[1], to[2])],
+                            profile: Profile::Cone,
+                        });
+                    }
+                }
+            }
+        }
+    }
+    Graph { hubs, beams }
+}
+
+#[test]
+fn the_field_is_negative_in_the_solid_alone_and_continuous() {
+    for fillet in [Fillet::None, Fillet::Auto, Fillet::Radius(1.0)] {
+        let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
+        assert!(q.overlaps().is_empty());
+        let mut random = Random(2);
+        let mut inside = 0;
+        for _ in 0..20_000 {
+            let p = [0; 3].map(|_| 24.0 * random.next() - 2.0);
+            let v = q.value(p);
+            inside += usize::from(v < 0.0);
+            assert_eq!(v < 0.0, q.contains(p), "{fillet:?} {p:?}: {v}");
+            let step = scale(random.direction(), 1e-7);
+            let w = q.value(add(p, step));
+            assert!((v - w).abs() < 1e-7 * 8.0, "{fillet:?} {p:?}: {v} {w}");
+            let (mut a, mut g) = ([0.0], [[0.0; 3]]);
+            q.gradients(&[p], &mut a, &mut g);
+            assert_eq!(a[0], v);
+            let ahead = q.value(add(p, scale(g[0], 1e-7)));
+            let rise = (ahead - v) / 1e-7;
+            assert!(
+                (rise - dot(g[0], g[0])).abs() < 2e-5
+                    || v > 0.9 * q.cap
+                    || g[0] == [0.0; 3]
+                    || kink(&q, p),
+                "{fillet:?} {p:?}: {rise} {g:?}"
+            );
+        }
+        assert!(inside > 500, "{inside}");
+    }
+}
+
+/// Whether hubs or pieces change near p.
+fn kink(q: &Quadors, p: Vec3) -> bool {
+    let slope = |p| {
+        let (mut a, mut g) = ([0.0], [[0.0; 3]]);
+        q.gradients(&[p], &mut a, &mut g);
+        g[0]
+    };
+    let g = slope(p);
+    six()
+        .into_iter()
+        .any(|u| norm(sub(slope(add(p, scale(u, 3e-6))), g)) > 1e-4)
+}
+
+#[test]
+fn bounds_of_boxes_hold_every_value() {
+    for fillet in [Fillet::None, Fillet::Auto] {
+        let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
+        let mut random = Random(4);
+        let mut told = 0;
+        for _ in 0..3000 {
+            let size = 0.05 * 100f64.powf(random.next());
+            let min = [0; 3].map(|_| 26.0 * random.next() - 3.0);
+            let b = Aabb {
+                min,
+                max: min.map(|v| v + size * (0.2 + random.next())),
+            };
+            let bound = q.bound(&b);
+            told += usize::from(bound.lo > 0.0 || bound.hi < 0.0);
+            for _ in 0..40 {
+                let p = [0, 1, 2].map(|a| b.min[a] + random.next() * (b.max[a] - b.min[a]));
+                let v = q.value(p);
+                assert!(
+                    v >= bound.lo && v <= bound.hi,
+                    "{fillet:?} {b:?}: {v} {bound:?}"
+                );
+            }
+        }
+        // Most small boxes are told to be empty or full.
+        assert!(told > 1200, "{told}");
+    }
+}
+
+#[test]
+fn faults_say_what_is_wrong() {
+    let two = |profile| star(1.0, &[([1.0, 0.0, 0.0], 5.0, 0.5)], |_| profile);
+    let says = |r: Result<Quadors, Fault>, at: &str, words: &str| {
+        let f = r.expect_err("refused");
+        assert!(f.at == at && f.message.contains(words), "{f}");
+    };
+    says(
+        Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto),
+        "beams[0].profile",
+        "between",
+    );
+    says(
+        Quadors::new(&two(Profile::Cylinder), Fillet::Auto),
+        "beams[0].profile",
+        "one radius",
+    );
+    says(
+        Quadors::new(&two(Profile::Cone), Fillet::Tau(1.0)),
+        "fillet",
+        "tau",
+    );
+    says(
+        Quadors::new(&two(Profile::Cone), Fillet::Radius(f64::NAN)),
+        "fillet",
+        "radius",
+    );
+    let mut lost = two(Profile::Cone);
+    lost.beams[0].ends[1] = 7;
+    says(Quadors::new(&lost, Fillet::None), "beams[0]", "names hub 7");
+    let mut same = two(Profile::Cone);
+    same.hubs[1].center = [0.0; 3];
+    says(
+        Quadors::new(&same, Fillet::None),
+        "beams[0]",
+        "no direction",
+    );
+    let mut odd = two(Profile::Cone);
+    odd.hubs[0].center[1] = f64::NAN;
+    says(
+        Quadors::new(&odd, Fillet::None),
+        "hubs[0]",
+        "not a position",
+    );
+    // Nearly parallel beams are built, but exact answers are refused.
+    let close = star(
+        1.0,
+        &[
+            ([1.0, 0.0, 0.0], 5.0, 1.0),
+            (unit([1.0, 0.1, 0.0]), 5.0, 1.0),
+        ],
+        |_| Profile::Cone,
+    );
+    let q = Quadors::new(&close, Fillet::Auto).expect("built");
+    assert!(q.exact().is_err() && !q.overlaps().is_empty());
+}

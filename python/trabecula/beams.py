@@ -1,0 +1,46 @@
+"""Unit cells of beams: the catalogue, for ``Beams(cell=…)``.
+
+>>> from trabecula import beams
+>>> beams.cell("octet")["valence"]
+{12: 4}
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any
+
+__all__ = ["cell", "cells", "names"]
+
+
+def names() -> list[str]:
+    """The names of the cells."""
+    return [it["name"] for it in cells()]
+
+
+def cells() -> list[dict[str, Any]]:
+    """All cells, each with ``name``, ``title``, space ``group``, ``aspect`` (cell edges in whose ratio it has its usual
+    shape), ``nodes`` (in cell edges), ``struts`` ({ends, shift}: two nodes, and the cell that the second lies in),
+    ``valence`` ({struts: nodes}), ``maxwell`` (struts less three for each node) and ``length`` (of all struts, in edges).
+    """
+    from collections import Counter
+
+    from . import _core
+
+    made = []
+    for name, title, group, aspect, nodes, struts, valences, maxwell, length in _core.beam_cells():
+        it = {"name": name, "title": title, "group": group, "aspect": list(aspect), "nodes": [list(n) for n in nodes]}
+        it["struts"] = [{"ends": list(ends), "shift": list(shift)} for ends, shift in struts]
+        it |= {"valence": dict(sorted(Counter(valences).items())), "maxwell": maxwell, "length": length}
+        made.append(it)
+    return made
+
+
+def cell(name: str) -> dict[str, Any]:
+    """One cell, as ``cells`` gives it."""
+    known = {it["name"]: it for it in cells()}
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+        raise KeyError(f"no cell of beams is named {name}{hint}")
+    return known[name]
