@@ -3,6 +3,7 @@
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
+mod blend;
 mod build;
 mod data;
 mod error;
@@ -32,6 +33,7 @@ use crate::lattice::Lattice;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
 
+pub use blend::Blended;
 pub use data::*;
 pub use error::{DesignError, nearest};
 pub use node::{Lines, Node, Value};
@@ -49,9 +51,12 @@ pub struct Design {
     pub units: Units,
     /// Where the part may be.
     pub region: RegionSpec,
-    /// What fills the region: one lattice, under a name of your own.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    /// What fills the region: lattices under names of your own. Several need a blend.
+    #[schemars(extend("minProperties" = 1))]
     pub lattice: Lattices,
+    /// Which lattice is where, if there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blend: Option<BlendSpec>,
     /// What closes the region's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
@@ -93,6 +98,8 @@ pub struct Built {
     pub solid: Solid,
     /// The lattices in it, by name.
     pub lattices: Vec<(String, Arc<Lattice>)>,
+    /// The blend of them, if there are several.
+    pub blend: Option<Blended>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.
@@ -110,6 +117,7 @@ impl Design {
             units: Units::Mm,
             region,
             lattice,
+            blend: None,
             skin: None,
             keep: Keeps::new(),
             lines: Lines::default(),

@@ -19,6 +19,8 @@ pub struct Solid {
     pub filled: Vec<Body>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
+    /// The width of the narrowest transition between lattices (mm), if there is one: no grid may be coarser.
+    pub transition: Option<f64>,
 }
 
 impl Solid {
@@ -29,6 +31,7 @@ impl Solid {
             field,
             filled: Vec::new(),
             wavelength,
+            transition: None,
         }
     }
 

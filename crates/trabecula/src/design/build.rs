@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Warning, level, map, region, sample, samples, skin};
+use super::{Built, Design, Loader, Warning, blend, level, map, region, sample, samples, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -122,6 +122,10 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
+        if spec.level.of == Of::Part && d.blend.is_some() {
+            let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
+            return Err(DesignError::new(format!("{path}.level.of"), message));
+        }
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
         warn(&built, &place, spec, &mut warnings);
@@ -131,16 +135,36 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let Some((_, first)) = lattices.first() else {
         return Err(DesignError::new("lattice", "no lattice given; give one"));
     };
-    if let Some((name, _)) = lattices.get(1) {
-        let message = "several lattices need a blend, which comes in a later version; keep one";
-        return Err(DesignError::new(format!("lattice.{name}"), message));
+    let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
+    let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
+    let mut lattice: Arc<dyn Field> = first.clone();
+    let mut blended = None;
+    match (&d.blend, lattices.get(1)) {
+        (Some(spec), _) => {
+            let place = Place {
+                path: "blend".into(),
+                region: &space,
+                points: &points,
+                filled: &filled,
+                loader,
+            };
+            let made = blend::blend(spec, &lattices, &place, &mut warnings)?;
+            lattice = made.blend.clone();
+            blended = Some(made);
+        }
+        (None, Some((name, _))) => {
+            let message = "several lattices need a blend to say where each is";
+            return Err(DesignError::new(format!("lattice.{name}"), message));
+        }
+        (None, None) => {}
     }
-    let lattice: Arc<dyn Field> = first.clone();
-    let solid = Solid::new(space.clone(), Some(lattice), first.map.wavelength());
+    let mut solid = Solid::new(space.clone(), Some(lattice), wavelength);
+    solid.transition = blended.as_ref().and_then(|b| b.width);
     let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built {
         solid,
         lattices,
+        blend: blended,
         skin: thinnest,
         warnings,
         repairs,

@@ -7,9 +7,11 @@ use serde::Serialize;
 
 use super::schema;
 
+mod blend;
 mod grade;
 mod map;
 
+pub use blend::*;
 pub use grade::*;
 pub use map::*;
 

@@ -7,6 +7,7 @@ use super::node::{At, Later, Node};
 use crate::cell::catalogue;
 use crate::fault::{self, counted};
 
+mod blend;
 mod grade;
 mod map;
 
@@ -28,13 +29,7 @@ const REGIONS: [&str; 9] = [
     "difference",
     "offset",
 ];
-const LATER_TOP: [Later; 2] = [
-    (
-        "blend",
-        "one lattice fills the whole region; leave the blend out and keep one lattice",
-    ),
-    ("beams", "use a lattice"),
-];
+const LATER_TOP: [Later; 1] = [("beams", "use a lattice")];
 const LATER_CELL: [Later; 3] = [
     ("tet", "use a named cell or a series"),
     ("beams", "use a named cell or a series"),
@@ -44,7 +39,9 @@ const LATER_CELL: [Later; 3] = [
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
         "a design",
-        &["schema", "units", "region", "lattice", "skin", "keep"],
+        &[
+            "schema", "units", "region", "lattice", "blend", "skin", "keep",
+        ],
         &LATER_TOP,
     )?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
@@ -75,12 +72,14 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     if entries.is_empty() {
         return Err(DesignError::new("lattice", missing));
     }
-    if let [(a, _), (b, at), ..] = entries.as_slice() {
+    if let ([(a, _), (b, at), ..], None) = (entries.as_slice(), f.get("blend")) {
         let message = format!(
-            "several lattices ({a}, {b}) need a blend to say where each is; blends come in a later version, so keep one"
+            "several lattices ({a}, {b}) need a blend to say where each is, such as [blend] with between = [\"{a}\", \"{b}\"] \
+             and a weight"
         );
         return Err(at.error(message));
     }
+    let names: Vec<&str> = entries.iter().map(|e| e.0).collect();
     let mut lattices = Lattices::new();
     for (name, at) in &entries {
         lattices.insert(name.to_string(), lattice(at)?);
@@ -90,6 +89,7 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         units: super::Units::Mm,
         region: spec,
         lattice: lattices,
+        blend: f.read("blend", None, |at| blend::blend(at, &names).map(Some))?,
         skin: f.read("skin", None, |at| skin(at).map(Some))?,
         keep: f.read("keep", Keeps::new(), keeps)?,
         lines: node.lines(),
