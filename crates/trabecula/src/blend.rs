@@ -313,6 +313,10 @@ impl Field for Blend {
         };
         let mut here = (0..w.len()).filter(|i| w[*i].hi > 0.0);
         if let (Some(i), None) = (here.next(), here.next()) {
+            if self.side == Some(Side::Low) && !self.strands[i].is_sheet() {
+                // Its lower end is below all its values.
+                return Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE);
+            }
             let (f, lo, hi) = ends(&self.strands[i]);
             return join(f, lo, hi);
         }

@@ -8,7 +8,7 @@
 use std::sync::OnceLock;
 
 use super::strand::Strand;
-use crate::math::{Aabb, Mat3, Vec3, add, apply, inverse, norm, product, sub, transpose};
+use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
 /// How the phases of the lattices of a blend go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,7 +218,8 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     None
 }
 
-/// Whether every beat between waves of two of the lattices is at most `longest` mm long.
+/// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
+/// make count too, since what is solid is no linear matter.
 fn independent(strands: &[Strand], maps: &[Mat3], longest: f64) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
     for (s, m) in strands.iter().zip(maps) {
@@ -227,19 +228,29 @@ fn independent(strands: &[Strand], maps: &[Mat3], longest: f64) -> bool {
         if terms.len() > WAVES {
             return false;
         }
+        let mut whole: Vec<[i32; 3]> = terms.iter().map(|t| t.hkl).collect();
+        whole.extend(terms.iter().map(|t| t.hkl.map(|h| -h)));
+        let pairs = whole
+            .iter()
+            .flat_map(|a| whole.iter().map(|b| [0, 1, 2].map(|i| a[i] + b[i])));
+        let mut all: Vec<[i32; 3]> = pairs.chain(whole.iter().copied()).collect();
+        all.sort_unstable();
+        all.dedup();
+        all.retain(|h| *h != [0; 3]);
         let back = transpose(m);
-        let each = terms.iter().map(|t| apply(&back, t.hkl.map(f64::from)));
-        waves.push(each.filter(|k| norm(*k) > 0.0).collect());
+        waves.push(
+            all.into_iter()
+                .map(|h| apply(&back, h.map(f64::from)))
+                .collect(),
+        );
     }
     let fast = |k: Vec3| norm(k) * longest >= 1.0 - 1e-9;
+    // Each list has the opposite of every wave, so differences are all there is.
     (0..waves.len()).all(|i| {
         (0..i).all(|j| {
-            let pairs = waves[i]
+            waves[i]
                 .iter()
-                .flat_map(|a| waves[j].iter().map(move |b| (*a, *b)));
-            pairs
-                .into_iter()
-                .all(|(a, b)| fast(sub(a, b)) && fast(add(a, b)))
+                .all(|a| waves[j].iter().all(|b| fast(sub(*a, *b))))
         })
     })
 }

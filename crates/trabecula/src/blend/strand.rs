@@ -46,7 +46,10 @@ impl Strand {
             of,
             least: 0.0,
         };
-        let range = made.bound(bounds);
+        let range = made.turned(match &made.of {
+            Constituent::Lattice(l) => l.distance().map_or_else(|| l.cell.range(), |d| d.range()),
+            Constituent::Field { field, .. } => field.bound(bounds),
+        });
         made.least = range.lo - BELOW * (range.hi - range.lo);
         made
     }
