@@ -5,6 +5,7 @@
 
 mod blend;
 mod build;
+mod control;
 mod data;
 mod error;
 mod grade;
