@@ -17,12 +17,13 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from . import cell, grade, level, map, region
+    from . import blend, cell, grade, level, map, region
     from .design import Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
     from .thickness import Thickness
+    from .transition import Transitions
 
 __all__ = [
     "Design",
@@ -32,8 +33,10 @@ __all__ = [
     "Mesh",
     "Solid",
     "Thickness",
+    "Transitions",
     "Voxels",
     "__version__",
+    "blend",
     "cell",
     "fraction",
     "grade",
@@ -57,13 +60,14 @@ _HOMES = {
     "Mesh": "mesh",
     "Solid": "solid",
     "Thickness": "thickness",
+    "Transitions": "transition",
     "Voxels": "solid",
     "spartan": "solid",
     "iso": "solid",
     "fraction": "solid",
     "__version__": "_core",
 }
-_MODULES = ("cell", "grade", "level", "map", "region")
+_MODULES = ("blend", "cell", "grade", "level", "map", "region")
 
 
 def __getattr__(name: str) -> Any:

@@ -43,6 +43,14 @@ def check(args) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
+    if report.get("blend"):
+        found = solid.transitions()
+        report["blend"]["transitions"] = list(found)
+        if args.transitions is not None:
+            check_place(args.transitions)
+            found.render(args.transitions)
+    elif args.transitions is not None:
+        raise Refused("--transitions is for designs with a blend; this one has none")
     if args.json:
         return print(json.dumps(report, indent=2))
     low, high = report["region"]["bounds"]
@@ -60,6 +68,29 @@ def check(args) -> None:
         print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
         if it.get("distortion"):
             tell_distortion(it["distortion"])
+    if report.get("blend"):
+        tell_blend(report["blend"])
+
+
+def tell_blend(blend: dict) -> None:
+    """A blend and its transitions."""
+    phases = f", phases {blend['phases']}" if blend["phases"] else ""
+    print(f"blend of {', '.join(blend['lattices'])} by {blend['by']}{phases}")
+    for it in blend["rbf"]:
+        print(f"  {it['path']}: {it['points']} points, delta {figure(it['delta'])} mm, condition {it['condition']:.2g}")
+    for it in blend["transitions"]:
+        print(f"transition {it['between'][0]} to {it['between'][1]}: {figure(it['volume'])} mm³")
+        rows = it["fractions"]
+        off = max((r["found"] - r["asked"] for r in rows), key=abs, default=0.0)
+        print(f"  fraction   {span([min(r['found'] for r in rows), max(r['found'] for r in rows)])}, off by {off:+.4f} at most")
+        neck = it["neck"]
+        text = "none: no way leads across"
+        if neck:
+            text = f"{neck['diameter']:.3g} mm at ({', '.join(figure(v) for v in neck['place'])}) mm, the widest way's narrowest"
+        print(f"  neck       {text}")
+        for word in ("loose", "dangling"):
+            text = f"{it[word]['bodies']}" + (f", {figure(it[word]['volume'])} mm³" if it[word]["bodies"] else "")
+            print(f"  {word:10} {text}")
 
 
 def tell_distortion(d: dict) -> None:
@@ -360,7 +391,7 @@ def files_of(tree) -> list[str]:
 def read_by(design: str) -> list[str]:
     """The files that a design reads."""
     data = load(design).to_dict()
-    return files_of([data.get("region"), *(data.get("keep") or {}).values()])
+    return files_of([data.get("region"), data.get("blend") or {}, *(data.get("keep") or {}).values()])
 
 
 def keep_inputs(design: str, output: str) -> None:

@@ -56,7 +56,8 @@ def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> d
 class Design:
     """A lattice part, as data.
 
-    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``).
+    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``); several
+    need a ``blend``, from the builders of that name, that says where each is.
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid as far as the region goes.
     Nothing is checked before ``build``, the last line that can raise.
     """
@@ -67,6 +68,7 @@ class Design:
     schema: int = 1
     skin: dict | None = None
     keep: Mapping[str, dict] | None = None
+    blend: dict | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
     _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
 
@@ -76,7 +78,7 @@ class Design:
         if isinstance(lattices, Mapping):
             lattices = {k: v.to_dict() if isinstance(v, Lattice) else v for k, v in lattices.items()}
         data = {"schema": self.schema, "units": self.units, "region": self.region, "lattice": lattices}
-        more = {"skin": self.skin, "keep": self.keep}
+        more = {"blend": self.blend, "skin": self.skin, "keep": self.keep}
         return copied(data | {k: v for k, v in more.items() if v is not None})
 
     def __eq__(self, other: object) -> bool:
@@ -141,7 +143,8 @@ def load(path: str | os.PathLike[str]) -> Design:
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()}
     folder = os.path.dirname(os.path.abspath(name))
-    design = Design(data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), folder=folder)
+    more = {key: data.get(key) for key in ("skin", "keep", "blend")}
+    design = Design(data["region"], lattices, data["units"], data["schema"], folder=folder, **more)
     object.__setattr__(design, "_read", read)
     return design
 
@@ -151,6 +154,8 @@ def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
     data["region"] = _moved(data["region"], turn)
     if isinstance(data.get("keep"), dict):
         data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
+    if isinstance(data.get("blend"), dict):
+        data["blend"] = _moved(data["blend"], turn)
     return data
 
 

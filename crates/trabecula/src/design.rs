@@ -198,6 +198,13 @@ impl Built {
         report::report(self)
     }
 
+    /// The transitions between the lattices of a blend, as JSON: for each the two names (`between`), `volume`, `pieces` (`loose`
+    /// and `dangling` bodies with their volumes), `neck` (diameter and place of the narrowest neck of the widest way across,
+    /// or null), and `fractions` (share of the second, fraction asked for, fraction found). Empty without a blend.
+    pub fn transitions(&self) -> Json {
+        report::transitions(self)
+    }
+
     /// The solid share of the region, by looks at some ten thousand points, and the region's volume (mm³), exact where
     /// that is known: what an extraction is held against.
     pub fn expected(&self) -> (f64, f64) {

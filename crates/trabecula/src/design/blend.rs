@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::Warning;
 use super::build::Place;
-use super::data::{BlendKind, BlendSpec, BySpec, GradeSpec};
+use super::control;
+use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::sample;
@@ -41,8 +42,49 @@ pub struct Blended {
     pub blend: Arc<Blend>,
     /// The names of its lattices.
     pub names: Vec<String>,
+    /// The radial basis functions among its weights.
+    pub functions: Vec<Functions>,
     /// How wide the narrowest transition is, mm: the inverse of the steepest weight where two lattices count the same.
     pub width: Option<f64>,
+}
+
+/// Radial basis functions in a weight.
+pub struct Functions {
+    /// Where they stand in the design.
+    pub path: String,
+    /// Number of control points.
+    pub points: usize,
+    /// δ, mm.
+    pub delta: f64,
+    /// Condition number of their equations.
+    pub condition: f64,
+}
+
+/// The radial basis functions in a weight, itself or under a step.
+fn functions(
+    spec: &GradeSpec,
+    path: &str,
+    place: &Place,
+    out: &mut Vec<Functions>,
+) -> Result<(), DesignError> {
+    match spec {
+        GradeSpec::Kind(GradeKind::Sigmoid(s)) => {
+            functions(&s.of, &format!("{path}.sigmoid.of"), place, out)
+        }
+        GradeSpec::Kind(GradeKind::Rbf(r)) => {
+            let path = format!("{path}.rbf");
+            let made = control::rbf(r, &path, place)?;
+            let (points, delta, condition) = (made.len(), made.delta(), made.condition());
+            out.push(Functions {
+                path,
+                points,
+                delta,
+                condition,
+            });
+            Ok(())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Builds the blend.
@@ -68,8 +110,9 @@ pub(super) fn blend(
             .ok_or_else(|| DesignError::new("blend", format!("there is no lattice \"{name}\"")))?;
         of.push(Constituent::Lattice(lattice.clone()));
     }
-    let mut grades = Vec::new();
+    let (mut grades, mut rbf) = (Vec::new(), Vec::new());
     for (path, spec) in spec.weights() {
+        functions(spec, &path, place, &mut rbf)?;
         let here = Place {
             path: path.clone(),
             ..*place
@@ -108,6 +151,7 @@ pub(super) fn blend(
     Ok(Blended {
         blend: Arc::new(blend),
         names: names.into_iter().map(String::from).collect(),
+        functions: rbf,
         width,
     })
 }
