@@ -86,7 +86,9 @@ def tell_blend(blend: dict) -> None:
         neck = it["neck"]
         text = "none: no way leads across"
         if neck:
-            text = f"{neck['diameter']:.3g} mm at ({', '.join(figure(v) for v in neck['place'])}) mm, the widest way's narrowest"
+            text = (
+                f"{neck['diameter']:.3g} mm at ({', '.join(figure(v) for v in neck['place'])}) mm, the widest way's narrowest"
+            )
         print(f"  neck       {text}")
         for word in ("loose", "dangling"):
             text = f"{it[word]['bodies']}" + (f", {figure(it[word]['volume'])} mm³" if it[word]["bodies"] else "")

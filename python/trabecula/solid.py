@@ -78,9 +78,9 @@ class Solid(Picture):
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``.
 
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
-        and the warnings; ``blend`` with the lattices' names, ``by``, ``phases`` (locked, independent or drifting), the ``width``
-        of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which
-        the wall folds.
+        and the warnings; with a blend ``blend``: the lattices' names, ``by``, ``phases`` (locked, independent or drifting),
+        the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
+        level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which the wall folds.
         """
         return json.loads(self._core.report())
 

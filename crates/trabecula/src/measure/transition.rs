@@ -297,7 +297,8 @@ fn transition(
         inside[i as usize] = true;
         let n = i as usize;
         let (x, y, z) = (n % nx, n / nx % ny, n / nx / ny);
-        let mut sides = bodies.sides[bodies.find(i) as usize];
+        let own = bodies.find(i) as usize;
+        let mut sides = bodies.sides[own];
         for (there, other) in [
             (x > 0, n.wrapping_sub(1)),
             (x + 1 < nx, n + 1),
