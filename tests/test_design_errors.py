@@ -177,14 +177,9 @@ CASES = [
         ["empty"],
     ),
     # more than there can be
-    (
-        "[lattice.core.level]",
-        "[blend]\nbetween = ['a', 'b']\n[lattice.core.level]",
-        "blend",
-        ["not in this version yet"],
-    ),
+    ("[lattice.core.level]", "[blend]\nbetween = ['core', 'b']\n[lattice.core.level]", "blend.between[1]", ["b", "core"]),
     ('units = "mm"', "beams.a.radius = 1", "beams", ["not in this version yet"]),
-    ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "later version"]),
+    ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "between"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]
 

@@ -17,13 +17,14 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from . import beams, cell, grade, level, map, region
+    from . import beams, blend, cell, grade, level, map, region
     from .design import Beams, Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
     from .solid import Solid, Voxels, fraction, iso, spartan
     from .tets import TetMesh
     from .thickness import Thickness
+    from .transition import Transitions
 
 __all__ = [
     "Beams",
@@ -35,9 +36,11 @@ __all__ = [
     "Solid",
     "TetMesh",
     "Thickness",
+    "Transitions",
     "Voxels",
     "__version__",
     "beams",
+    "blend",
     "cell",
     "fraction",
     "grade",
@@ -63,13 +66,14 @@ _HOMES = {
     "Solid": "solid",
     "TetMesh": "tets",
     "Thickness": "thickness",
+    "Transitions": "transition",
     "Voxels": "solid",
     "spartan": "solid",
     "iso": "solid",
     "fraction": "solid",
     "__version__": "_core",
 }
-_MODULES = ("beams", "cell", "grade", "level", "map", "region")
+_MODULES = ("beams", "blend", "cell", "grade", "level", "map", "region")
 
 
 def __getattr__(name: str) -> Any:

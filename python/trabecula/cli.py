@@ -174,6 +174,12 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json)")
     p.add_argument("--json", action="store_true", help="print the report as JSON")
+    p.add_argument(
+        "--transitions",
+        metavar="OUT",
+        type=ending(("png",)),
+        help="draw the fraction along the transitions of a blend to OUT.png",
+    )
 
     p = command(
         "mesh",

@@ -45,6 +45,14 @@ def check(args) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
+    if report.get("blend"):
+        found = solid.transitions()
+        report["blend"]["transitions"] = list(found)
+        if args.transitions is not None:
+            check_place(args.transitions)
+            found.render(args.transitions)
+    elif args.transitions is not None:
+        raise Refused("--transitions is for designs with a blend; this one has none")
     if args.json:
         return print(json.dumps(report, indent=2))
     low, high = report["region"]["bounds"]
@@ -66,6 +74,8 @@ def check(args) -> None:
             tell_distortion(it["distortion"])
     for name, it in report["beams"].items():
         tell_beams(name, it)
+    if report.get("blend"):
+        tell_blend(report["blend"])
 
 
 def tell_beams(name: str, it: dict) -> None:
@@ -101,6 +111,29 @@ def tell_tiling(t: dict) -> None:
         c = t["creases"]
         smooth = " (before smoothing)" if t["overlap"] else ""
         print(f"  creases    {c['mean']:.0f}° on average, {c['max']:.0f}° at most at the faces of tetrahedra{smooth}")
+
+
+def tell_blend(blend: dict) -> None:
+    """A blend and its transitions."""
+    phases = f", phases {blend['phases']}" if blend["phases"] else ""
+    print(f"blend of {', '.join(blend['lattices'])} by {blend['by']}{phases}")
+    for it in blend["rbf"]:
+        print(f"  {it['path']}: {it['points']} points, delta {figure(it['delta'])} mm, condition {it['condition']:.2g}")
+    for it in blend["transitions"]:
+        print(f"transition {it['between'][0]} to {it['between'][1]}: {figure(it['volume'])} mm³")
+        rows = it["fractions"]
+        off = max((r["found"] - r["asked"] for r in rows), key=abs, default=0.0)
+        print(f"  fraction   {span([min(r['found'] for r in rows), max(r['found'] for r in rows)])}, off by {off:+.4f} at most")
+        neck = it["neck"]
+        text = "none: no way leads across"
+        if neck:
+            text = (
+                f"{neck['diameter']:.3g} mm at ({', '.join(figure(v) for v in neck['place'])}) mm, the widest way's narrowest"
+            )
+        print(f"  neck       {text}")
+        for word in ("loose", "dangling"):
+            text = f"{it[word]['bodies']}" + (f", {figure(it[word]['volume'])} mm³" if it[word]["bodies"] else "")
+            print(f"  {word:10} {text}")
 
 
 def tell_distortion(d: dict) -> None:
@@ -505,7 +538,8 @@ def read_by(design: str) -> list[str]:
     """The files that a design reads."""
     data = load(design).to_dict()
     tables = [b[k] for b in (data.get("beams") or {}).values() for k in ("nodes", "struts") if isinstance(b.get(k), str)]
-    return files_of([data.get("region"), *(data.get("keep") or {}).values()]) + tables
+    regions = [data.get("region"), data.get("blend") or {}, *(data.get("keep") or {}).values()]
+    return files_of(regions) + tables
 
 
 def keep_inputs(design: str, output: str) -> None:

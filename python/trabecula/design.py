@@ -85,8 +85,9 @@ def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> d
 class Design:
     """A lattice part, as data.
 
-    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``);
-    ``beams``, instead of a lattice, is {name: Beams}, or one Beams (named ``core``).
+    ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``); several
+    need a ``blend``, from the builders of that name, that says where each is. ``beams``, instead of a lattice, is
+    {name: Beams}, or one Beams (named ``core``).
     ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid as far as the region goes.
     Nothing is checked before ``build``, the last line that can raise.
     """
@@ -98,13 +99,15 @@ class Design:
     skin: dict | None = None
     keep: Mapping[str, dict] | None = None
     beams: Mapping[str, Beams | dict] | Beams | None = None
+    blend: dict | None = None
     folder: str | None = field(default=None, compare=False, repr=False)
     _read: _core.Design | None = field(default=None, init=False, compare=False, repr=False)
 
     def to_dict(self) -> dict:
         """The design as plain data: what stands in its file."""
         data = {"schema": self.schema, "units": self.units, "region": self.region}
-        more = {"lattice": _by_name(self.lattice), "beams": _by_name(self.beams), "skin": self.skin, "keep": self.keep}
+        more = {"lattice": _by_name(self.lattice), "beams": _by_name(self.beams)}
+        more |= {"blend": self.blend, "skin": self.skin, "keep": self.keep}
         return copied(data | {k: v for k, v in more.items() if v is not None})
 
     def __eq__(self, other: object) -> bool:
@@ -178,9 +181,8 @@ def load(path: str | os.PathLike[str]) -> Design:
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None
     beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
     folder = os.path.dirname(os.path.abspath(name))
-    design = Design(
-        data["region"], lattices, data["units"], data["schema"], data.get("skin"), data.get("keep"), beams, folder=folder
-    )
+    more = {key: data.get(key) for key in ("skin", "keep", "blend")}
+    design = Design(data["region"], lattices, data["units"], data["schema"], beams=beams, folder=folder, **more)
     object.__setattr__(design, "_read", read)
     return design
 
@@ -194,6 +196,8 @@ def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
                 graph[key] = turn(graph[key])
     if isinstance(data.get("keep"), dict):
         data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
+    if isinstance(data.get("blend"), dict):
+        data["blend"] = _moved(data["blend"], turn)
     return data
 
 

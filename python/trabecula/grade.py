@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from .given import copied, plain, settings
 
-__all__ = ["depth", "field", "formula", "grid", "linear", "points", "radial"]
+__all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid"]
 
 Stops = Mapping[float, float] | Iterable[Sequence[float]]
 
@@ -55,6 +55,51 @@ def points(path: str, neighbours: int | None = None, remap: Stops | None = None)
 def field(path: str, array: str, component: int | None = None, remap: Stops | None = None) -> dict:
     """An array of points or cells of a result on a mesh (vtu, vtk) or a grid (vti, vtk)."""
     return {"field": settings(path=path, array=array, component=component, remap=_remap(remap))}
+
+
+def sigmoid(of: float | dict, width: float, at: float = 0.0) -> dict:
+    """A smooth step (the logistic function, with ends) from 0 to 1 as the grade ``of`` rises through ``at``, over ``width`` in
+    its unit; a negative width falls."""
+    return {"sigmoid": {"of": of, "width": width} | ({"at": at} if at else {})}
+
+
+def region(of: dict, width: float) -> dict:
+    """1 inside a region (from the builders of ``trabecula.region``) and 0 outside, with a smooth step of ``width`` mm."""
+    return {"region": {"of": of, "width": width}}
+
+
+def distance(
+    points: Iterable[Sequence[float]] | str,
+    closed: bool = False,
+    axis: Sequence[float] | None = None,
+    sharpness: float | None = None,
+) -> dict:
+    """Distance (mm) to a line through control points: [x, y, z] in order, or the path of a table (csv) of them.
+
+    With an ``axis`` all is seen along it, and inside a ``closed`` line distances are negative. ``sharpness`` (at least 10)
+    asks for the smooth form instead of the exact one.
+    """
+    given = settings(axis=axis, sharpness=sharpness) | ({"closed": True} if closed else {})
+    return {"distance": _control(points) | given}
+
+
+def rbf(
+    points: Iterable[Sequence[float]] | str,
+    values: Sequence[float] | None = None,
+    delta: float | None = None,
+    axis: Sequence[float] | None = None,
+) -> dict:
+    """Gaussian radial basis functions that take ``values`` (1 unless given) at control points; ``delta`` (mm) is their width.
+
+    ``points`` are [x, y, z] or the path of a table (csv) of x, y, z, or x, y, z, value.
+    """
+    return {"rbf": _control(points) | settings(values=values, delta=delta, axis=axis)}
+
+
+def _control(points: Iterable[Sequence[float]] | str) -> dict:
+    if isinstance(points, str) or hasattr(points, "__fspath__"):
+        return {"path": points}
+    return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
 
 
 def _remap(remap: Stops | None) -> list | None:

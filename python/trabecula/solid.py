@@ -19,6 +19,7 @@ from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
 from .thickness import Thickness
+from .transition import Transitions
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,10 +86,16 @@ class Solid(Picture):
         ``beams.NAME`` with counts, lengths, valences, the smallest angle and what was cleaned and trimmed.
 
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
-        and the warnings. Where the level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which
-        the wall folds.
+        and the warnings; with a blend ``blend``: the lattices' names, ``by``, ``phases`` (locked, independent or drifting),
+        the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
+        level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which the wall folds.
         """
         return json.loads(self._core.report())
+
+    def transitions(self) -> Transitions:
+        """The transitions between the lattices of a blend: bodies that are loose or dangle, the narrowest neck, and the
+        fraction along each. The lattices alone are looked at, without skin and kept zones."""
+        return Transitions(json.loads(self._core.transitions()))
 
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
         """Values at points (n, 3) in mm: negative in the solid, positive outside, continuous; not a distance."""

@@ -156,6 +156,11 @@ impl Solid {
         run(py, None, None, |_| self.built.report().to_string())
     }
 
+    /// The transitions between the lattices of a blend, as JSON text.
+    fn transitions(&self, py: Python<'_>) -> PyResult<String> {
+        run(py, None, None, |_| self.built.transitions().to_string())
+    }
+
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
     fn expected(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
         run(py, None, None, |_| self.built.expected())

@@ -4,7 +4,9 @@
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
 mod beams;
+mod blend;
 mod build;
+mod control;
 mod data;
 mod error;
 mod grade;
@@ -41,6 +43,7 @@ use crate::tets::TetMesh;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
 
+pub use blend::Blended;
 pub use data::*;
 pub use error::{DesignError, nearest};
 pub use node::{Lines, Node, Value};
@@ -60,14 +63,17 @@ pub struct Design {
     pub units: Units,
     /// Where the part may be.
     pub region: RegionSpec,
-    /// What fills the region: one lattice, under a name of your own.
+    /// What fills the region: lattices under names of your own. Several need a blend.
     #[serde(default, skip_serializing_if = "Lattices::is_empty")]
-    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    #[schemars(extend("minProperties" = 1))]
     pub lattice: Lattices,
     /// What fills the region instead of a lattice: one graph of beams, under a name of your own.
     #[serde(default, skip_serializing_if = "BeamsSpecs::is_empty")]
     #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
     pub beams: BeamsSpecs,
+    /// Which lattice is where, if there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blend: Option<BlendSpec>,
     /// What closes the region's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
@@ -142,6 +148,8 @@ pub struct Built {
     pub tilings: Vec<Tiled>,
     /// The beams in it, by name.
     pub beams: Vec<(String, Beams)>,
+    /// The blend of them, if there are several.
+    pub blend: Option<Blended>,
     /// The least thickness of the skin (mm), if there is one.
     pub skin: Option<f64>,
     /// What may not be meant.
@@ -160,6 +168,7 @@ impl Design {
             region,
             lattice,
             beams: BeamsSpecs::new(),
+            blend: None,
             skin: None,
             keep: Keeps::new(),
             lines: Lines::default(),
@@ -237,6 +246,13 @@ impl Built {
     /// which the wall folds, else null.
     pub fn report(&self) -> Json {
         report::report(self)
+    }
+
+    /// The transitions between the lattices of a blend, as JSON: for each the two names (`between`), `volume`, `pieces` (`loose`
+    /// and `dangling` bodies with their volumes), `neck` (diameter and place of the narrowest neck of the widest way across,
+    /// or null), and `fractions` (share of the second, fraction asked for, fraction found). Empty without a blend.
+    pub fn transitions(&self) -> Json {
+        report::transitions(self)
     }
 
     /// The solid share of the region, by looks at some ten thousand points, and the region's volume (mm³), exact where

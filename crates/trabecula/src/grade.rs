@@ -7,9 +7,15 @@ use crate::field::Field;
 use crate::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
 
 mod formula;
+mod polyline;
+mod rbf;
 mod samples;
+mod sigmoid;
 pub use formula::Formula;
+pub use polyline::Polyline;
+pub use rbf::Rbf;
 pub use samples::Samples;
+pub use sigmoid::Sigmoid;
 
 /// A number that may vary in space. Its unit is that of the key it stands under.
 #[derive(Clone)]
@@ -48,6 +54,8 @@ pub enum Grade {
         /// What they stand for: (number, value), number ascending; empty if for themselves.
         remap: Vec<[f64; 2]>,
     },
+    /// Any other function of position: a distance to a line, radial basis functions, a smooth step.
+    Function(Arc<dyn Field>),
 }
 
 impl Grade {
@@ -97,6 +105,7 @@ impl Grade {
                 }
             }
             Grade::Formula(f) => f.values(points, out),
+            Grade::Function(f) => f.values(points, out),
             Grade::Radial {
                 center,
                 axis,
@@ -137,6 +146,7 @@ impl Grade {
                 }
             }
             Grade::Formula(f) => f.gradients(points, values, gradients),
+            Grade::Function(f) => f.gradients(points, values, gradients),
             Grade::Radial {
                 center,
                 axis,
@@ -178,6 +188,7 @@ impl Grade {
             }
             Grade::Depth { region, stops } => range(stops, -region.bound(b)),
             Grade::Formula(f) => f.bound(b),
+            Grade::Function(f) => f.bound(b),
             Grade::Radial {
                 center,
                 axis,
@@ -335,6 +346,11 @@ mod tests {
                 ),
                 remap: vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]],
             },
+            Grade::Function(Arc::new(Sigmoid::new(
+                Grade::Formula(Formula::parse("x + y*z").unwrap()),
+                0.2,
+                1.5,
+            ))),
         ]
     }
 

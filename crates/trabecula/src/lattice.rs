@@ -1,6 +1,7 @@
 //! A lattice: cell, map, part, level. The only file where cell and map meet.
 
 mod rows;
+pub(crate) use rows::Rows;
 
 use std::sync::Arc;
 
@@ -12,8 +13,6 @@ use crate::math::{
     Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm,
     transpose,
 };
-
-use rows::Rows;
 
 /// How much of the cell is solid.
 #[derive(Clone)]
@@ -194,7 +193,7 @@ impl Lattice {
     }
 
     /// An interval that contains the core's values in the box.
-    fn core_bound(&self, b: &Aabb) -> Interval {
+    pub fn core_bound(&self, b: &Aabb) -> Interval {
         let reach = norm(b.size()) / 2.0;
         let around = |v: f64, reach: f64, all: Interval| {
             Interval::new((v - reach).max(all.lo), (v + reach).min(all.hi))
@@ -266,7 +265,7 @@ impl Lattice {
     }
 
     /// An interval that contains the core's levels in the box.
-    fn iso_bound(&self, b: &Aabb) -> Interval {
+    pub fn iso_bound(&self, b: &Aabb) -> Interval {
         if let Some(t) = self.uniform {
             return Interval::new(t, t);
         }
@@ -295,6 +294,19 @@ impl Lattice {
             Some(d) => d.fraction(self.part, t),
             None => self.cell.fraction(self.part, t),
         }
+    }
+
+    /// The share of the cell in which the core is less than v.
+    pub fn below(&self, v: f64) -> f64 {
+        match &self.distance {
+            Some(d) => d.fraction(Part::Lower, v),
+            None => self.cell.fraction(Part::Lower, v),
+        }
+    }
+
+    /// The level of the core, where it does not vary.
+    pub fn uniform(&self) -> Option<f64> {
+        self.uniform
     }
 
     /// The intervals of solid fraction in which the periodic solid is one piece in R³.

@@ -4,6 +4,7 @@
 //! Lengths are mm, angles degrees at the door, phases turns; negative is solid; triangles are counter-clockwise
 //! seen from outside.
 
+pub mod blend;
 pub mod cell;
 pub mod design;
 pub mod extract;

@@ -10,6 +10,7 @@ mod cavity;
 mod cut;
 mod local;
 mod quality;
+mod transition;
 
 pub use crate::mesh::{is_embedded, self_intersections};
 pub use adjacency::non_manifold_vertices;
@@ -18,6 +19,7 @@ pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
 pub use local::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
 pub use quality::{Quality, quality};
+pub use transition::{Transition, transitions};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;

@@ -22,6 +22,8 @@ pub struct Solid {
     pub wavelength: f64,
     /// The lattice over a tetrahedral mesh that all of this is, if its surface is to be made without a grid.
     pub tiling: Option<Arc<Tiling>>,
+    /// The width of the narrowest transition between lattices (mm), if there is one: no grid may be coarser.
+    pub transition: Option<f64>,
 }
 
 impl Solid {
@@ -33,6 +35,7 @@ impl Solid {
             filled: Vec::new(),
             wavelength,
             tiling: None,
+            transition: None,
         }
     }
 

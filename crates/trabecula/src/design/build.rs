@@ -7,7 +7,8 @@ use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
 use super::{
-    Built, Design, Loader, Tiled, Warning, beams, level, map, region, sample, samples, skin, tiling,
+    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, samples, skin,
+    tiling,
 };
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
@@ -139,6 +140,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             lattices,
             tilings: vec![tiled],
             beams: Vec::new(),
+            blend: None,
             skin: thinnest,
             warnings,
             repairs,
@@ -153,6 +155,10 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
+        if spec.level.of == Of::Part && d.blend.is_some() {
+            let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
+            return Err(DesignError::new(format!("{path}.level.of"), message));
+        }
         let built = Arc::new(lattice(spec, &place)?);
         check_solid(&built, &place, spec)?;
         warn(&built, &place, spec, &mut warnings);
@@ -160,9 +166,6 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         lattices.push((name.clone(), built));
     }
     let mut graphs = Vec::new();
-    let mut fields: Vec<(Arc<dyn Field>, f64)> = (lattices.iter())
-        .map(|(_, l)| (l.clone() as Arc<dyn Field>, l.map.wavelength()))
-        .collect();
     for (name, spec) in &d.beams {
         let place = Place {
             path: format!("beams.{name}"),
@@ -172,28 +175,47 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             loader,
         };
         let made = beams::beams(spec, &place, &mut warnings)?;
-        fields.push((made.field(), made.wavelength()));
         graphs.push((name.clone(), made));
     }
-    let mut fields = fields.into_iter();
-    let Some((field, wavelength)) = fields.next() else {
-        return Err(DesignError::new("lattice", "no lattice given; give one"));
+    let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
+    let wavelengths = wavelengths.chain(graphs.iter().map(|g| g.1.wavelength()));
+    let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
+    let mut blended = None;
+    let field: Arc<dyn Field> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
+        (Some(spec), _, []) => {
+            let place = Place {
+                path: "blend".into(),
+                region: &space,
+                points: &points,
+                filled: &filled,
+                loader,
+            };
+            let made = blend::blend(spec, &lattices, &place, &mut warnings)?;
+            let field = made.blend.clone();
+            blended = Some(made);
+            field
+        }
+        (None, [(_, one)], []) => one.clone(),
+        (None, [], [(_, one)]) => one.field(),
+        (None, [_, (name, _), ..], _) => {
+            let message = "several lattices need a blend to say where each is";
+            return Err(DesignError::new(format!("lattice.{name}"), message));
+        }
+        (_, _, [.., (name, _)]) => {
+            let message = "beams fill a region alone; keep either one block of beams or lattices";
+            return Err(DesignError::new(format!("beams.{name}"), message));
+        }
+        (None, [], []) => return Err(DesignError::new("lattice", "no lattice given; give one")),
     };
-    if fields.next().is_some() {
-        let names = d.lattice.keys().map(|n| format!("lattice.{n}"));
-        let second = names
-            .chain(d.beams.keys().map(|n| format!("beams.{n}")))
-            .nth(1);
-        let message = "several lattices need a blend, which comes in a later version; keep one";
-        return Err(DesignError::new(second.unwrap_or_default(), message));
-    }
-    let solid = Solid::new(space.clone(), Some(field), wavelength);
+    let mut solid = Solid::new(space.clone(), Some(field), wavelength);
+    solid.transition = blended.as_ref().and_then(|b| b.width);
     let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built {
         solid,
         lattices,
         tilings: Vec::new(),
         beams: graphs,
+        blend: blended,
         skin: thinnest,
         warnings,
         repairs,

@@ -8,10 +8,12 @@ use serde::Serialize;
 use super::schema;
 
 mod beams;
+mod blend;
 mod grade;
 mod map;
 
 pub use beams::*;
+pub use blend::*;
 pub use grade::*;
 pub use map::*;
 

@@ -1,9 +1,11 @@
 //! Numbers that may vary: data to [`Grade`], values checked.
 
+use std::sync::Arc;
+
 use super::build::{Place, finite};
 use super::data::{GradeKind, GradeSpec};
 use super::error::DesignError;
-use super::samples;
+use super::{control, samples};
 use crate::fault::number;
 use crate::grade::{Formula, Grade};
 use crate::math::{norm, unit};
@@ -163,6 +165,26 @@ pub(super) fn grade(
             let at = format!("{path}.field");
             let of = samples::field(f, &at, place)?;
             samples::grade(of, &f.remap, &at, place, allowed, complement)
+        }
+        GradeKind::Sigmoid(s) => {
+            let at = format!("{path}.sigmoid");
+            let of = Arc::new(control::sigmoid(s, &at, place)?);
+            control::checked(of, &at, place, allowed, complement)
+        }
+        GradeKind::Region(r) => {
+            let at = format!("{path}.region");
+            let of = Arc::new(control::within(r, &at, place)?);
+            control::checked(of, &at, place, allowed, complement)
+        }
+        GradeKind::Distance(d) => {
+            let at = format!("{path}.distance");
+            let of = Arc::new(control::distance(d, &at, place)?);
+            control::checked(of, &at, place, allowed, complement)
+        }
+        GradeKind::Rbf(r) => {
+            let at = format!("{path}.rbf");
+            let of = Arc::new(control::rbf(r, &at, place)?);
+            control::checked(of, &at, place, allowed, complement)
         }
         GradeKind::Formula(text) => {
             let place = format!("{path}.formula");

@@ -384,8 +384,9 @@ impl<'a> At<'a> {
 }
 
 /// The kinds of grade in this version.
-pub(super) const GRADES: [&str; 7] = [
-    "linear", "depth", "radial", "formula", "grid", "points", "field",
+pub(super) const GRADES: [&str; 11] = [
+    "linear", "depth", "radial", "formula", "grid", "points", "field", "sigmoid", "region",
+    "distance", "rbf",
 ];
 
 /// A table whose keys are known to be allowed.

@@ -9,6 +9,7 @@ use crate::cell::tet::ready_cells;
 use crate::fault::{self, counted};
 
 mod beams;
+mod blend;
 mod grade;
 mod map;
 
@@ -30,19 +31,15 @@ const REGIONS: [&str; 9] = [
     "difference",
     "offset",
 ];
-const LATER_TOP: [Later; 1] = [(
-    "blend",
-    "one lattice fills the whole region; leave the blend out and keep one lattice",
-)];
 const LATER_CELL: [Later; 1] = [("waves", "use a named cell or a series")];
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
         "a design",
         &[
-            "schema", "units", "region", "lattice", "beams", "skin", "keep",
+            "schema", "units", "region", "lattice", "beams", "blend", "skin", "keep",
         ],
-        &LATER_TOP,
+        &[],
     )?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
     let number = schema.number()?;
@@ -79,16 +76,18 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     }
     if let (Some((name, _)), Some(other)) = (entries.first(), beams.keys().next()) {
         let message = format!(
-            "a lattice and beams ({name}, {other}) need a blend to say where each is; blends come in a later version, so keep one"
+            "a lattice and beams ({name}, {other}) in one part need a blend, and blends of lattices with beams come in a later version; keep one"
         );
         return Err(f.need("beams", "")?.error(message));
     }
-    if let [(a, _), (b, at), ..] = entries.as_slice() {
+    if let ([(a, _), (b, at), ..], None) = (entries.as_slice(), f.get("blend")) {
         let message = format!(
-            "several lattices ({a}, {b}) need a blend to say where each is; blends come in a later version, so keep one"
+            "several lattices ({a}, {b}) need a blend to say where each is, such as [blend] with between = [\"{a}\", \"{b}\"] \
+             and a weight"
         );
         return Err(at.error(message));
     }
+    let names: Vec<&str> = entries.iter().map(|e| e.0).collect();
     let mut lattices = Lattices::new();
     for (name, at) in &entries {
         lattices.insert(name.to_string(), lattice(at)?);
@@ -99,6 +98,7 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         region: spec,
         lattice: lattices,
         beams,
+        blend: f.read("blend", None, |at| blend::blend(at, &names).map(Some))?,
         skin: f.read("skin", None, |at| skin(at).map(Some))?,
         keep: f.read("keep", Keeps::new(), keeps)?,
         lines: node.lines(),

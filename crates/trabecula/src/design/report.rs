@@ -2,11 +2,13 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Built, Tiled, beams, build::LOOKS, sample};
+use super::{Blended, Built, Tiled, beams, build::LOOKS, sample};
+use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
+use crate::measure;
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,7 +134,7 @@ pub(super) fn report(built: &Built) -> Json {
     let beams: serde_json::Map<String, Json> = (built.beams.iter())
         .map(|(name, made)| (name.clone(), beams::report(made, share.unwrap_or_default())))
         .collect();
-    json!({
+    let mut report = json!({
         "lattices": lattices,
         "beams": beams,
         "region": {
@@ -141,6 +143,33 @@ pub(super) fn report(built: &Built) -> Json {
             "volume_exact": exact.is_some(),
         },
         "warnings": built.warnings,
+    });
+    if let Some(b) = &built.blend {
+        report["blend"] = blend(b);
+    }
+    report
+}
+
+/// How the phases of a blend go together, in a word.
+fn phases(phases: Phases) -> &'static str {
+    match phases {
+        Phases::Locked => "locked",
+        Phases::Independent => "independent",
+        Phases::Drifting => "drifting",
+    }
+}
+
+/// The blend without its transitions.
+fn blend(b: &Blended) -> Json {
+    let functions = b.functions.iter().map(|f| {
+        json!({ "path": f.path, "points": f.points, "delta": f.delta, "condition": f.condition })
+    });
+    json!({
+        "lattices": b.names,
+        "by": if b.blend.phases().is_some() { "fraction" } else { "value" },
+        "phases": b.blend.phases().map(phases),
+        "width": b.width,
+        "rbf": functions.collect::<Vec<Json>>(),
     })
 }
 
@@ -187,6 +216,26 @@ fn word(part: Part) -> &'static str {
         Part::Lower => "lower",
         Part::Upper => "upper",
     }
+}
+
+/// The transitions of a blend, by sampling the solid.
+pub(super) fn transitions(built: &Built) -> Json {
+    let Some(b) = &built.blend else {
+        return json!([]);
+    };
+    let found = measure::transitions(&built.solid, &b.blend);
+    let each = found.iter().map(|t| {
+        json!({
+            "between": t.between.map(|i| &b.names[i]),
+            "volume": t.volume,
+            "loose": { "bodies": t.loose.0, "volume": t.loose.1 },
+            "dangling": { "bodies": t.dangling.0, "volume": t.dangling.1 },
+            "neck": t.neck.map(|(diameter, place)| json!({ "diameter": diameter, "place": place })),
+            "fractions": t.fractions.iter().map(|f| json!({ "share": f[0], "asked": f[1], "found": f[2] })).collect::<Vec<Json>>(),
+            "step": t.step,
+        })
+    });
+    each.collect()
 }
 
 /// The thinnest wall or narrowest neck (mm), at five levels where the level varies; null where there is none.

@@ -233,7 +233,9 @@ pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Sam
     let file = bytes(&spec.path, &at, place)?;
     let wrong =
         |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
-    let (places, values) = table(&String::from_utf8_lossy(&file)).map_err(wrong)?;
+    let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
+    let (places, values): (Vec<Vec3>, Vec<f64>) =
+        rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
     if spec.neighbours < 1.0 || spec.neighbours.fract() != 0.0 || spec.neighbours > 64.0 {
         let message = format!(
             "neighbours is {}; it must be a whole number from 1 to 64",
@@ -250,9 +252,27 @@ pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Sam
     .map_err(wrong)
 }
 
-/// Rows of x, y, z, value, apart by commas, semicolons or spaces; one line of words before them is passed over.
-fn table(text: &str) -> Result<(Vec<Vec3>, Vec<f64>), Fault> {
-    let (mut places, mut values) = (Vec::new(), Vec::new());
+/// Control points, and the values beside them if there are four columns.
+pub(super) fn control(
+    file: &str,
+    at: &str,
+    place: &Place,
+) -> Result<(Vec<Vec3>, Option<Vec<f64>>), DesignError> {
+    let text = bytes(file, at, place)?;
+    let rows = table(&String::from_utf8_lossy(&text), &[3, 4])
+        .map_err(|f| DesignError::new(at, format!("{file}: {}", f.message)).found(file))?;
+    let places = rows.iter().map(|r| [r[0], r[1], r[2]]).collect();
+    Ok((places, rows.iter().map(|r| r.get(3).copied()).collect()))
+}
+
+/// Rows of numbers, apart by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width; one
+/// line of words before them is passed over.
+fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let what = match widths {
+        [4] => "four numbers x, y, z, value",
+        _ => "x, y, z, or x, y, z, value in all rows",
+    };
     let fault = |n: usize, message: String| Fault::new("", format!("line {}: {message}", n + 1));
     for (n, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
@@ -267,28 +287,26 @@ fn table(text: &str) -> Result<(Vec<Vec3>, Vec<f64>), Fault> {
             .iter()
             .map(|w| w.trim_matches('"').parse().ok())
             .collect();
-        if places.is_empty() && row.iter().all(Option::is_none) {
+        if rows.is_empty() && row.iter().all(Option::is_none) {
             continue;
         }
-        let [Some(x), Some(y), Some(z), Some(v)] = row[..] else {
-            return Err(fault(
-                n,
-                format!("expected four numbers x, y, z, value, found \"{line}\""),
-            ));
+        let wide = rows.first().map_or(row.len(), Vec::len);
+        let numbers: Option<Vec<f64>> = row.into_iter().collect();
+        let Some(row) = numbers.filter(|r| r.len() == wide && widths.contains(&wide)) else {
+            return Err(fault(n, format!("expected {what}, found \"{line}\"")));
         };
-        if [x, y, z, v].iter().any(|v| !v.is_finite()) {
+        if row.iter().any(|v| !v.is_finite()) {
             return Err(fault(
                 n,
                 format!("numbers must be finite, found \"{line}\""),
             ));
         }
-        places.push([x, y, z]);
-        values.push(v);
+        rows.push(row);
     }
-    if places.is_empty() {
-        return Err(Fault::new("", "the file has no rows of x, y, z, value"));
+    if rows.is_empty() {
+        return Err(Fault::new("", format!("the file has no rows of {what}")));
     }
-    Ok((places, values))
+    Ok(rows)
 }
 
 pub(super) fn field(spec: &FieldSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {

@@ -69,6 +69,13 @@ impl Grid {
                 "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
             ));
         }
+        if let Some(width) = solid.transition.filter(|w| *w < edge) {
+            let message = format!(
+                "{edge} mm; a transition between lattices is only {width:.3} mm wide, less than a grid step. Widen it, or use \
+                 a finer edge"
+            );
+            return Err(Fault::new("edge", message));
+        }
         let (faces, tree) = solid.faces();
         // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)

@@ -13,7 +13,7 @@ use crate::math::{Complex, Vec3, add, apply, complex_product, dot, sin_cos_turns
 /// Under an affine map every wave is a product of three one-dimensional ones, so a row of nodes costs two
 /// multiplications per distinct wave number along x and no trigonometry; a distance is looked up in its table.
 /// Under any other map phases come row by row, and waves are summed at each node.
-pub(super) enum Rows<'a> {
+pub(crate) enum Rows<'a> {
     Waves(RowWaves),
     Distance(&'a Distance, &'a Affine, Block<'a>),
     Phases(&'a Series, Box<map::Rows<'a>>, [Vec<f64>; 3]),
@@ -21,7 +21,7 @@ pub(super) enum Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    pub(super) fn new(lattice: &'a Lattice, block: &Block<'a>) -> Rows<'a> {
+    pub(crate) fn new(lattice: &'a Lattice, block: &Block<'a>) -> Rows<'a> {
         let series = lattice.cell.series();
         match (&lattice.distance, lattice.map.affine()) {
             (Some(d), Some(map)) => Rows::Distance(d, map, *block),
@@ -39,7 +39,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Makes ready for the rows of layer k.
-    pub(super) fn enter_layer(&mut self, k: usize) {
+    pub(crate) fn enter_layer(&mut self, k: usize) {
         match self {
             Rows::Waves(waves) => waves.enter_layer(k),
             Rows::Phases(_, map, _) => map.enter_layer(k),
@@ -48,7 +48,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Fills the row (j, k) of the layer entered last; nodes whose bit in `wanted` is not set may be left out.
-    pub(super) fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
+    pub(crate) fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
         match self {
             Rows::Phases(series, map, u) => {
                 map.fill(j, u);
@@ -79,7 +79,7 @@ impl<'a> Rows<'a> {
 }
 
 /// The waves of a series on the nodes of a block, as tables along the axes.
-pub(super) struct RowWaves {
+pub(crate) struct RowWaves {
     /// For each distinct wave number along x: cosines and sines at the nodes.
     along_x: Vec<(Vec<f32>, Vec<f32>)>,
     /// For each distinct wave number along x: the terms that have it, and whether conjugated.

@@ -1,5 +1,6 @@
 //! Laws of the whole: random designs, rates of convergence, bodies known exactly.
 
+mod blend;
 mod common;
 mod damage;
 mod fields;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{OneOrThree, is_default};
+use super::{OneOrThree, RegionSpec, is_default};
 
 /// A number that may vary in space.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -33,6 +33,85 @@ pub enum GradeKind {
     Points(PointsSpec),
     /// An array of a result on a mesh, from a file.
     Field(FieldSpec),
+    /// A smooth step of another number.
+    Sigmoid(SigmoidSpec),
+    /// 1 inside a region and 0 outside, with a smooth step at its surface.
+    Region(WithinSpec),
+    /// Distance (mm) to a line of control points.
+    Distance(DistanceSpec),
+    /// Gaussian radial basis functions through control points.
+    Rbf(RbfSpec),
+}
+
+/// A smooth step from 0 to 1: the logistic function, with ends.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SigmoidSpec {
+    /// The number that it is a step of.
+    pub of: Box<GradeSpec>,
+    /// Where it is one half.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub at: f64,
+    /// From where it is 0 to where it is 1, in the unit of the number; a negative width falls.
+    pub width: f64,
+}
+
+/// 1 inside a region and 0 outside.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WithinSpec {
+    /// The region.
+    pub of: Box<RegionSpec>,
+    /// Width of the step (mm), half of it on either side of the surface.
+    pub width: f64,
+}
+
+/// Distance to a chain of straight segments.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DistanceSpec {
+    /// The corners of the line (mm), in order.
+    #[serde(flatten)]
+    pub points: ControlSpec,
+    /// Whether the last is joined to the first.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub closed: bool,
+    /// Direction along which all is seen: the distance is that from a wall through the line. Inside a closed one it is
+    /// negative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// The smooth form instead of the exact distance: at least 10; it is off by at most 0.2785/sharpness of the longest
+    /// segment, and has no sign.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sharpness: Option<f64>,
+}
+
+/// Gaussian radial basis functions: the sum of β exp(−r²/δ²) over control points.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RbfSpec {
+    /// The control points (mm).
+    #[serde(flatten)]
+    pub points: ControlSpec,
+    /// The values that are taken at them: 1 at all unless given here or as a fourth column of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub values: Option<Vec<f64>>,
+    /// δ, mm; unless given one and a half times the mean distance of a point from its nearest neighbour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delta: Option<f64>,
+    /// Direction along which all is seen, so that a point stands for a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+}
+
+/// Control points: here, or in a file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ControlSpec {
+    /// [x, y, z] each, mm.
+    Points(Vec<[f64; 3]>),
+    /// Path of a table (csv) of x, y, z (mm), relative to the design file.
+    Path(String),
 }
 
 /// Piecewise linear in s = along · x, constant beyond the ends.

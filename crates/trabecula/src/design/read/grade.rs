@@ -1,6 +1,6 @@
 //! Grades: tree to data.
 
-use super::{Read, three};
+use super::{Read, region, three};
 use crate::design::data::*;
 use crate::design::node::{At, Fields, GRADES};
 
@@ -9,7 +9,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         return Ok(GradeSpec::Constant(at.number()?));
     }
     if at.is_list() || at.is_text() {
-        return Err(at.expected("a number or a grade (a table with linear, depth, radial, formula, grid, points or field)"));
+        return Err(at.expected("a number or a grade (a table with linear, depth, radial, formula, grid, points, field, sigmoid, region, distance or rbf)"));
     }
     let (kind, at) = at.kind("grade", &GRADES, &[])?;
     Ok(GradeSpec::Kind(match kind {
@@ -52,6 +52,54 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             })
         }
         "field" => GradeKind::Field(field(&at)?),
+        "sigmoid" => {
+            let f = at.fields("a smooth step", &["of", "at", "width"], &[])?;
+            GradeKind::Sigmoid(SigmoidSpec {
+                of: Box::new(grade(f.need("of", "the number that it is a step of")?)?),
+                at: f.read("at", 0.0, At::number)?,
+                width: f
+                    .need("width", "from where it is 0 to where it is 1")?
+                    .number()?,
+            })
+        }
+        "region" => {
+            let f = at.fields("a region as a number", &["of", "width"], &[])?;
+            GradeKind::Region(WithinSpec {
+                of: Box::new(region(
+                    f.need("of", "a region, such as { sphere = { radius = 5 } }")?,
+                )?),
+                width: f
+                    .need("width", "of the step at its surface, mm")?
+                    .number()?,
+            })
+        }
+        "distance" => {
+            let keys = ["points", "path", "closed", "axis", "sharpness"];
+            let f = at.fields("a distance to a line", &keys, &[])?;
+            GradeKind::Distance(DistanceSpec {
+                points: control(&f)?,
+                closed: f.read("closed", false, At::truth)?,
+                axis: f.read("axis", None, |at| three(at).map(Some))?,
+                sharpness: f.read("sharpness", None, |at| at.number().map(Some))?,
+            })
+        }
+        "rbf" => {
+            let keys = ["points", "path", "values", "delta", "axis"];
+            let f = at.fields("radial basis functions", &keys, &[])?;
+            GradeKind::Rbf(RbfSpec {
+                points: control(&f)?,
+                values: f.read("values", None, |at| {
+                    let values = at.list("a list of numbers")?;
+                    values
+                        .iter()
+                        .map(At::number)
+                        .collect::<Read<Vec<f64>>>()
+                        .map(Some)
+                })?,
+                delta: f.read("delta", None, |at| at.number().map(Some))?,
+                axis: f.read("axis", None, |at| three(at).map(Some))?,
+            })
+        }
         _ => {
             let f = at.fields("a linear grade", &["along", "stops"], &[])?;
             let along = three(f.need("along", "the direction [x, y, z]")?)?;
@@ -61,6 +109,25 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             })
         }
     }))
+}
+
+/// Control points: here, or in a file.
+fn control(f: &Fields) -> Read<ControlSpec> {
+    match (f.get("points"), f.get("path")) {
+        (Some(_), Some(path)) => {
+            Err(path.error("points and path at once; give the points here or in a file"))
+        }
+        (Some(points), None) => {
+            let points = points.list("a list of points [x, y, z]")?;
+            Ok(ControlSpec::Points(
+                points.iter().map(three).collect::<Read<_>>()?,
+            ))
+        }
+        (None, Some(path)) => Ok(ControlSpec::Path(path.text("a path")?.to_string())),
+        (None, None) => Err(f.at.error(
+            "the points are missing; give points = [[x, y, z], ...] or path, a table (csv)",
+        )),
+    }
 }
 
 /// An array of a result.

@@ -1,0 +1,256 @@
+//! How the cores of a blend go together: their values at the same places.
+//!
+//! Every core is a function of its own phase, so what matters is which phases meet. Where the maps are affine and one is
+//! a whole multiple of the other, the same phases meet in every cell: one cell tells all. Where the beats between
+//! their waves are shorter than a cell, all phases meet everywhere. Else phases drift past each other, slowly, and
+//! each neighbourhood has a distribution of its own.
+
+use std::sync::OnceLock;
+
+use super::strand::Strand;
+use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
+
+/// How the phases of the lattices of a blend go together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phases {
+    /// The same in every cell.
+    Locked,
+    /// All combinations in every neighbourhood.
+    Independent,
+    /// Their combination changes from place to place.
+    Drifting,
+}
+
+/// Places looked at where one distribution serves all, and in each neighbourhood.
+const EVERYWHERE: usize = 1 << 16;
+const NEARBY: usize = 1 << 12;
+/// Most neighbourhoods.
+const MOST: f64 = 20_000.0;
+/// Most waves of a series whose beats are looked at.
+const WAVES: usize = 64;
+
+/// Where cores are looked at together.
+pub(super) struct Joint {
+    pub phases: Phases,
+    /// Back to mm from the common cell, in turns, where one serves all.
+    common: Option<Mat3>,
+    /// Middle of the first neighbourhood, distance between them, and how many along each axis.
+    pub origin: Vec3,
+    pub step: f64,
+    pub shape: [usize; 3],
+    bounds: Aabb,
+}
+
+/// The neighbourhoods about a point: each with its share and the gradient of that (per mm).
+pub(super) type Corners = [(usize, f64, Vec3); 8];
+
+impl Joint {
+    pub fn new(strands: &[Strand], bounds: &Aabb) -> Joint {
+        let longest = strands.iter().map(Strand::longest).fold(0.0, f64::max);
+        let maps: Option<Vec<Mat3>> = strands
+            .iter()
+            .map(|s| Some(s.lattice()?.map.affine()?.matrix))
+            .collect();
+        let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
+        let (phases, common) = match (found, &maps) {
+            (Some(back), _) => (Phases::Locked, Some(back)),
+            (None, Some(maps)) if independent(strands, maps, longest) => {
+                let mut wide = [[0.0; 3]; 3];
+                // So far that what is met there has no memory.
+                (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
+                (Phases::Independent, Some(wide))
+            }
+            _ => (Phases::Drifting, None),
+        };
+        let size = bounds.size();
+        let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
+        let mut step = longest;
+        while fine(step).iter().product::<f64>() > MOST {
+            step *= 1.1;
+        }
+        let shape = if common.is_some() {
+            [1; 3]
+        } else {
+            fine(step).map(|n| n as usize)
+        };
+        let origin = core::array::from_fn(|a| {
+            0.5 * (bounds.min[a] + bounds.max[a] - step * (shape[a] - 1) as f64)
+        });
+        Joint {
+            phases,
+            common,
+            origin,
+            step,
+            shape,
+            bounds: *bounds,
+        }
+    }
+
+    /// Number of neighbourhoods.
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
+    /// ever fewer up to one step away along each axis (a raised cosine, in which whole waves leave no trace).
+    pub fn places(&self, i: usize) -> Vec<Vec3> {
+        let even = |n: usize| {
+            move |k: usize| -> Vec3 {
+                // Multiples of the powers of the root of x⁴ = x + 1: the most even such sequence.
+                [
+                    0.819_172_513_396_164_4,
+                    0.671_043_606_703_789_2,
+                    0.549_700_477_901_970_3,
+                ]
+                .map(|a| (0.5 + a * (k % n) as f64).fract())
+            }
+        };
+        if let Some(back) = &self.common {
+            return (0..EVERYWHERE)
+                .map(even(EVERYWHERE))
+                .map(|u| apply(back, u))
+                .collect();
+        }
+        let [nx, ny, _] = self.shape;
+        let at = [i % nx, i / nx % ny, i / nx / ny];
+        let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
+        let table = raised_cosine();
+        (0..NEARBY)
+            .map(even(NEARBY))
+            .map(|u| {
+                core::array::from_fn(|a| {
+                    let x = u[a] * (table.len() - 1) as f64;
+                    let j = (x as usize).min(table.len() - 2);
+                    let s = table[j] + (table[j + 1] - table[j]) * (x - j as f64);
+                    // Solved maps end where the region does: what would lie beyond is mirrored.
+                    let (lo, hi) = (self.bounds.min[a], self.bounds.max[a]);
+                    let p = middle[a] + self.step * s;
+                    let p = if p > hi { 2.0 * hi - p } else { p };
+                    let p = if p < lo { 2.0 * lo - p } else { p };
+                    p.clamp(lo, hi)
+                })
+            })
+            .collect()
+    }
+
+    /// The neighbourhoods about a point.
+    pub fn corners(&self, p: Vec3) -> Corners {
+        let mut out = [(0, 0.0, [0.0; 3]); 8];
+        if self.common.is_some() {
+            out[0].1 = 1.0;
+            return out;
+        }
+        let along: [(usize, f64, f64); 3] = core::array::from_fn(|a| {
+            let last = (self.shape[a] - 1) as f64;
+            let s = (p[a] - self.origin[a]) / self.step;
+            let inside = s.clamp(0.0, last);
+            let i = (inside as usize).min(self.shape[a].saturating_sub(2));
+            let slope = if s == inside && last > 0.0 {
+                1.0 / self.step
+            } else {
+                0.0
+            };
+            (i, inside - i as f64, slope)
+        });
+        for (c, o) in out.iter_mut().enumerate() {
+            let up = |a: usize| c >> a & 1;
+            let share = |a: usize| {
+                if up(a) == 1 {
+                    along[a].1
+                } else {
+                    1.0 - along[a].1
+                }
+            };
+            let slope = |a: usize| if up(a) == 1 { along[a].2 } else { -along[a].2 };
+            let [x, y, z] = [0, 1, 2].map(|a| (along[a].0 + up(a)).min(self.shape[a] - 1));
+            let [sx, sy, sz] = [0, 1, 2].map(share);
+            *o = (
+                (z * self.shape[1] + y) * self.shape[0] + x,
+                sx * sy * sz,
+                [slope(0) * sy * sz, sx * slope(1) * sz, sx * sy * slope(2)],
+            );
+        }
+        out
+    }
+}
+
+/// The inverse of the distribution with density (1 + cos πs)/2 on [−1, 1], at even shares.
+fn raised_cosine() -> &'static [f64] {
+    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        const N: usize = 512;
+        let below =
+            |s: f64| 0.5 * (1.0 + s + (std::f64::consts::PI * s).sin() / std::f64::consts::PI);
+        (0..=N)
+            .map(|i| {
+                let share = i as f64 / N as f64;
+                let (mut lo, mut hi) = (-1.0, 1.0);
+                for _ in 0..60 {
+                    let mid = 0.5 * (lo + hi);
+                    if below(mid) < share {
+                        lo = mid
+                    } else {
+                        hi = mid
+                    }
+                }
+                0.5 * (lo + hi)
+            })
+            .collect()
+    })
+}
+
+/// Back to mm from a cell that all maps share and that is at most `most` mm long, if there is one.
+fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
+    let back = inverse(maps.first()?);
+    for size in 1..=4 {
+        let cell = back.map(|r| r.map(|v| v * f64::from(size)));
+        let whole = maps.iter().all(|m| {
+            product(m, &cell)
+                .iter()
+                .flatten()
+                .all(|v| (v - v.round()).abs() < 1e-9)
+        });
+        if whole {
+            let long = transpose(&cell).map(norm).into_iter().fold(0.0, f64::max);
+            return (long <= most * (1.0 + 1e-9)).then_some(cell);
+        }
+    }
+    None
+}
+
+/// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
+/// make count too, since what is solid is no linear matter.
+fn independent(strands: &[Strand], maps: &[Mat3], longest: f64) -> bool {
+    let mut waves: Vec<Vec<Vec3>> = Vec::new();
+    for (s, m) in strands.iter().zip(maps) {
+        let Some(l) = s.lattice() else { return false };
+        let terms = l.cell.series().terms();
+        if terms.len() > WAVES {
+            return false;
+        }
+        let mut whole: Vec<[i32; 3]> = terms.iter().map(|t| t.hkl).collect();
+        whole.extend(terms.iter().map(|t| t.hkl.map(|h| -h)));
+        let pairs = whole
+            .iter()
+            .flat_map(|a| whole.iter().map(|b| [0, 1, 2].map(|i| a[i] + b[i])));
+        let mut all: Vec<[i32; 3]> = pairs.chain(whole.iter().copied()).collect();
+        all.sort_unstable();
+        all.dedup();
+        all.retain(|h| *h != [0; 3]);
+        let back = transpose(m);
+        waves.push(
+            all.into_iter()
+                .map(|h| apply(&back, h.map(f64::from)))
+                .collect(),
+        );
+    }
+    let fast = |k: Vec3| norm(k) * longest >= 1.0 - 1e-9;
+    // Each list has the opposite of every wave, so differences are all there is.
+    (0..waves.len()).all(|i| {
+        (0..i).all(|j| {
+            waves[i]
+                .iter()
+                .all(|a| waves[j].iter().all(|b| fast(sub(*a, *b))))
+        })
+    })
+}

@@ -1,0 +1,165 @@
+//! Numbers tabulated over all ways to divide one among n lattices, linear between.
+//!
+//! Shares w₁ … wₙ are placed by y_k = m (w_k + … + wₙ), k = 2 … n, which fall: m ≥ y₂ ≥ … ≥ yₙ ≥ 0. Kuhn's division of the
+//! unit cubes into simplices keeps that order, so every corner that is asked for is a node of the table, and the
+//! interpolation is continuous.
+
+/// Steps along an edge of the table for n lattices, so that it has a few hundred nodes.
+pub(super) fn steps(n: usize) -> usize {
+    match n {
+        0..=2 => 24,
+        3 => 12,
+        4 => 8,
+        5 => 6,
+        6 => 5,
+        7 | 8 => 4,
+        9 | 10 => 3,
+        _ => 2,
+    }
+}
+
+/// The nodes of the table.
+pub(super) struct Grid {
+    n: usize,
+    steps: usize,
+    /// binomial[a][k] = C(a, k).
+    binomial: Vec<Vec<usize>>,
+}
+
+/// Where shares lie in the table: the corners of the simplex about them, each with its share of the value.
+#[derive(Default)]
+pub(super) struct Place {
+    pub nodes: Vec<usize>,
+    pub shares: Vec<f64>,
+    /// For each corner but the first: the y that has risen by one since the corner before it.
+    pub axes: Vec<usize>,
+    floor: Vec<usize>,
+    order: Vec<(f64, usize)>,
+}
+
+impl Grid {
+    pub fn new(n: usize) -> Grid {
+        let steps = steps(n);
+        let mut binomial = vec![vec![0usize; n + 1]; steps + n + 1];
+        for a in 0..binomial.len() {
+            binomial[a][0] = 1;
+            for k in 1..=n.min(a) {
+                binomial[a][k] =
+                    binomial[a - 1][k - 1] + if k < a { binomial[a - 1][k] } else { 0 };
+            }
+        }
+        Grid { n, steps, binomial }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        // C(m + n − 1, n − 1)
+        self.binomial[self.steps + self.n - 1][self.n - 1]
+    }
+
+    /// The number of the node with these falling y.
+    fn rank(&self, y: &[usize]) -> usize {
+        let d = self.n - 1;
+        (0..d).map(|k| self.binomial[y[k] + d - 1 - k][d - k]).sum()
+    }
+
+    /// Calls `each` with every node's number and shares.
+    pub fn each(&self, mut each: impl FnMut(usize, &[f64])) {
+        let (d, m) = (self.n - 1, self.steps);
+        let mut y = vec![0usize; d];
+        loop {
+            let mut w = vec![0.0; self.n];
+            for (i, w) in w.iter_mut().enumerate() {
+                let above = if i == 0 { m } else { y[i - 1] };
+                let below = if i == d { 0 } else { y[i] };
+                *w = (above - below) as f64 / m as f64;
+            }
+            each(self.rank(&y), &w);
+            // The next falling sequence: the last that may rise does, what follows starts again.
+            let Some(i) = (0..d)
+                .rev()
+                .find(|&i| y[i] < if i == 0 { m } else { y[i - 1] })
+            else {
+                return;
+            };
+            y[i] += 1;
+            y[i + 1..].fill(0);
+        }
+    }
+
+    /// Finds where shares lie.
+    pub fn place(&self, w: &[f64], at: &mut Place) {
+        let (d, m) = (self.n - 1, self.steps as f64);
+        at.floor.clear();
+        at.floor.resize(d, 0);
+        at.order.clear();
+        at.order.resize(d, (0.0, 0));
+        let mut sum = 0.0;
+        for k in (0..d).rev() {
+            sum += w[k + 1];
+            let y = (m * sum).clamp(0.0, m);
+            let low = (y as usize).min(self.steps - 1);
+            at.floor[k] = low;
+            at.order[k] = (y - low as f64, k);
+        }
+        // Stable: of equal y the first goes first, so that the order is kept.
+        at.order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        at.nodes.clear();
+        at.shares.clear();
+        at.axes.clear();
+        let mut before = 1.0;
+        at.nodes.push(self.rank(&at.floor));
+        for &(share, k) in &at.order {
+            at.shares.push(before - share);
+            before = share;
+            at.floor[k] += 1;
+            at.nodes.push(self.rank(&at.floor));
+            at.axes.push(k);
+        }
+        at.shares.push(before);
+    }
+
+    /// Steps along an edge.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_are_numbered_once_and_linear_functions_are_met() {
+        for n in 2..=6 {
+            let grid = Grid::new(n);
+            let slope: Vec<f64> = (0..n).map(|i| (i as f64 * 1.7).sin()).collect();
+            let f = |w: &[f64]| w.iter().zip(&slope).map(|(w, s)| w * s).sum::<f64>();
+            let mut table = vec![f64::NAN; grid.len()];
+            grid.each(|i, w| {
+                assert!(table[i].is_nan() && (w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                table[i] = f(w);
+            });
+            assert!(table.iter().all(|v| v.is_finite()));
+            let mut at = Place::default();
+            for i in 0..2000 {
+                let mut w: Vec<f64> = (0..n)
+                    .map(|k| ((i * (k + 3)) as f64 * 0.7548776662466927).fract())
+                    .map(|v| if v < 0.3 { 0.0 } else { v })
+                    .collect();
+                w[i % n] += 1e-3;
+                let sum: f64 = w.iter().sum();
+                w.iter_mut().for_each(|w| *w /= sum);
+                grid.place(&w, &mut at);
+                let found: f64 = at
+                    .nodes
+                    .iter()
+                    .zip(&at.shares)
+                    .map(|(i, s)| table[*i] * s)
+                    .sum();
+                assert!(at.shares.iter().all(|s| *s >= -1e-12));
+                assert!((found - f(&w)).abs() < 1e-12, "{n} {w:?}");
+            }
+        }
+    }
+}

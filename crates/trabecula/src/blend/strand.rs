@@ -1,0 +1,251 @@
+//! What a blend is made of: a function and the interval of it that is solid.
+
+use std::sync::Arc;
+
+use crate::cell::Part;
+use crate::field::{Block, Field};
+use crate::lattice::{self, Lattice};
+use crate::math::{Aabb, Interval, Vec3, scale};
+
+/// One of what is blended.
+#[derive(Clone)]
+pub enum Constituent {
+    /// A lattice, by its core.
+    Lattice(Arc<Lattice>),
+    /// Any other field: solid where it is negative, and its fraction is found by looking.
+    Field {
+        /// The field.
+        field: Arc<dyn Field>,
+        /// How long its cells are, mm.
+        wavelength: f64,
+    },
+}
+
+/// How far below all its values the lower end of a network's interval lies, in shares of its range; also how far below
+/// zero its quantile is counted.
+pub(super) const BELOW: f64 = 0.1;
+
+/// A constituent whose core is turned and scaled so that solid is where lo ≤ g ≤ hi. A sheet has two ends, −t and t. A
+/// network has one: its lower end is below all values of g, so that a sheet's second side sinks into the network's
+/// heart on the way there and is gone where the network is alone.
+#[derive(Clone)]
+pub(super) struct Strand {
+    of: Constituent,
+    /// The sign of the core in g over its scale.
+    factor: f64,
+    /// The lower end of a network.
+    least: f64,
+}
+
+impl Strand {
+    /// g is the core over `unit`; `bounds` is where it is looked at.
+    pub fn new(of: Constituent, unit: f64, bounds: &Aabb) -> Strand {
+        let turned = matches!(&of, Constituent::Lattice(l) if l.part == Part::Upper);
+        let mut made = Strand {
+            factor: if turned { -1.0 } else { 1.0 } / unit,
+            of,
+            least: 0.0,
+        };
+        let range = made.turned(match &made.of {
+            Constituent::Lattice(l) => l.distance().map_or_else(|| l.cell.range(), |d| d.range()),
+            Constituent::Field { field, .. } => field.bound(bounds),
+        });
+        made.least = range.lo - BELOW * (range.hi - range.lo);
+        made
+    }
+
+    pub fn constituent(&self) -> &Constituent {
+        &self.of
+    }
+
+    pub fn lattice(&self) -> Option<&Lattice> {
+        match &self.of {
+            Constituent::Lattice(l) => Some(l),
+            Constituent::Field { .. } => None,
+        }
+    }
+
+    /// Whether it has two ends.
+    pub fn is_sheet(&self) -> bool {
+        self.lattice().is_some_and(|l| l.part == Part::Sheet)
+    }
+
+    /// The greatest length of a cell, mm.
+    pub fn longest(&self) -> f64 {
+        match &self.of {
+            Constituent::Lattice(l) => l.map.longest(),
+            Constituent::Field { wavelength, .. } => *wavelength,
+        }
+    }
+
+    /// A bound of the steepness of g, per mm.
+    pub fn slope(&self) -> f64 {
+        let own = match &self.of {
+            Constituent::Lattice(l) => l.slope(),
+            Constituent::Field { field, .. } => field.slope(),
+        };
+        own * self.factor.abs()
+    }
+
+    /// Fills g at points (mm).
+    pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        match &self.of {
+            Constituent::Lattice(l) => l.cores(points, out),
+            Constituent::Field { field, .. } => field.values(points, out),
+        }
+        out.iter_mut().for_each(|v| *v *= self.factor);
+    }
+
+    /// Fills g and ∇g (per mm).
+    pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        match &self.of {
+            Constituent::Lattice(l) => l.core_gradients(points, values, gradients),
+            Constituent::Field { field, .. } => field.gradients(points, values, gradients),
+        }
+        values.iter_mut().for_each(|v| *v *= self.factor);
+        gradients
+            .iter_mut()
+            .for_each(|g| *g = scale(*g, self.factor));
+    }
+
+    /// An interval that contains g in the box.
+    pub fn bound(&self, b: &Aabb) -> Interval {
+        self.turned(match &self.of {
+            Constituent::Lattice(l) => l.core_bound(b),
+            Constituent::Field { field, .. } => field.bound(b),
+        })
+    }
+
+    /// An interval that contains the upper end in the box.
+    pub fn high_bound(&self, b: &Aabb) -> Interval {
+        match &self.of {
+            Constituent::Lattice(l) => self.turned(l.iso_bound(b)),
+            Constituent::Field { .. } => Interval::new(0.0, 0.0),
+        }
+    }
+
+    fn turned(&self, r: Interval) -> Interval {
+        let ends = [self.factor * r.lo, self.factor * r.hi];
+        Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
+    }
+
+    /// The upper end, where it does not vary.
+    pub fn uniform(&self) -> Option<f64> {
+        match &self.of {
+            Constituent::Lattice(l) => l.uniform().map(|t| self.factor * t),
+            Constituent::Field { .. } => Some(0.0),
+        }
+    }
+
+    /// Fills the upper end at points (mm).
+    pub fn highs(&self, points: &[Vec3], out: &mut [f64]) {
+        match &self.of {
+            Constituent::Lattice(l) => l.isos(points, out),
+            Constituent::Field { .. } => out.fill(0.0),
+        }
+        out.iter_mut().for_each(|v| *v *= self.factor);
+    }
+
+    /// Fills the upper end and its gradient (per mm).
+    pub fn high_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        match &self.of {
+            Constituent::Lattice(l) => l.iso_gradients(points, values, gradients),
+            Constituent::Field { .. } => {
+                values.fill(0.0);
+                gradients.fill([0.0; 3]);
+            }
+        }
+        values.iter_mut().for_each(|v| *v *= self.factor);
+        gradients
+            .iter_mut()
+            .for_each(|g| *g = scale(*g, self.factor));
+    }
+
+    /// The lower end where the upper one is `high`.
+    pub fn low(&self, high: f64) -> f64 {
+        if self.is_sheet() { -high } else { self.least }
+    }
+
+    /// The shares of the cell in which g is below the lower and the upper end, the latter being `high`, and how they
+    /// change with it; `None` where that is known by looking only.
+    pub fn quantiles(&self, high: f64) -> Option<[(f64, f64); 2]> {
+        let l = self.lattice()?;
+        let t = high / self.factor;
+        // Some steps of the table.
+        let h = 2e-4
+            * l.cell
+                .series()
+                .amplitude()
+                .min(l.distance().map_or(f64::INFINITY, |d| d.range().abs().hi));
+        let at = |t: f64| {
+            (
+                l.below(t),
+                (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor,
+            )
+        };
+        let (b, slope) = at(t);
+        Some(match l.part {
+            Part::Lower => [(-BELOW, 0.0), (b, slope)],
+            // g = −f: what is below the end is above t.
+            Part::Upper => [(-BELOW, 0.0), (1.0 - b, -slope)],
+            Part::Sheet => {
+                let (a, down) = at(-t);
+                [(a, -down), (b, slope)]
+            }
+        })
+    }
+
+    /// g on the rows of a block; `wanted` says where.
+    pub fn rows<'a>(&'a self, block: &Block<'a>, wanted: Option<&[u64]>) -> Rows<'a> {
+        let of = match &self.of {
+            Constituent::Lattice(l) => Kind::Lattice(Box::new(lattice::Rows::new(l, block))),
+            Constituent::Field { field, .. } => {
+                let mut values = vec![0f32; block.len()];
+                match wanted {
+                    Some(w) => field.fill_where(block, w, &mut values),
+                    None => field.fill(block, &mut values),
+                }
+                Kind::Filled(values, [block.axes[0].len(), block.axes[1].len()])
+            }
+        };
+        Rows {
+            of,
+            factor: self.factor,
+        }
+    }
+}
+
+/// A strand's core on the rows of a block.
+pub(super) struct Rows<'a> {
+    of: Kind<'a>,
+    factor: f64,
+}
+
+enum Kind<'a> {
+    Lattice(Box<lattice::Rows<'a>>),
+    Filled(Vec<f32>, [usize; 2]),
+}
+
+impl Rows<'_> {
+    /// Makes ready for the rows of layer k.
+    pub fn enter_layer(&mut self, k: usize) {
+        if let Kind::Lattice(rows) = &mut self.of {
+            rows.enter_layer(k);
+        }
+    }
+
+    /// Fills the row (j, k) of the layer entered last with the core in single precision.
+    pub fn fill(&mut self, j: usize, k: usize, wanted: u64, row: &mut [f32]) {
+        match &mut self.of {
+            Kind::Lattice(rows) => rows.fill(j, k, wanted, row),
+            Kind::Filled(values, [nx, ny]) => {
+                row.copy_from_slice(&values[(k * *ny + j) * *nx..][..*nx]);
+            }
+        }
+    }
+
+    /// g where the core is `core`.
+    pub fn value(&self, core: f32) -> f64 {
+        self.factor * f64::from(core)
+    }
+}

@@ -1,0 +1,263 @@
+//! Which lattice is where: data to [`Blend`].
+
+use std::sync::Arc;
+
+use super::Warning;
+use super::build::Place;
+use super::control;
+use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
+use super::error::DesignError;
+use super::grade::{Allowed, grade};
+use super::sample;
+use crate::blend::{Blend, By, Constituent, Weights};
+use crate::fault::number;
+use crate::lattice::Lattice;
+use crate::math::{Vec3, add, norm, scale, sub};
+
+impl BlendSpec {
+    /// The names of its lattices, in the order of their weights.
+    pub fn names(&self) -> Vec<&str> {
+        match &self.lattices {
+            BlendKind::Between(b) => b.between.iter().map(String::as_str).collect(),
+            BlendKind::Of(of) => of.of.keys().map(String::as_str).collect(),
+        }
+    }
+
+    /// Its weights, by the paths at which they stand.
+    fn weights(&self) -> Vec<(String, &GradeSpec)> {
+        match &self.lattices {
+            BlendKind::Between(b) => vec![("blend.weight".into(), &b.weight)],
+            BlendKind::Of(of) => of
+                .of
+                .iter()
+                .map(|(n, g)| (format!("blend.of.{n}"), g))
+                .collect(),
+        }
+    }
+}
+
+/// A blend and the lattices in it, in the order of their weights.
+pub struct Blended {
+    /// The field.
+    pub blend: Arc<Blend>,
+    /// The names of its lattices.
+    pub names: Vec<String>,
+    /// The radial basis functions among its weights.
+    pub functions: Vec<Functions>,
+    /// How wide the narrowest transition is, mm: the inverse of the steepest weight where two lattices count the same.
+    pub width: Option<f64>,
+}
+
+/// Radial basis functions in a weight.
+pub struct Functions {
+    /// Where they stand in the design.
+    pub path: String,
+    /// Number of control points.
+    pub points: usize,
+    /// δ, mm.
+    pub delta: f64,
+    /// Condition number of their equations.
+    pub condition: f64,
+}
+
+/// The radial basis functions in a weight, itself or under a step.
+fn functions(
+    spec: &GradeSpec,
+    path: &str,
+    place: &Place,
+    out: &mut Vec<Functions>,
+) -> Result<(), DesignError> {
+    match spec {
+        GradeSpec::Kind(GradeKind::Sigmoid(s)) => {
+            functions(&s.of, &format!("{path}.sigmoid.of"), place, out)
+        }
+        GradeSpec::Kind(GradeKind::Rbf(r)) => {
+            let path = format!("{path}.rbf");
+            let made = control::rbf(r, &path, place)?;
+            let (points, delta, condition) = (made.len(), made.delta(), made.condition());
+            out.push(Functions {
+                path,
+                points,
+                delta,
+                condition,
+            });
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Builds the blend.
+pub(super) fn blend(
+    spec: &BlendSpec,
+    lattices: &[(String, Arc<Lattice>)],
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<Blended, DesignError> {
+    let names = spec.names();
+    if let Some((name, _)) = lattices.iter().find(|(n, _)| !names.contains(&n.as_str())) {
+        let message = format!(
+            "the blend does not use this lattice; it is of {}",
+            names.join(", ")
+        );
+        return Err(DesignError::new(format!("lattice.{name}"), message));
+    }
+    let mut of = Vec::new();
+    for name in &names {
+        let (_, lattice) = lattices
+            .iter()
+            .find(|(n, _)| n == name)
+            .ok_or_else(|| DesignError::new("blend", format!("there is no lattice \"{name}\"")))?;
+        of.push(Constituent::Lattice(lattice.clone()));
+    }
+    let (mut grades, mut rbf) = (Vec::new(), Vec::new());
+    for (path, spec) in spec.weights() {
+        functions(spec, &path, place, &mut rbf)?;
+        let here = Place {
+            path: path.clone(),
+            ..*place
+        };
+        grades.push(grade(spec, &path, &here, Allowed::Finite, false)?);
+    }
+    let weights = match (&spec.lattices, grades.pop()) {
+        (BlendKind::Between(_), Some(weight)) => Weights::between(weight),
+        (_, last) => Weights::shares(grades.into_iter().chain(last).collect()),
+    };
+    check_weights(&weights, spec, place)?;
+    let by = match spec.by {
+        BySpec::Fraction => By::Fraction,
+        BySpec::Value => By::Value,
+    };
+    let bounds = place.region.bounds();
+    let width = narrowest(&weights, place.points);
+    let longest = lattices
+        .iter()
+        .map(|l| l.1.map.longest())
+        .fold(0.0, f64::max);
+    let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
+    unused(&blend, &names, place, warnings);
+    if let Some(width) = width.filter(|w| *w < 2.0 * longest) {
+        let message = format!(
+            "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
+             growing into each other, and the fraction is not held",
+            figure(width),
+            number(longest)
+        );
+        warnings.push(Warning {
+            path: spec.weights()[0].0.clone(),
+            message,
+        });
+    }
+    Ok(Blended {
+        blend: Arc::new(blend),
+        names: names.into_iter().map(String::from).collect(),
+        functions: rbf,
+        width,
+    })
+}
+
+/// Refuses weights that are no number, or none of which counts, anywhere that is looked at.
+fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(), DesignError> {
+    let paths = spec.weights();
+    let (points, _) = sample::inside(place.region, 60_000);
+    let points: Vec<Vec3> = points
+        .into_iter()
+        .chain(place.points.iter().copied())
+        .collect();
+    let mut most = vec![f64::NEG_INFINITY; points.len()];
+    let mut values = vec![0.0; points.len()];
+    let at = |i: usize| points[i].map(|v| format!("{v:.4}")).join(", ");
+    for (grade, (path, _)) in weights.grades().iter().zip(&paths) {
+        grade.values(&points, &mut values);
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            let message = format!(
+                "the weight is {} at ({}) mm; it must be a finite number",
+                number(values[i]),
+                at(i)
+            );
+            return Err(DesignError::new(path, message).found(number(values[i])));
+        }
+        most.iter_mut()
+            .zip(&values)
+            .for_each(|(m, v)| *m = m.max(*v));
+    }
+    if let (BlendKind::Of(_), Some(i)) = (&spec.lattices, most.iter().position(|m| *m <= 0.0)) {
+        let message = format!(
+            "all weights are 0 at ({}) mm, so that none of the lattices is there; let one of them count everywhere",
+            at(i)
+        );
+        return Err(DesignError::new("blend.of", message));
+    }
+    Ok(())
+}
+
+/// Warns of lattices that count nowhere.
+fn unused(blend: &Blend, names: &[&str], place: &Place, warnings: &mut Vec<Warning>) {
+    let n = names.len();
+    let mut w = vec![0.0; n * place.points.len()];
+    blend.weights().values(place.points, &mut w);
+    for (i, name) in names.iter().enumerate() {
+        if w.chunks_exact(n).all(|w| w[i] == 0.0) {
+            let message =
+                "this lattice has no weight at any place that was looked at in the region"
+                    .to_string();
+            warnings.push(Warning {
+                path: format!("lattice.{name}"),
+                message,
+            });
+        }
+    }
+}
+
+/// The width of the narrowest transition: 1/|∇w| where two lattices count the same, found by halving the way between
+/// places where different ones count most.
+fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
+    const WAYS: usize = 400;
+    let n = weights.len();
+    let mut w = vec![0.0; n * points.len()];
+    weights.values(points, &mut w);
+    let first = |w: &[f64]| (0..n).fold(0, |m, i| if w[i] > w[m] { i } else { m });
+    let owner: Vec<usize> = w.chunks_exact(n).map(first).collect();
+    let mut least: Option<f64> = None;
+    let stride = (points.len() / WAYS).max(1);
+    let mut own = vec![0.0; n];
+    for i in (0..points.len()).step_by(stride) {
+        // The nearest of some places that belong to another.
+        let near = (1..200)
+            .map(|k| (i + k * 7) % points.len())
+            .filter(|j| owner[*j] != owner[i]);
+        let way = |j: &usize| norm(sub(points[*j], points[i]));
+        let Some(j) = near.min_by(|a, b| way(a).total_cmp(&way(b))) else {
+            continue;
+        };
+        let (mut a, mut b) = (points[i], points[j]);
+        for _ in 0..50 {
+            let middle = scale(add(a, b), 0.5);
+            weights.values(&[middle], &mut own);
+            if first(&own) == owner[i] {
+                a = middle
+            } else {
+                b = middle
+            }
+        }
+        let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
+        weights.gradients(&[a], &mut v, &mut g);
+        let (mut u, mut h) = (vec![0.0; n], vec![[0.0; 3]; n]);
+        weights.gradients(&[b], &mut u, &mut h);
+        let steep = g.iter().chain(&h).map(|g| norm(*g)).fold(0.0, f64::max);
+        // A jump has no slope on either side of it.
+        let jump = v
+            .iter()
+            .zip(&u)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+            > 0.1;
+        let width = if jump { 0.0 } else { 1.0 / steep };
+        least = Some(least.map_or(width, |l| l.min(width)));
+    }
+    least
+}
+
+fn figure(v: f64) -> String {
+    number((v * 1000.0).round() / 1000.0)
+}

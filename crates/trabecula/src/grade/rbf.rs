@@ -1,0 +1,352 @@
+//! Gaussian radial basis functions through control points.
+
+use crate::fault::{Fault, number};
+use crate::field::Field;
+use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
+
+/// Most control points: their equations are solved as they are.
+pub const MOST: usize = 2000;
+/// Condition number beyond which the weights of the functions have no correct digit to speak of.
+const WORST: f64 = 1e12;
+/// δ in mean distances between neighbours, unless given: the surface sags little between points, and the condition
+/// number of points on a cubic grid stays near 10⁶.
+const WIDTH: f64 = 1.5;
+
+/// α(x) = Σ βᵢ exp(−|x − xᵢ|²/δ²) that takes given values at control points: equations 18 to 20 of the hybrid paper, with
+/// the distance of vectors.
+pub struct Rbf {
+    points: Vec<Vec3>,
+    beta: Vec<f64>,
+    delta: f64,
+    axis: Option<Vec3>,
+    condition: f64,
+}
+
+impl Rbf {
+    /// Through `values` at `points` (mm). With an axis all is seen along it. `delta` (mm) is one and a half times the mean
+    /// distance of a point from its nearest neighbour unless given.
+    ///
+    /// # Errors
+    /// No point or more than 2000, points that coincide, a δ that is not positive or so large that the equations are
+    /// singular to working precision.
+    pub fn new(
+        points: Vec<Vec3>,
+        values: &[f64],
+        delta: Option<f64>,
+        axis: Option<Vec3>,
+    ) -> Result<Rbf, Fault> {
+        let n = points.len();
+        if n == 0 || n > MOST || values.len() != n {
+            let message = format!(
+                "{n} points and {} values; give from 1 to {MOST} points with a value each",
+                values.len()
+            );
+            return Err(Fault::new("points", message));
+        }
+        let axis = axis.map(unit);
+        let across = |p: Vec3| axis.map_or(p, |n| sub(p, scale(n, dot(n, p))));
+        let points: Vec<Vec3> = points.into_iter().map(across).collect();
+        let mut nearest = vec![(f64::INFINITY, 0); n];
+        for i in 0..n {
+            for j in 0..i {
+                let d = norm(sub(points[i], points[j]));
+                if d < nearest[i].0 {
+                    nearest[i] = (d, j);
+                }
+                if d < nearest[j].0 {
+                    nearest[j] = (d, i);
+                }
+            }
+        }
+        let size = (0..3).map(|a| {
+            let x = points.iter().map(|p| p[a]);
+            x.clone().fold(f64::NEG_INFINITY, f64::max) - x.fold(f64::INFINITY, f64::min)
+        });
+        let size = size.fold(0.0, f64::max);
+        if let Some(i) = (0..n).find(|i| nearest[*i].0 <= 1e-9 * size) {
+            let message = format!(
+                "points {} and {i} coincide{}: no function passes through both; leave one out",
+                nearest[i].1,
+                if axis.is_some() {
+                    " seen along the axis"
+                } else {
+                    ""
+                }
+            );
+            return Err(Fault::new("points", message));
+        }
+        let own = WIDTH * nearest.iter().map(|d| d.0).sum::<f64>() / n as f64;
+        let delta = match delta {
+            Some(d) if !(d > 0.0 && d.is_finite()) => {
+                let message = format!(
+                    "delta is {} mm; it must be a finite length greater than 0",
+                    number(d)
+                );
+                return Err(Fault::new("delta", message));
+            }
+            Some(d) => d,
+            None if n == 1 => {
+                return Err(Fault::new(
+                    "delta",
+                    "one point has no neighbour; give delta, mm",
+                ));
+            }
+            None => own,
+        };
+        let kernel = |a: Vec3, b: Vec3| (-dot(sub(a, b), sub(a, b)) / (delta * delta)).exp();
+        let matrix: Vec<Vec<f64>> = points
+            .iter()
+            .map(|a| points.iter().map(|b| kernel(*a, *b)).collect())
+            .collect();
+        let factor = cholesky(&matrix);
+        let condition = factor
+            .as_ref()
+            .map_or(f64::INFINITY, |l| condition(&matrix, l));
+        let (Some(factor), true) = (factor, condition < WORST) else {
+            let message = format!(
+                "delta is {} mm: functions that wide are so alike at these points that their equations are singular to working \
+                 precision (condition number above 1e12); {} mm would do",
+                number(delta),
+                number(own)
+            );
+            return Err(Fault::new("delta", message));
+        };
+        let beta = solve(&factor, values);
+        Ok(Rbf {
+            points,
+            beta,
+            delta,
+            axis,
+            condition,
+        })
+    }
+
+    /// δ, mm.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// The condition number of the equations: so many times an error of the values can appear between the points.
+    pub fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// Number of control points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no control point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    fn across(&self, p: Vec3) -> Vec3 {
+        self.axis.map_or(p, |n| sub(p, scale(n, dot(n, p))))
+    }
+}
+
+/// The lower factor of a symmetric positive definite matrix, if it is one.
+fn cholesky(m: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = m.len();
+    let mut l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        let (above, rest) = l.split_at_mut(i);
+        let row = &mut rest[0];
+        for j in 0..i {
+            let s: f64 = row[..j]
+                .iter()
+                .zip(&above[j][..j])
+                .map(|(a, b)| a * b)
+                .sum();
+            row[j] = (m[i][j] - s) / above[j][j];
+        }
+        let s = m[i][i] - row[..i].iter().map(|v| v * v).sum::<f64>();
+        if s.is_nan() || s <= f64::EPSILON * m[i][i] {
+            return None;
+        }
+        row[i] = s.sqrt();
+    }
+    Some(l)
+}
+
+/// x of L Lᵀ x = b.
+fn solve(l: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
+    let n = l.len();
+    let mut x = b.to_vec();
+    for i in 0..n {
+        let s: f64 = l[i][..i].iter().zip(&x).map(|(a, b)| a * b).sum();
+        x[i] = (x[i] - s) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        x[i] /= l[i][i];
+        let v = x[i];
+        x[..i].iter_mut().zip(&l[i]).for_each(|(x, l)| *x -= l * v);
+    }
+    x
+}
+
+/// The ratio of the greatest and the least eigenvalue, by powers of the matrix and of its inverse.
+fn condition(m: &[Vec<f64>], l: &[Vec<f64>]) -> f64 {
+    let powers = |by: &dyn Fn(&[f64]) -> Vec<f64>| {
+        // No eigenvector is likely to be at right angles to this.
+        let mut x: Vec<f64> = (0..m.len()).map(|i| 1.0 + (i as f64 * 1.7).sin()).collect();
+        let mut value = 0.0;
+        for _ in 0..60 {
+            let length = x.iter().map(|v| v * v).sum::<f64>().sqrt();
+            x.iter_mut().for_each(|v| *v /= length);
+            let y = by(&x);
+            value = y.iter().zip(&x).map(|(a, b)| a * b).sum();
+            x = y;
+        }
+        value
+    };
+    let times = |x: &[f64]| {
+        m.iter()
+            .map(|r| r.iter().zip(x).map(|(a, b)| a * b).sum())
+            .collect()
+    };
+    powers(&times) * powers(&|x| solve(l, x))
+}
+
+impl Field for Rbf {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let by = 1.0 / (self.delta * self.delta);
+        for (o, p) in out.iter_mut().zip(points) {
+            let p = self.across(*p);
+            let each = self.points.iter().zip(&self.beta);
+            *o = each.fold(0.0, |sum, (q, beta)| {
+                let d = sub(p, *q);
+                sum + beta * (-dot(d, d) * by).exp()
+            });
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        let by = 1.0 / (self.delta * self.delta);
+        for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
+            let p = self.across(*p);
+            (*v, *g) = (0.0, [0.0; 3]);
+            for (q, beta) in self.points.iter().zip(&self.beta) {
+                let d = sub(p, *q);
+                let e = beta * (-dot(d, d) * by).exp();
+                *v += e;
+                *g = add(*g, scale(d, -2.0 * by * e));
+            }
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        if !b.is_finite() {
+            let ends = self
+                .beta
+                .iter()
+                .fold([0.0; 2], |s, v| [s[0] + v.min(0.0), s[1] + v.max(0.0)]);
+            return Interval::new(ends[0], ends[1]);
+        }
+        let by = 1.0 / (self.delta * self.delta);
+        let middle = self.across(b.center());
+        let reach = norm(b.size()) / 2.0 * (1.0 + 1e-12) + 1e-12 * (1.0 + norm(middle));
+        // Each function by how near and far its point is, and all by how steep they can be.
+        let (mut lo, mut hi, mut value, mut slope, mut size) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (q, beta) in self.points.iter().zip(&self.beta) {
+            let d = norm(sub(middle, *q));
+            let (near, far) = ((d - reach).max(0.0), d + reach);
+            let (most, least) = ((-near * near * by).exp(), (-far * far * by).exp());
+            let ends = [beta * least, beta * most];
+            lo += ends[0].min(ends[1]);
+            hi += ends[0].max(ends[1]);
+            value += beta * (-d * d * by).exp();
+            // 2r/δ² e^(−r²/δ²) rises to r = δ/√2 and falls after it.
+            let top = self.delta / std::f64::consts::SQRT_2;
+            let r = top.clamp(near, far);
+            slope += beta.abs() * 2.0 * r * by * (-r * r * by).exp();
+            size += beta.abs() * most;
+        }
+        let slack = 1e-13 * size;
+        Interval::new(
+            lo.max(value - slope * reach) - slack,
+            hi.min(value + slope * reach) + slack,
+        )
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn ring(n: usize) -> Vec<Vec3> {
+        let turn = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+        (0..n)
+            .map(|i| [turn(i).cos(), turn(i).sin(), 0.0])
+            .collect()
+    }
+
+    #[test]
+    fn it_passes_through_its_points() {
+        let points = ring(16);
+        let values: Vec<f64> = (0..16).map(|i| f64::from(i % 5)).collect();
+        let rbf = Rbf::new(points.clone(), &values, None, None).unwrap();
+        let mut out = vec![0.0; 16];
+        rbf.values(&points, &mut out);
+        for (a, b) in out.iter().zip(&values) {
+            assert!((a - b).abs() < 1e-12 * rbf.condition());
+        }
+    }
+
+    /// Known of a ring of radius one: α in its middle for δ of 0.3, 0.6, 1.0.
+    #[test]
+    fn the_middle_of_a_ring_is_as_known() {
+        for (n, delta, middle) in [(16, 0.3, 0.0002), (16, 0.6, 0.358), (16, 1.0, 1.192)] {
+            let rbf = Rbf::new(ring(n), &vec![1.0; n], Some(delta), None).unwrap();
+            assert!(
+                (rbf.value([0.0; 3]) - middle).abs() < 2e-3,
+                "{delta}: {}",
+                rbf.value([0.0; 3])
+            );
+        }
+        // Seen along an axis a point's height does not matter.
+        let rbf = Rbf::new(ring(16), &[1.0; 16], Some(0.6), Some([0.0, 0.0, 3.0])).unwrap();
+        assert!((rbf.value([0.0, 0.0, 7.0]) - 0.358).abs() < 2e-3);
+    }
+
+    #[test]
+    fn gradients_and_bounds_hold() {
+        let rbf = Rbf::new(ring(12), &[1.0; 12], None, None).unwrap();
+        for i in 0..3000 {
+            let p =
+                [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 4.0 - 2.0);
+            let size = 0.001 * f64::from(i % 700);
+            let b = rbf.bound(&Aabb {
+                min: p,
+                max: p.map(|x| x + size),
+            });
+            let q = add(p, [0.2 * size, 0.9 * size, 0.5 * size]);
+            assert!(b.lo <= rbf.value(q) && rbf.value(q) <= b.hi);
+            let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+            rbf.gradients(&[p], &mut v, &mut g);
+            for a in 0..3 {
+                let (mut lo, mut hi) = (p, p);
+                lo[a] -= 1e-5;
+                hi[a] += 1e-5;
+                assert!((g[0][a] - (rbf.value(hi) - rbf.value(lo)) / 2e-5).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn points_and_widths_that_cannot_be_are_refused() {
+        let at = |points: Vec<Vec3>, delta| {
+            let values = vec![1.0; points.len()];
+            Rbf::new(points, &values, delta, None).err().map(|f| f.at)
+        };
+        let mut twice = ring(8);
+        twice.push(twice[3]);
+        assert_eq!(at(twice, None).as_deref(), Some("points"));
+        assert_eq!(at(Vec::new(), None).as_deref(), Some("points"));
+        assert_eq!(at(ring(32), Some(1.0)).as_deref(), Some("delta"));
+        assert_eq!(at(ring(8), Some(-1.0)).as_deref(), Some("delta"));
+        assert_eq!(at(ring(8), None), None);
+    }
+}

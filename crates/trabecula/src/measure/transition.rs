@@ -1,0 +1,362 @@
+//! Where lattices of a blend pass into each other, and how well they hold together there.
+//!
+//! The part is looked at on a grid of points. A *transition* of two lattices is where both count and no other counts
+//! more. Solid points of it, and of the two lattices where they are alone, are neighbours along the axes. Taken in the
+//! order of their depth below the surface, the deepest first, they grow together to bodies; when those of the two sides
+//! meet, the depth reached is that of the widest way across: half the thickness of its narrowest neck.
+
+use rayon::prelude::*;
+
+use crate::blend::Blend;
+use crate::field::Field;
+use crate::math::Vec3;
+use crate::solid::Solid;
+
+/// Most points looked at, and steps on the shortest wavelength where they suffice.
+const MOST: f64 = 3e6;
+const FINE: f64 = 16.0;
+/// Shares of the second lattice at which the fraction is told.
+const BINS: usize = 10;
+/// What hangs by a neck thinner than this share of the widest way's neck is dangling.
+const THIN: f64 = 0.5;
+
+/// How two lattices pass into each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transition {
+    /// Which two, by their places in the blend.
+    pub between: [usize; 2],
+    /// Volume in which both count, mm³.
+    pub volume: f64,
+    /// Bodies of solid that touch neither side, and their volume, mm³.
+    pub loose: (usize, f64),
+    /// Bodies that hang by necks thinner than half the narrowest of the widest way, and their volume, mm³.
+    pub dangling: (usize, f64),
+    /// The narrowest neck of the widest way from one lattice to the other: its diameter (mm, to within a step) and place;
+    /// `None` where no way leads across.
+    pub neck: Option<(f64, Vec3)>,
+    /// For tenths of the second's share from 0 to 1: the share in the middle, the solid fraction asked for and found, and
+    /// the number of points.
+    pub fractions: Vec<[f64; 4]>,
+    /// Distance between points, mm.
+    pub step: f64,
+}
+
+/// The points of a grid over a region.
+struct Points {
+    shape: [usize; 3],
+    /// For each point the lattices that count most and second, the share of the second among both, the fraction asked
+    /// for, and whether it is solid; `None` outside.
+    of: Vec<Option<Point>>,
+}
+
+#[derive(Clone, Copy)]
+struct Point {
+    first: u8,
+    second: u8,
+    share: f32,
+    asked: f32,
+    solid: bool,
+}
+
+/// Looks at every transition of the blend in the region; lattices alone, without skin and kept zones.
+pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
+    let b = solid.region.bounds();
+    let size = b.size();
+    let volume: f64 = size.iter().product();
+    let step = (solid.wavelength / FINE).max((volume / MOST).cbrt());
+    let shape = size.map(|s| (s / step).ceil().max(1.0) as usize);
+    let at = |i: usize| -> Vec3 {
+        let n = [
+            i % shape[0],
+            i / shape[0] % shape[1],
+            i / shape[0] / shape[1],
+        ];
+        core::array::from_fn(|a| b.min[a] + (n[a] as f64 + 0.5) * size[a] / shape[a] as f64)
+    };
+    let points = look(solid, blend, shape, &at);
+    let depth = depths(&points, step);
+    let mut pairs: Vec<[u8; 2]> = Vec::new();
+    for p in points.of.iter().flatten().filter(|p| p.share > 0.0) {
+        let pair = [p.first.min(p.second), p.first.max(p.second)];
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    pairs.sort_unstable();
+    pairs
+        .into_iter()
+        .map(|pair| transition(&points, &depth, pair, step, &at))
+        .collect()
+}
+
+fn look(
+    solid: &Solid,
+    blend: &Blend,
+    shape: [usize; 3],
+    at: &(dyn Fn(usize) -> Vec3 + Sync),
+) -> Points {
+    let n = blend.weights().len();
+    let row = shape[0];
+    let rows: Vec<Vec<Option<Point>>> = (0..shape[1] * shape[2])
+        .into_par_iter()
+        .map(|r| {
+            let places: Vec<Vec3> = (r * row..(r + 1) * row).map(at).collect();
+            let zeros = || vec![0.0; row];
+            let (mut region, mut value, mut asked) = (zeros(), zeros(), zeros());
+            solid.region.values(&places, &mut region);
+            if region.iter().all(|d| *d > 0.0) {
+                return vec![None; row];
+            }
+            let mut w = vec![0.0; n * row];
+            blend.weights().values(&places, &mut w);
+            blend.values(&places, &mut value);
+            blend.fractions(&places, &mut asked);
+            (0..row)
+                .map(|i| {
+                    let w = &w[i * n..][..n];
+                    let first = (0..n).fold(0, |m, k| if w[k] > w[m] { k } else { m });
+                    let rest = (0..n).filter(|k| *k != first);
+                    let second = rest.fold(None, |m: Option<usize>, k| match m {
+                        Some(m) if w[m] >= w[k] => Some(m),
+                        _ => Some(k),
+                    })?;
+                    (region[i] <= 0.0).then(|| Point {
+                        first: first as u8,
+                        second: second as u8,
+                        share: (w[second] / (w[first] + w[second])) as f32,
+                        asked: asked[i] as f32,
+                        solid: value[i] <= 0.0,
+                    })
+                })
+                .collect()
+        })
+        .collect();
+    Points {
+        shape,
+        of: rows.into_iter().flatten().collect(),
+    }
+}
+
+/// How deep each solid point lies below the lattice's surface, mm: half a step less than the way to the nearest open
+/// point. Squares of distances along one axis after the other, each the lower envelope of parabolas (Felzenszwalb and
+/// Huttenlocher, Theory of Computing 8, 2012).
+fn depths(points: &Points, step: f64) -> Vec<f32> {
+    let [nx, ny, nz] = points.shape;
+    // The region's surface is a cut and no surface of the lattice: what lies outside is as good as solid.
+    let far = 1e12f32;
+    let open = |p: &Option<Point>| p.is_some_and(|p| !p.solid);
+    let mut d: Vec<f32> = points
+        .of
+        .iter()
+        .map(|p| if open(p) { 0.0 } else { far })
+        .collect();
+    let lines = |d: &mut Vec<f32>,
+                 count: usize,
+                 length: usize,
+                 stride: usize,
+                 start: &dyn Fn(usize) -> usize| {
+        let (mut f, mut v, mut z) = (
+            vec![0f32; length],
+            vec![0usize; length],
+            vec![0f32; length + 1],
+        );
+        for line in 0..count {
+            let from = start(line);
+            (0..length).for_each(|i| f[i] = d[from + i * stride]);
+            let mut k = 0;
+            (v[0], z[0], z[1]) = (0, f32::NEG_INFINITY, f32::INFINITY);
+            let meet = |p: usize, q: usize, f: &[f32]| {
+                let (a, b) = (p as f32, q as f32);
+                ((f[q] + b * b) - (f[p] + a * a)) / (2.0 * (b - a))
+            };
+            for q in 1..length {
+                let mut s = meet(v[k], q, &f);
+                while s <= z[k] {
+                    k -= 1;
+                    s = meet(v[k], q, &f);
+                }
+                k += 1;
+                (v[k], z[k], z[k + 1]) = (q, s, f32::INFINITY);
+            }
+            let mut k = 0;
+            for q in 0..length {
+                while z[k + 1] < q as f32 {
+                    k += 1;
+                }
+                let way = q as f32 - v[k] as f32;
+                d[from + q * stride] = way * way + f[v[k]];
+            }
+        }
+    };
+    lines(&mut d, ny * nz, nx, 1, &|l| l * nx);
+    lines(&mut d, nx * nz, ny, nx, &|l| l / nx * nx * ny + l % nx);
+    lines(&mut d, nx * ny, nz, nx * ny, &|l| l);
+    d.into_iter()
+        .map(|d| ((d.sqrt() - 0.5).max(0.0) as f64 * step) as f32)
+        .collect()
+}
+
+/// A body that grows: its points, whether it reaches either side.
+struct Bodies {
+    parent: Vec<u32>,
+    sides: Vec<u8>,
+    size: Vec<u32>,
+}
+
+impl Bodies {
+    fn find(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            let up = self.parent[self.parent[i as usize] as usize];
+            self.parent[i as usize] = up;
+            i = up;
+        }
+        i
+    }
+
+    /// Joins two; which sides the whole reaches.
+    fn join(&mut self, a: u32, b: u32) -> u8 {
+        let (a, b) = (self.find(a), self.find(b));
+        if a != b {
+            let (big, small) = if self.size[a as usize] >= self.size[b as usize] {
+                (a, b)
+            } else {
+                (b, a)
+            };
+            self.parent[small as usize] = big;
+            self.size[big as usize] += self.size[small as usize];
+            self.sides[big as usize] |= self.sides[small as usize];
+            return self.sides[big as usize];
+        }
+        self.sides[a as usize]
+    }
+
+    /// Bodies that reach neither side and the points in them, of the points that are in.
+    fn apart(&mut self, inside: &[bool]) -> (usize, u64) {
+        let (mut count, mut all) = (0, 0);
+        for i in 0..self.parent.len() as u32 {
+            if inside[i as usize] && self.parent[i as usize] == i && self.sides[i as usize] == 0 {
+                count += 1;
+                all += u64::from(self.size[i as usize]);
+            }
+        }
+        (count, all)
+    }
+}
+
+fn transition(
+    points: &Points,
+    depth: &[f32],
+    pair: [u8; 2],
+    step: f64,
+    at: &(dyn Fn(usize) -> Vec3 + Sync),
+) -> Transition {
+    let [nx, ny, nz] = points.shape;
+    let of_pair =
+        |p: &Point| p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == pair;
+    let side = |p: &Point| match p.share {
+        0.0 if p.first == pair[0] => 1u8,
+        0.0 if p.first == pair[1] => 2,
+        _ => 0,
+    };
+    let cell = step.powi(3);
+    let mut sums = vec![[0.0; 3]; BINS];
+    let mut count = 0usize;
+    for p in points.of.iter().flatten().filter(|p| of_pair(p)) {
+        let share = f64::from(if p.first == pair[0] {
+            p.share
+        } else {
+            1.0 - p.share
+        });
+        let s = &mut sums[((share * BINS as f64) as usize).min(BINS - 1)];
+        *s = [
+            s[0] + 1.0,
+            s[1] + f64::from(p.asked),
+            s[2] + f64::from(u8::from(p.solid)),
+        ];
+        count += 1;
+    }
+    let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && (of_pair(&p) || side(&p) > 0));
+    let mut order: Vec<u32> = (0..points.of.len() as u32)
+        .filter(|i| wanted(&points.of[*i as usize]))
+        .collect();
+    order.sort_unstable_by(|a, b| {
+        depth[*b as usize]
+            .total_cmp(&depth[*a as usize])
+            .then(a.cmp(b))
+    });
+    let anew = || Bodies {
+        parent: (0..points.of.len() as u32).collect(),
+        sides: points
+            .of
+            .iter()
+            .map(|p| p.as_ref().map_or(0, side))
+            .collect(),
+        size: vec![1; points.of.len()],
+    };
+    let grow = |bodies: &mut Bodies, inside: &mut [bool], i: u32| {
+        inside[i as usize] = true;
+        let n = i as usize;
+        let (x, y, z) = (n % nx, n / nx % ny, n / nx / ny);
+        let own = bodies.find(i) as usize;
+        let mut sides = bodies.sides[own];
+        for (there, other) in [
+            (x > 0, n.wrapping_sub(1)),
+            (x + 1 < nx, n + 1),
+            (y > 0, n.wrapping_sub(nx)),
+            (y + 1 < ny, n + nx),
+            (z > 0, n.wrapping_sub(nx * ny)),
+            (z + 1 < nz, n + nx * ny),
+        ] {
+            if there && inside[other] {
+                sides = bodies.join(i, other as u32);
+            }
+        }
+        sides
+    };
+    let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
+    let mut neck = None;
+    for i in &order {
+        if grow(&mut bodies, &mut inside, *i) == 3 && neck.is_none() {
+            // Its own half step stands for the point's extent.
+            neck = Some((2.0 * f64::from(depth[*i as usize]), at(*i as usize)));
+        }
+    }
+    let (loose, lost) = bodies.apart(&inside);
+    let mut dangling = (0, 0.0);
+    if let Some((wide, _)) = neck {
+        let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
+        for i in order
+            .iter()
+            .filter(|i| 2.0 * f64::from(depth[**i as usize]) >= THIN * wide)
+        {
+            grow(&mut bodies, &mut inside, *i);
+        }
+        let (many, all) = bodies.apart(&inside);
+        // Those that are loose hang by nothing.
+        dangling = (
+            many.saturating_sub(loose),
+            (all.saturating_sub(lost)) as f64 * cell,
+        );
+    }
+    Transition {
+        between: pair.map(usize::from),
+        volume: count as f64 * cell,
+        loose: (loose, lost as f64 * cell),
+        dangling,
+        neck,
+        fractions: sums
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| s[0] > 0.0)
+            .map(|(i, s)| {
+                [
+                    (i as f64 + 0.5) / BINS as f64,
+                    s[1] / s[0],
+                    s[2] / s[0],
+                    s[0],
+                ]
+            })
+            .collect(),
+        step,
+    }
+}
