@@ -35,17 +35,18 @@ impl Solid {
     /// The same solid with one more body that is solid whatever the lattice says.
     pub fn with(mut self, mut body: Body) -> Solid {
         let mut others = Vec::new();
-        self.region.clone().faces(0.0, &mut others);
+        self.region.clone().faces(0.0, f64::INFINITY, &mut others);
         others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
         flush::apart(&mut body, &others, &self.region.bounds());
         self.filled.push(body);
         self
     }
 
-    /// The smooth faces of the solid and how they make it. The region's come first.
-    pub fn faces(&self) -> (Vec<Face>, Tree) {
+    /// The smooth faces of the solid, to be sampled on a grid of some step (mm), and how they make it. The region's come
+    /// first.
+    pub fn faces(&self, step: f64) -> (Vec<Face>, Tree) {
         let mut faces = Vec::new();
-        let mut all = vec![self.region.clone().faces(0.0, &mut faces)];
+        let mut all = vec![self.region.clone().faces(0.0, step, &mut faces)];
         if let Some(field) = &self.field {
             let mut any = Vec::new();
             for body in &self.filled {

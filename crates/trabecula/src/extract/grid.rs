@@ -69,7 +69,7 @@ impl Grid {
                 "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
             ));
         }
-        let (faces, tree) = solid.faces();
+        let (faces, tree) = solid.faces(edge);
         // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();

@@ -1,0 +1,299 @@
+//! The smooth patches of a mesh, as far as a grid of some step can tell them apart.
+//!
+//! Triangles are of one patch if they meet without a crease between them. A crease that fades out inside a patch divides
+//! it all the same: what grows from its two sides never joins. Patches too narrow for the grid go to a neighbour.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap, HashSet};
+
+use super::check::Pairs;
+use super::edges::Sets;
+use super::tree::normal;
+use crate::math::{cross, dot, norm, sub};
+use crate::mesh::Mesh;
+
+/// The least turn of the normal across a crease, radians (25°). Below it a rounded edge is off by a twentieth of a step.
+pub const TURN: f64 = 0.436;
+/// Patches narrower than this many steps do without faces of their own.
+const NARROW: f64 = 1.5;
+/// Creases within a patch divide it if they are at least this long and this far from each other on average, in steps:
+/// others are noise.
+const LONG: f64 = 4.0;
+
+/// An edge between two triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// Its half-edges: 3 · triangle + corner where it begins.
+    pub halves: [u32; 2],
+    /// How far the normal turns across it, radians; positive where the solid is convex.
+    pub turn: f64,
+    length: f64,
+}
+
+impl Edge {
+    fn triangles(&self) -> [u32; 2] {
+        self.halves.map(|h| h / 3)
+    }
+}
+
+/// The patches of a mesh.
+pub struct Patches {
+    /// The patch of each triangle.
+    pub of: Vec<u32>,
+    /// How many there are.
+    pub count: usize,
+    /// The edges between patches.
+    pub borders: Vec<Edge>,
+}
+
+/// The patches of a closed mesh, whose half-edges `pairs` gives, for a grid of some step (mm); `None` if there is no
+/// crease that it can see.
+pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
+    let normals: Vec<_> = (0..mesh.triangles.len())
+        .map(|i| normal(mesh.corners(i)))
+        .collect();
+    let edge = |halves: &[u32; 2]| {
+        let [a, b] = halves.map(|h| (h as usize / 3, h as usize % 3));
+        let (n, m) = (normals[a.0], normals[b.0]);
+        let (p, q) = (mesh.corners(a.0), mesh.corners(b.0));
+        let turn = norm(cross(n, m)).atan2(dot(n, m));
+        // The far corner of the other triangle lies below the plane of this one.
+        let convex = dot(n, sub(q[(b.1 + 2) % 3], p[a.1])) <= 0.0;
+        Edge {
+            halves: *halves,
+            turn: if convex { turn } else { -turn },
+            length: norm(sub(p[(a.1 + 1) % 3], p[a.1])),
+        }
+    };
+    let edges: Vec<Edge> = pairs.iter().map(edge).collect();
+    let mut sets = Sets::new(mesh.triangles.len());
+    for e in edges.iter().filter(|e| e.turn.abs() < TURN) {
+        let [a, b] = e.triangles();
+        sets.join(a, b);
+    }
+    let (mut of, count) = sets.numbers();
+    if edges.iter().all(|e| e.turn.abs() < TURN) {
+        return None;
+    }
+    let count = divide(mesh, &edges, &mut of, count, step);
+    merge(mesh, &edges, &mut of, count, step);
+    let mut numbers = HashMap::new();
+    for p in &mut of {
+        let next = numbers.len() as u32;
+        *p = *numbers.entry(*p).or_insert(next);
+    }
+    let between = |e: &&Edge| {
+        let [a, b] = e.triangles();
+        of[a as usize] != of[b as usize]
+    };
+    let borders: Vec<Edge> = edges.iter().filter(between).copied().collect();
+    (!borders.is_empty()).then_some(Patches {
+        of,
+        count: numbers.len(),
+        borders,
+    })
+}
+
+fn area(mesh: &Mesh, i: usize) -> f64 {
+    let [a, b, c] = mesh.corners(i);
+    norm(cross(sub(b, a), sub(c, a))) / 2.0
+}
+
+/// Divides patches along the creases within them; gives the new number of patches.
+fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) -> usize {
+    let same = |e: &Edge| {
+        let [a, b] = e.triangles().map(|t| of[t as usize]);
+        (a == b).then_some(a as usize)
+    };
+    let mut lengths = vec![0.0; count];
+    for e in edges.iter().filter(|e| e.turn.abs() >= TURN) {
+        if let Some(p) = same(e) {
+            lengths[p] += e.length;
+        }
+    }
+    let mut areas = vec![0.0; count];
+    for i in 0..of.len() {
+        areas[of[i] as usize] += area(mesh, i);
+    }
+    let divided: Vec<bool> = lengths
+        .iter()
+        .zip(&areas)
+        .map(|(l, a)| *l >= LONG * step && l * LONG * step <= *a)
+        .collect();
+    if !divided.contains(&true) {
+        return count;
+    }
+    let inside: Vec<&Edge> = edges
+        .iter()
+        .filter(|e| same(e).is_some_and(|p| divided[p]))
+        .collect();
+    // How far the vertices are from the creases, along edges.
+    let ends = |e: &Edge| {
+        let (t, k) = (
+            mesh.triangles[e.halves[0] as usize / 3],
+            e.halves[0] as usize % 3,
+        );
+        [t[k], t[(k + 1) % 3]]
+    };
+    let mut around: HashMap<u32, Vec<(u32, f64)>> = HashMap::new();
+    let mut far: HashMap<u32, f64> = HashMap::new();
+    let mut queue = BinaryHeap::new();
+    for e in &inside {
+        let [a, b] = ends(e);
+        around.entry(a).or_default().push((b, e.length));
+        around.entry(b).or_default().push((a, e.length));
+        if e.turn.abs() >= TURN {
+            for v in [a, b] {
+                far.insert(v, 0.0);
+                queue.push((Reverse(0u64), v));
+            }
+        }
+    }
+    while let Some((Reverse(bits), v)) = queue.pop() {
+        // Bits of positive numbers are ordered as they are.
+        let d = f64::from_bits(bits);
+        if far[&v] < d {
+            continue;
+        }
+        for &(w, length) in around.get(&v).into_iter().flatten() {
+            let new = d + length;
+            if far.get(&w).is_none_or(|old| new < *old) {
+                far.insert(w, new);
+                queue.push((Reverse(new.to_bits()), w));
+            }
+        }
+    }
+    // Edges at the creases first, the flattest first, so that a border goes on where the crease ends; then outwards.
+    let key = |e: &Edge| {
+        let [a, b] = ends(e).map(|v| far.get(&v).copied().unwrap_or(f64::INFINITY));
+        if a.min(b) == 0.0 {
+            (0, e.turn.abs())
+        } else {
+            (1, (a + b) * (1.0 + e.turn.abs() / TURN))
+        }
+    };
+    let mut order: Vec<((u8, f64), &Edge)> = inside
+        .iter()
+        .filter(|e| e.turn.abs() < TURN)
+        .map(|e| (key(e), *e))
+        .collect();
+    order.sort_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
+    let mut sets = Sets::new(of.len());
+    let mut apart: HashMap<u32, HashSet<u32>> = HashMap::new();
+    for e in inside.iter().filter(|e| e.turn.abs() >= TURN) {
+        let [a, b] = e.triangles();
+        apart.entry(a).or_default().insert(b);
+        apart.entry(b).or_default().insert(a);
+    }
+    for (_, e) in order {
+        let [a, b] = e.triangles().map(|t| sets.root(t));
+        if a == b || apart.get(&a).is_some_and(|s| s.contains(&b)) {
+            continue;
+        }
+        let others: Vec<u32> = [a, b]
+            .iter()
+            .filter_map(|r| apart.remove(r))
+            .flatten()
+            .collect();
+        sets.join(a, b);
+        let root = sets.root(a);
+        for o in &others {
+            if let Some(s) = apart.get_mut(o) {
+                s.remove(&a);
+                s.remove(&b);
+                s.insert(root);
+            }
+        }
+        if !others.is_empty() {
+            apart.insert(root, others.into_iter().collect());
+        }
+    }
+    let mut numbers: HashMap<u32, u32> = HashMap::new();
+    for i in 0..of.len() {
+        if divided[of[i] as usize] {
+            let next = (count + numbers.len()) as u32;
+            of[i] = *numbers.entry(sets.root(i as u32)).or_insert(next);
+        }
+    }
+    count + numbers.len()
+}
+
+/// A patch while narrow ones are given to their neighbours.
+#[derive(Default)]
+struct Piece {
+    area: f64,
+    border: f64,
+    /// For each neighbour the length of the common border, and how much of it is flat.
+    beside: HashMap<u32, (f64, f64)>,
+}
+
+impl Piece {
+    /// The mean width of a strip with this area and border.
+    fn width(&self) -> f64 {
+        2.0 * self.area / self.border
+    }
+}
+
+/// Gives patches that are too narrow to the neighbour with the longest and flattest border.
+fn merge(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) {
+    let mut pieces: Vec<Piece> = Vec::new();
+    pieces.resize_with(count, Piece::default);
+    for i in 0..of.len() {
+        pieces[of[i] as usize].area += area(mesh, i);
+    }
+    for e in edges {
+        let [a, b] = e.triangles().map(|t| of[t as usize]);
+        if a == b {
+            continue;
+        }
+        for (p, q) in [(a, b), (b, a)] {
+            let piece = &mut pieces[p as usize];
+            piece.border += e.length;
+            let shared = piece.beside.entry(q).or_default();
+            shared.0 += e.length;
+            shared.1 += e.length * (1.0 + e.turn.cos()) / 2.0;
+        }
+    }
+    let mut to = Sets::new(count);
+    let mut queue: BinaryHeap<(Reverse<u64>, u32)> = BinaryHeap::new();
+    let rank = |p: &Piece| Reverse(p.width().to_bits());
+    let narrow = |p: &Piece| p.border > 0.0 && p.width() < NARROW * step;
+    queue.extend((0..).zip(&pieces).filter(|(_, p)| narrow(p)).map(|(i, p)| (rank(p), i)));
+    while let Some((order, i)) = queue.pop() {
+        let piece = &pieces[i as usize];
+        if to.root(i) != i || !narrow(piece) || rank(piece) != order {
+            continue;
+        }
+        let best = piece
+            .beside
+            .iter()
+            .max_by(|a, b| a.1.1.total_cmp(&b.1.1).then(b.0.cmp(a.0)));
+        let Some((&other, _)) = best else { continue };
+        // The lower number stays, as in the sets.
+        let (kept, gone) = (i.min(other), i.max(other));
+        to.join(kept, gone);
+        let gone_piece = std::mem::take(&mut pieces[gone as usize]);
+        let shared = pieces[kept as usize].beside.remove(&gone).unwrap_or_default();
+        let piece = &mut pieces[kept as usize];
+        piece.area += gone_piece.area;
+        piece.border += gone_piece.border - 2.0 * shared.0;
+        for (n, s) in gone_piece.beside {
+            if n == kept {
+                continue;
+            }
+            for (p, q) in [(kept, n), (n, kept)] {
+                let at = pieces[p as usize].beside.entry(q).or_default();
+                at.0 += s.0;
+                at.1 += s.1;
+            }
+            pieces[n as usize].beside.remove(&gone);
+        }
+        let piece = &pieces[kept as usize];
+        if narrow(piece) {
+            queue.push((rank(piece), kept));
+        }
+    }
+    for p in of.iter_mut() {
+        *p = to.root(*p);
+    }
+}
