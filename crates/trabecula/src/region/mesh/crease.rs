@@ -34,8 +34,11 @@ const COLORS: usize = 10;
 const SETS: usize = 16;
 /// Places that are looked at to find which patches meet.
 const LOOKS: usize = 20_000;
-/// Neither on nor off by more than rounding would be lost: what is off, in steps.
+/// How far colors that are off are so, in steps: the first this, the second twice as much, that no two change sign in one
+/// plane. On is a step.
 const OFF: f64 = 1.0 / 4096.0;
+/// ... and switches, which often change between the same nodes.
+const APART: f64 = 1.0 / 64.0;
 
 /// The faces of a mesh for a grid of some step; `None` if there are no creases that it could show.
 pub(super) fn faces(region: &Arc<MeshRegion>, step: f64, out: &mut Vec<Face>) -> Option<Tree> {
@@ -103,6 +106,15 @@ struct Fan {
     lean: f64,
 }
 
+/// The common border of two patches.
+struct Seam {
+    bounds: Aabb,
+    /// Middles of its edges, and how much the solid bends inwards there: turn times length.
+    edges: Vec<(Vec3, f64)>,
+    /// Whether it is concave; none if it is so in part only.
+    concave: Option<bool>,
+}
+
 /// Colors that meet in concave edges somewhere.
 struct Set {
     colors: u32,
@@ -120,6 +132,8 @@ struct Creased {
     rims: Vec<Rim>,
     rim: Vec<u32>,
     fans: Vec<Fan>,
+    /// By the patches' numbers, the lower one first.
+    seams: HashMap<(u32, u32), Seam>,
     /// The color of each patch.
     color: Vec<u8>,
     colors: usize,
@@ -135,7 +149,6 @@ struct Creased {
 #[derive(Clone, Copy)]
 struct Member {
     patch: u32,
-    distance: f64,
     /// The distance to the patch as continued, negative inside; and its gradient.
     value: f64,
     gradient: Vec3,
@@ -204,6 +217,7 @@ impl Creased {
             rims,
             rim,
             fans,
+            seams: seams(&region, patches),
             color: vec![0; patches.count],
             colors: 1,
             switched: vec![false],
@@ -218,8 +232,14 @@ impl Creased {
         creased
     }
 
-    fn off(&self) -> f64 {
-        -OFF * self.step
+    /// The value of a face that is off.
+    fn off(&self, part: Part) -> f64 {
+        let share = match part {
+            Part::Color(c) => OFF * (c + 1) as f64,
+            Part::Alone(c) => APART * (c + 1) as f64,
+            Part::Set(s) => APART * (self.colors + s + 1) as f64,
+        };
+        -share * self.step
     }
 
     /// The nearest point of each patch within `reach` of a place, the nearest patch first.
@@ -281,10 +301,8 @@ impl Creased {
         let region = &*self.region;
         let t = hit.triangle as usize;
         let face = &region.tree.faces()[t];
-        let distance = hit.square.sqrt();
         let mut m = Member {
             patch: self.patch[t],
-            distance,
             value: 0.0,
             gradient: face.normal,
             foot: sub(p, hit.away),
@@ -329,8 +347,16 @@ impl Creased {
         m
     }
 
-    /// Whether the edge of two patches, real or thought, is concave: the one is above the other near it.
-    fn concave(&self, a: &Member, b: &Member) -> bool {
+    /// Whether two patches near a place meet in a concave edge; or would, if they do not meet there.
+    fn concave(&self, p: Vec3, a: &Member, b: &Member) -> bool {
+        let seam = self.seams.get(&(a.patch.min(b.patch), a.patch.max(b.patch)));
+        if let Some(seam) = seam.filter(|s| s.bounds.distance(p) <= REACH * self.step) {
+            return seam.concave.unwrap_or_else(|| {
+                let far = |e: &(Vec3, f64)| norm(sub(e.0, p));
+                let near = seam.edges.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+                near.is_some_and(|e| e.1 > 0.0)
+            });
+        }
         let within = |m: &Member| add(m.foot, scale(m.inward, 0.5 * self.step));
         a.continued(within(b)) + b.continued(within(a)) > 0.0
     }
@@ -350,12 +376,12 @@ impl Creased {
     }
 
     /// The greatest sets of patches that are concave to each other, as bits.
-    fn cliques(&self, members: &[Member]) -> Vec<u32> {
+    fn cliques(&self, p: Vec3, members: &[Member]) -> Vec<u32> {
         let n = members.len();
         let mut beside = [0u32; MOST];
         for i in 0..n {
             for j in 0..i {
-                if self.concave(&members[i], &members[j]) {
+                if self.concave(p, &members[i], &members[j]) {
                     beside[i] |= 1 << j;
                     beside[j] |= 1 << i;
                 }
@@ -377,7 +403,7 @@ impl Creased {
 
     /// The values where the patches `members` are near and the sign is `inside`; `None` if the faces that there are
     /// cannot say so.
-    fn joined(&self, members: &[Member], inside: bool) -> Option<Values> {
+    fn joined(&self, p: Vec3, members: &[Member], inside: bool) -> Option<Values> {
         let mut values = Values { count: members.len(), ..Values::default() };
         let mut near = 0u32;
         for (to, m) in values.colors.iter_mut().zip(members) {
@@ -385,7 +411,7 @@ impl Creased {
             *to = (color, m.value as f32);
             near |= 1 << color;
         }
-        for clique in self.cliques(members) {
+        for clique in self.cliques(p, members) {
             let colors = self.colors_of(members, clique);
             if colors.is_power_of_two() {
                 values.alone |= colors;
@@ -424,7 +450,7 @@ impl Creased {
     fn values_at(&self, p: Vec3, d: f64, hits: &[Hit]) -> (Values, Vec<Member>) {
         let mut members = self.members(p, hits);
         while members.len() > 1 {
-            if let Some(v) = self.joined(&members, d <= 0.0) {
+            if let Some(v) = self.joined(p, &members, d <= 0.0) {
                 return (v, members);
             }
             members.pop();
@@ -491,7 +517,7 @@ impl Creased {
                 continue;
             }
             let near = self.colors_of(&members, (1 << members.len()) - 1);
-            let held: Vec<u32> = self.cliques(&members).iter().map(|c| self.colors_of(&members, *c)).collect();
+            let held: Vec<u32> = self.cliques(*p, &members).iter().map(|c| self.colors_of(&members, *c)).collect();
             for c in held.iter().filter(|c| !c.is_power_of_two()) {
                 *found.entry(*c).or_default() += 1;
             }
@@ -531,6 +557,34 @@ fn places(region: &MeshRegion, patches: &Patches) -> Vec<Vec3> {
         places.push(scale(add(a, add(b, c)), 1.0 / 3.0));
     }
     places
+}
+
+/// The borders that patches have in common.
+fn seams(region: &MeshRegion, patches: &Patches) -> HashMap<(u32, u32), Seam> {
+    /// The share of a border that may bend the other way.
+    const STRAY: f64 = 0.02;
+    let mut seams: HashMap<(u32, u32), Seam> = HashMap::new();
+    for e in &patches.borders {
+        let [a, b] = e.halves.map(|h| patches.of[h as usize / 3]);
+        let (corners, k) = (region.mesh.corners(e.halves[0] as usize / 3), e.halves[0] as usize % 3);
+        let (p, q) = (corners[k], corners[(k + 1) % 3]);
+        let seam = seams.entry((a.min(b), a.max(b))).or_insert(Seam {
+            bounds: Aabb::EMPTY,
+            edges: Vec::new(),
+            concave: None,
+        });
+        seam.bounds = seam.bounds.with(p).with(q);
+        seam.edges.push((scale(add(p, q), 0.5), -e.turn * norm(sub(p, q))));
+    }
+    for s in seams.values_mut() {
+        let sum = |sign: f64| s.edges.iter().map(|e| (sign * e.1).max(0.0)).sum::<f64>();
+        let (inwards, outwards) = (sum(1.0), sum(-1.0));
+        if inwards.min(outwards) <= STRAY * (inwards + outwards) {
+            s.concave = Some(inwards > outwards);
+            s.edges = Vec::new();
+        }
+    }
+    seams
 }
 
 /// The triangles that touch borders, in the tree's order; which one each triangle is; and the fans at the corners.
@@ -613,7 +667,7 @@ struct OfCrease {
 impl OfCrease {
     /// The value of the face by those of all. Far outside, the first color stands for all.
     fn pick(&self, values: &Values) -> f64 {
-        let (on, off) = (self.of.step, self.of.off());
+        let (on, off) = (self.of.step, self.of.off(self.part));
         let switch = |word: u32, i: usize| if word >> i & 1 == 1 { on } else { off };
         match self.part {
             Part::Color(c) => f64::from(values.color(c, off as f32)),
@@ -627,7 +681,7 @@ impl OfCrease {
         match self.part {
             Part::Color(0) => d,
             Part::Alone(0) if d > 0.0 => self.of.step,
-            _ => self.of.off(),
+            _ => self.of.off(self.part),
         }
     }
 
@@ -681,7 +735,7 @@ impl Field for OfCrease {
             let colors = if d.abs() - reach > NEAR * of.step { 0 } else { of.colors_near(b) };
             (d, colors)
         });
-        let (d, colors) = *found;
+        let ((d, colors), off) = (*found, of.off(self.part));
         let far = colors == 0;
         let live = match self.part {
             Part::Color(c) | Part::Alone(c) => c == 0 || colors >> c & 1 == 1,
@@ -691,7 +745,7 @@ impl Field for OfCrease {
             Part::Color(0) if far => of.region.bound(b),
             Part::Alone(0) if far && d > 0.0 => Interval::new(of.step, of.step),
             _ if !far && live => Interval::new(f64::NEG_INFINITY, f64::INFINITY),
-            _ => Interval::new(of.off(), of.off()),
+            _ => Interval::new(off, off),
         }
     }
 
@@ -710,7 +764,7 @@ impl Field for OfCrease {
                 _ if *tag == FAR => self.far(f64::from(*d)) as f32,
                 Part::Color(c) if c == color => *d,
                 Part::Alone(c) if c == color => self.of.step as f32,
-                _ => self.of.off() as f32,
+                _ => self.of.off(self.part) as f32,
             };
         }
         for (i, values) in &s.several {
@@ -881,5 +935,54 @@ impl<T> Recent<T> {
             q.push_back((key, new.clone()));
         }
         new
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::region::Repair;
+    use crate::region::tests::random;
+
+    #[test]
+    fn debug_corner() {
+        let polygon = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.8], [0.7, 0.8], [0.7, 1.9], [0.0, 1.9]];
+        let fan = [[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let n = 6u32;
+        let mut mesh = Mesh::default();
+        for z in [0.0, 0.9] {
+            mesh.vertices.extend(polygon.iter().map(|p| [p[0], p[1], z]));
+        }
+        for [a, b, c] in fan {
+            mesh.triangles.extend([[a, c, b], [a + n, b + n, c + n]]);
+        }
+        for i in 0..n {
+            let j = (i + 1) % n;
+            mesh.triangles.extend([[i, j, j + n], [i, j + n, i + n]]);
+        }
+        let region = Arc::new(MeshRegion::new(mesh, Repair::Refuse).unwrap());
+        let pairs = check::edges(&region.mesh).unwrap();
+        let step = 0.04;
+        let p = patches::patches(&region.mesh, &pairs, step).unwrap();
+        let of = Creased::new(region.clone(), &p, step);
+        println!("{} patches, sets {:?} switched {:?}", p.count, of.sets.iter().map(|s| (s.colors, s.switched)).collect::<Vec<_>>(), of.switched);
+        let mut seed = 5;
+        let mut hits = Vec::new();
+        for _ in 0..20000 {
+            let q = [0.7, 0.8, 0.9].map(|c| c + 0.08 * random(&mut seed));
+            let d = region.value(q);
+            of.around(q, REACH * step, &mut hits);
+            let (v, members) = of.values_at(q, d, &hits);
+            if members.len() < hits.len() {
+                println!("{q:?} {d} {} of {}", members.len(), hits.len());
+                let all = of.members(q, &hits);
+                for m in &all {
+                    println!("   {} {} {:?} {:?} {:?}", m.patch, m.value, m.foot, m.normal, m.inward);
+                }
+                println!("   {:?} {v:?}", of.cliques(q, &all));
+                break;
+            }
+        }
     }
 }
