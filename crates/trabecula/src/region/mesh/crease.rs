@@ -941,48 +941,65 @@ impl<T> Recent<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Mesh;
     use crate::region::Repair;
     use crate::region::tests::random;
 
     #[test]
-    fn debug_corner() {
-        let polygon = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.8], [0.7, 0.8], [0.7, 1.9], [0.0, 1.9]];
-        let fan = [[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
-        let n = 6u32;
-        let mut mesh = Mesh::default();
-        for z in [0.0, 0.9] {
-            mesh.vertices.extend(polygon.iter().map(|p| [p[0], p[1], z]));
-        }
-        for [a, b, c] in fan {
-            mesh.triangles.extend([[a, c, b], [a + n, b + n, c + n]]);
-        }
-        for i in 0..n {
-            let j = (i + 1) % n;
-            mesh.triangles.extend([[i, j, j + n], [i, j + n, i + n]]);
-        }
+    fn debug_edges() {
+        let steps: f64 = std::env::var("STEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(80.0);
+        let bytes = std::fs::read("/work/shared/data/fandisk.obj").unwrap();
+        let mesh = crate::io::read_mesh(&bytes, "obj").unwrap().mesh;
         let region = Arc::new(MeshRegion::new(mesh, Repair::Refuse).unwrap());
+        let step = region.bounds.size().iter().fold(0.0f64, |m, x| m.max(*x)) / steps;
+        let mut faces = Vec::new();
+        let tree = super::faces(&region, step, &mut faces).unwrap();
         let pairs = check::edges(&region.mesh).unwrap();
-        let step = 0.04;
         let p = patches::patches(&region.mesh, &pairs, step).unwrap();
         let of = Creased::new(region.clone(), &p, step);
-        println!("{} patches, sets {:?} switched {:?}", p.count, of.sets.iter().map(|s| (s.colors, s.switched)).collect::<Vec<_>>(), of.switched);
+        println!("{} patches, sets {:?} switched {:?}", p.count, of.sets.iter().map(|s| (bits(s.colors).collect::<Vec<_>>(), s.switched)).collect::<Vec<_>>(), of.switched);
         let mut seed = 5;
-        let mut hits = Vec::new();
-        for _ in 0..20000 {
-            let q = [0.7, 0.8, 0.9].map(|c| c + 0.08 * random(&mut seed));
-            let d = region.value(q);
-            of.around(q, REACH * step, &mut hits);
-            let (v, members) = of.values_at(q, d, &hits);
-            if members.len() < hits.len() {
-                println!("{q:?} {d} {} of {}", members.len(), hits.len());
-                let all = of.members(q, &hits);
-                for m in &all {
-                    println!("   {} {} {:?} {:?} {:?}", m.patch, m.value, m.foot, m.normal, m.inward);
+        let (mut tried, mut bad, mut fell, mut near) = (0, 0, 0, 0);
+        for _ in 0..400000 {
+            let t = (random(&mut seed).abs() * region.mesh.triangles.len() as f64) as usize;
+            let [a, b, c] = region.mesh.corners(t);
+            let m = scale(add(a, add(b, c)), 1.0 / 3.0);
+            let p = add(m, [0; 3].map(|_| 2.0 * step * random(&mut seed)));
+            let axis = (random(&mut seed).abs() * 3.0) as usize;
+            let mut q = p;
+            q[axis] += step;
+            let (dp, dq) = (region.value(p), region.value(q));
+            if (dp < 0.0) != (dq < 0.0) || dp.abs() + dq.abs() < 1.2 * step {
+                continue;
+            }
+            tried += 1;
+            let mut hits = Vec::new();
+            of.around(p, REACH * step, &mut hits);
+            if dp.abs() < NEAR * step && hits.len() > 1 {
+                near += 1;
+                fell += usize::from(of.values_at(p, dp, &hits).1.len() < hits.len());
+            }
+            let u: Vec<[f64; 2]> = faces.iter().map(|f| [f.field.value(p), f.field.value(q)]).collect();
+            let wrong = (0..=64).find(|t| {
+                let t = f64::from(*t) / 64.0;
+                let v = tree.value(&|f| u[f][0] * (1.0 - t) + u[f][1] * t).0;
+                (v <= 0.0) != (dp <= 0.0)
+            });
+            if let Some(t) = wrong {
+                bad += 1;
+                if bad <= 4 {
+                    println!("{p:.4?} {q:.4?}: {:.2} {:.2} steps, wrong at {t}", dp / step, dq / step);
+                    for x in [p, q] {
+                        of.around(x, REACH * step, &mut hits);
+                        println!("  all:");
+                        for m in &of.members(x, &hits) {
+                            println!("   {} {:.2} {:.3?} {:.2?} {:.2?} {:.2}", m.patch, m.value / step, m.foot, m.normal, m.inward, m.lean);
+                        }
+                        let (v, members) = of.values_at(x, region.value(x), &hits);
+                        println!("   used {} alone {:?} sets {:?}", members.len(), bits(v.alone).collect::<Vec<_>>(), bits(v.sets).collect::<Vec<_>>());
+                    }
                 }
-                println!("   {:?} {v:?}", of.cliques(q, &all));
-                break;
             }
         }
+        println!("{bad} of {tried} bad; {fell} of {near} fell back");
     }
 }

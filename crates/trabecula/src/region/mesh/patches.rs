@@ -77,6 +77,7 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
     }
     let count = divide(mesh, &edges, &mut of, count, step);
     merge(mesh, &edges, &mut of, count, step);
+    part(mesh, &edges, &mut of, step);
     let mut numbers = HashMap::new();
     for p in &mut of {
         let next = numbers.len() as u32;
@@ -127,27 +128,96 @@ fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) 
         .iter()
         .filter(|e| same(e).is_some_and(|p| divided[p]))
         .collect();
+    let strong = inside.iter().filter(|e| e.turn.abs() >= TURN);
+    let apart: Vec<[u32; 2]> = strong.clone().map(|e| e.triangles()).collect();
+    let from: Vec<u32> = strong.flat_map(|e| ends(mesh, e)).collect();
+    let mut sets = Sets::new(of.len());
+    grow(mesh, &inside, &from, &apart, &mut sets);
+    renumber(&mut sets, of, &divided)
+}
+
+/// Divides patches that meet another one both in convex and in concave edges: near them each side is a patch of its own.
+fn part(mesh: &Mesh, edges: &[Edge], of: &mut [u32], step: f64) {
+    // For each patch and neighbour the triangles at their convex and at their concave edges, and the lengths of these.
+    let mut sides: HashMap<(u32, u32), [(Vec<u32>, f64); 2]> = HashMap::new();
+    let count = of.iter().max().map_or(0, |m| *m as usize + 1);
+    let mut areas = vec![0.0; count];
+    for i in 0..of.len() {
+        areas[of[i] as usize] += area(mesh, i);
+    }
+    for e in edges.iter().filter(|e| e.turn.abs() >= TURN) {
+        let [s, t] = e.triangles();
+        let (a, b) = (of[s as usize], of[t as usize]);
+        if a != b {
+            let larger = areas[a as usize] > areas[b as usize]
+                || (areas[a as usize] == areas[b as usize] && a < b);
+            let (name, triangle) = if larger { ((a, b), s) } else { ((b, a), t) };
+            let side = &mut sides.entry(name).or_default()[usize::from(e.turn < 0.0)];
+            side.0.push(triangle);
+            side.1 += e.length;
+        }
+    }
+    sides.retain(|_, s| s.iter().all(|side| side.1 >= LONG * step));
+    if sides.is_empty() {
+        return;
+    }
+    let mut sides: Vec<_> = sides.into_iter().collect();
+    sides.sort_by_key(|s| s.0);
+    let mut parted = vec![false; count];
+    let mut sets = Sets::new(of.len());
+    let (mut apart, mut from) = (Vec::new(), Vec::new());
+    for ((patch, _), both) in &sides {
+        parted[*patch as usize] = true;
+        for (side, _) in both {
+            side.iter().for_each(|t| sets.join(side[0], *t));
+            from.extend(side.iter().flat_map(|t| mesh.triangles[*t as usize]));
+        }
+        apart.push([both[0].0[0], both[1].0[0]]);
+    }
+    let inside: Vec<&Edge> = edges
+        .iter()
+        .filter(|e| {
+            let [a, b] = e.triangles().map(|t| of[t as usize]);
+            a == b && parted[a as usize]
+        })
+        .collect();
+    grow(mesh, &inside, &from, &apart, &mut sets);
+    renumber(&mut sets, of, &parted);
+}
+
+/// Gives the sets that some patches fall into numbers of their own; how many there are then.
+fn renumber(sets: &mut Sets, of: &mut [u32], divided: &[bool]) -> usize {
+    let mut numbers: HashMap<u32, u32> = HashMap::new();
+    for i in 0..of.len() {
+        if divided[of[i] as usize] {
+            let next = (divided.len() + numbers.len()) as u32;
+            of[i] = *numbers.entry(sets.root(i as u32)).or_insert(next);
+        }
+    }
+    divided.len() + numbers.len()
+}
+
+/// The ends of an edge.
+fn ends(mesh: &Mesh, e: &Edge) -> [u32; 2] {
+    let (t, k) = (mesh.triangles[e.halves[0] as usize / 3], e.halves[0] as usize % 3);
+    [t[k], t[(k + 1) % 3]]
+}
+
+/// Joins triangles across the edges `inside` that are no creases, from the vertices `from` outwards; but never the sets of
+/// two triangles that are to stay `apart`.
+fn grow(mesh: &Mesh, inside: &[&Edge], from: &[u32], apart: &[[u32; 2]], sets: &mut Sets) {
     // How far the vertices are from the creases, along edges.
-    let ends = |e: &Edge| {
-        let (t, k) = (
-            mesh.triangles[e.halves[0] as usize / 3],
-            e.halves[0] as usize % 3,
-        );
-        [t[k], t[(k + 1) % 3]]
-    };
     let mut around: HashMap<u32, Vec<(u32, f64)>> = HashMap::new();
     let mut far: HashMap<u32, f64> = HashMap::new();
     let mut queue = BinaryHeap::new();
-    for e in &inside {
-        let [a, b] = ends(e);
+    for v in from {
+        far.insert(*v, 0.0);
+        queue.push((Reverse(0u64), *v));
+    }
+    for e in inside {
+        let [a, b] = ends(mesh, e);
         around.entry(a).or_default().push((b, e.length));
         around.entry(b).or_default().push((a, e.length));
-        if e.turn.abs() >= TURN {
-            for v in [a, b] {
-                far.insert(v, 0.0);
-                queue.push((Reverse(0u64), v));
-            }
-        }
     }
     while let Some((Reverse(bits), v)) = queue.pop() {
         // Bits of positive numbers are ordered as they are.
@@ -165,7 +235,7 @@ fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) 
     }
     // Edges at the creases first, the flattest first, so that a border goes on where the crease ends; then outwards.
     let key = |e: &Edge| {
-        let [a, b] = ends(e).map(|v| far.get(&v).copied().unwrap_or(f64::INFINITY));
+        let [a, b] = ends(mesh, e).map(|v| far.get(&v).copied().unwrap_or(f64::INFINITY));
         if a.min(b) == 0.0 {
             (0, e.turn.abs())
         } else {
@@ -178,44 +248,35 @@ fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) 
         .map(|e| (key(e), *e))
         .collect();
     order.sort_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
-    let mut sets = Sets::new(of.len());
-    let mut apart: HashMap<u32, HashSet<u32>> = HashMap::new();
-    for e in inside.iter().filter(|e| e.turn.abs() >= TURN) {
-        let [a, b] = e.triangles();
-        apart.entry(a).or_default().insert(b);
-        apart.entry(b).or_default().insert(a);
+    let mut enemies: HashMap<u32, HashSet<u32>> = HashMap::new();
+    for pair in apart {
+        let [a, b] = pair.map(|t| sets.root(t));
+        enemies.entry(a).or_default().insert(b);
+        enemies.entry(b).or_default().insert(a);
     }
     for (_, e) in order {
         let [a, b] = e.triangles().map(|t| sets.root(t));
-        if a == b || apart.get(&a).is_some_and(|s| s.contains(&b)) {
+        if a == b || enemies.get(&a).is_some_and(|s| s.contains(&b)) {
             continue;
         }
         let others: Vec<u32> = [a, b]
             .iter()
-            .filter_map(|r| apart.remove(r))
+            .filter_map(|r| enemies.remove(r))
             .flatten()
             .collect();
         sets.join(a, b);
         let root = sets.root(a);
         for o in &others {
-            if let Some(s) = apart.get_mut(o) {
+            if let Some(s) = enemies.get_mut(o) {
                 s.remove(&a);
                 s.remove(&b);
                 s.insert(root);
             }
         }
         if !others.is_empty() {
-            apart.insert(root, others.into_iter().collect());
+            enemies.insert(root, others.into_iter().collect());
         }
     }
-    let mut numbers: HashMap<u32, u32> = HashMap::new();
-    for i in 0..of.len() {
-        if divided[of[i] as usize] {
-            let next = (count + numbers.len()) as u32;
-            of[i] = *numbers.entry(sets.root(i as u32)).or_insert(next);
-        }
-    }
-    count + numbers.len()
 }
 
 /// A patch while narrow ones are given to their neighbours.
