@@ -27,13 +27,15 @@ const NEAR: f64 = 2.0;
 /// Patches this near to a node are continued there, in steps: at a crease of `patches::TURN` a patch has left the grid
 /// cells of the other one so far from it.
 const REACH: f64 = 4.5;
+/// Where they are farther than this as continued, more than a cell's diagonal, they may be left out.
+const ACROSS: f64 = 1.75;
 /// Most patches that are continued at one place.
-const MOST: usize = 6;
+const MOST: usize = 8;
 /// Most colors, and most sets of them that meet in concave edges.
-const COLORS: usize = 10;
-const SETS: usize = 16;
+const COLORS: usize = 14;
+const SETS: usize = 20;
 /// Places that are looked at to find which patches meet.
-const LOOKS: usize = 20_000;
+const LOOKS: usize = 4_000;
 /// How far colors that are off are so, in steps: the first this, the second twice as much, that no two change sign in one
 /// plane. On is a step.
 const OFF: f64 = 1.0 / 4096.0;
@@ -226,7 +228,7 @@ impl Creased {
             samples: Recent::default(),
             region,
         };
-        let places = places(&creased.region, patches);
+        let places = places(&creased.region, patches, step);
         creased.paint(&places, patches.count);
         creased.survey(&places);
         creased
@@ -375,11 +377,10 @@ impl Creased {
         members
     }
 
-    /// The greatest sets of patches that are concave to each other, as bits.
-    fn cliques(&self, p: Vec3, members: &[Member]) -> Vec<u32> {
-        let n = members.len();
+    /// Which of some patches meet in concave edges, as bits.
+    fn meeting(&self, p: Vec3, members: &[Member]) -> [u32; MOST] {
         let mut beside = [0u32; MOST];
-        for i in 0..n {
+        for i in 0..members.len() {
             for j in 0..i {
                 if self.concave(p, &members[i], &members[j]) {
                     beside[i] |= 1 << j;
@@ -387,12 +388,31 @@ impl Creased {
                 }
             }
         }
-        let common = |set: u32| bits(set).fold(u32::MAX, |w, i| w & beside[i]);
-        let full = (1u32 << n) - 1;
+        beside
+    }
+
+    /// The greatest sets of patches that are concave to each other, as bits; without patches that are in no grid cell
+    /// about the place and would not matter there, which leave `members`.
+    fn cliques(&self, p: Vec3, members: &mut Vec<Member>) -> Vec<u32> {
+        let beside = self.meeting(p, members);
+        let across = ACROSS * self.step;
+        let mut i = 0;
+        // Below all the others, or above one of any that it joins.
+        let idle: Vec<bool> = members
+            .iter()
+            .zip(beside)
+            .map(|(m, b)| (m.value < -across && b == 0) || (m.value > across && b != 0))
+            .collect();
+        members.retain(|_| {
+            i += 1;
+            i == 1 || !idle[i - 1]
+        });
+        let beside = self.meeting(p, members);
+        let full = (1u32 << members.len()) - 1;
+        let common = |set: u32| bits(set).fold(full, |w, i| w & beside[i]);
         (1..=full)
-            .filter(|set| {
-                bits(*set).all(|i| set & !(1 << i) & !beside[i] == 0) && common(*set) & full & !set == 0
-            })
+            .filter(|set| bits(*set).all(|i| set & !(1 << i) & !beside[i] == 0))
+            .filter(|set| common(*set) & !set == 0)
             .collect()
     }
 
@@ -403,15 +423,16 @@ impl Creased {
 
     /// The values where the patches `members` are near and the sign is `inside`; `None` if the faces that there are
     /// cannot say so.
-    fn joined(&self, p: Vec3, members: &[Member], inside: bool) -> Option<Values> {
+    fn joined(&self, p: Vec3, members: &mut Vec<Member>, inside: bool) -> Option<Values> {
+        let cliques = self.cliques(p, members);
         let mut values = Values { count: members.len(), ..Values::default() };
         let mut near = 0u32;
-        for (to, m) in values.colors.iter_mut().zip(members) {
+        for (to, m) in values.colors.iter_mut().zip(&*members) {
             let color = self.color[m.patch as usize];
             *to = (color, m.value as f32);
             near |= 1 << color;
         }
-        for clique in self.cliques(p, members) {
+        for clique in cliques {
             let colors = self.colors_of(members, clique);
             if colors.is_power_of_two() {
                 values.alone |= colors;
@@ -450,7 +471,7 @@ impl Creased {
     fn values_at(&self, p: Vec3, d: f64, hits: &[Hit]) -> (Values, Vec<Member>) {
         let mut members = self.members(p, hits);
         while members.len() > 1 {
-            if let Some(v) = self.joined(p, &members, d <= 0.0) {
+            if let Some(v) = self.joined(p, &mut members, d <= 0.0) {
                 return (v, members);
             }
             members.pop();
@@ -512,12 +533,10 @@ impl Creased {
         let mut ways: HashMap<(u32, Vec<u32>), usize> = HashMap::new();
         for p in places {
             self.around(*p, REACH * self.step, &mut hits);
-            let members = self.members(*p, &hits);
-            if members.len() < 2 {
-                continue;
-            }
+            let mut members = self.members(*p, &hits);
+            let cliques = self.cliques(*p, &mut members);
             let near = self.colors_of(&members, (1 << members.len()) - 1);
-            let held: Vec<u32> = self.cliques(*p, &members).iter().map(|c| self.colors_of(&members, *c)).collect();
+            let held: Vec<u32> = cliques.iter().map(|c| self.colors_of(&members, *c)).collect();
             for c in held.iter().filter(|c| !c.is_power_of_two()) {
                 *found.entry(*c).or_default() += 1;
             }
@@ -543,8 +562,14 @@ impl Creased {
     }
 }
 
-/// Places on the surface at which patches may meet: those of borders, and some of all others.
-fn places(region: &MeshRegion, patches: &Patches) -> Vec<Vec3> {
+/// Places at which patches may meet: at borders, some elsewhere on the surface, and beside all these.
+fn places(region: &MeshRegion, patches: &Patches, step: f64) -> Vec<Vec3> {
+    const BESIDE: [Vec3; 4] = [
+        [0.0; 3],
+        [1.3, 0.4, -0.7],
+        [-0.8, 1.1, 0.5],
+        [-0.5, -1.2, 0.9],
+    ];
     let mesh = &region.mesh;
     let mut places = Vec::new();
     for e in patches.borders.iter().step_by(patches.borders.len().div_ceil(LOOKS)) {
@@ -552,11 +577,12 @@ fn places(region: &MeshRegion, patches: &Patches) -> Vec<Vec3> {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         places.extend([a, scale(add(a, b), 0.5)]);
     }
-    for i in (0..mesh.triangles.len()).step_by(mesh.triangles.len().div_ceil(LOOKS / 4)) {
+    for i in (0..mesh.triangles.len()).step_by(mesh.triangles.len().div_ceil(LOOKS / 2)) {
         let [a, b, c] = mesh.corners(i);
         places.push(scale(add(a, add(b, c)), 1.0 / 3.0));
     }
-    places
+    let beside = |p: Vec3| BESIDE.map(|b| add(p, scale(b, step)));
+    places.into_iter().flat_map(beside).collect()
 }
 
 /// The borders that patches have in common.

@@ -20,6 +20,14 @@ const NARROW: f64 = 1.5;
 /// others are noise.
 const LONG: f64 = 4.0;
 
+/// A border between patches is one if it turns enough over most of its length, or much more than that in part: others
+/// are noise.
+const MOSTLY: f64 = 0.6;
+const MUCH: (f64, f64) = (0.785, 0.15);
+/// Many creases that are no farther from each other than so many steps are noise, too.
+const MANY: usize = 40;
+const DENSE: f64 = 5.0;
+
 /// An edge between two triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
@@ -77,6 +85,11 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
     }
     let count = divide(mesh, &edges, &mut of, count, step);
     merge(mesh, &edges, &mut of, count, step);
+    while let Some(joined) = faint(&edges, &of, step) {
+        for p in &mut of {
+            *p = joined[*p as usize];
+        }
+    }
     part(mesh, &edges, &mut of, step);
     let mut numbers = HashMap::new();
     for p in &mut of {
@@ -88,6 +101,10 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
         of[a as usize] != of[b as usize]
     };
     let borders: Vec<Edge> = edges.iter().filter(between).copied().collect();
+    let length: f64 = borders.iter().map(|e| e.length).sum();
+    if numbers.len() > MANY && length * DENSE * step > mesh.area() {
+        return None;
+    }
     (!borders.is_empty()).then_some(Patches {
         of,
         count: numbers.len(),
@@ -134,6 +151,30 @@ fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) 
     let mut sets = Sets::new(of.len());
     grow(mesh, &inside, &from, &apart, &mut sets);
     renumber(&mut sets, of, &divided)
+}
+
+/// The patches joined across borders that are no creases for most of their length; `None` if all are.
+fn faint(edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>> {
+    let mut borders: HashMap<(u32, u32), [f64; 3]> = HashMap::new();
+    for e in edges {
+        let [a, b] = e.triangles().map(|t| of[t as usize]);
+        if a != b {
+            let lengths = borders.entry((a.min(b), a.max(b))).or_default();
+            for (l, least) in lengths.iter_mut().zip([0.0, TURN, MUCH.0]) {
+                *l += if e.turn.abs() >= least { e.length } else { 0.0 };
+            }
+        }
+    }
+    let faint = |l: &[f64; 3]| {
+        l[1] < MOSTLY * l[0] && (l[2] < MUCH.1 * l[0] || l[2] < LONG * step)
+    };
+    let mut sets = Sets::new(of.iter().max().map_or(0, |m| *m as usize + 1));
+    let mut any = false;
+    for ((a, b), _) in borders.iter().filter(|b| faint(b.1)) {
+        sets.join(*a, *b);
+        any = true;
+    }
+    any.then(|| sets.numbers().0)
 }
 
 /// Divides patches that meet another one both in convex and in concave edges: near them each side is a patch of its own.
