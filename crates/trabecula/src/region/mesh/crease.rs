@@ -349,29 +349,56 @@ impl Creased {
         m
     }
 
-    /// Whether two patches near a place meet in a concave edge; or would, if they do not meet there.
-    fn concave(&self, p: Vec3, a: &Member, b: &Member) -> bool {
+    /// The common border of two patches if it is near to a place.
+    fn seam(&self, p: Vec3, a: &Member, b: &Member) -> Option<&Seam> {
         let seam = self.seams.get(&(a.patch.min(b.patch), a.patch.max(b.patch)));
-        if let Some(seam) = seam.filter(|s| s.bounds.distance(p) <= REACH * self.step) {
+        seam.filter(|s| s.bounds.distance(p) <= REACH * self.step)
+    }
+
+    /// Whether two patches near a place meet in a concave edge; or would, if they meet in a corner at most.
+    fn concave(&self, p: Vec3, a: &Member, b: &Member) -> bool {
+        if let Some(seam) = self.seam(p, a, b).filter(|s| !s.edges.is_empty() || s.concave.is_some()) {
             return seam.concave.unwrap_or_else(|| {
                 let far = |e: &(Vec3, f64)| norm(sub(e.0, p));
                 let near = seam.edges.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
                 near.is_some_and(|e| e.1 > 0.0)
             });
         }
-        let within = |m: &Member| add(m.foot, scale(m.inward, 0.5 * self.step));
-        a.continued(within(b)) + b.continued(within(a)) > 0.0
+        let [x, y] = self.heights(a, b);
+        x + y > 0.0
     }
 
-    /// The nearest patches about a place, of different colors; the nearest one first.
+    /// How high either of two patches is above the other one.
+    fn heights(&self, a: &Member, b: &Member) -> [f64; 2] {
+        let within = |m: &Member| add(m.foot, scale(m.inward, 0.5 * self.step));
+        [b.continued(within(a)), a.continued(within(b))]
+    }
+
+    /// Whether two patches are the sides of a wall or a gap that a grid cell may hold.
+    fn opposite(&self, a: &Member, b: &Member) -> bool {
+        let [x, y] = self.heights(a, b);
+        dot(a.normal, b.normal) < -0.5 && (x < 0.0) == (y < 0.0)
+    }
+
+    /// The patches about a place that meet the nearest one, which is the first, or are opposite to it: of different
+    /// colors. Others are continued only where they are nearest themselves.
     fn members(&self, p: Vec3, hits: &[Hit]) -> Vec<Member> {
         let mut members: Vec<Member> = Vec::with_capacity(MOST);
         let mut used = 0u32;
+        let across = ACROSS * self.step;
         for hit in hits {
             let color = 1u32 << self.color[self.patch[hit.triangle as usize] as usize];
-            if used & color == 0 && members.len() < MOST {
+            if used & color != 0 || members.len() == MOST {
+                continue;
+            }
+            let m = self.member(p, hit);
+            let known = members.first().is_none_or(|first| {
+                self.seam(p, first, &m).is_some()
+                    || (hit.square <= across * across && self.opposite(first, &m))
+            });
+            if known {
                 used |= color;
-                members.push(self.member(p, hit));
+                members.push(m);
             }
         }
         members
@@ -602,7 +629,31 @@ fn seams(region: &MeshRegion, patches: &Patches) -> HashMap<(u32, u32), Seam> {
         seam.bounds = seam.bounds.with(p).with(q);
         seam.edges.push((scale(add(p, q), 0.5), -e.turn * norm(sub(p, q))));
     }
-    for s in seams.values_mut() {
+    // Patches that have a corner in common only.
+    let mut about: HashMap<u32, Vec<u32>> = HashMap::new();
+    for e in &patches.borders {
+        for h in e.halves {
+            let (t, k) = (region.mesh.triangles[h as usize / 3], h as usize % 3);
+            for v in [t[k], t[(k + 1) % 3]] {
+                about.entry(v).or_default().push(patches.of[h as usize / 3]);
+            }
+        }
+    }
+    for (v, list) in &mut about {
+        list.sort_unstable();
+        list.dedup();
+        for (i, a) in list.iter().enumerate() {
+            for b in &list[..i] {
+                let seam = seams.entry((*b, *a)).or_insert(Seam {
+                    bounds: Aabb::EMPTY,
+                    edges: Vec::new(),
+                    concave: None,
+                });
+                seam.bounds = seam.bounds.with(region.mesh.vertices[*v as usize]);
+            }
+        }
+    }
+    for s in seams.values_mut().filter(|s| !s.edges.is_empty()) {
         let sum = |sign: f64| s.edges.iter().map(|e| (sign * e.1).max(0.0)).sum::<f64>();
         let (inwards, outwards) = (sum(1.0), sum(-1.0));
         if inwards.min(outwards) <= STRAY * (inwards + outwards) {
@@ -702,10 +753,10 @@ impl OfCrease {
         }
     }
 
-    /// The value at distance `d` from the surface, where that is far.
+    /// The value at distance `d` from the surface, where that is far: no matter how far, for it may not be known.
     fn far(&self, d: f64) -> f64 {
         match self.part {
-            Part::Color(0) => d,
+            Part::Color(0) => (NEAR * self.of.step).copysign(d),
             Part::Alone(0) if d > 0.0 => self.of.step,
             _ => self.of.off(self.part),
         }
@@ -1014,6 +1065,7 @@ mod tests {
                 bad += 1;
                 if bad <= 4 {
                     println!("{p:.4?} {q:.4?}: {:.2} {:.2} steps, wrong at {t}", dp / step, dq / step);
+                    println!("  sets {:?}", of.sets.iter().map(|s| bits(s.colors).collect::<Vec<_>>()).collect::<Vec<_>>());
                     for x in [p, q] {
                         of.around(x, REACH * step, &mut hits);
                         println!("  all:");
@@ -1021,7 +1073,7 @@ mod tests {
                             println!("   {} {:.2} {:.3?} {:.2?} {:.2?} {:.2}", m.patch, m.value / step, m.foot, m.normal, m.inward, m.lean);
                         }
                         let (v, members) = of.values_at(x, region.value(x), &hits);
-                        println!("   used {} alone {:?} sets {:?}", members.len(), bits(v.alone).collect::<Vec<_>>(), bits(v.sets).collect::<Vec<_>>());
+                        println!("   color {:?} used {} alone {:?} sets {:?}", members.iter().map(|m| (m.patch, of.color[m.patch as usize])).collect::<Vec<_>>(), members.len(), bits(v.alone).collect::<Vec<_>>(), bits(v.sets).collect::<Vec<_>>());
                     }
                 }
             }

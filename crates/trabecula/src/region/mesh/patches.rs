@@ -9,13 +9,13 @@ use std::collections::{BinaryHeap, HashMap, HashSet};
 use super::check::Pairs;
 use super::edges::Sets;
 use super::tree::normal;
-use crate::math::{cross, dot, norm, sub};
+use crate::math::{Vec3, cross, dot, norm, sub};
 use crate::mesh::Mesh;
 
 /// The least turn of the normal across a crease, radians (25°). Below it a rounded edge is off by a twentieth of a step.
 pub const TURN: f64 = 0.436;
 /// Patches narrower than this many steps do without faces of their own.
-const NARROW: f64 = 1.5;
+const NARROW: f64 = 2.0;
 /// Creases within a patch divide it if they are at least this long and this far from each other on average, in steps:
 /// others are noise.
 const LONG: f64 = 4.0;
@@ -23,7 +23,9 @@ const LONG: f64 = 4.0;
 /// A border between patches is one if it turns enough over most of its length, or much more than that in part: others
 /// are noise.
 const MOSTLY: f64 = 0.6;
-const MUCH: (f64, f64) = (0.785, 0.15);
+const MUCH: (f64, f64) = (0.785, 0.3);
+/// Nor is it one if it zigzags: by more than this on average at its vertices, radians.
+const ZIGZAG: f64 = 0.5;
 /// Many creases that are no farther from each other than so many steps are noise, too.
 const MANY: usize = 40;
 const DENSE: f64 = 5.0;
@@ -85,7 +87,7 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
     }
     let count = divide(mesh, &edges, &mut of, count, step);
     merge(mesh, &edges, &mut of, count, step);
-    while let Some(joined) = faint(&edges, &of, step) {
+    while let Some(joined) = faint(mesh, &edges, &of, step) {
         for p in &mut of {
             *p = joined[*p as usize];
         }
@@ -105,6 +107,7 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
     if numbers.len() > MANY && length * DENSE * step > mesh.area() {
         return None;
     }
+    if std::env::var("TRACE").is_ok() { println!("{} patches, density {}", numbers.len(), length * step / mesh.area()); }
     (!borders.is_empty()).then_some(Patches {
         of,
         count: numbers.len(),
@@ -154,7 +157,8 @@ fn divide(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) 
 }
 
 /// The patches joined across borders that are no creases for most of their length; `None` if all are.
-fn faint(edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>> {
+fn faint(mesh: &Mesh, edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>> {
+    let mut corners: HashMap<(u32, u32, u32), Vec<Vec3>> = HashMap::new();
     let mut borders: HashMap<(u32, u32), [f64; 3]> = HashMap::new();
     for e in edges {
         let [a, b] = e.triangles().map(|t| of[t as usize]);
@@ -163,14 +167,33 @@ fn faint(edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>> {
             for (l, least) in lengths.iter_mut().zip([0.0, TURN, MUCH.0]) {
                 *l += if e.turn.abs() >= least { e.length } else { 0.0 };
             }
+            if e.turn.abs() >= TURN {
+                let [v, w] = ends(mesh, e);
+                let along = sub(mesh.vertices[w as usize], mesh.vertices[v as usize]);
+                let pair = (a.min(b), a.max(b));
+                corners.entry((pair.0, pair.1, v)).or_default().push(along);
+                let back = along.map(|x| -x);
+                corners.entry((pair.0, pair.1, w)).or_default().push(back);
+            }
         }
     }
-    let faint = |l: &[f64; 3]| {
+    let mut bends: HashMap<(u32, u32), (f64, f64)> = HashMap::new();
+    for ((a, b, _), ways) in &corners {
+        if let [u, v] = ways[..] {
+            let bend = norm(cross(u, v)).atan2(-dot(u, v));
+            let weight = norm(u) + norm(v);
+            let sum = bends.entry((*a, *b)).or_default();
+            sum.0 += weight * bend;
+            sum.1 += weight;
+        }
+    }
+    let faint = |pair: &(u32, u32), l: &[f64; 3]| {
         l[1] < MOSTLY * l[0] && (l[2] < MUCH.1 * l[0] || l[2] < LONG * step)
+            || bends.get(pair).is_some_and(|s| s.0 > ZIGZAG * s.1)
     };
     let mut sets = Sets::new(of.iter().max().map_or(0, |m| *m as usize + 1));
     let mut any = false;
-    for ((a, b), _) in borders.iter().filter(|b| faint(b.1)) {
+    for ((a, b), _) in borders.iter().filter(|b| faint(b.0, b.1)) {
         sets.join(*a, *b);
         any = true;
     }
