@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use trabecula::extract::{Silent, Surface, surface};
 use trabecula::cell::{Cell, Part, Series, named};
+use trabecula::extract::{Silent, Surface, surface};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
@@ -23,9 +23,17 @@ fn check(what: &str, s: &Surface) {
         *x = f64::from(*x as f32) + 0.0;
     }
     let places: HashSet<[u64; 3]> = m.vertices.iter().map(|v| v.map(f64::to_bits)).collect();
-    assert_eq!(places.len(), m.vertices.len(), "{what}: vertices fall together");
+    assert_eq!(
+        places.len(),
+        m.vertices.len(),
+        "{what}: vertices fall together"
+    );
     assert!(size(&m).closed, "{what}: not closed");
-    assert_eq!(non_manifold_vertices(&m), 0, "{what}: a vertex with two fans");
+    assert_eq!(
+        non_manifold_vertices(&m),
+        0,
+        "{what}: a vertex with two fans"
+    );
     assert_eq!(self_intersections(&m, 1), 0, "{what}: crosses itself");
 }
 
@@ -70,7 +78,14 @@ fn block(x: f64, y: f64, z: f64) -> Mesh {
 
 /// An L; its inner edge is concave, and so is one of the three edges at that edge's ends.
 fn angle() -> Mesh {
-    let polygon = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.8], [0.7, 0.8], [0.7, 1.9], [0.0, 1.9]];
+    let polygon = [
+        [0.0, 0.0],
+        [2.0, 0.0],
+        [2.0, 0.8],
+        [0.7, 0.8],
+        [0.7, 1.9],
+        [0.0, 1.9],
+    ];
     prism(&polygon, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 0.9)
 }
 
@@ -81,7 +96,11 @@ fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
     let mut mesh = Mesh::default();
     let mut names = HashMap::new();
     for n in 0..cells.iter().product() {
-        let c = [n % cells[0], n / cells[0] % cells[1], n / cells[0] / cells[1]];
+        let c = [
+            n % cells[0],
+            n / cells[0] % cells[1],
+            n / cells[0] / cells[1],
+        ];
         for (axis, up) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let mut beside = c;
             beside[axis] = c[axis].wrapping_add(if up { 1 } else { usize::MAX });
@@ -120,8 +139,15 @@ fn notched() -> Mesh {
 fn creases(mesh: &Mesh, degrees: f64) -> Vec<Vec3> {
     let normal = |i: usize| {
         let [a, b, c] = mesh.corners(i);
-        let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
-        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let (u, v) = (
+            [0, 1, 2].map(|k| b[k] - a[k]),
+            [0, 1, 2].map(|k| c[k] - a[k]),
+        );
+        let n = [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ];
         let l = n.iter().map(|x| x * x).sum::<f64>().sqrt();
         n.map(|x| x / l)
     };
@@ -148,19 +174,33 @@ fn creases(mesh: &Mesh, degrees: f64) -> Vec<Vec3> {
 /// How far the creases of the region are from the mesh, and points of the mesh from the region.
 fn apart(truth: &MeshRegion, mesh: &Mesh) -> [f64; 2] {
     let found = region(mesh.clone());
-    let farthest = |r: &MeshRegion, points: &[Vec3]| points.iter().map(|p| r.value(*p).abs()).fold(0.0, f64::max);
+    let farthest = |r: &MeshRegion, points: &[Vec3]| {
+        points.iter().map(|p| r.value(*p).abs()).fold(0.0, f64::max)
+    };
     let middles: Vec<Vec3> = (0..mesh.triangles.len())
         .flat_map(|i| {
             let [a, b, c] = mesh.corners(i);
-            [a, scale(add(a, b), 0.5), scale(add(b, c), 0.5), scale(add(c, a), 0.5)]
+            [
+                a,
+                scale(add(a, b), 0.5),
+                scale(add(b, c), 0.5),
+                scale(add(c, a), 0.5),
+            ]
         })
         .collect();
-    [farthest(&found, &creases(truth.mesh(), 30.0)), farthest(truth, &middles)]
+    [
+        farthest(&found, &creases(truth.mesh(), 30.0)),
+        farthest(truth, &middles),
+    ]
 }
 
 #[test]
 fn polyhedra_are_met_exactly() {
-    for (name, mesh) in [("block", block(1.0, 1.3, 0.8)), ("angle", angle()), ("notched", notched())] {
+    for (name, mesh) in [
+        ("block", block(1.0, 1.3, 0.8)),
+        ("angle", angle()),
+        ("notched", notched()),
+    ] {
         for turn in [[0.0; 3], [17.0, 31.0, 47.0], [-70.0, 12.0, 5.0]] {
             for edge in [0.2, 0.09, 0.04] {
                 let truth = region(moved(mesh.clone(), turn, [0.11, -0.07, 0.05]));
@@ -168,7 +208,11 @@ fn polyhedra_are_met_exactly() {
                 let s = surface(&solid, edge, &Silent).expect("surface");
                 check(name, &s);
                 let off = apart(&truth, &s.mesh);
-                println!("{name} {turn:?} {edge}: {:?} steps, volume {}", off.map(|x| x / edge), s.mesh.volume() / truth.mesh().volume() - 1.0);
+                println!(
+                    "{name} {turn:?} {edge}: {:?} steps, volume {}",
+                    off.map(|x| x / edge),
+                    s.mesh.volume() / truth.mesh().volume() - 1.0
+                );
             }
         }
     }
@@ -200,7 +244,12 @@ fn rims_and_cut_lattices_come_to_second_order() {
     let cell = Cell::new(Series::new(named("gyroid").expect("gyroid").terms()).expect("series"));
     let map = Affine::rigid([1.1, 1.3, 0.9], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("map");
     let level = Level::Iso(Grade::Constant(0.1));
-    let lattice: Arc<dyn Field> = Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), Part::Lower, level));
+    let lattice: Arc<dyn Field> = Arc::new(Lattice::new(
+        Arc::new(cell),
+        Map::Affine(map),
+        Part::Lower,
+        level,
+    ));
     let truth = region(moved(block(2.0, 2.3, 1.8), turn, by));
     let mut points = Vec::new();
     for w in creases(truth.mesh(), 30.0).windows(2) {
@@ -211,16 +260,28 @@ fn rims_and_cut_lattices_come_to_second_order() {
         }
         for _ in 0..50 {
             let m = scale(add(a, b), 0.5);
-            *(if (lattice.value(m) < 0.0) == (lattice.value(a) < 0.0) { &mut a } else { &mut b }) = m;
+            *(if (lattice.value(m) < 0.0) == (lattice.value(a) < 0.0) {
+                &mut a
+            } else {
+                &mut b
+            }) = m;
         }
         points.push(a);
     }
     assert!(points.len() > 10);
     let errors = [10.0, 20.0, 40.0].map(|n| {
-        let s = surface(&Solid::new(truth.clone(), Some(lattice.clone()), 1.0), 1.0 / n, &Silent).expect("surface");
+        let s = surface(
+            &Solid::new(truth.clone(), Some(lattice.clone()), 1.0),
+            1.0 / n,
+            &Silent,
+        )
+        .expect("surface");
         check("lattice in a block", &s);
         let found = region(s.mesh);
-        points.iter().map(|p| found.value(*p).abs()).fold(0.0, f64::max)
+        points
+            .iter()
+            .map(|p| found.value(*p).abs())
+            .fold(0.0, f64::max)
     });
     println!("lattice on the edges of a block at 10, 20, 40 steps: {errors:?}");
     assert!(errors[2] < errors[0] / 9.0, "{errors:?}");
@@ -228,7 +289,9 @@ fn rims_and_cut_lattices_come_to_second_order() {
 
 /// A number in [0, 1) from a linear congruential generator.
 fn random(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    *seed = seed
+        .wrapping_mul(6364136223846793005)
+        .wrapping_add(1442695040888963407);
     (*seed >> 11) as f64 / (1u64 << 53) as f64
 }
 
@@ -264,12 +327,16 @@ fn random_boxes_with_thin_walls_and_gaps_keep_every_guarantee() {
         let at = [planes(0.3), planes(0.3), planes(0.3)];
         let share = 0.5 + 0.4 * random(&mut seed);
         let full: Vec<bool> = (0..27).map(|_| random(&mut seed) < share).collect();
-        let mesh = boxes(at.each_ref().map(|a| &a[..]), |[i, j, k]| full[i + 3 * j + 9 * k]);
+        let mesh = boxes(at.each_ref().map(|a| &a[..]), |[i, j, k]| {
+            full[i + 3 * j + 9 * k]
+        });
         let turn = [0; 3].map(|_| 180.0 * random(&mut seed));
         let turn = if done % 4 == 0 { [0.0; 3] } else { turn };
         let edge = 0.03 + 0.07 * random(&mut seed);
         let what = format!("boxes {done}");
-        let Some(off) = off(&what, moved(mesh, turn, [0.1, 0.2, 0.3]), edge) else { continue };
+        let Some(off) = off(&what, moved(mesh, turn, [0.1, 0.2, 0.3]), edge) else {
+            continue;
+        };
         println!("{what}: volume off by {off:.4} steps over the surface");
         // What is thinner than a step may be lost, or thickened by about as much.
         assert!(off < 0.5, "{what}: {off}");
@@ -282,18 +349,25 @@ fn ball(n: usize) -> Mesh {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut mesh = Mesh::default();
     for (a, b) in [(1.0, g), (1.0, -g), (-1.0, g), (-1.0, -g)] {
-        mesh.vertices.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
+        mesh.vertices
+            .extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
     }
     // Corners are neighbours at the least distance, which is 2.
     let near = |v: &[Vec3], i: usize, j: usize| {
         let d = sub(v[i], v[j]);
         (d.iter().map(|x| x * x).sum::<f64>() - 4.0).abs() < 1e-9
     };
-    for (i, j, k) in (0..12).flat_map(|i| (0..12).flat_map(move |j| (0..12).map(move |k| (i, j, k)))) {
+    for (i, j, k) in
+        (0..12).flat_map(|i| (0..12).flat_map(move |j| (0..12).map(move |k| (i, j, k))))
+    {
         let v = &mesh.vertices;
         let right = {
             let (p, q, r) = (v[i], v[j], v[k]);
-            let n = [q[1] * r[2] - q[2] * r[1], q[2] * r[0] - q[0] * r[2], q[0] * r[1] - q[1] * r[0]];
+            let n = [
+                q[1] * r[2] - q[2] * r[1],
+                q[2] * r[0] - q[0] * r[2],
+                q[0] * r[1] - q[1] * r[0],
+            ];
             n.iter().zip(p).map(|(a, b)| a * b).sum::<f64>() > 0.0
         };
         if i < j && i < k && right && near(v, i, j) && near(v, j, k) && near(v, i, k) {
@@ -311,7 +385,8 @@ fn ball(n: usize) -> Mesh {
                     mesh.vertices.len() as u32 - 1
                 })
             });
-            mesh.triangles.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
+            mesh.triangles
+                .extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
         }
         for v in &mut mesh.vertices {
             let l = v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -342,7 +417,10 @@ fn dented_balls_and_fading_creases_keep_every_guarantee() {
         let deep = 0.3 * (2.0 * random(&mut seed) - 1.0);
         for v in &mut fading.vertices {
             let [x, y, z] = *v;
-            *v = scale(*v, 1.0 + deep * x.max(0.0) * (1.0 - (z + 0.2 * y).abs() * 3.0).max(0.0));
+            *v = scale(
+                *v,
+                1.0 + deep * x.max(0.0) * (1.0 - (z + 0.2 * y).abs() * 3.0).max(0.0),
+            );
         }
         let turn = [0; 3].map(|_| 180.0 * random(&mut seed));
         let what = format!("fading {case}");

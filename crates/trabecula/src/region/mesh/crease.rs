@@ -204,7 +204,11 @@ impl Creased {
         for (i, n) in tree.nodes().iter().enumerate().rev() {
             nodes[i] = if n.count > 0 {
                 let all = &patch[n.at as usize..(n.at + n.count) as usize];
-                if all.iter().all(|p| *p == all[0]) { all[0] } else { MIXED }
+                if all.iter().all(|p| *p == all[0]) {
+                    all[0]
+                } else {
+                    MIXED
+                }
             } else if nodes[i + 1] == nodes[n.at as usize] {
                 nodes[i + 1]
             } else {
@@ -255,7 +259,9 @@ impl Creased {
                 return false;
             }
             let patch = self.nodes[node as usize];
-            let known = (patch != MIXED).then(|| best.iter().find(|b| b.0 == patch)).flatten();
+            let known = (patch != MIXED)
+                .then(|| best.iter().find(|b| b.0 == patch))
+                .flatten();
             known.is_none_or(|(_, hit)| square <= hit.square)
         };
         let mut stack = [(0u32, 0.0f64); 128];
@@ -268,12 +274,18 @@ impl Creased {
                 if node.count > 0 {
                     for k in node.at..node.at + node.count {
                         let (square, away, feature) = tree.faces()[k as usize].nearest(p);
-                        let hit = Hit { square, away, triangle: k, feature };
+                        let hit = Hit {
+                            square,
+                            away,
+                            triangle: k,
+                            feature,
+                        };
                         let patch = self.patch[k as usize];
                         match best.iter_mut().find(|b| b.0 == patch) {
                             _ if square > limit => {}
                             Some((_, old)) => {
-                                if square < old.square || (square == old.square && k < old.triangle) {
+                                if square < old.square || (square == old.square && k < old.triangle)
+                                {
                                     *old = hit;
                                 }
                             }
@@ -282,7 +294,12 @@ impl Creased {
                     }
                     break;
                 }
-                let child = |c: u32| (c, tree::square_distance(&tree.nodes()[c as usize].bounds, p));
+                let child = |c: u32| {
+                    (
+                        c,
+                        tree::square_distance(&tree.nodes()[c as usize].bounds, p),
+                    )
+                };
                 let (mut near, mut far) = (child(i + 1), child(node.at));
                 if far.1 < near.1 {
                     (near, far) = (far, near);
@@ -350,14 +367,17 @@ impl Creased {
     }
 
     /// The common border of two patches if it is near to a place.
-    fn seam(&self, p: Vec3, a: &Member, b: &Member) -> Option<&Seam> {
-        let seam = self.seams.get(&(a.patch.min(b.patch), a.patch.max(b.patch)));
+    fn seam(&self, p: Vec3, a: u32, b: u32) -> Option<&Seam> {
+        let seam = self.seams.get(&(a.min(b), a.max(b)));
         seam.filter(|s| s.bounds.distance(p) <= REACH * self.step)
     }
 
     /// Whether two patches near a place meet in a concave edge; or would, if they meet in a corner at most.
     fn concave(&self, p: Vec3, a: &Member, b: &Member) -> bool {
-        if let Some(seam) = self.seam(p, a, b).filter(|s| !s.edges.is_empty() || s.concave.is_some()) {
+        if let Some(seam) = self
+            .seam(p, a.patch, b.patch)
+            .filter(|s| !s.edges.is_empty() || s.concave.is_some())
+        {
             return seam.concave.unwrap_or_else(|| {
                 let far = |e: &(Vec3, f64)| norm(sub(e.0, p));
                 let near = seam.edges.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
@@ -393,8 +413,16 @@ impl Creased {
             }
             let m = self.member(p, hit);
             let known = members.first().is_none_or(|first| {
-                self.seam(p, first, &m).is_some()
-                    || (hit.square <= across * across && self.opposite(first, &m))
+                // What ends at a concave edge does not stand for the wall alone.
+                let ends = || {
+                    hits.iter().any(|h| {
+                        let other = self.patch[h.triangle as usize];
+                        let seam = self.seam(p, other, m.patch);
+                        other != m.patch && seam.is_some_and(|s| s.concave != Some(false))
+                    })
+                };
+                self.seam(p, first.patch, m.patch).is_some()
+                    || (hit.square <= across * across && self.opposite(first, &m) && !ends())
             });
             if known {
                 used |= color;
@@ -452,7 +480,10 @@ impl Creased {
     /// cannot say so.
     fn joined(&self, p: Vec3, members: &mut Vec<Member>, inside: bool) -> Option<Values> {
         let cliques = self.cliques(p, members);
-        let mut values = Values { count: members.len(), ..Values::default() };
+        let mut values = Values {
+            count: members.len(),
+            ..Values::default()
+        };
         let mut near = 0u32;
         for (to, m) in values.colors.iter_mut().zip(&*members) {
             let color = self.color[m.patch as usize];
@@ -503,7 +534,10 @@ impl Creased {
             }
             members.pop();
         }
-        let mut values = Values { count: 1, ..Values::default() };
+        let mut values = Values {
+            count: 1,
+            ..Values::default()
+        };
         if let Some(m) = members.first() {
             let color = self.color[m.patch as usize];
             values.colors[0] = (color, d as f32);
@@ -543,7 +577,9 @@ impl Creased {
                         *c += u64::from(*weight);
                     }
                 }
-                let best = (0..COLORS).min_by_key(|c| (cost[*c], used[*c])).unwrap_or(0);
+                let best = (0..COLORS)
+                    .min_by_key(|c| (cost[*c], used[*c]))
+                    .unwrap_or(0);
                 color[i] = best as u8;
                 used[best] += 1;
             }
@@ -563,7 +599,10 @@ impl Creased {
             let mut members = self.members(*p, &hits);
             let cliques = self.cliques(*p, &mut members);
             let near = self.colors_of(&members, (1 << members.len()) - 1);
-            let held: Vec<u32> = cliques.iter().map(|c| self.colors_of(&members, *c)).collect();
+            let held: Vec<u32> = cliques
+                .iter()
+                .map(|c| self.colors_of(&members, *c))
+                .collect();
             for c in held.iter().filter(|c| !c.is_power_of_two()) {
                 *found.entry(*c).or_default() += 1;
             }
@@ -574,10 +613,16 @@ impl Creased {
         sets.truncate(SETS);
         self.sets = sets
             .into_iter()
-            .map(|(_, colors)| Set { colors, switched: false })
+            .map(|(_, colors)| Set {
+                colors,
+                switched: false,
+            })
             .collect();
         for (near, held) in ways.keys() {
-            let alone = held.iter().filter(|c| c.is_power_of_two()).fold(0, |w, c| w | c);
+            let alone = held
+                .iter()
+                .filter(|c| c.is_power_of_two())
+                .fold(0, |w, c| w | c);
             for c in bits(near & !alone) {
                 self.switched[c] = true;
             }
@@ -599,8 +644,15 @@ fn places(region: &MeshRegion, patches: &Patches, step: f64) -> Vec<Vec3> {
     ];
     let mesh = &region.mesh;
     let mut places = Vec::new();
-    for e in patches.borders.iter().step_by(patches.borders.len().div_ceil(LOOKS)) {
-        let (corners, k) = (mesh.corners(e.halves[0] as usize / 3), e.halves[0] as usize % 3);
+    for e in patches
+        .borders
+        .iter()
+        .step_by(patches.borders.len().div_ceil(LOOKS))
+    {
+        let (corners, k) = (
+            mesh.corners(e.halves[0] as usize / 3),
+            e.halves[0] as usize % 3,
+        );
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         places.extend([a, scale(add(a, b), 0.5)]);
     }
@@ -619,7 +671,10 @@ fn seams(region: &MeshRegion, patches: &Patches) -> HashMap<(u32, u32), Seam> {
     let mut seams: HashMap<(u32, u32), Seam> = HashMap::new();
     for e in &patches.borders {
         let [a, b] = e.halves.map(|h| patches.of[h as usize / 3]);
-        let (corners, k) = (region.mesh.corners(e.halves[0] as usize / 3), e.halves[0] as usize % 3);
+        let (corners, k) = (
+            region.mesh.corners(e.halves[0] as usize / 3),
+            e.halves[0] as usize % 3,
+        );
         let (p, q) = (corners[k], corners[(k + 1) % 3]);
         let seam = seams.entry((a.min(b), a.max(b))).or_insert(Seam {
             bounds: Aabb::EMPTY,
@@ -627,7 +682,8 @@ fn seams(region: &MeshRegion, patches: &Patches) -> HashMap<(u32, u32), Seam> {
             concave: None,
         });
         seam.bounds = seam.bounds.with(p).with(q);
-        seam.edges.push((scale(add(p, q), 0.5), -e.turn * norm(sub(p, q))));
+        seam.edges
+            .push((scale(add(p, q), 0.5), -e.turn * norm(sub(p, q))));
     }
     // Patches that have a corner in common only.
     let mut about: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -696,10 +752,16 @@ fn rims(region: &MeshRegion, patches: &Patches) -> (Vec<Rim>, Vec<u32>, Vec<Fan>
             if !on_border[corners[k] as usize] {
                 continue;
             }
-            let name = names.entry((corners[k], patches.of[t as usize])).or_insert(fans.len() as u32);
+            let name = names
+                .entry((corners[k], patches.of[t as usize]))
+                .or_insert(fans.len() as u32);
             fan[k] = *name;
             if *name as usize == fans.len() {
-                fans.push(Fan { normal: [0.0; 3], inward: [0.0; 3], lean: 0.0 });
+                fans.push(Fan {
+                    normal: [0.0; 3],
+                    inward: [0.0; 3],
+                    lean: 0.0,
+                });
                 counts.push(0.0);
             }
             let f = &mut fans[*name as usize];
@@ -708,7 +770,10 @@ fn rims(region: &MeshRegion, patches: &Patches) -> (Vec<Rim>, Vec<u32>, Vec<Fan>
             let angle = norm(cross(u, v)).atan2(dot(u, v));
             f.normal = add(f.normal, scale(face.normal, angle));
             f.inward = add(f.inward, scale(add(unit(u), unit(v)), angle));
-            for l in [lean[k], lean[(k + 2) % 3]].into_iter().filter(|l| !l.is_nan()) {
+            for l in [lean[k], lean[(k + 2) % 3]]
+                .into_iter()
+                .filter(|l| !l.is_nan())
+            {
                 f.lean += l;
                 counts[*name as usize] += 1.0;
             }
@@ -809,7 +874,11 @@ impl Field for OfCrease {
         let found = of.boxes.get(key(b.min, b.max), || {
             let d = of.region.value(b.center());
             let reach = norm(b.size()) / 2.0 * (1.0 + 1e-9);
-            let colors = if d.abs() - reach > NEAR * of.step { 0 } else { of.colors_near(b) };
+            let colors = if d.abs() - reach > NEAR * of.step {
+                0
+            } else {
+                of.colors_near(b)
+            };
             (d, colors)
         });
         let ((d, colors), off) = (*found, of.off(self.part));
@@ -1000,7 +1069,8 @@ impl<T> Default for Recent<T> {
 impl<T> Recent<T> {
     /// What belongs to a key, made if it is not at hand.
     fn get(&self, key: Vec<u64>, make: impl FnOnce() -> T) -> Arc<T> {
-        let held = |q: &VecDeque<(Vec<u64>, Arc<T>)>| q.iter().find(|e| e.0 == key).map(|e| e.1.clone());
+        let held =
+            |q: &VecDeque<(Vec<u64>, Arc<T>)>| q.iter().find(|e| e.0 == key).map(|e| e.1.clone());
         if let Some(known) = self.0.lock().ok().and_then(|q| held(&q)) {
             return known;
         }
@@ -1012,72 +1082,5 @@ impl<T> Recent<T> {
             q.push_back((key, new.clone()));
         }
         new
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::region::Repair;
-    use crate::region::tests::random;
-
-    #[test]
-    fn debug_edges() {
-        let steps: f64 = std::env::var("STEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(80.0);
-        let bytes = std::fs::read("/work/shared/data/fandisk.obj").unwrap();
-        let mesh = crate::io::read_mesh(&bytes, "obj").unwrap().mesh;
-        let region = Arc::new(MeshRegion::new(mesh, Repair::Refuse).unwrap());
-        let step = region.bounds.size().iter().fold(0.0f64, |m, x| m.max(*x)) / steps;
-        let mut faces = Vec::new();
-        let tree = super::faces(&region, step, &mut faces).unwrap();
-        let pairs = check::edges(&region.mesh).unwrap();
-        let p = patches::patches(&region.mesh, &pairs, step).unwrap();
-        let of = Creased::new(region.clone(), &p, step);
-        println!("{} patches, sets {:?} switched {:?}", p.count, of.sets.iter().map(|s| (bits(s.colors).collect::<Vec<_>>(), s.switched)).collect::<Vec<_>>(), of.switched);
-        let mut seed = 5;
-        let (mut tried, mut bad, mut fell, mut near) = (0, 0, 0, 0);
-        for _ in 0..400000 {
-            let t = (random(&mut seed).abs() * region.mesh.triangles.len() as f64) as usize;
-            let [a, b, c] = region.mesh.corners(t);
-            let m = scale(add(a, add(b, c)), 1.0 / 3.0);
-            let p = add(m, [0; 3].map(|_| 2.0 * step * random(&mut seed)));
-            let axis = (random(&mut seed).abs() * 3.0) as usize;
-            let mut q = p;
-            q[axis] += step;
-            let (dp, dq) = (region.value(p), region.value(q));
-            if (dp < 0.0) != (dq < 0.0) || dp.abs() + dq.abs() < 1.2 * step {
-                continue;
-            }
-            tried += 1;
-            let mut hits = Vec::new();
-            of.around(p, REACH * step, &mut hits);
-            if dp.abs() < NEAR * step && hits.len() > 1 {
-                near += 1;
-                fell += usize::from(of.values_at(p, dp, &hits).1.len() < hits.len());
-            }
-            let u: Vec<[f64; 2]> = faces.iter().map(|f| [f.field.value(p), f.field.value(q)]).collect();
-            let wrong = (0..=64).find(|t| {
-                let t = f64::from(*t) / 64.0;
-                let v = tree.value(&|f| u[f][0] * (1.0 - t) + u[f][1] * t).0;
-                (v <= 0.0) != (dp <= 0.0)
-            });
-            if let Some(t) = wrong {
-                bad += 1;
-                if bad <= 4 {
-                    println!("{p:.4?} {q:.4?}: {:.2} {:.2} steps, wrong at {t}", dp / step, dq / step);
-                    println!("  sets {:?}", of.sets.iter().map(|s| bits(s.colors).collect::<Vec<_>>()).collect::<Vec<_>>());
-                    for x in [p, q] {
-                        of.around(x, REACH * step, &mut hits);
-                        println!("  all:");
-                        for m in &of.members(x, &hits) {
-                            println!("   {} {:.2} {:.3?} {:.2?} {:.2?} {:.2}", m.patch, m.value / step, m.foot, m.normal, m.inward, m.lean);
-                        }
-                        let (v, members) = of.values_at(x, region.value(x), &hits);
-                        println!("   color {:?} used {} alone {:?} sets {:?}", members.iter().map(|m| (m.patch, of.color[m.patch as usize])).collect::<Vec<_>>(), members.len(), bits(v.alone).collect::<Vec<_>>(), bits(v.sets).collect::<Vec<_>>());
-                    }
-                }
-            }
-        }
-        println!("{bad} of {tried} bad; {fell} of {near} fell back");
     }
 }

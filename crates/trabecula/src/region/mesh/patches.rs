@@ -107,7 +107,6 @@ pub fn patches(mesh: &Mesh, pairs: &Pairs, step: f64) -> Option<Patches> {
     if numbers.len() > MANY && length * DENSE * step > mesh.area() {
         return None;
     }
-    if std::env::var("TRACE").is_ok() { println!("{} patches, density {}", numbers.len(), length * step / mesh.area()); }
     (!borders.is_empty()).then_some(Patches {
         of,
         count: numbers.len(),
@@ -263,7 +262,10 @@ fn renumber(sets: &mut Sets, of: &mut [u32], divided: &[bool]) -> usize {
 
 /// The ends of an edge.
 fn ends(mesh: &Mesh, e: &Edge) -> [u32; 2] {
-    let (t, k) = (mesh.triangles[e.halves[0] as usize / 3], e.halves[0] as usize % 3);
+    let (t, k) = (
+        mesh.triangles[e.halves[0] as usize / 3],
+        e.halves[0] as usize % 3,
+    );
     [t[k], t[(k + 1) % 3]]
 }
 
@@ -383,7 +385,12 @@ fn merge(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) {
     let mut queue: BinaryHeap<(Reverse<u64>, u32)> = BinaryHeap::new();
     let rank = |p: &Piece| Reverse(p.width().to_bits());
     let narrow = |p: &Piece| p.border > 0.0 && p.width() < NARROW * step;
-    queue.extend((0..).zip(&pieces).filter(|(_, p)| narrow(p)).map(|(i, p)| (rank(p), i)));
+    queue.extend(
+        (0..)
+            .zip(&pieces)
+            .filter(|(_, p)| narrow(p))
+            .map(|(i, p)| (rank(p), i)),
+    );
     while let Some((order, i)) = queue.pop() {
         let piece = &pieces[i as usize];
         if to.root(i) != i || !narrow(piece) || rank(piece) != order {
@@ -398,7 +405,10 @@ fn merge(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) {
         let (kept, gone) = (i.min(other), i.max(other));
         to.join(kept, gone);
         let gone_piece = std::mem::take(&mut pieces[gone as usize]);
-        let shared = pieces[kept as usize].beside.remove(&gone).unwrap_or_default();
+        let shared = pieces[kept as usize]
+            .beside
+            .remove(&gone)
+            .unwrap_or_default();
         let piece = &mut pieces[kept as usize];
         piece.area += gone_piece.area;
         piece.border += gone_piece.border - 2.0 * shared.0;
@@ -420,5 +430,50 @@ fn merge(mesh: &Mesh, edges: &[Edge], of: &mut [u32], count: usize, step: f64) {
     }
     for p in of.iter_mut() {
         *p = to.root(*p);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::check;
+    use super::super::tests::{ball, cuboid};
+    use super::*;
+
+    fn found(mesh: &Mesh, step: f64) -> Option<(usize, usize)> {
+        let pairs = check::edges(mesh).unwrap();
+        let p = patches(mesh, &pairs, step)?;
+        Some((p.count, p.borders.len()))
+    }
+
+    #[test]
+    fn patches_are_the_sides_that_a_grid_can_see() {
+        let plate = cuboid([0.0; 3], [2.0, 1.0, 0.1]);
+        assert_eq!(found(&plate, 0.02), Some((6, 12)));
+        // Its rim is narrower than two steps: each side goes to a neighbour, in the end to one of the two that are left.
+        assert_eq!(found(&plate, 0.07).unwrap().0, 2);
+        // Nothing is left of it at all.
+        assert_eq!(found(&plate, 2.0), None);
+        assert_eq!(found(&ball(4, 1.0, 0.0), 0.01), None);
+    }
+
+    #[test]
+    fn a_crease_that_fades_has_a_patch_on_either_side() {
+        let mut mesh = ball(5, 1.0, 0.0);
+        for v in &mut mesh.vertices {
+            let [x, _, z] = *v;
+            let ridge = 0.3 * x.max(0.0) * (1.0 - z.abs() * 3.0).max(0.0);
+            *v = v.map(|c| c * (1.0 + ridge));
+        }
+        let p = patches(&mesh, &check::edges(&mesh).unwrap(), 0.02).unwrap();
+        // The crest is an edge of triangles on both sides of z = 0.
+        let above = |t: u32| mesh.corners(t as usize).iter().map(|c| c[2]).sum::<f64>() > 0.0;
+        let strong = p.borders.iter().filter(|e| e.turn > TURN);
+        assert!(strong.clone().count() > 20);
+        let split = strong.filter(|e| {
+            let [a, b] = e.triangles();
+            above(a) != above(b)
+        });
+        assert!(split.count() > 20);
+        assert!(p.borders.iter().any(|e| e.turn.abs() < TURN / 4.0));
     }
 }
