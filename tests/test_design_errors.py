@@ -102,7 +102,36 @@ CASES = [
     # cells
     ('cell = "gyroid"', "cell.tet = {}", "lattice.core.cell.tet", ["not in this version yet"]),
     ('cell = "gyroid"', "cell.series = { terms = [] }", "lattice.core.cell.series", []),
-    ('cell = "gyroid"', "cell.series = { group = 227 }", "lattice.core.cell.series.group", ["not in this version yet"]),
+    (
+        'cell = "gyroid"',
+        "cell.series = { group = 231, terms = [{ hkl = [1, 0, 0] }] }",
+        "lattice.core.cell.series.group",
+        ["1 to 230"],
+    ),
+    (
+        'cell = "gyroid"',
+        'cell.series = { group = "Fd3x", terms = [{ hkl = [1, 0, 0] }] }',
+        "lattice.core.cell.series.group",
+        ["Fd3x"],
+    ),
+    (
+        'cell = "gyroid"',
+        "cell.series = { group = 1.5, terms = [{ hkl = [1, 0, 0] }] }",
+        "lattice.core.cell.series.group",
+        ["1.5"],
+    ),
+    (
+        'cell = "gyroid"',
+        "cell.series = { group = 229, terms = [{ hkl = [1, 0, 0] }] }",
+        "lattice.core.cell.series.terms[0].hkl",
+        ["absent in Im-3m"],
+    ),
+    (
+        'cell = "gyroid"',
+        'cell.series = { group = 221, terms = [{ hkl = [1, 0, 0], component = "im" }] }',
+        "lattice.core.cell.series.terms[0].hkl",
+        ["imaginary part", 'component = "re"'],
+    ),
     (
         'cell = "gyroid"',
         "cell.series = { terms = [{ hkl = [1, 0.5, 0] }] }",

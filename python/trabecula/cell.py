@@ -14,7 +14,7 @@ from difflib import get_close_matches
 
 from .given import plain
 
-__all__ = ["names", "series", "term"]
+__all__ = ["group", "names", "series", "term"]
 
 
 def names() -> list[str]:
@@ -25,7 +25,11 @@ def names() -> list[str]:
 
 
 def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, component: str = "re") -> dict:
-    """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``."""
+    """One plane wave, amplitude · cos 2π(h·u + phase): whole numbers hkl, phase in turns; a sine if ``component="im"``.
+
+    In a series with a group it is the real or imaginary part of amplitude · e^{2πi phase} Σ e^{2πi h·(R u + t)}, the sum
+    over the group's operations, divided by its largest Fourier coefficient.
+    """
     made: dict = {"hkl": plain(hkl)}
     if amplitude != 1.0:
         made["amplitude"] = amplitude
@@ -36,9 +40,32 @@ def term(hkl: Sequence[int], amplitude: float = 1.0, phase: float = 0.0, compone
     return made
 
 
-def series(terms: Iterable[dict]) -> dict:
-    """A cell as the sum of its terms."""
-    return {"series": {"terms": list(terms)}}
+def series(terms: Iterable[dict], group: int | str | None = None) -> dict:
+    """A cell as the sum of its terms; with ``group``, each of them summed over that space group.
+
+    ``group``: the number (227), the Hermann–Mauguin symbol (``"Fd-3m"``), either with a setting (``"227:1"``; origin choice
+    2 unless given), or the Hall symbol (``"-F 4vw 2vw 3"``). Designs refuse a wave that the group's centring, screws or
+    glides extinguish.
+    """
+    made: dict = {"terms": list(terms)}
+    if group is not None:
+        made["group"] = plain(group)
+    return {"series": made}
+
+
+def group(symbol: int | str) -> dict:
+    """A space group: ``number`` (None for a Hall symbol in a setting of one's own), ``name``, and ``operations``, pairs of a
+    rotation R (3×3) and a translation t, u ↦ R u + t with u in turns and t as fractions; centring included.
+
+    Symbols as in ``series``; what is no group raises a ``DesignError``.
+    """
+    from fractions import Fraction
+
+    from . import _core
+
+    number, name, operations = _core.group(str(plain(symbol)))
+    parts = [(r, [Fraction(v, 24) for v in t]) for r, t in operations]
+    return {"number": number, "name": name, "operations": parts}
 
 
 def __getattr__(name: str) -> Callable[[], str]:

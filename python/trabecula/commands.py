@@ -1,4 +1,4 @@
-"""The commands. This module brings all that they need, so that nothing is imported once the work has begun."""
+"""The commands. What one needs is imported before its work begins."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import os
 import time
 import warnings
 from difflib import get_close_matches
-
-import numpy  # noqa: F401  voxels and figures want it later
 
 from . import _core, cell
 from .design import load
@@ -140,6 +138,8 @@ def simplified(mesh: Mesh, args) -> Mesh:
 
 def voxels(args) -> None:
     """``trabecula voxels``."""
+    import numpy  # noqa: F401  wanted in the end; see `interrupt` for why no import waits until then
+
     check_place(args.output)
     start = time.perf_counter()
     solid = build(args.design)

@@ -1,5 +1,6 @@
-//! Files that are read whole: regular ones that memory can hold.
+//! Files: read whole if they are regular ones that memory can hold; written anew.
 
+use std::fs::File;
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
@@ -35,4 +36,18 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
         return wrong(ErrorKind::OutOfMemory, message);
     }
     std::fs::read(path).or_else(|e| wrong(e.kind(), format!("{name} cannot be read: {e}")))
+}
+
+/// The file at `path`, empty, to be written and read back.
+///
+/// It is cut off only if there is something to cut: some systems flush a file to the disk when it is closed if it was
+/// truncated when it was opened, and that takes as long as the writing.
+pub fn anew(path: &Path) -> Result<File> {
+    let mut options = File::options();
+    let file = options.read(true).write(true).create(true).truncate(false);
+    let file = file.open(path)?;
+    if file.metadata()?.len() > 0 {
+        file.set_len(0)?;
+    }
+    Ok(file)
 }

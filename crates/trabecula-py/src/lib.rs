@@ -83,6 +83,16 @@ mod _core {
         trabecula::design::schema().to_string()
     }
 
+    /// A space group: its number, its name, and its operations as rotations and translations (in parts of 24).
+    #[pyfunction]
+    #[allow(clippy::type_complexity)] // what Python gets, and nothing else uses
+    fn group(symbol: &str) -> PyResult<(Option<u16>, String, Vec<([[i32; 3]; 3], [i32; 3])>)> {
+        let group = trabecula::symmetry::Group::named(symbol).map_err(crate::error::fault)?;
+        let operations = group.operations.iter();
+        let operations = operations.map(|o| (o.rotation, o.translation)).collect();
+        Ok((group.number, group.name, operations))
+    }
+
     /// The named cells: (name, title, formula, group, source).
     #[pyfunction]
     fn cells() -> Vec<(

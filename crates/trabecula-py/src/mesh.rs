@@ -1,6 +1,5 @@
 //! Meshes: arrays, figures, files, pictures.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
@@ -15,6 +14,7 @@ use trabecula::simplify::{Goal, simplify};
 use trabecula::{io, measure};
 
 use crate::error;
+use crate::file;
 use crate::run::run;
 use crate::solid::Region;
 
@@ -270,7 +270,7 @@ impl Mesh {
             application,
         };
         let written = run(py, None, None, |_| {
-            let mut out = BufWriter::with_capacity(1 << 20, File::create(path)?);
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
             io::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;
             out.flush()
         })?;

@@ -1,6 +1,5 @@
 //! Solids: field, surface, voxels, figures.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
@@ -17,6 +16,7 @@ use trabecula::region::Repaired;
 
 use crate::design::Folder;
 use crate::error;
+use crate::file;
 use crate::islands;
 use crate::mesh::Mesh;
 use crate::run::run;
@@ -209,13 +209,7 @@ impl Solid {
         let islands = islands::named(islands)?;
         let summary = run(py, threads, progress, |p| {
             // Whole tiles are written at once: a buffer would only copy them.
-            let open = File::options()
-                .read(true)
-                .write(true)
-                .create(true)
-                .truncate(true)
-                .open(path);
-            let mut out = open.map_err(Stopped::Io)?;
+            let mut out = file::anew(&path).map_err(Stopped::Io)?;
             extract::stream_stl(&self.built.solid, edge, islands, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
@@ -357,7 +351,7 @@ impl Voxels {
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str) -> PyResult<()> {
         let v = &self.voxels;
         let written = run(py, None, None, |_| {
-            let mut out = BufWriter::with_capacity(1 << 20, File::create(path)?);
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
             match extension {
                 "npy" => io::write_npy(v.shape, &v.solid, &mut out)?,
                 _ => io::write_vti(v, &mut out)?,

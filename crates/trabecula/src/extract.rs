@@ -4,9 +4,11 @@
 //! and taken in order, so the result does not depend on the number of threads and memory is bounded by the tiles in
 //! flight plus the output.
 
+use std::collections::HashMap;
 use std::io;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use rayon::Scope;
 use rayon::prelude::*;
 
 use crate::fault::Fault;
@@ -148,47 +150,138 @@ fn not_empty(triangles: u64, edge: f64) -> Result<(), Stopped> {
     Err(Stopped::Refused(Fault::new("edge", message)))
 }
 
-/// Extracts all tiles, a few at a time, and hands what `cook` makes of them to `take` in order.
+/// Tiles that may be extracted before their turn to be taken, for each thread: so few that they stay in the cache.
+const AHEAD: usize = 4;
+
+/// What the threads at work on the tiles share.
+struct Queue<T> {
+    /// The next tile to extract.
+    next: usize,
+    /// The next tile to take.
+    turn: usize,
+    /// Tiles that wait for their turn.
+    ready: HashMap<usize, Option<T>>,
+    /// Whether a thread is taking tiles.
+    taking: bool,
+    /// Threads that have stopped because too many tiles wait.
+    resting: usize,
+    ended: Result<(), Stopped>,
+}
+
+/// Extracts all tiles and hands what `cook` makes of them to `take` in order.
+///
+/// Every thread extracts the next tile, and takes what is ready if no other does. A thread that is too far ahead ends,
+/// and is started again when a tile has been taken: none ever waits, which might block what it waits for.
 fn each_tile<T: Send>(
     grid: &Grid,
     progress: &dyn Progress,
     cook: impl Fn(View) -> T + Sync,
-    mut take: impl FnMut(T) -> Result<(), Stopped> + Send,
+    take: impl FnMut(T) -> Result<(), Stopped> + Send,
 ) -> Result<(), Stopped> {
     let total: usize = grid.tiles().iter().product();
-    let scratch = Mutex::new(Vec::<Scratch>::new());
-    let work = |tiles: std::ops::Range<usize>| -> Vec<Option<T>> {
-        tiles
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|i| {
-                let mut mine = borrow(&scratch);
-                let found = tile::extract(grid, grid.tile(i), &mut mine).map(&cook);
-                give_back(&scratch, mine);
-                found
-            })
-            .collect()
+    let threads = rayon::current_num_threads();
+    let work = Work {
+        grid,
+        progress,
+        total,
+        ahead: AHEAD * threads,
+        scratch: Mutex::default(),
+        cook,
+        take: Mutex::new(take),
+        queue: Mutex::new(Queue {
+            next: 0,
+            turn: 0,
+            ready: HashMap::new(),
+            taking: false,
+            resting: 0,
+            ended: Ok(()),
+        }),
     };
-    // Enough tiles that threads seldom wait for each other, few enough that they fit in some tens of megabytes.
-    let batch = 16 * rayon::current_num_threads();
-    let mut ready: Vec<Option<T>> = Vec::new();
-    let mut next = 0;
-    loop {
-        let tiles = next..(next + batch).min(total);
-        next = tiles.end;
-        // While one batch is taken the following one is extracted.
-        let (done, found) = rayon::join(
-            || ready.drain(..).flatten().try_for_each(&mut take),
-            || work(tiles.clone()),
-        );
-        done?;
-        if !progress.step(next as u64, total as u64) {
-            return Err(Stopped::Interrupted);
+    rayon::scope(|scope| (0..threads).for_each(|_| scope.spawn(|scope| work.run(scope))));
+    let queue = work.queue.into_inner();
+    queue.unwrap_or_else(PoisonError::into_inner).ended
+}
+
+/// The work on all tiles.
+struct Work<'a, T, C, K> {
+    grid: &'a Grid,
+    progress: &'a dyn Progress,
+    total: usize,
+    ahead: usize,
+    scratch: Mutex<Vec<Scratch>>,
+    cook: C,
+    take: Mutex<K>,
+    queue: Mutex<Queue<T>>,
+}
+
+impl<T, C, K> Work<'_, T, C, K>
+where
+    T: Send,
+    C: Fn(View) -> T + Sync,
+    K: FnMut(T) -> Result<(), Stopped> + Send,
+{
+    /// No thread panics while it holds the queue.
+    fn queue(&self) -> MutexGuard<'_, Queue<T>> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn run<'s>(&'s self, scope: &Scope<'s>) {
+        let mut scratch = borrow(&self.scratch);
+        while let Some(i) = self.claim() {
+            let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(&self.cook);
+            self.queue().ready.insert(i, found);
+            self.take_ready(scope);
         }
-        ready = found;
-        if tiles.is_empty() {
-            return Ok(());
+        give_back(&self.scratch, scratch);
+    }
+
+    /// The next tile to extract, if there is one and not too many wait.
+    fn claim(&self) -> Option<usize> {
+        let mut q = self.queue();
+        if q.next == self.total || q.ended.is_err() {
+            return None;
         }
+        if q.next >= q.turn + self.ahead {
+            q.resting += 1;
+            return None;
+        }
+        q.next += 1;
+        Some(q.next - 1)
+    }
+
+    /// Takes the tiles whose turn it is, unless another thread does.
+    fn take_ready<'s>(&'s self, scope: &Scope<'s>) {
+        let mut q = self.queue();
+        if q.taking {
+            return;
+        }
+        q.taking = true;
+        while q.ended.is_ok() {
+            let turn = q.turn;
+            let Some(found) = q.ready.remove(&turn) else {
+                break;
+            };
+            drop(q);
+            let taken = match (found, self.take.lock()) {
+                (Some(found), Ok(mut take)) => take(found),
+                _ => Ok(()),
+            };
+            let go_on = self.progress.step(turn as u64 + 1, self.total as u64);
+            q = self.queue();
+            q.turn += 1;
+            if q.ended.is_ok() {
+                q.ended = taken.and(if go_on {
+                    Ok(())
+                } else {
+                    Err(Stopped::Interrupted)
+                });
+            }
+            if q.resting > 0 {
+                q.resting -= 1;
+                scope.spawn(|scope| self.run(scope));
+            }
+        }
+        q.taking = false;
     }
 }
 
@@ -217,10 +310,7 @@ pub fn surface_of(
     let mut census = Census::default();
     // Vertices on the borders of tiles, by name.
     let mut border: ByName<u32> = ByName::default();
-    let cook = |view: View| {
-        let bodies = Bodies::of(&view, middle);
-        (view.patch(&bodies), bodies)
-    };
+    let cook = |view: View| view.patch(middle);
     each_tile(&grid, progress, cook, |(patch, bodies)| {
         let mut names = Vec::with_capacity(patch.vertices.len());
         for (v, shared) in patch.vertices.iter().zip(&patch.shared) {
@@ -322,10 +412,9 @@ pub fn stream_stl<W: Store>(
     out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
     let spare = Mutex::new(Vec::<Vec<u8>>::new());
     let cook = |view: View| {
-        let bodies = Bodies::of(&view, middle);
         let mut records = borrow(&spare);
         let places = view.places();
-        bodies.each_triangle(&view, |t, _| {
+        let bodies = Bodies::each_triangle(&view, middle, |t, _| {
             let corners = t.map(|v| places[v as usize].map(|x| x as f32));
             stl::push_record(&mut records, corners);
         });

@@ -23,3 +23,4 @@ pub mod render;
 pub mod simplify;
 pub mod skin;
 pub mod solid;
+pub mod symmetry;

@@ -1,5 +1,6 @@
 //! Data to solid: values are checked, pieces are joined, and what may not be meant is warned of.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::data::*;
@@ -8,12 +9,14 @@ use super::report::Varied;
 use super::{Built, Design, Loader, Warning, level, region, sample, skin};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
-use crate::fault::number;
+use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::lattice::Lattice;
 use crate::map::{Affine, Map};
+use crate::math::sin_cos_turns;
 use crate::region::Region;
 use crate::solid::Solid;
+use crate::symmetry::{Group, Side};
 
 /// Points at which a design is looked at.
 pub(super) const LOOKS: usize = 8_000;
@@ -171,22 +174,63 @@ pub(super) fn cell<'a>(
                 finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
                 finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
             }
-            let term = |t: &TermSpec| Term {
-                hkl: t.hkl,
-                amplitude: t.amplitude,
-                // sin a = cos(a − a quarter turn).
-                phase: t.phase
-                    - if t.component == Component::Im {
-                        0.25
-                    } else {
-                        0.0
-                    },
+            let terms = match &s.group {
+                None => s.terms.iter().map(plain_term).collect(),
+                Some(symbol) => {
+                    let wrong = |place: &str, f| DesignError::fault(&format!("{at}.{place}"), f);
+                    let group = Group::named(symbol).map_err(|f| wrong("group", f))?;
+                    let mut all = Vec::new();
+                    for (i, t) in s.terms.iter().enumerate() {
+                        let orbit = orbit_terms(&group, t);
+                        all.extend(orbit.map_err(|f| wrong(&format!("terms[{i}]"), f))?);
+                    }
+                    all
+                }
             };
-            (None, s.terms.iter().map(term).collect(), at)
+            (None, terms, at)
         }
     };
     let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
     Ok((name, Cell::new(series)))
+}
+
+fn plain_term(t: &TermSpec) -> Term {
+    // sin a = cos(a − a quarter turn).
+    let behind = match t.component {
+        Component::Re => 0.0,
+        Component::Im => 0.25,
+    };
+    Term {
+        hkl: t.hkl,
+        amplitude: t.amplitude,
+        phase: t.phase - behind,
+    }
+}
+
+/// The sum of a term over a space group. A phase mixes its two parts, each of them normalised.
+fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
+    let (s, c) = sin_cos_turns(t.phase);
+    let (parts, word, other) = match t.component {
+        Component::Re => ([(Side::Re, c), (Side::Im, -s)], "real", "im"),
+        Component::Im => ([(Side::Re, s), (Side::Im, c)], "imaginary", "re"),
+    };
+    let mut terms = Vec::new();
+    for (side, factor) in parts.into_iter().filter(|p| p.1 != 0.0) {
+        let waves = group.orbit(t.hkl, side)?;
+        terms.extend(waves.into_iter().map(|(hkl, cosine, sine)| Term {
+            hkl,
+            amplitude: t.amplitude * factor * cosine.hypot(sine),
+            phase: (-sine).atan2(cosine) / TAU,
+        }));
+    }
+    if terms.is_empty() {
+        let message = format!(
+            "the {word} part of the sum of {:?} over {} vanishes; use component = \"{other}\", or another origin choice",
+            t.hkl, group.name
+        );
+        return Err(Fault::new("hkl", message));
+    }
+    Ok(terms)
 }
 
 fn map(spec: &MapSpec, path: &str) -> Result<Map, DesignError> {

@@ -234,11 +234,18 @@ pub enum CellKind {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SeriesSpec {
+    /// A space group: then each term stands for the sum of its wave over the group, divided by that sum's largest Fourier
+    /// coefficient. By number (227), Hermann–Mauguin symbol ("Fd-3m"), either with a setting ("227:1"; origin choice 2 unless
+    /// given), or Hall symbol.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "schema::group")]
+    pub group: Option<String>,
     /// The terms.
     pub terms: Vec<TermSpec>,
 }
 
-/// amplitude · cos 2π(h·u + phase), u in turns; or the sine.
+/// amplitude · cos 2π(h·u + phase), u in turns; or the sine. With a group: the same part of amplitude · e^{2πi phase} times
+/// the sum of e^{2πi h·u} over the group.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermSpec {

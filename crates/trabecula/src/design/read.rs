@@ -339,8 +339,7 @@ fn cell(at: &At) -> Read<CellSpec> {
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
     let (_, at) = at.kind("cell", &["series"], &LATER_CELL)?;
-    let later = [("group", "write out all its terms")];
-    let f = at.fields("a series", &["terms"], &later)?;
+    let f = at.fields("a series", &["terms", "group"], &[])?;
     let terms = f.need(
         "terms",
         "a list of { hkl = [h, k, l], amplitude = 1, phase = 0 }",
@@ -350,7 +349,26 @@ fn cell(at: &At) -> Read<CellSpec> {
         .iter()
         .map(term)
         .collect::<Read<Vec<_>>>()?;
-    Ok(CellSpec::Kind(CellKind::Series(SeriesSpec { terms })))
+    let group = f.get("group").map(group).transpose()?;
+    Ok(CellSpec::Kind(CellKind::Series(SeriesSpec {
+        group,
+        terms,
+    })))
+}
+
+/// A space group's symbol, which may be its number.
+fn group(at: &At) -> Read<String> {
+    if !at.is_number() {
+        return Ok(at
+            .text("a space group such as 227, \"227:2\" or \"Fd-3m\"")?
+            .to_string());
+    }
+    match at.number()? {
+        n if n.fract() == 0.0 && n.abs() < 1e6 => Ok(format!("{n}")),
+        n => Err(at.error(format!(
+            "expected a space group, found {n}; they are numbered from 1 to 230"
+        ))),
+    }
 }
 
 fn term(at: &At) -> Read<TermSpec> {

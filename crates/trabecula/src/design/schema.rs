@@ -13,6 +13,11 @@ pub fn schema() -> Value {
     v
 }
 
+/// A space group's number or symbol.
+pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["string", "integer"] })
+}
+
 /// The names of the ready cells.
 pub(super) fn cell_name(_: &mut SchemaGenerator) -> Schema {
     let names: Vec<&str> = catalogue().iter().map(|n| n.name).collect();

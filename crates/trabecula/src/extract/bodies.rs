@@ -64,47 +64,62 @@ pub(super) const LINES: usize = TILE * TILE;
 #[derive(Debug)]
 pub(super) struct Bodies {
     pub tile: [usize; 3],
+    /// Triangles, volumes and areas are added up while the triangles are taken.
     pub sums: Vec<Sum>,
     /// The vertices that other tiles may use: name and body.
     pub border: Vec<(u128, u32)>,
     /// Bodies with a stretch of solid between them.
     pub beside: Vec<(u32, u32)>,
     pub lines: Vec<Line>,
-    /// The tile's triangles body by body, as numbers in its own order; empty where there is one body only.
-    order: Vec<u32>,
 }
 
 impl Bodies {
-    /// Finds the bodies of a tile's surface; volumes are taken about `middle`.
-    pub fn of(view: &View, middle: Vec3) -> Bodies {
+    /// Finds the bodies of a tile's surface and calls `take` for its triangles, body by body, so that what is left out
+    /// later lies together: with the corners' numbers, and whether it lies on the region's surface. Volumes are taken
+    /// about `middle`.
+    pub fn each_triangle(
+        view: &View,
+        middle: Vec3,
+        mut take: impl FnMut([u32; 3], bool),
+    ) -> Bodies {
         let places = view.places();
         let mut root = vec![NONE; places.len()];
         for (t, _) in view.triangles() {
             join(&mut root, t);
         }
-        let (body, mut sums) = number(root);
-        add_triangles(view, &body, middle, &mut sums);
-        let border = add_vertices(view, &body, &mut sums);
+        let (body, mut sums) = number(root, places);
+        let mut add = |sum: &mut Sum, t: [u32; 3], cut: bool| {
+            let [a, b, c] = t.map(|v| places[v as usize]);
+            let n = cross(sub(b, a), sub(c, a));
+            sum.triangles += 1;
+            sum.volume += dot(sub(a, middle), n) / 6.0;
+            sum.area[usize::from(cut)] += norm(n) / 2.0;
+            take(t, cut);
+        };
+        // Added up apart: what is not in memory need not go through it.
+        if let [sum] = &mut sums[..] {
+            let mut whole = *sum;
+            view.triangles()
+                .for_each(|(t, cut)| add(&mut whole, t, cut));
+            *sum = whole;
+        } else {
+            let apart = sorted(view, &body, sums.len());
+            for (sum, triangles) in sums.iter_mut().zip(apart) {
+                let mut whole = *sum;
+                for (t, cut) in triangles {
+                    add(&mut whole, t, cut);
+                }
+                *sum = whole;
+            }
+        }
+        let border = border(view, &body, &mut sums);
         let (lines, beside) = lines(view, &body);
         Bodies {
             tile: view.tile(),
             border,
             beside,
             lines,
-            order: sorted(view, &body, sums.len()),
             sums,
-        }
-    }
-
-    /// Calls `take` for the tile's triangles, body by body: so what is left out later lies together.
-    pub fn each_triangle(&self, view: &View, mut take: impl FnMut([u32; 3], bool)) {
-        if self.order.is_empty() {
-            return view.triangles().for_each(|(t, cut)| take(t, cut));
-        }
-        let all: Vec<_> = view.triangles().collect();
-        for &i in &self.order {
-            let (t, cut) = all[i as usize];
-            take(t, cut);
         }
     }
 }
@@ -149,11 +164,11 @@ fn join(root: &mut [u32], [a, b, c]: [u32; 3]) {
     }
 }
 
-/// The body of each vertex, and a place for the sums of each body.
-fn number(mut root: Vec<u32>) -> (Vec<u32>, Vec<Sum>) {
+/// The body of each vertex, and the number and bounds of each body's vertices.
+fn number(mut root: Vec<u32>, places: &[Vec3]) -> (Vec<u32>, Vec<Sum>) {
     let mut body = vec![NONE; root.len()];
-    let mut sums = Vec::new();
-    for v in 0..root.len() {
+    let mut sums: Vec<Sum> = Vec::new();
+    for (v, place) in places.iter().enumerate() {
         if root[v] == NONE {
             continue;
         }
@@ -163,88 +178,33 @@ fn number(mut root: Vec<u32>) -> (Vec<u32>, Vec<Sum>) {
             sums.push(Sum::NONE);
         }
         body[v] = body[top];
+        let sum = &mut sums[body[v] as usize];
+        sum.vertices += 1;
+        sum.bounds = sum.bounds.with(*place);
     }
     (body, sums)
 }
 
-/// Adds up the triangles. Neighbours are mostly of one body, whose sums stay at hand.
-fn add_triangles(view: &View, body: &[u32], middle: Vec3, sums: &mut [Sum]) {
-    let places = view.places();
-    let (mut at, mut count, mut volume, mut area) = (NONE, 0u64, 0.0, [0.0; 2]);
-    let mut put = |at: u32, count: u64, volume: f64, area: [f64; 2]| {
-        if let Some(sum) = sums.get_mut(at as usize) {
-            sum.triangles += count;
-            sum.volume += volume / 6.0;
-            sum.area[0] += area[0] / 2.0;
-            sum.area[1] += area[1] / 2.0;
-        }
-    };
-    for (t, cut) in view.triangles() {
-        let of = body[t[0] as usize];
-        if of != at {
-            put(at, count, volume, area);
-            (at, count, volume, area) = (of, 0, 0.0, [0.0; 2]);
-        }
-        let [a, b, c] = t.map(|v| places[v as usize]);
-        let n = cross(sub(b, a), sub(c, a));
-        let twice = norm(n);
-        count += 1;
-        volume += dot(sub(a, middle), n);
-        area[0] += if cut { 0.0 } else { twice };
-        area[1] += if cut { twice } else { 0.0 };
-    }
-    put(at, count, volume, area);
-}
-
-/// Adds up the vertices; gives those that other tiles may use, with their bodies.
-fn add_vertices(view: &View, body: &[u32], sums: &mut [Sum]) -> Vec<(u128, u32)> {
+/// The vertices that other tiles may use, with their bodies; they are not counted in their tile.
+fn border(view: &View, body: &[u32], sums: &mut [Sum]) -> Vec<(u128, u32)> {
     let mut border = Vec::new();
-    let (mut at, mut count, mut bounds) = (NONE, 0u64, Aabb::EMPTY);
-    let mut put = |at: u32, count: u64, bounds: Aabb| {
-        if let Some(sum) = sums.get_mut(at as usize) {
-            sum.vertices += count;
-            sum.bounds = sum.bounds.union(bounds);
+    view.each_shared(&mut |v| {
+        let of = body[v as usize];
+        if of != NONE {
+            border.push((view.name(v as usize), of));
+            sums[of as usize].vertices -= 1;
         }
-    };
-    for (v, (place, &of)) in view.places().iter().zip(body).enumerate() {
-        if of == NONE {
-            continue;
-        }
-        if of != at {
-            put(at, count, bounds);
-            (at, count, bounds) = (of, 0, Aabb::EMPTY);
-        }
-        bounds = bounds.with(*place);
-        if view.is_shared(v) {
-            border.push((view.name(v), of));
-        } else {
-            count += 1;
-        }
-    }
-    put(at, count, bounds);
+    });
     border
 }
 
-/// The numbers of triangles sorted by body, each body's in their order; none where there is nothing to sort.
-fn sorted(view: &View, body: &[u32], bodies: usize) -> Vec<u32> {
-    if bodies < 2 {
-        return Vec::new();
+/// The triangles of each body, in their order.
+fn sorted(view: &View, body: &[u32], bodies: usize) -> Vec<Vec<([u32; 3], bool)>> {
+    let mut of = vec![Vec::new(); bodies];
+    for (t, cut) in view.triangles() {
+        of[body[t[0] as usize] as usize].push((t, cut));
     }
-    let all: Vec<u32> = view.triangles().map(|(t, _)| body[t[0] as usize]).collect();
-    let mut next = vec![0u32; bodies + 1];
-    for b in &all {
-        next[*b as usize + 1] += 1;
-    }
-    for b in 0..bodies {
-        next[b + 1] += next[b];
-    }
-    let mut order = vec![0; all.len()];
-    for (i, b) in all.iter().enumerate() {
-        let at = &mut next[*b as usize];
-        order[*at as usize] = i as u32;
-        *at += 1;
-    }
-    order
+    of
 }
 
 /// What the grid's lines in x meet in a tile, and which bodies have a stretch of solid between them on one.

@@ -6,26 +6,108 @@
 use std::ops::Range;
 
 use super::knot::{Key, Knots};
-use super::signs::Signs;
+use super::signs::{Signs, bits};
 
 /// Adds the cap of a laid face on the tile's own cells.
 pub(super) fn close(knots: &mut Knots, flat: usize, own: &[Range<usize>; 3]) {
     let face = &knots.local.flat[flat];
-    let axis = face.axis;
-    let layer = if face.below { face.at - 1 } else { face.at };
+    let (axis, upper, plane) = (face.axis, face.below, face.at);
+    let layer = if upper { plane - 1 } else { plane };
     if !own[axis].contains(&layer) {
         return;
     }
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let at = |layer: usize, a: usize, b: usize| {
+        let mut at = [layer; 3];
+        (at[u], at[v]) = (a, b);
+        at
+    };
+    let solid = solid_nodes(knots, axis, plane);
+    let mut names = [[u32::MAX; 64]; 64];
     for b in own[v].clone() {
+        let both = solid[b] & solid[b + 1];
         for a in own[u].clone() {
-            let mut cell = [0; 3];
-            (cell[axis], cell[u], cell[v]) = (layer, a, b);
-            if !knots.signs.is_knotted(cell) {
-                plain(knots, cell, axis, face.below);
+            let cell = at(layer, a, b);
+            if knots.signs.is_knotted(cell) {
+                continue;
+            }
+            let whole = both >> a & 3 == 3 && holds(knots, cell);
+            if !whole || beside_knot(knots, cell, [u, v]) {
+                plain(knots, cell, axis, upper);
+                continue;
+            }
+            // Nearly all of a cap: squares of nodes.
+            let mut ring = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)].map(|(a, b)| {
+                let name = &mut names[b][a];
+                if *name == u32::MAX {
+                    let node = knots.nodes.index(at(plane, a, b));
+                    *name = knots.vertex(Key::new(node, &[], &[]));
+                }
+                *name
+            });
+            if !upper {
+                ring.reverse();
+            }
+            let [p, q, r, s] = ring;
+            knots
+                .extra
+                .triangles
+                .extend([([p, q, r], true), ([p, r, s], true)]);
+        }
+    }
+}
+
+/// Whether a cell lies on the solid side of all laid faces.
+fn holds(knots: &Knots, [i, j, k]: [usize; 3]) -> bool {
+    let flats = 0..knots.local.flat.len();
+    let beside = |f| Signs::beside(knots.local, f, j, k);
+    flats.fold(u64::MAX, |w, f| w & beside(f)) >> i & 1 == 1
+}
+
+/// Whether a cell has a knotted neighbour in its layer, which may divide a common edge.
+fn beside_knot(knots: &Knots, cell: [usize; 3], sides: [usize; 2]) -> bool {
+    sides.into_iter().any(|side| {
+        [cell[side].wrapping_sub(1), cell[side] + 1]
+            .into_iter()
+            .any(|n| {
+                let mut beside = cell;
+                beside[side] = n;
+                n < knots.signs.shape[side] - 1 && knots.signs.is_knotted(beside)
+            })
+    })
+}
+
+/// Where the other faces are solid on a plane of nodes: a word along the next axis, for each node along the last.
+fn solid_nodes(knots: &Knots, axis: usize, plane: usize) -> [u64; 64] {
+    let signs = knots.signs;
+    let [_, ny, nz] = signs.shape;
+    let row = |j: usize, k: usize| {
+        knots.local.tree.solid(&|f| {
+            let negative = signs.negative.get(f);
+            negative.map_or(u64::MAX, |n| n[k * ny + j])
+        })
+    };
+    let mut words = [0; 64];
+    match axis {
+        0 => {
+            for (k, word) in words[..nz].iter_mut().enumerate() {
+                *word = (0..ny).fold(0, |w, j| w | (row(j, k) >> plane & 1) << j);
+            }
+        }
+        1 => {
+            for k in 0..nz {
+                for i in bits(row(plane, k)) {
+                    words[i] |= 1 << k;
+                }
+            }
+        }
+        _ => {
+            for (j, word) in words[..ny].iter_mut().enumerate() {
+                *word = row(j, plane);
             }
         }
     }
+    words
 }
 
 /// The cap of a cell that at most one face crosses: a polygon of nodes and of points on grid edges.

@@ -126,14 +126,18 @@ impl Hasher for Spread {
 
     fn write(&mut self, bytes: &[u8]) {
         for b in bytes {
-            self.write_u128(u128::from(*b));
+            self.write_u64(u64::from(*b));
         }
     }
 
-    fn write_u128(&mut self, n: u128) {
+    fn write_u64(&mut self, n: u64) {
         const ODD: u64 = 0x9e37_79b9_7f4a_7c15;
-        let half = (n as u64 ^ self.0).wrapping_mul(ODD).rotate_left(32);
-        self.0 = (half ^ (n >> 64) as u64).wrapping_mul(ODD).rotate_left(32);
+        self.0 = (self.0 ^ n).wrapping_mul(ODD).rotate_left(32);
+    }
+
+    fn write_u128(&mut self, n: u128) {
+        self.write_u64(n as u64);
+        self.write_u64((n >> 64) as u64);
     }
 }
 
@@ -206,9 +210,12 @@ impl Census {
             self.open.clear();
             self.open.resize(LINES, NONE);
         }
+        // Lines side by side mostly join the same two bodies.
+        let mut joined = (NONE, NONE);
         for line in &tile.lines {
             let open = &mut self.open[line.row as usize];
-            if line.first != NONE && *open != NONE {
+            if line.first != NONE && *open != NONE && joined != (line.first, *open) {
+                joined = (line.first, *open);
                 unite(&mut self.solid, base + line.first, *open);
             }
             *open = if line.last == NONE {

@@ -15,6 +15,7 @@
 //! for piecewise linear functions, ACM Trans. Graph. 41 (2022) 41; the division after H. Freudenthal (1942).
 
 use std::collections::{HashMap, HashSet};
+use std::hash::BuildHasherDefault;
 use std::ops::Range;
 
 use crate::math::{Vec3, add, cross, scale, sub};
@@ -22,6 +23,7 @@ use crate::measure::is_embedded;
 use crate::mesh::Mesh;
 
 use super::grid::{Grid, Local};
+use super::islands::Spread;
 use super::signs::{Signs, bits};
 use super::table::{CASES, EDGES};
 use super::tile::{Nodes, Numbers};
@@ -89,7 +91,7 @@ impl Key {
 /// What is not on plain cells' edges.
 #[derive(Default)]
 pub(super) struct Extra {
-    names: HashMap<Key, u32>,
+    names: HashMap<Key, u32, BuildHasherDefault<Spread>>,
     /// The names of the extra vertices.
     pub keys: Vec<Key>,
     /// Triangles, and whether they lie on the region's surface.
@@ -182,7 +184,7 @@ impl Knots<'_> {
         } else {
             v
         };
-        if self.samples[face][node] <= 0.0 {
+        if self.signs.is_negative(face, node) {
             v.min(-least)
         } else {
             v.max(least)
@@ -464,7 +466,7 @@ impl Knots<'_> {
         for f in 0..self.local.live.len() {
             let count = simplex.nodes[..simplex.count]
                 .iter()
-                .filter(|n| self.samples[f][**n] <= 0.0)
+                .filter(|n| self.signs.is_negative(f, **n))
                 .count();
             all |= u64::from(count == simplex.count) << f;
             some |= u64::from(count > 0) << f;

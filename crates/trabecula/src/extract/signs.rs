@@ -172,6 +172,13 @@ impl Signs {
             | pair(row + self.shape[1] + 1) << 6
     }
 
+    /// Whether a face is negative at a node.
+    #[inline]
+    pub fn is_negative(&self, face: usize, node: usize) -> bool {
+        let nx = self.shape[0];
+        self.negative[face][node / nx] >> (node % nx) & 1 == 1
+    }
+
     /// Whether a cell of the block is knotted.
     #[inline]
     pub fn is_knotted(&self, cell: [usize; 3]) -> bool {
@@ -260,20 +267,25 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The word of signs of each row of samples: the bits whose value is at most zero.
+/// The word of signs of each row of samples: the bits whose value is negative, or zero too if `zero_counts`.
+///
+/// Zero counts for the region, so that bodies that touch are joined. For the lattice it does not: where a surface runs
+/// through the very corner of a region, the corner would become a speck of solid.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(super) fn negative(words: &mut Vec<u64>, samples: &[f32], nx: usize) {
+pub(super) fn negative(words: &mut Vec<u64>, samples: &[f32], nx: usize, zero_counts: bool) {
+    // The negative number nearest to zero.
+    let most = if zero_counts { 0.0 } else { -f32::from_bits(1) };
     words.clear();
     for row in samples.chunks_exact(nx) {
         let mut signs = 0u64;
         let (whole, rest) = row.as_chunks::<32>();
         for (k, values) in whole.iter().enumerate() {
             // Thirty-two values, so that a lane of the vector is as wide as a value.
-            let lanes: [u32; 32] = core::array::from_fn(|i| u32::from(values[i] <= 0.0) << i);
+            let lanes: [u32; 32] = core::array::from_fn(|i| u32::from(values[i] <= most) << i);
             signs |= u64::from(lanes.iter().fold(0, |w, b| w | b)) << (32 * k);
         }
         for (i, v) in rest.iter().enumerate() {
-            signs |= u64::from(*v <= 0.0) << (32 * whole.len() + i);
+            signs |= u64::from(*v <= most) << (32 * whole.len() + i);
         }
         words.push(signs);
     }

@@ -22,13 +22,13 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use crate::field::{Block, Field};
-use crate::math::{Vec3, cross, dot, norm, sub, unit};
+use crate::math::{Vec3, unit};
 
 use super::bodies::Bodies;
 use super::cap;
 use super::grid::{Flat, Grid, Local, TILE};
 use super::knot::{Extra, Key, Knots};
-use super::signs::{Signs, below, negative, within};
+use super::signs::{Signs, below, bits, negative, within};
 use super::table::{CASES, EDGES, MOST};
 
 /// The surface in one tile, by itself.
@@ -59,9 +59,9 @@ pub(super) struct Scratch {
     /// Places of all vertices: those on grid edges, then the extra ones.
     places: Vec<Vec3>,
     /// Unit normals of the vertices on edges.
-    normals: Vec<Vec3>,
+    normals: Vec<[f32; 3]>,
     /// For each vertex on an edge: the volume it is to lose, and three times what it loses per mm along its edge.
-    moments: Vec<(f64, f64)>,
+    moments: Vec<(f32, f32)>,
     extra: Extra,
 }
 
@@ -113,41 +113,44 @@ enum Kind {
     Cut,
 }
 
-/// A vertex on a grid edge, at `solid` + t · `reach` along `axis`.
+/// A vertex on a grid edge. Small, as a tile has ten thousand of them: what the block tells is not kept.
 #[derive(Clone, Copy)]
 struct Vertex {
-    /// The solid end of the edge.
-    solid: Vec3,
-    /// Signed length of the edge from its solid to its void end.
-    reach: f64,
-    /// Position on the edge from the solid end (0) to the void end (1).
-    t: f64,
-    /// Index in the block of the lower node of the edge.
-    low: u32,
+    /// The lower node of the edge.
+    node: [u8; 3],
     axis: u8,
     face: u8,
+    /// Whether the solid end is the lower one.
+    up: bool,
     /// Whether a knotted cell has the edge too: then its way of placing the vertex holds.
     fixed: bool,
+    /// Position on the edge from the solid end (0) to the void end (1). Rounding moves the vertex by 1e-7 of the edge.
+    t: f32,
 }
 
 impl Vertex {
+    /// The lower node, as an index in the block.
     #[inline]
-    fn at(&self, t: f64) -> Vec3 {
-        // Chosen, not indexed: a number stored by index is not there yet when the whole is loaded.
-        let moved = self.solid.map(|x| x + t * self.reach);
-        core::array::from_fn(|a| {
-            if a == self.axis as usize {
-                moved[a]
-            } else {
-                self.solid[a]
-            }
-        })
+    fn low(&self, nodes: &Nodes) -> usize {
+        nodes.index(self.node.map(usize::from))
     }
 
-    /// Whether the solid end is the lower one.
+    /// Signed length of the edge from its solid to its void end.
     #[inline]
-    fn up(&self) -> bool {
-        self.reach > 0.0
+    fn reach(&self, nodes: &Nodes) -> f64 {
+        let axis = usize::from(self.axis) % 3;
+        let length = nodes.steps[axis][usize::from(self.node[axis]) % 64];
+        if self.up { length } else { -length }
+    }
+
+    #[inline]
+    fn at(&self, nodes: &Nodes, t: f64) -> Vec3 {
+        let s = if self.up { t } else { 1.0 - t };
+        core::array::from_fn(|a| {
+            let n = usize::from(self.node[a]) % 64;
+            let share = if a == usize::from(self.axis) { s } else { 0.0 };
+            nodes.places[a][n] + share * nodes.steps[a][n]
+        })
     }
 }
 
@@ -156,15 +159,27 @@ pub(super) struct Nodes<'a> {
     pub axes: [&'a [f64]; 3],
     pub shape: [usize; 3],
     pub stride: [usize; 3],
+    /// The coordinates again, and the steps to the next, where any index is within bounds.
+    places: [[f64; 64]; 3],
+    steps: [[f64; 64]; 3],
 }
 
 impl<'a> Nodes<'a> {
     fn new(block: &Block<'a>) -> Nodes<'a> {
         let shape = block.shape();
+        let (mut places, mut steps) = ([[0.0; 64]; 3], [[0.0; 64]; 3]);
+        for (a, axis) in block.axes.iter().enumerate() {
+            places[a][..axis.len()].copy_from_slice(axis);
+            for (step, ends) in steps[a].iter_mut().zip(axis.windows(2)) {
+                *step = ends[1] - ends[0];
+            }
+        }
         Nodes {
             axes: block.axes,
             shape,
             stride: [1, shape[0], shape[0] * shape[1]],
+            places,
+            steps,
         }
     }
 
@@ -187,7 +202,7 @@ impl<'a> Nodes<'a> {
 }
 
 /// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
-const BATCH: usize = 2048;
+const BATCH: usize = 512;
 
 /// The surface found in a tile, in the buffers that it was found in.
 pub(super) struct View<'a> {
@@ -231,13 +246,14 @@ pub(super) fn extract<'a>(
         solve(s, &nodes, &*grid.faces[face].field, i, first..first + count);
         first += count;
     }
-    for v in &mut s.vertices {
-        v.t = v.t.clamp(grid.margin, 1.0 - grid.margin);
-    }
     list_triangles(s, grid, &local, &own);
+    let margin = grid.margin as f32;
     s.places.clear();
-    s.places.extend(s.vertices.iter().map(|v| v.at(v.t)));
-    balance(s, grid, &local);
+    s.places.extend(s.vertices.iter_mut().map(|v| {
+        v.t = v.t.clamp(margin, 1.0 - margin);
+        v.at(&nodes, f64::from(v.t))
+    }));
+    balance(s, grid, &local, &nodes);
     finish(s, grid, &local, &nodes, &own);
     let own_triangles =
         s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
@@ -275,7 +291,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
             });
             face.field.fill_where(block, wanted, out);
         }
-        negative(&mut s.signs.negative[i], out, block.shape()[0]);
+        negative(&mut s.signs.negative[i], out, block.shape()[0], face.cut);
     }
 }
 
@@ -333,19 +349,13 @@ fn list_face(
                     let i = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
                     let node = [i, j, k];
-                    let up = w >> i & 1 == 1;
-                    let solid = core::array::from_fn(|a| {
-                        nodes.axes[a][node[a] + usize::from(a == axis && !up)]
-                    });
-                    let length = nodes.axes[axis][node[axis] + 1] - nodes.axes[axis][node[axis]];
                     vertices.push(Vertex {
-                        solid,
-                        reach: if up { length } else { -length },
-                        t: 1.0,
-                        low: (row * nx + i) as u32,
+                        node: node.map(|n| n as u8),
                         axis: axis as u8,
                         face: face as u8,
+                        up: w >> i & 1 == 1,
                         fixed: fixed >> i & 1 == 1,
+                        t: 1.0,
                     });
                 }
             }
@@ -360,6 +370,28 @@ struct Root {
     solid: (f64, f64),
     void: (f64, f64),
     t: f64,
+}
+
+impl Root {
+    /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess.
+    #[inline]
+    fn narrow(&mut self, value: f64, slope: f64) -> f64 {
+        *(if value <= 0.0 {
+            &mut self.solid
+        } else {
+            &mut self.void
+        }) = (self.t, value);
+        let ((lo, a), (hi, b)) = (self.solid, self.void);
+        let newton = self.t - value / slope;
+        let next = if newton >= lo && newton <= hi {
+            newton
+        } else {
+            lo - (hi - lo) * a / (b - a)
+        };
+        let step = next - self.t;
+        self.t = next;
+        step.abs()
+    }
 }
 
 /// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
@@ -383,11 +415,13 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, which: Rang
     let mut roots = Vec::with_capacity(BATCH);
     for from in which.clone().step_by(BATCH) {
         roots.clear();
-        for i in from..(from + BATCH).min(which.end) {
-            let v = &vertices[i];
-            let low = v.low as usize;
-            let high = low + nodes.stride[v.axis as usize];
-            let (a, b) = if v.up() { (low, high) } else { (high, low) };
+        for (i, v) in (from..which.end)
+            .zip(&vertices[from..which.end])
+            .take(BATCH)
+        {
+            let low = v.low(nodes);
+            let high = low + nodes.stride[usize::from(v.axis)];
+            let (a, b) = if v.up { (low, high) } else { (high, low) };
             let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
             roots.push(Root {
                 vertex: i as u32,
@@ -398,30 +432,22 @@ fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, which: Rang
         }
         for round in 0..ROUNDS {
             points.clear();
-            points.extend(roots.iter().map(|r| vertices[r.vertex as usize].at(r.t)));
+            let place = |r: &Root| vertices[r.vertex as usize].at(nodes, r.t);
+            points.extend(roots.iter().map(place));
             values.resize(roots.len(), 0.0);
             gradients.resize(roots.len(), [0.0; 3]);
             f.gradients(points, values, gradients);
             let mut open = 0;
             for n in 0..roots.len() {
-                let (mut r, v) = (roots[n], values[n]);
-                let vertex = &mut vertices[r.vertex as usize];
-                *(if v <= 0.0 { &mut r.solid } else { &mut r.void }) = (r.t, v);
-                let ((lo, a), (hi, b)) = (r.solid, r.void);
-                let newton = r.t - v / (gradients[n][vertex.axis as usize] * vertex.reach);
-                let next = if newton >= lo && newton <= hi {
-                    newton
-                } else {
-                    lo - (hi - lo) * a / (b - a)
-                };
-                let step = (next - r.t).abs();
-                r.t = next;
-                if step > SETTLED && round + 1 < ROUNDS {
+                let mut r = roots[n];
+                let v = &mut vertices[r.vertex as usize];
+                let slope = gradients[n][usize::from(v.axis)] * v.reach(nodes);
+                if r.narrow(values[n], slope) > SETTLED && round + 1 < ROUNDS {
                     roots[open] = r;
                     open += 1;
                 } else {
-                    vertex.t = r.t;
-                    normals[r.vertex as usize] = unit(gradients[n]);
+                    v.t = r.t as f32;
+                    normals[r.vertex as usize] = unit(gradients[n]).map(|x| x as f32);
                 }
             }
             roots.truncate(open);
@@ -544,7 +570,7 @@ fn list_patches(
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what faces its edge can move without running far along it.
-fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
+fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];
@@ -563,48 +589,61 @@ fn balance(s: &mut Scratch, grid: &Grid, local: &Local) {
             &mut s.moments,
         );
     }
+    let margin = grid.margin as f32;
     for ((v, place), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.places).zip(&s.moments) {
         // Volume gained per unit of t: a third of the ring's area as seen along the edge.
-        let gain = area * v.reach / 3.0;
+        let gain = area * v.reach(nodes) as f32 / 3.0;
         if gain > 0.0 {
             let step = (volume / gain).clamp(-0.25, 0.25);
-            v.t = (v.t + step).clamp(grid.margin, 1.0 - grid.margin);
-            *place = v.at(v.t);
+            v.t = (v.t + step).clamp(margin, 1.0 - margin);
+            *place = v.at(nodes, f64::from(v.t));
         }
     }
 }
 
 /// Gives the corners of a face's triangles their shares. `edged`: the face may have edges of its own.
+///
+/// Single precision is ample for a move that is a small share of an edge, and neighbouring tiles still agree: it is used
+/// on differences of places that they have in common.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 fn share_out(
     triangles: &[[u32; 3]],
     starts: [u32; 2],
     edged: bool,
     places: &[Vec3],
-    normals: &[Vec3],
-    moments: &mut [(f64, f64)],
+    normals: &[[f32; 3]],
+    moments: &mut [(f32, f32)],
 ) {
+    type Short = [f32; 3];
+    let sub = |a: Short, b: Short| -> Short { core::array::from_fn(|i| a[i] - b[i]) };
+    let dot = |a: Short, b: Short| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for t in triangles {
         let [a, b, c] = t.map(|v| places[v as usize]);
         let [na, nb, nc] = t.map(|v| normals[v as usize]);
-        let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
+        let edge = |p: Vec3, q: Vec3| -> Short { core::array::from_fn(|i| (q[i] - p[i]) as f32) };
+        let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
         // A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature.
         if edged && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
-        let n = cross(ab, sub(c, a));
-        let volume = above * 0.5 * norm(n);
+        let n = [
+            ca[1] * ab[2] - ca[2] * ab[1],
+            ca[2] * ab[0] - ca[0] * ab[2],
+            ca[0] * ab[1] - ca[1] * ab[0],
+        ];
+        let volume = above * 0.5 * dot(n, n).sqrt();
         let facing = t.map(|v| match v {
             v if v < starts[0] => n[0],
             v if v < starts[1] => n[1],
             _ => n[2],
         });
-        let sum = facing[0] * facing[0] + facing[1] * facing[1] + facing[2] * facing[2];
+        let sum = dot(facing, facing);
         if sum > 0.0 {
+            let share = volume / sum;
             for (&v, facing) in t.iter().zip(facing) {
                 let m = &mut moments[v as usize];
-                m.0 += volume * facing * facing / sum;
+                m.0 += share * facing * facing;
                 m.1 += 0.5 * facing;
             }
         }
@@ -633,7 +672,7 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         knots.all(own);
     }
     for (i, v) in s.vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
-        let key = Key::new(v.low as usize, &[1 << v.axis], &[usize::from(v.face)]);
+        let key = Key::new(v.low(nodes), &[1 << v.axis], &[usize::from(v.face)]);
         knots.places[i] = knots.place(key);
     }
     for &(cell, face) in &s.plain.seams {
@@ -659,24 +698,27 @@ impl View<'_> {
             .chain(self.s.extra.triangles.iter().copied())
     }
 
-    /// The tile's surface by itself, body by body, with what stitching needs.
-    pub fn patch(&self, bodies: &Bodies) -> Patch {
+    /// The tile's surface by itself, body by body, with what stitching needs; and its bodies.
+    pub fn patch(&self, middle: Vec3) -> (Patch, Bodies) {
         let mut patch = Patch::default();
         let mut renamed = vec![u32::MAX; self.s.places.len()];
-        bodies.each_triangle(self, |t, cut| {
+        let mut shared = vec![false; self.s.places.len()];
+        self.each_shared(&mut |v| shared[v as usize] = true);
+        let bodies = Bodies::each_triangle(self, middle, |t, cut| {
             patch.cut.push(cut);
             patch.triangles.push(t.map(|v| {
                 let slot = &mut renamed[v as usize];
                 if *slot == u32::MAX {
                     *slot = patch.vertices.len() as u32;
                     patch.vertices.push(self.s.places[v as usize]);
-                    let shared = self.is_shared(v as usize);
-                    patch.shared.push(shared.then(|| self.name(v as usize)));
+                    patch
+                        .shared
+                        .push(shared[v as usize].then(|| self.name(v as usize)));
                 }
                 *slot
             }));
         });
-        patch
+        (patch, bodies)
     }
 
     /// The tile's position among the tiles.
@@ -706,27 +748,39 @@ impl View<'_> {
 
     fn key(&self, v: usize) -> Key {
         match self.s.vertices.get(v) {
-            Some(v) => Key::new(v.low as usize, &[1 << v.axis], &[usize::from(v.face)]),
+            Some(v) => Key::new(v.low(&self.nodes), &[1 << v.axis], &[usize::from(v.face)]),
             None => self.s.extra.keys[v - self.s.vertices.len()],
         }
     }
 
-    /// Whether a neighbouring tile may use a vertex as well.
-    #[inline]
-    pub fn is_shared(&self, v: usize) -> bool {
-        if let Some(vertex) = self.s.vertices.get(v) {
-            // Its other coordinates are those of its edge, to the last bit.
-            let border = |a: usize| {
-                let (axis, own) = (self.nodes.axes[a], &self.own[a]);
-                let at = vertex.solid[a];
-                a != usize::from(vertex.axis) && (at == axis[own.start] || at == axis[own.end])
-            };
-            return border(0) || border(1) || border(2);
+    /// Tells of the vertices that a neighbouring tile may use as well, in their order.
+    pub fn each_shared(&self, found: &mut impl FnMut(u32)) {
+        let borders = |a: usize| [self.own[a].start, self.own[a].end];
+        let at_x = borders(0).into_iter().fold(0, |w, i| w | 1u64 << i);
+        let [_, ny, nz] = self.nodes.shape;
+        for numbers in self.numbers() {
+            for axis in 0..3 {
+                for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
+                    let whole = (axis != 1 && borders(1).contains(&j))
+                        || (axis != 2 && borders(2).contains(&k));
+                    let mask = match axis {
+                        _ if whole => u64::MAX,
+                        0 => continue,
+                        _ => at_x,
+                    };
+                    let (crossed, first) = numbers.row(axis, k * ny + j);
+                    for i in bits(crossed & mask) {
+                        found(first + (crossed & below(i)).count_ones());
+                    }
+                }
+            }
         }
-        let key = self.key(v);
-        let (at, spans) = (self.nodes.at(key.node()), key.spans());
-        let border = |a: usize| at[a] == self.own[a].start || at[a] == self.own[a].end;
-        (0..3).any(|a| spans >> a & 1 == 0 && border(a))
+        for (v, key) in self.extra() {
+            let (at, spans) = (self.nodes.at(key.node()), key.spans());
+            if (0..3).any(|a| spans >> a & 1 == 0 && borders(a).contains(&at[a])) {
+                found(v);
+            }
+        }
     }
 
     /// The name of a vertex among all tiles.
