@@ -15,7 +15,7 @@ use crate::mesh::Mesh;
 /// The least turn of the normal across a crease, radians (25°). Below it a rounded edge is off by a twentieth of a step.
 pub const TURN: f64 = 0.436;
 /// Patches narrower than this many steps do without faces of their own.
-const NARROW: f64 = 2.0;
+const NARROW: f64 = 3.0;
 /// Creases within a patch divide it if they are at least this long and this far from each other on average, in steps:
 /// others are noise.
 const LONG: f64 = 4.0;
@@ -202,7 +202,8 @@ fn faint(mesh: &Mesh, edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>>
 /// Divides patches that meet another one both in convex and in concave edges: near them each side is a patch of its own.
 fn part(mesh: &Mesh, edges: &[Edge], of: &mut [u32], step: f64) {
     // For each patch and neighbour the triangles at their convex and at their concave edges, and the lengths of these.
-    let mut sides: HashMap<(u32, u32), [(Vec<u32>, f64); 2]> = HashMap::new();
+    type Side = (Vec<u32>, f64);
+    let mut sides: HashMap<(u32, u32), [Side; 2]> = HashMap::new();
     let count = of.iter().max().map_or(0, |m| *m as usize + 1);
     let mut areas = vec![0.0; count];
     for i in 0..of.len() {
@@ -355,9 +356,10 @@ struct Piece {
 }
 
 impl Piece {
-    /// The mean width of a strip with this area and border.
+    /// The width of a rectangle with this area and border.
     fn width(&self) -> f64 {
-        2.0 * self.area / self.border
+        let half = self.border / 2.0;
+        (half - (half * half - 4.0 * self.area).max(0.0).sqrt()) / 2.0
     }
 }
 
@@ -449,7 +451,7 @@ mod tests {
     fn patches_are_the_sides_that_a_grid_can_see() {
         let plate = cuboid([0.0; 3], [2.0, 1.0, 0.1]);
         assert_eq!(found(&plate, 0.02), Some((6, 12)));
-        // Its rim is narrower than two steps: each side goes to a neighbour, in the end to one of the two that are left.
+        // Its rim is narrower than three steps: each side goes to a neighbour, in the end to one of the two that are left.
         assert_eq!(found(&plate, 0.07).unwrap().0, 2);
         // Nothing is left of it at all.
         assert_eq!(found(&plate, 2.0), None);
