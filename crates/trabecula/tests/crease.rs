@@ -202,17 +202,20 @@ fn polyhedra_are_met_exactly() {
         ("notched", notched()),
     ] {
         for turn in [[0.0; 3], [17.0, 31.0, 47.0], [-70.0, 12.0, 5.0]] {
-            for edge in [0.2, 0.09, 0.04] {
+            for edge in [0.2, 0.07] {
                 let truth = region(moved(mesh.clone(), turn, [0.11, -0.07, 0.05]));
                 let solid = Solid::new(truth.clone(), None, 1.0);
                 let s = surface(&solid, edge, &Silent).expect("surface");
                 check(name, &s);
                 let off = apart(&truth, &s.mesh);
-                println!(
-                    "{name} {turn:?} {edge}: {:?} steps, volume {}",
-                    off.map(|x| x / edge),
-                    s.mesh.volume() / truth.mesh().volume() - 1.0
+                println!("{name} {turn:?} {edge}: {:?} steps", off.map(|x| x / edge));
+                // Faces keep 1/4096 of a step away from nodes; a corner sees three of them.
+                assert!(
+                    off.iter().all(|x| *x < edge * 3.0 / 4096.0),
+                    "{name}: {off:?}"
                 );
+                let volume = s.mesh.volume() / truth.mesh().volume();
+                assert!((volume - 1.0).abs() < 1e-4, "{name}: {volume}");
             }
         }
     }
@@ -298,7 +301,7 @@ fn random(seed: &mut u64) -> f64 {
 /// How many random solids of each kind.
 fn cases() -> u64 {
     let asked = std::env::var("TRABECULA_CASES").ok();
-    asked.and_then(|n| n.parse().ok()).unwrap_or(12)
+    asked.and_then(|n| n.parse().ok()).unwrap_or(8)
 }
 
 /// Extracts a mesh and checks every guarantee; how far the volume is off, in steps over the surface. `None` if the mesh is
