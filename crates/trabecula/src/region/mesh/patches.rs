@@ -24,8 +24,8 @@ const LONG: f64 = 4.0;
 /// are noise.
 const MOSTLY: f64 = 0.6;
 const MUCH: (f64, f64) = (0.785, 0.3);
-/// Nor is it one if it zigzags: by more than this on average at its vertices, radians.
-const ZIGZAG: f64 = 0.5;
+/// Nor is it one if it zigzags: by more than this on average at its vertices, radians, if there are at least so many.
+const ZIGZAG: (f64, usize) = (0.5, 9);
 /// Many creases that are no farther from each other than so many steps are noise, too.
 const MANY: usize = 40;
 const DENSE: f64 = 5.0;
@@ -176,7 +176,7 @@ fn faint(mesh: &Mesh, edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>>
             }
         }
     }
-    let mut bends: HashMap<(u32, u32), (f64, f64)> = HashMap::new();
+    let mut bends: HashMap<(u32, u32), (f64, f64, usize)> = HashMap::new();
     for ((a, b, _), ways) in &corners {
         if let [u, v] = ways[..] {
             let bend = norm(cross(u, v)).atan2(-dot(u, v));
@@ -184,11 +184,14 @@ fn faint(mesh: &Mesh, edges: &[Edge], of: &[u32], step: f64) -> Option<Vec<u32>>
             let sum = bends.entry((*a, *b)).or_default();
             sum.0 += weight * bend;
             sum.1 += weight;
+            sum.2 += 1;
         }
     }
     let faint = |pair: &(u32, u32), l: &[f64; 3]| {
         l[1] < MOSTLY * l[0] && (l[2] < MUCH.1 * l[0] || l[2] < LONG * step)
-            || bends.get(pair).is_some_and(|s| s.0 > ZIGZAG * s.1)
+            || bends
+                .get(pair)
+                .is_some_and(|s| s.0 > ZIGZAG.0 * s.1 && s.2 >= ZIGZAG.1)
     };
     let mut sets = Sets::new(of.iter().max().map_or(0, |m| *m as usize + 1));
     let mut any = false;
@@ -460,22 +463,48 @@ mod tests {
 
     #[test]
     fn a_crease_that_fades_has_a_patch_on_either_side() {
-        let mut mesh = ball(5, 1.0, 0.0);
-        for v in &mut mesh.vertices {
-            let [x, _, z] = *v;
-            let ridge = 0.3 * x.max(0.0) * (1.0 - z.abs() * 3.0).max(0.0);
-            *v = v.map(|c| c * (1.0 + ridge));
+        // A roof whose ridge fades before its end.
+        let n = 40;
+        let mut mesh = Mesh::default();
+        for k in 0..2 * (n + 1) * (n + 1) {
+            let [i, j] = [k % (n + 1), k / (n + 1) % (n + 1)].map(|i| f64::from(i) / f64::from(n));
+            let top = 1.0 - 0.8 * (1.2 - i) * (j - 0.5).abs();
+            let z = if k < (n + 1) * (n + 1) { 0.0 } else { top };
+            mesh.vertices.push([i, j, z]);
+        }
+        let at = |i: u32, j: u32, up: u32| i + (n + 1) * (j + (n + 1) * up);
+        let mut quad = |a, b, c, d| mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        for i in 0..n {
+            quad(at(i, 0, 0), at(i + 1, 0, 0), at(i + 1, 0, 1), at(i, 0, 1));
+            quad(at(i, n, 1), at(i + 1, n, 1), at(i + 1, n, 0), at(i, n, 0));
+            quad(at(0, i, 1), at(0, i + 1, 1), at(0, i + 1, 0), at(0, i, 0));
+            quad(at(n, i, 0), at(n, i + 1, 0), at(n, i + 1, 1), at(n, i, 1));
+            for j in 0..n {
+                quad(
+                    at(i, j, 1),
+                    at(i + 1, j, 1),
+                    at(i + 1, j + 1, 1),
+                    at(i, j + 1, 1),
+                );
+                quad(
+                    at(i, j + 1, 0),
+                    at(i + 1, j + 1, 0),
+                    at(i + 1, j, 0),
+                    at(i, j, 0),
+                );
+            }
         }
         let p = patches(&mesh, &check::edges(&mesh).unwrap(), 0.02).unwrap();
-        // The crest is an edge of triangles on both sides of z = 0.
-        let above = |t: u32| mesh.corners(t as usize).iter().map(|c| c[2]).sum::<f64>() > 0.0;
-        let strong = p.borders.iter().filter(|e| e.turn > TURN);
-        assert!(strong.clone().count() > 20);
-        let split = strong.filter(|e| {
-            let [a, b] = e.triangles();
-            above(a) != above(b)
+        assert_eq!(p.count, 7);
+        let ridge = p.borders.iter().filter(|e| {
+            let ends = ends(&mesh, e).map(|v| mesh.vertices[v as usize]);
+            ends.iter().all(|v| v[1] == 0.5 && v[2] > 0.0)
         });
-        assert!(split.count() > 20);
-        assert!(p.borders.iter().any(|e| e.turn.abs() < TURN / 4.0));
+        // It turns by 25 degrees where the slope is 0.22: at 0.92 of the length, which has 40 edges.
+        let strong = ridge.clone().filter(|e| e.turn >= TURN).count();
+        assert!(
+            (35..39).contains(&strong) && ridge.count() == 40,
+            "{strong}"
+        );
     }
 }
