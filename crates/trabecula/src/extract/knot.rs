@@ -514,18 +514,22 @@ impl Knots<'_> {
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
         let cells: Vec<[usize; 3]> = self.signs.knotted_cells().collect();
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
+        // Not moved before all have been looked at: what is found in a cell must not depend on the cells before it, which
+        // a neighbouring tile may not see.
+        let mut moved = HashSet::new();
         for c in &cells {
             let first = self.extra.triangles.len();
             self.cell(*c);
             if self.muddled(first) {
                 let node = self.nodes.index(*c);
                 let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| node + self.offset(corner));
-                self.moved.extend(corners);
+                moved.extend(corners);
             }
             if !mine(c) {
                 self.extra.triangles.truncate(first);
             }
         }
+        self.moved = moved;
         if !self.moved.is_empty() {
             self.places
                 .truncate(self.places.len() - self.extra.keys.len());
