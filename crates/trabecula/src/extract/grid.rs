@@ -69,7 +69,13 @@ impl Grid {
                 "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
             ));
         }
-        let (faces, tree) = solid.faces();
+        // Without faces for the creases of meshes, should there be too many.
+        Grid::with(solid, edge, solid.faces(edge))
+            .or_else(|_| Grid::with(solid, edge, solid.faces(f64::INFINITY)))
+    }
+
+    fn with(solid: &Solid, edge: f64, (faces, tree): (Vec<Face>, Tree)) -> Result<Grid, Fault> {
+        let bounds = solid.region.bounds();
         // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();

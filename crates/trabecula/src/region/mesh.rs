@@ -12,12 +12,14 @@ use crate::mesh::Mesh;
 mod cap;
 mod check;
 mod clean;
+mod crease;
 mod cut;
 mod edges;
 mod fair;
 mod normals;
 mod open;
 mod orient;
+mod patches;
 mod repair;
 mod tree;
 mod winding;
@@ -41,6 +43,8 @@ const REACH: f64 = 1.4;
 #[derive(Debug)]
 pub struct MeshRegion {
     tree: Tree,
+    /// The place in the mesh of each triangle of the tree.
+    order: Vec<u32>,
     normals: Normals,
     /// Asked where the boundary is not one clean sheet; none where it is everywhere.
     winding: Option<Winding>,
@@ -79,6 +83,7 @@ impl MeshRegion {
             volume: mesh.volume(),
             planes: [0, 1, 2].map(|axis| planes(&faces, &mesh.bounds(), axis)),
             tree,
+            order,
             mesh,
             repaired: done,
         })
@@ -218,10 +223,10 @@ impl Shape for MeshRegion {
         fill.part([0; 3], shape, 0, NOTHING);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
+    fn faces(self: Arc<Self>, by: f64, step: f64, out: &mut Vec<face::Face>) -> face::Tree {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
-            _ => one_face(self, out),
+            _ => crease::faces(&self, step, out).unwrap_or_else(|| one_face(self, out)),
         }
     }
 
