@@ -22,6 +22,17 @@ pub struct Face {
     pub cut: bool,
     /// Whether its zero set may have edges, as those of distances have; they are no curvature.
     pub edged: bool,
+    /// Where it has edges, as far as that is known.
+    pub creases: Arc<Creases>,
+}
+
+/// The edges of a face's zero set.
+#[derive(Debug, Default)]
+pub struct Creases {
+    /// Straight pieces of them, mm.
+    pub segments: Vec<[Vec3; 2]>,
+    /// Where they end, meet or bend, mm.
+    pub corners: Vec<Vec3>,
 }
 
 /// A plane normal to a coordinate axis.
@@ -231,6 +242,7 @@ impl Face {
             plane: None,
             cut: true,
             edged: true,
+            creases: Arc::default(),
         }
     }
 

@@ -53,9 +53,8 @@ pub trait Shape: Field {
     }
 
     /// Adds to `out` the smooth faces of the solid within distance `by` (mm) of the shape, or deeper than −`by` in it;
-    /// returns how they make it. The faces' numbers are their places in `out`. `step` (mm) is the grid's that they will be
-    /// sampled on, infinite if it is not known: what is smaller may do without faces of its own.
-    fn faces(self: Arc<Self>, by: f64, step: f64, out: &mut Vec<Face>) -> Tree;
+    /// returns how they make it. The faces' numbers are their places in `out`.
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree;
 
     /// The same region seen without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;

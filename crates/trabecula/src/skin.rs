@@ -34,7 +34,7 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<Bo
     let walls = region.clone().opened(open, &mut found);
     let walls = walls.unwrap_or_else(|| region.clone());
     let mut faces = Vec::new();
-    let tree = walls.faces(-least, f64::INFINITY, &mut faces);
+    let tree = walls.faces(-least, &mut faces);
     let mut kept = Vec::new();
     let signs: Vec<Sign> = faces
         .into_iter()

@@ -34,7 +34,7 @@ impl Solid {
 
     /// The same solid with one more body that is solid whatever the lattice says.
     pub fn with(mut self, mut body: Body) -> Solid {
-        let mut others = self.boundary(f64::INFINITY).faces;
+        let mut others = self.boundary().faces;
         others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
         let mut moved = others.len();
         flush::apart(&mut body, &others, &self.region.bounds(), &mut moved);
@@ -42,19 +42,18 @@ impl Solid {
         self
     }
 
-    /// The region by its faces for a grid of some step (mm), none of which coincide.
-    fn boundary(&self, step: f64) -> Body {
+    /// The region by its faces, none of which coincide.
+    fn boundary(&self) -> Body {
         let mut faces = Vec::new();
-        let tree = self.region.clone().faces(0.0, step, &mut faces);
+        let tree = self.region.clone().faces(0.0, &mut faces);
         let mut body = Body { faces, tree };
         flush::parted(&mut body, &self.region.bounds(), &mut 0);
         body
     }
 
-    /// The smooth faces of the solid, to be sampled on a grid of some step (mm), and how they make it. The region's come
-    /// first.
-    pub fn faces(&self, step: f64) -> (Vec<Face>, Tree) {
-        let Body { mut faces, tree } = self.boundary(step);
+    /// The smooth faces of the solid and how they make it. The region's come first.
+    pub fn faces(&self) -> (Vec<Face>, Tree) {
+        let Body { mut faces, tree } = self.boundary();
         let mut all = vec![tree];
         if let Some(field) = &self.field {
             let mut any = Vec::new();
@@ -75,6 +74,7 @@ impl Solid {
                     plane: None,
                     cut: false,
                     edged: false,
+                    creases: Arc::default(),
                 });
             }
             if any.is_empty() {

@@ -44,7 +44,7 @@ pub(super) fn filled(
         let zone = region::region(spec, &path, loader, notes)?;
         check_zone(&zone, space, points, &path)?;
         let mut faces = Vec::new();
-        let tree = zone.faces(0.0, f64::INFINITY, &mut faces);
+        let tree = zone.faces(0.0, &mut faces);
         filled.push(Body { faces, tree });
     }
     if filled.len() > 1 && !is_open(&filled, space, points) {

@@ -23,6 +23,7 @@ use std::ops::Range;
 use crate::math::{Vec3, add, scale};
 use crate::mesh::{Mesh, is_embedded};
 
+use super::crease::Edges;
 use super::grid::{Grid, Local};
 use super::islands::Spread;
 use super::key::Key;
@@ -59,6 +60,7 @@ pub(super) struct Knots<'a> {
     pub numbers: &'a [Numbers],
     pub places: &'a mut Vec<Vec3>,
     pub extra: &'a mut Extra,
+    pub edges: &'a Edges,
     /// Nodes at which the faces are moved a little.
     pub moved: HashSet<usize>,
 }
@@ -73,6 +75,12 @@ const PATHS: [([usize; 2], bool); 6] = [
     ([2, 3], false),
     ([4, 6], false),
 ];
+
+/// The middle of some points.
+pub(super) fn middle(points: &[Vec3]) -> Vec3 {
+    let sum = points.iter().fold([0.0; 3], |s, p| add(s, *p));
+    scale(sum, 1.0 / points.len() as f64)
+}
 
 impl Knots<'_> {
     /// The vertex of a name; made if it is new.
@@ -121,6 +129,7 @@ impl Knots<'_> {
         let case = &CASES[self.signs.corners(face, i, j, k)];
         let n = case.ring.len();
         let mut ring: Vec<Key> = Vec::with_capacity(2 * n);
+        let mut corners = Vec::new();
         let ends = |e: u8| {
             let (corner, axis) = EDGES[e as usize];
             (corner, corner | 1 << axis)
@@ -135,6 +144,17 @@ impl Knots<'_> {
                 continue;
             };
             let upper = a >> axis & 1 == 1;
+            let low = node + self.offset(usize::from(upper) << axis);
+            if let Some(place) = self.edges.side(low, axis) {
+                let key = Key::center(low, 7 & !(1 << axis));
+                if !self.extra.names.contains_key(&key) {
+                    let n = self.push(key, place);
+                    self.extra.names.insert(key, n);
+                }
+                ring.push(key);
+                corners.push(place);
+                continue;
+            }
             let mut across = cell;
             if upper {
                 across[axis] += 1;
@@ -168,15 +188,20 @@ impl Knots<'_> {
             );
             return;
         }
-        self.cone(Key::center(node, 7), &names, cut);
+        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
+        let apex = if corners.is_empty() {
+            middle(&rim)
+        } else {
+            let field = &*self.grid.faces[self.local.live[face]].field;
+            let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
+            edges.apex(grid, nodes, node, field, &rim, &corners)
+        };
+        self.cone(Key::center(node, 7), apex, &names, cut);
     }
 
-    /// Adds the cone over a ring of vertices from the point in their middle.
-    fn cone(&mut self, middle: Key, ring: &[u32], cut: bool) {
-        let sum = ring
-            .iter()
-            .fold([0.0; 3], |s, v| add(s, self.places[*v as usize]));
-        let middle = self.push(middle, scale(sum, 1.0 / ring.len() as f64));
+    /// Adds the cone over a ring of vertices from a new one.
+    fn cone(&mut self, apex: Key, place: Vec3, ring: &[u32], cut: bool) {
+        let middle = self.push(apex, place);
         for at in 0..ring.len() {
             let (a, b) = (ring[at], ring[(at + 1) % ring.len()]);
             self.extra.triangles.push(([middle, a, b], cut));
@@ -186,7 +211,8 @@ impl Knots<'_> {
     /// Adds a polygon in the side of a cell that spans two axes; it may have straight angles.
     pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[Key]) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
-        self.cone(Key::center(low, span), &names, true);
+        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
+        self.cone(Key::center(low, span), middle(&rim), &names, true);
     }
 
     /// Which signs are solid in a cell.

@@ -121,18 +121,6 @@ impl Signs {
                     continue;
                 }
                 found = true;
-                for i in bits(twice) {
-                    // Faces that a tree names more than once may only seem to matter.
-                    let Some(matter) = matter(local, &seen, &beside, i) else {
-                        continue;
-                    };
-                    for (f, d) in decides.iter_mut().enumerate() {
-                        *d = *d & !(1 << i) | (matter >> f & 1) << i;
-                    }
-                    if matter.count_ones() < 2 {
-                        twice &= !(1 << i);
-                    }
-                }
                 let row = k * ny + j;
                 let mut knotted = twice;
                 for f in 0..faces {
@@ -217,43 +205,6 @@ impl Signs {
             }
         }
     }
-}
-
-/// The faces on whose signs it depends whether a place in cell i of a row is solid, as bits: those that vary in the cell
-/// are tried in all combinations. `None` if these are too many. `seen` tells where faces are negative somewhere and
-/// everywhere, `beside` where the laid ones are.
-fn matter(
-    local: &Local,
-    seen: &[(u64, u64)],
-    beside: &impl Fn(usize) -> u64,
-    i: usize,
-) -> Option<u64> {
-    // Bit n of word k is bit k of n: the places of a word are the combinations of six signs.
-    const COMBINED: [u64; 6] = [
-        0xaaaa_aaaa_aaaa_aaaa,
-        0xcccc_cccc_cccc_cccc,
-        0xf0f0_f0f0_f0f0_f0f0,
-        0xff00_ff00_ff00_ff00,
-        0xffff_0000_ffff_0000,
-        0xffff_ffff_0000_0000,
-    ];
-    let mut varying = [usize::MAX; COMBINED.len()];
-    let mut count = 0;
-    for (f, (some, all)) in seen.iter().enumerate() {
-        if (some & !all) >> i & 1 == 1 {
-            *varying.get_mut(count)? = f;
-            count += 1;
-        }
-    }
-    let solid = local.tree.solid(&|f| {
-        if let Some(k) = varying.iter().position(|v| *v == f) {
-            return COMBINED[k];
-        }
-        let negative = seen.get(f).map_or_else(|| beside(f), |s| s.1);
-        if negative >> i & 1 == 1 { u64::MAX } else { 0 }
-    });
-    let turns = |k: &usize| (solid ^ solid >> (1 << k)) & !COMBINED[*k] != 0;
-    Some((0..count).filter(turns).fold(0, |w, k| w | 1 << varying[k]))
 }
 
 /// The numbers of the bits that are set.

@@ -225,13 +225,13 @@ macro_rules! joined {
                 }
             }
 
-            fn faces(self: Arc<Self>, by: f64, step: f64, out: &mut Vec<Face>) -> Tree {
+            fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
                 let each = self.regions().iter().enumerate().map(|(i, r)| {
                     if !self.negated(i) {
-                        return r.clone().faces(by, step, out);
+                        return r.clone().faces(by, out);
                     }
                     let first = out.len();
-                    let tree = r.clone().faces(-by, step, out).complement();
+                    let tree = r.clone().faces(-by, out).complement();
                     let turned = out.split_off(first);
                     out.extend(turned.into_iter().map(Face::turned));
                     tree
@@ -306,8 +306,8 @@ impl Shape for Offset {
             .for_each(|v| *v = 0.0);
     }
 
-    fn faces(self: Arc<Self>, by: f64, step: f64, out: &mut Vec<Face>) -> Tree {
-        self.of.clone().faces(self.by + by, step, out)
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+        self.of.clone().faces(self.by + by, out)
     }
 
     fn volume(&self) -> Option<f64> {

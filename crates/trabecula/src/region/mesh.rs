@@ -1,6 +1,6 @@
 //! The solid inside a closed triangle mesh, as an exact signed distance.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::{HalfSpace, Offset, Region, Shape, one_face};
 use crate::face;
@@ -19,7 +19,6 @@ mod fair;
 mod normals;
 mod open;
 mod orient;
-mod patches;
 mod repair;
 mod tree;
 mod winding;
@@ -43,8 +42,6 @@ const REACH: f64 = 1.4;
 #[derive(Debug)]
 pub struct MeshRegion {
     tree: Tree,
-    /// The place in the mesh of each triangle of the tree.
-    order: Vec<u32>,
     normals: Normals,
     /// Asked where the boundary is not one clean sheet; none where it is everywhere.
     winding: Option<Winding>,
@@ -53,6 +50,8 @@ pub struct MeshRegion {
     planes: [Vec<f64>; 3],
     mesh: Mesh,
     repaired: Repaired,
+    /// Found when they are first asked for.
+    creases: OnceLock<Arc<face::Creases>>,
 }
 
 impl MeshRegion {
@@ -83,9 +82,9 @@ impl MeshRegion {
             volume: mesh.volume(),
             planes: [0, 1, 2].map(|axis| planes(&faces, &mesh.bounds(), axis)),
             tree,
-            order,
             mesh,
             repaired: done,
+            creases: OnceLock::new(),
         })
     }
 
@@ -223,10 +222,17 @@ impl Shape for MeshRegion {
         fill.part([0; 3], shape, 0, NOTHING);
     }
 
-    fn faces(self: Arc<Self>, by: f64, step: f64, out: &mut Vec<face::Face>) -> face::Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
-            _ => crease::faces(&self, step, out).unwrap_or_else(|| one_face(self, out)),
+            _ => {
+                let creases = self.creases.get_or_init(|| Arc::new(crease::creases(&self.mesh)));
+                out.push(face::Face {
+                    creases: creases.clone(),
+                    ..face::Face::distance(self.clone())
+                });
+                face::Tree::Face(out.len() - 1)
+            }
         }
     }
 

@@ -222,7 +222,7 @@ impl Shape for Cuboid {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, _: f64, out: &mut Vec<Face>) -> Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
         if by > 0.0 {
             return rounded(self, by, out);
         }
@@ -281,7 +281,7 @@ impl Shape for Sphere {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, _: f64, out: &mut Vec<Face>) -> Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
         if self.radius + by <= 0.0 {
             return Tree::EMPTY;
         }
@@ -351,7 +351,7 @@ impl Shape for HalfSpace {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, _: f64, out: &mut Vec<Face>) -> Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
         let point = add(self.point, scale(self.normal, by));
         match coordinate_axis(self.normal) {
             Some(a) => flat((a, point[a], self.normal[a] > 0.0), out),

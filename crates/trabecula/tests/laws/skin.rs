@@ -53,7 +53,7 @@ fn half(point: Vec3, normal: Vec3) -> HalfSpace {
 
 fn zone(region: &Region) -> Body {
     let mut faces = Vec::new();
-    let tree = region.clone().faces(0.0, f64::INFINITY, &mut faces);
+    let tree = region.clone().faces(0.0, &mut faces);
     Body { faces, tree }
 }
 

@@ -127,7 +127,7 @@ impl Shape for OpenMesh {
         }
     }
 
-    fn faces(self: Arc<Self>, by: f64, _: f64, out: &mut Vec<face::Face>) -> face::Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
         match Offset::new(self.clone(), by) {
             Ok(moved) => one_face(Arc::new(moved), out),
             Err(_) => one_face(self, out),

@@ -244,7 +244,7 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 #[inline(always)]
-pub fn square_distance(b: &Aabb, p: Vec3) -> f64 {
+fn square_distance(b: &Aabb, p: Vec3) -> f64 {
     let mut square = 0.0;
     for a in 0..3 {
         let d = larger(larger(b.min[a] - p[a], p[a] - b.max[a]), 0.0);

@@ -166,7 +166,7 @@ impl Shape for Cylinder {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, _: f64, out: &mut Vec<Face>) -> Tree {
+    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
         if by > 0.0 {
             return rounded(self, by, out);
         }
