@@ -26,11 +26,20 @@ pub struct Face {
     pub creases: Arc<Creases>,
 }
 
+/// A straight piece of an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Its ends, mm.
+    pub ends: [Vec3; 2],
+    /// How much the normal turns across it, radians.
+    pub turn: f64,
+}
+
 /// The edges of a face's zero set.
 #[derive(Debug, Default)]
 pub struct Creases {
-    /// Straight pieces of them, mm.
-    pub segments: Vec<[Vec3; 2]>,
+    /// Straight pieces of them.
+    pub segments: Vec<Segment>,
     /// Where they end, meet or bend, mm.
     pub corners: Vec<Vec3>,
 }

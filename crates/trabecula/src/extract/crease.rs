@@ -1,12 +1,17 @@
-//! Edges that a face has of its own, such as those of a mesh, in cells that it crosses in one plain patch.
+//! Edges that a face has of its own, such as those of a mesh, where it alone makes the surface.
 //!
-//! The line in which a patch meets the side of a cell runs straight from one grid edge to another. Where an edge of the
-//! face pierces the side it gets a corner there, if it then lies nearer to the face; and the patch becomes the cone over
-//! its rim, from a point of the edge inside the cell. The rim stays a simple curve on the boundary of a convex cell, so
-//! the cone cannot meet itself. Whether a side gets its corner depends on what both its cells see alike.
+//! The line in which a face meets the side of a cell runs straight from one grid edge to another. Where an edge of the
+//! face pierces the side it gets a corner there, if it lies nearer to the face with it. A grid edge that the face
+//! crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its rim from a point
+//! of the face's edge inside the cell. A rim is a simple curve on the boundary of a convex cell, so the cone cannot meet
+//! itself. What a side or a grid edge gets depends on nothing but what all cells around it see alike.
 //!
 //! Source: corners in the sides of cells after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares,
 //! Comput. Graph. Forum 24 (2005) 537.
+
+mod chord;
+mod rim;
+mod twice;
 
 use std::collections::HashMap;
 
@@ -14,39 +19,60 @@ use crate::face::Creases;
 use crate::field::Field;
 use crate::math::{Vec3, add, dot, norm, scale, sub};
 
-use super::grid::{Grid, Local};
+use super::grid::{Grid, Local, TILE};
+use super::key::Key;
 use super::knot::middle;
-use super::signs::Signs;
+use super::signs::{Signs, bits};
 use super::tile::Nodes;
+pub(super) use chord::Chord;
+
+/// Cells that are this many steps long or more show edges between them, however little the face turns there.
+const LONG: f64 = 3.0;
+/// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
+/// step.
+const SHARP: f64 = 0.436;
 
 /// Edges of faces in the cells of a block.
 #[derive(Default)]
 pub(super) struct Edges {
-    /// For each row of cells: those with a corner in a side.
+    /// For each row of cells: those that have a side with chords.
     pub cells: Vec<u64>,
-    /// The corners, by the lowest node of the side and the axis normal to it.
-    sides: HashMap<(usize, usize), Vec3>,
+    /// The face that makes the surface in these.
+    pub face: HashMap<usize, usize>,
+    /// The chords of sides, by the lowest node of the side and the axis normal to it.
+    sides: HashMap<(usize, usize), Vec<Chord>>,
+    /// Grid edges that are crossed twice, by their lower nodes and axes: the lower point first.
+    twice: HashMap<(usize, usize), [Vec3; 2]>,
+    /// The places of points that nothing else has.
+    points: HashMap<Key, Vec3>,
     /// Pieces of edges in cells, by the cells' lowest nodes.
     pieces: HashMap<usize, Vec<[Vec3; 2]>>,
     /// Places where edges end, meet or bend, likewise.
     corners: HashMap<usize, Vec<Vec3>>,
 }
 
-/// A side of a cell that edges of a face pierce.
-struct Pierced {
-    low: usize,
-    axis: usize,
-    /// The ends of the line in which the face meets it.
-    ends: [Vec3; 2],
-    /// Where edges pierce it.
-    at: Vec<Vec3>,
+/// A block, and a face in it.
+pub(super) struct Seen<'a, P: Fn(usize, usize) -> Option<Vec3>> {
+    pub grid: &'a Grid,
+    pub local: &'a Local,
+    pub nodes: &'a Nodes<'a>,
+    pub signs: &'a Signs,
+    /// The face's number among the live ones, its samples and its field.
+    pub face: usize,
+    pub samples: &'a [f32],
+    pub field: &'a dyn Field,
+    /// The vertices of plain cells: by the lower node of their grid edge, and its axis.
+    pub place: P,
 }
 
 impl Edges {
     pub fn clear(&mut self, shape: [usize; 3]) {
         self.cells.clear();
         self.cells.resize(shape[1] * shape[2], 0);
+        self.face.clear();
         self.sides.clear();
+        self.twice.clear();
+        self.points.clear();
         self.pieces.clear();
         self.corners.clear();
     }
@@ -56,56 +82,65 @@ impl Edges {
         !self.sides.is_empty()
     }
 
-    /// The corner of a side of a cell.
-    pub fn side(&self, low: usize, axis: usize) -> Option<Vec3> {
-        self.sides.get(&(low, axis)).copied()
+    /// The place of a point that is none of a plain or a knotted cell.
+    pub fn place(&self, key: Key) -> Option<Vec3> {
+        self.points.get(&key).copied()
     }
 
-    /// Adds the edges of a live face, as far as they lie in the block. `place` gives the vertices of plain cells: by the
-    /// lower node of their grid edge, and its axis.
-    pub fn find(
+    /// Adds the edges of a face as far as they lie in the block. `all`: whether grid edges may be crossed twice.
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(
         &mut self,
-        grid: &Grid,
-        local: &Local,
-        nodes: &Nodes,
-        signs: &Signs,
-        (face, segments): (usize, &[u32]),
-        place: impl Fn(usize, usize) -> Option<Vec3>,
+        seen: &Seen<P>,
+        segments: &[u32],
+        all: bool,
     ) {
-        let of = &grid.faces[local.live[face]];
+        let nodes = seen.nodes;
+        let of = &seen.grid.faces[seen.local.live[seen.face]].creases;
         let mut pierced: Vec<((usize, usize), Vec3)> = Vec::new();
         for &i in segments {
-            self.walk(nodes, of.creases.segments[i as usize], &mut pierced);
+            self.walk(nodes, of.segments[i as usize].ends, &mut pierced);
+        }
+        if all {
+            let cells: Vec<usize> = self.pieces.keys().copied().collect();
+            self.find_twice(seen, cells);
         }
         // In the order of the segments where they pierce one side.
         pierced.sort_by_key(|p| p.0);
-        let sides: Vec<Pierced> = pierced
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter_map(|all| {
-                let (low, axis) = all[0].0;
-                let ends = ends(grid, local, nodes, signs, face, (low, axis), &place)?;
-                let at = all.iter().map(|p| inside(grid, nodes, low, axis, p.1));
-                Some(Pierced {
-                    low,
-                    axis,
-                    ends,
-                    at: at.collect(),
-                })
-            })
-            .collect();
-        for (side, corner) in sides.iter().zip(nearer(&*of.field, &sides)) {
-            let Some(corner) = corner else { continue };
-            self.sides.insert((side.low, side.axis), corner);
-            let mut cell = nodes.at(side.low);
-            for _ in 0..2 {
-                self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
-                cell[side.axis] = cell[side.axis].wrapping_sub(1);
+        let mut at: HashMap<(usize, usize), Vec<Vec3>> = HashMap::new();
+        for (side, p) in pierced {
+            let p = seen.inside(side, p);
+            at.entry(side).or_default().push(p);
+        }
+        for &(node, axis) in self.twice.keys() {
+            for other in (0..3).filter(|a| *a != axis) {
+                // The side is normal to the third axis.
+                let normal = 3 - axis - other;
+                at.entry((node, normal)).or_default();
+                at.entry((node - nodes.stride[other], normal)).or_default();
             }
         }
-        if !self.sides.is_empty() {
-            for p in &of.creases.corners {
+        for (side, pierced) in at {
+            let Some(chords) = self.chords(seen, side, &pierced) else {
+                continue;
+            };
+            let mut cell = nodes.at(side.0);
+            for _ in 0..2 {
+                self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
+                self.face.insert(nodes.index(cell), seen.face);
+                cell[side.1] -= 1;
+            }
+            for c in &chords {
+                self.points.extend(c.via);
+            }
+            self.sides.insert(side, chords);
+        }
+        if self.any() {
+            for p in &of.corners {
                 if let Some(cell) = cell_of(nodes, *p) {
-                    self.corners.entry(nodes.index(cell)).or_default().push(*p);
+                    self.corners
+                        .entry(nodes.index(cell))
+                        .or_default()
+                        .push(*p);
                 }
             }
         }
@@ -138,14 +173,17 @@ impl Edges {
         for w in stops.windows(2).filter(|w| w[0] < w[1]) {
             let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
             if let Some(cell) = cell_of(nodes, scale(add(ends[0], ends[1]), 0.5)) {
-                self.pieces.entry(nodes.index(cell)).or_default().push(ends);
+                self.pieces
+                    .entry(nodes.index(cell))
+                    .or_default()
+                    .push(ends);
             }
         }
     }
 
     /// The point of a cell over which its patch becomes a cone: on the face's edges there, if any. `rim` are the points
     /// of its rim, `corners` those of them that are corners of sides.
-    pub fn apex(
+    fn apex(
         &self,
         grid: &Grid,
         nodes: &Nodes,
@@ -154,15 +192,16 @@ impl Edges {
         rim: &[Vec3],
         corners: &[Vec3],
     ) -> Vec3 {
-        let middle = middle(if corners.is_empty() { rim } else { corners });
+        let center = middle(if corners.is_empty() { rim } else { corners });
         let mut tried = Vec::with_capacity(4);
         if let Some(pieces) = self.pieces.get(&cell) {
-            let near = pieces.iter().map(|s| nearest(*s, middle));
-            tried.extend(near.min_by(|a, b| far(*a, middle).total_cmp(&far(*b, middle))));
+            let far = |p: &Vec3| norm(sub(*p, center));
+            let near = pieces.iter().map(|s| nearest(*s, center));
+            tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
         }
         tried.extend(self.corners.get(&cell).into_iter().flatten());
         if tried.is_empty() {
-            tried.push(middle);
+            tried.push(center);
         }
         let at = nodes.at(cell);
         for p in &mut tried {
@@ -188,8 +227,51 @@ impl Edges {
     }
 }
 
-fn far(p: Vec3, q: Vec3) -> f64 {
-    norm(sub(p, q))
+impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
+    /// Whether the face alone makes the surface in a cell of the block, or would if it crossed it.
+    fn alone(&self, cell: [usize; 3]) -> bool {
+        let (signs, [i, j, k]) = (self.signs, cell);
+        let row = k * signs.shape[1] + j;
+        if signs.knotted[row] >> i & 1 == 1 {
+            return false;
+        }
+        if signs.plain[self.face][row] >> i & 1 == 1 {
+            return true;
+        }
+        let live = self.local.live.len();
+        if (0..live).any(|f| signs.plain[f][row] >> i & 1 == 1) {
+            return false;
+        }
+        let (mut varies, mut negative) = (0u64, 0u64);
+        for f in (0..live).filter(|f| *f != self.face) {
+            match signs.corners(f, i, j, k) {
+                0 => {}
+                0xff => negative |= 1 << f,
+                _ => varies |= 1 << f,
+            }
+        }
+        let holds = |mask: u64| {
+            let sign = |f: usize| match f.checked_sub(live) {
+                Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
+                None => mask >> f,
+            };
+            self.local.tree.solid(&sign) & 1 == 1
+        };
+        // The tree never falls when a face becomes negative: so two cases stand for all that vary.
+        let own = 1 << self.face;
+        [negative, negative | varies]
+            .iter()
+            .all(|n| holds(n | own) && !holds(n & !own))
+    }
+
+    /// A point of a side kept within it.
+    fn inside(&self, (low, axis): (usize, usize), mut p: Vec3) -> Vec3 {
+        let at = self.nodes.at(low);
+        for a in (0..3).filter(|a| *a != axis) {
+            p[a] = within(self.grid, self.nodes.axes[a], at[a], p[a]);
+        }
+        p
+    }
 }
 
 /// The point of a segment nearest to another one.
@@ -224,92 +306,21 @@ fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
     x.clamp(low + margin, high - margin)
 }
 
-/// A point of a side kept within it.
-fn inside(grid: &Grid, nodes: &Nodes, low: usize, axis: usize, mut p: Vec3) -> Vec3 {
-    let at = nodes.at(low);
-    for a in (0..3).filter(|a| *a != axis) {
-        p[a] = within(grid, nodes.axes[a], at[a], p[a]);
-    }
-    p
-}
-
-/// The ends of the line in which a face meets a side, if both cells beside it are plain patches of that face.
-fn ends(
-    grid: &Grid,
-    local: &Local,
-    nodes: &Nodes,
-    signs: &Signs,
-    face: usize,
-    (low, axis): (usize, usize),
-    place: &impl Fn(usize, usize) -> Option<Vec3>,
-) -> Option<[Vec3; 2]> {
-    let _ = grid;
-    let at = nodes.at(low);
-    let laid = local.flat.iter().any(|f| f.axis == axis && f.at == at[axis]);
-    if laid || at[axis] == 0 || (0..3).any(|a| at[a] + 1 >= nodes.shape[a]) {
-        return None;
-    }
-    let mut below = at;
-    below[axis] -= 1;
-    let plain = |c: [usize; 3]| signs.plain[face][c[2] * nodes.shape[1] + c[1]] >> c[0] & 1 == 1;
-    if !plain(at) || !plain(below) {
-        return None;
-    }
-    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let (du, dv) = (nodes.stride[u], nodes.stride[v]);
-    let edges = [(low, u), (low, v), (low + du, v), (low + dv, u)];
-    let mut found = edges.iter().filter_map(|&(n, along)| {
-        let sign = |n| signs.is_negative(face, n);
-        (sign(n) != sign(n + nodes.stride[along])).then(|| place(n, along))
-    });
-    let ends = [found.next()??, found.next()??];
-    found.next().is_none().then_some(ends)
-}
-
-/// For each side the point at which a corner brings its line nearest to the face; none if it does not bring it nearer.
-fn nearer(field: &dyn Field, sides: &[Pierced]) -> Vec<Option<Vec3>> {
-    let middle = |p: Vec3, q: Vec3| scale(add(p, q), 0.5);
-    let mut places = Vec::with_capacity(3 * sides.len());
-    for s in sides {
-        places.push(middle(s.ends[0], s.ends[1]));
-        for p in &s.at {
-            places.extend(s.ends.map(|e| middle(e, *p)));
-        }
-    }
-    let mut off = vec![0.0; places.len()];
-    field.values(&places, &mut off);
-    let mut rest = &off[..];
-    let mut take = |n: usize| {
-        let (first, others) = rest.split_at(n);
-        rest = others;
-        first.iter().fold(0.0f64, |m, d| m.max(d.abs()))
-    };
-    sides
-        .iter()
-        .map(|s| {
-            let mut best = (take(1), None);
-            for p in &s.at {
-                let off = take(2);
-                if off < best.0 {
-                    best = (off, Some(*p));
-                }
-            }
-            best.1
-        })
-        .collect()
-}
-
-/// The segments of a face's edges that come near the tiles, by the tiles' numbers.
+/// The pieces of a face's edges that the grid shows, by the numbers of the tiles that they come near.
 pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
     let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
     let tiles = grid.tiles();
-    for (i, [p, q]) in (0..).zip(&creases.segments) {
+    for (i, s) in (0..).zip(&creases.segments) {
+        let [p, q] = s.ends;
+        if s.turn < SHARP && norm(sub(q, p)) < LONG * grid.step {
+            continue;
+        }
         let range = [0, 1, 2].map(|a| {
             let axis = &grid.axes[a];
-            // The cells it lies in, and one more on either side: tiles look so far beyond themselves.
+            // The cells it lies in, and more on either side: tiles look one cell beyond themselves.
             let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
             let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
-            let tile = |c: usize| (c / super::grid::TILE).min(tiles[a] - 1);
+            let tile = |c: usize| (c / TILE).min(tiles[a] - 1);
             tile(low.saturating_sub(2))..tile(high + 2) + 1
         });
         for k in range[2].clone() {
@@ -318,6 +329,21 @@ pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>
                     let tile = t + tiles[0] * (j + tiles[1] * k);
                     found.entry(tile).or_default().push(i);
                 }
+            }
+        }
+    }
+    found
+}
+
+/// The cells that have edges, among some.
+pub(super) fn cells(edges: &Edges, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
+    let ny = nodes.shape[1];
+    let mut found = Vec::new();
+    for (row, w) in edges.cells.iter().enumerate() {
+        for i in bits(*w) {
+            let cell = [i, row % ny, row / ny];
+            if (0..3).all(|a| own[a].contains(&cell[a])) {
+                found.push((cell, edges.face[&nodes.index(cell)]));
             }
         }
     }

@@ -33,6 +33,8 @@ pub(super) struct Grid {
     laid: Vec<Option<usize>>,
     /// For each face, the edges that it has of its own in each tile.
     creases: Vec<HashMap<usize, Vec<u32>>>,
+    /// Whether one face at most has edges of its own.
+    pub one_creased: bool,
 }
 
 /// What is known of the solid in a block without sampling it.
@@ -175,10 +177,12 @@ impl Grid {
             tree,
             laid,
             creases: Vec::new(),
+            one_creased: true,
         };
         grid.creases = (grid.faces.iter())
             .map(|f| crease::by_tile(&grid, &f.creases))
             .collect();
+        grid.one_creased = grid.creases.iter().filter(|c| !c.is_empty()).count() < 2;
         grid.few_enough().map(|()| grid)
     }
 
@@ -214,6 +218,13 @@ impl Grid {
     /// Number of tiles along each axis.
     pub(super) fn tiles(&self) -> [usize; 3] {
         self.cells().map(|n| n.div_ceil(TILE))
+    }
+
+    /// Whether a plane normal to an axis is a face of the solid.
+    pub(super) fn is_laid(&self, axis: usize, at: f64) -> bool {
+        let planes = self.faces.iter().zip(&self.laid);
+        let mut laid = planes.filter_map(|(f, laid)| laid.and(f.plane));
+        laid.any(|p| p.axis == axis && p.at == at)
     }
 
     /// The pieces of edges that a face has of its own near a tile.

@@ -90,7 +90,10 @@ impl Knots<'_> {
         }
         let n = self
             .numbered(key)
-            .unwrap_or_else(|| self.push(key, self.place(key)));
+            .unwrap_or_else(|| {
+                let own = self.edges.place(key);
+                self.push(key, own.unwrap_or_else(|| self.place(key)))
+            });
         self.extra.names.insert(key, n);
         n
     }
@@ -106,7 +109,7 @@ impl Knots<'_> {
         self.numbers[key.faces().next()?].get(steps.trailing_zeros() as usize, row, i)
     }
 
-    fn push(&mut self, key: Key, place: Vec3) -> u32 {
+    pub fn push(&mut self, key: Key, place: Vec3) -> u32 {
         self.places.push(place);
         self.extra.keys.push(key);
         self.places.len() as u32 - 1
@@ -129,7 +132,6 @@ impl Knots<'_> {
         let case = &CASES[self.signs.corners(face, i, j, k)];
         let n = case.ring.len();
         let mut ring: Vec<Key> = Vec::with_capacity(2 * n);
-        let mut corners = Vec::new();
         let ends = |e: u8| {
             let (corner, axis) = EDGES[e as usize];
             (corner, corner | 1 << axis)
@@ -144,17 +146,6 @@ impl Knots<'_> {
                 continue;
             };
             let upper = a >> axis & 1 == 1;
-            let low = node + self.offset(usize::from(upper) << axis);
-            if let Some(place) = self.edges.side(low, axis) {
-                let key = Key::center(low, 7 & !(1 << axis));
-                if !self.extra.names.contains_key(&key) {
-                    let n = self.push(key, place);
-                    self.extra.names.insert(key, n);
-                }
-                ring.push(key);
-                corners.push(place);
-                continue;
-            }
             let mut across = cell;
             if upper {
                 across[axis] += 1;
@@ -189,18 +180,11 @@ impl Knots<'_> {
             return;
         }
         let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
-        let apex = if corners.is_empty() {
-            middle(&rim)
-        } else {
-            let field = &*self.grid.faces[self.local.live[face]].field;
-            let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
-            edges.apex(grid, nodes, node, field, &rim, &corners)
-        };
-        self.cone(Key::center(node, 7), apex, &names, cut);
+        self.cone(Key::center(node, 7), middle(&rim), &names, cut);
     }
 
     /// Adds the cone over a ring of vertices from a new one.
-    fn cone(&mut self, apex: Key, place: Vec3, ring: &[u32], cut: bool) {
+    pub fn cone(&mut self, apex: Key, place: Vec3, ring: &[u32], cut: bool) {
         let middle = self.push(apex, place);
         for at in 0..ring.len() {
             let (a, b) = (ring[at], ring[(at + 1) % ring.len()]);
@@ -365,7 +349,7 @@ impl Knots<'_> {
     }
 
     /// The points between two others on the line in which a face crosses the side of a cell.
-    fn trace(
+    pub fn trace(
         &self,
         cell: [usize; 3],
         axis: usize,

@@ -28,7 +28,7 @@ use crate::math::Vec3;
 
 use super::bodies::Bodies;
 use super::cap;
-use super::crease::Edges;
+use super::crease::{self, Edges, Seen};
 use super::grid::{Flat, Grid, Local, TILE};
 use super::key::Key;
 use super::knot::{Extra, Knots};
@@ -307,6 +307,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
 fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
     let Scratch {
         edges,
+        samples,
         signs,
         numbers,
         places,
@@ -316,11 +317,21 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usiz
     for (face, &id) in local.live.iter().enumerate() {
         let segments = grid.creases(id, tile);
         if !segments.is_empty() {
-            edges.find(grid, local, nodes, signs, (face, segments), |node, axis| {
-                let [i, j, k] = nodes.at(node);
-                let v = numbers[face].get(axis, k * nodes.shape[1] + j, i)?;
-                Some(places[v as usize])
-            });
+            let seen = Seen {
+                grid,
+                local,
+                nodes,
+                signs,
+                face,
+                samples: &samples[face],
+                field: &*grid.faces[id].field,
+                place: |node, axis| {
+                    let [i, j, k] = nodes.at(node);
+                    let v = numbers[face].get(axis, k * nodes.shape[1] + j, i)?;
+                    Some(places[v as usize])
+                },
+            };
+            edges.find(&seen, segments, grid.one_creased);
         }
     }
 }
@@ -353,6 +364,9 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
     }
     for &(cell, face) in &s.plain.seams {
         knots.seam(cell, face);
+    }
+    for (cell, face) in crease::cells(knots.edges, nodes, own) {
+        knots.edged(cell, face);
     }
     for flat in 0..local.flat.len() {
         cap::close(&mut knots, flat, own);

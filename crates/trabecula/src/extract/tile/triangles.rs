@@ -74,7 +74,7 @@ fn list_patches(
                 // cells of the tile itself, except at the grid's padding.
                 let below =
                     if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
-                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below | edged[row]) & mine;
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below ) & mine & !edged[row];
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
@@ -102,7 +102,9 @@ fn list_patches(
                 } else {
                     Kind::Neighbour
                 };
-                if seam >> i & 1 == 1 {
+                if edged[row] >> i & 1 == 1 {
+                    kind = Kind::Neighbour;
+                } else if seam >> i & 1 == 1 {
                     seams.push(([i, j, k], face));
                     kind = Kind::Neighbour;
                 }

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use super::edges::{ends, halves};
 use super::tree::normal;
-use crate::face::Creases;
-use crate::math::{Vec3, add, dot, norm, scale, sub};
+use crate::face::{Creases, Segment};
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 
 /// The least turn of the normal across a crease, radians (6°): below it a rounded edge is off by a fortieth of a step.
@@ -22,12 +22,13 @@ pub fn creases(mesh: &Mesh) -> Creases {
     for edge in halves.chunk_by(|a, b| a.0 == b.0) {
         let [(_, a), (_, b)] = edge else { continue };
         let [m, n] = [a, b].map(|h| normal(mesh.corners(*h as usize / 3)));
-        if dot(m, n) > TURN.cos() {
+        let turn = norm(cross(m, n)).atan2(dot(m, n));
+        if turn < TURN {
             continue;
         }
         let ends = ends(mesh, *a);
         let [p, q] = ends.map(|v| mesh.vertices[v as usize]);
-        creases.segments.push([p, q]);
+        creases.segments.push(Segment { ends: [p, q], turn });
         let along = sub(q, p);
         let along = scale(along, 1.0 / norm(along));
         for (v, way) in ends.into_iter().zip([along, scale(along, -1.0)]) {
