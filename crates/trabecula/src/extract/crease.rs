@@ -193,14 +193,16 @@ impl Edges {
         corners: &[Vec3],
     ) -> Vec3 {
         let center = middle(if corners.is_empty() { rim } else { corners });
+        let far = |p: &Vec3| norm(sub(*p, center));
         let mut tried = Vec::with_capacity(4);
         if let Some(pieces) = self.pieces.get(&cell) {
-            let far = |p: &Vec3| norm(sub(*p, center));
             let near = pieces.iter().map(|s| nearest(*s, center));
             tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
         }
         tried.extend(self.corners.get(&cell).into_iter().flatten());
-        if tried.is_empty() {
+        // An edge that runs through needs no other choice.
+        let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
+        if !through {
             tried.push(center);
         }
         let at = nodes.at(cell);

@@ -276,7 +276,7 @@ impl Knots<'_> {
     }
 
     /// Whether the triangles from the `first` on touch where they should not, once rounded to single precision.
-    fn muddled(&self, first: usize) -> bool {
+    pub fn muddled(&self, first: usize) -> bool {
         let triangles = &self.extra.triangles[first..];
         let mut mesh = Mesh::default();
         let mut names: Vec<u32> = Vec::with_capacity(32);

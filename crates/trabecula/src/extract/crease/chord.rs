@@ -165,7 +165,9 @@ impl Edges {
                 // Straight unless that is farther off.
                 pierced.iter().for_each(|p| add(Some(*p)));
                 if from.edge == to.edge {
-                    [0.25, 0.0].map(|by| add(Some(seen.beside(side, from, to, by))));
+                    for by in [0.25, 0.0] {
+                        add(Some(seen.beside(side, from, to, by)));
+                    }
                 } else {
                     add(None);
                 }

@@ -47,7 +47,8 @@ impl Knots<'_> {
             }
         }
         let cut = self.grid.faces[self.local.live[face]].cut;
-        if let [(rim, corners)] = &rims[..] {
+        let first = self.extra.triangles.len();
+        for (rim, corners) in &rims {
             let names: Vec<u32> = rim.iter().map(|k| self.vertex(*k)).collect();
             let places: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
             let corners: Vec<Vec3> = corners.iter().filter_map(|k| self.edges.place(*k)).collect();
@@ -56,9 +57,12 @@ impl Knots<'_> {
             let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
             let apex = edges.apex(grid, nodes, node, field, &places, &corners);
             self.cone(Key::center(node, 7), apex, &names, cut);
-            return;
         }
-        self.hollow(cell, face, &steps, cut);
+        // One cone cannot meet itself, but several may meet each other.
+        if rims.len() > 1 && self.muddled(first) {
+            self.extra.triangles.truncate(first);
+            self.hollow(cell, face, &steps, cut);
+        }
     }
 
     /// The ways of all rims through the sides of a cell: counter-clockwise seen from the void.
