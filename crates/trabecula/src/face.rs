@@ -40,8 +40,8 @@ pub struct Segment {
 pub struct Creases {
     /// Straight pieces of them.
     pub segments: Vec<Segment>,
-    /// Where they end, meet or bend, mm.
-    pub corners: Vec<Vec3>,
+    /// Where they end, meet or bend, mm; and how many are there.
+    pub corners: Vec<(Vec3, usize)>,
 }
 
 /// A plane normal to a coordinate axis.

@@ -47,8 +47,10 @@ pub(super) struct Edges {
     points: HashMap<Key, Vec3>,
     /// Pieces of edges in cells, by the cells' lowest nodes.
     pieces: HashMap<usize, Vec<[Vec3; 2]>>,
-    /// Places where edges end, meet or bend, likewise.
-    corners: HashMap<usize, Vec<Vec3>>,
+    /// Places where edges end, meet or bend, and how many are there, likewise.
+    corners: HashMap<usize, Vec<(Vec3, usize)>>,
+    /// The corner that the patch of a cell has in a cell beside it, likewise.
+    beyond: HashMap<usize, Vec3>,
 }
 
 /// A block, and a face in it.
@@ -75,6 +77,7 @@ impl Edges {
         self.points.clear();
         self.pieces.clear();
         self.corners.clear();
+        self.beyond.clear();
     }
 
     /// Whether there are any.
@@ -119,8 +122,8 @@ impl Edges {
                 at.entry((node - nodes.stride[other], normal)).or_default();
             }
         }
-        for (side, pierced) in at {
-            let Some(chords) = self.chords(seen, side, &pierced) else {
+        for (&side, pierced) in &at {
+            let Some(chords) = self.chords(seen, side, pierced) else {
                 continue;
             };
             let mut cell = nodes.at(side.0);
@@ -130,18 +133,67 @@ impl Edges {
                 cell[side.1] -= 1;
             }
             for c in &chords {
-                self.points.extend(c.via);
+                self.points.extend(c.via.iter().copied());
             }
             self.sides.insert(side, chords);
         }
         if self.any() {
             for p in &of.corners {
-                if let Some(cell) = cell_of(nodes, *p) {
-                    self.corners
-                        .entry(nodes.index(cell))
-                        .or_default()
-                        .push(*p);
+                if let Some(cell) = cell_of(nodes, p.0) {
+                    let here = self.corners.entry(nodes.index(cell)).or_default();
+                    here.push(*p);
                 }
+            }
+            self.find_beyond(seen, &at);
+        }
+    }
+
+    /// Finds the corners that lie in cells without any other surface, all their edges coming through one side: the patch
+    /// behind that side reaches through it. Its rim lies on the boundary of the two cells together, which are convex.
+    fn find_beyond<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        seen: &Seen<P>,
+        pierced: &HashMap<(usize, usize), Vec<Vec3>>,
+    ) {
+        let nodes = seen.nodes;
+        let mut found: Vec<(usize, Vec3)> = Vec::new();
+        for (&node, corners) in &self.corners {
+            let cell = nodes.at(node);
+            let [(place, count)] = corners[..] else {
+                continue;
+            };
+            let untouched = || seen.alone(cell) && seen.untouched(cell);
+            if count < 3 || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
+                continue;
+            }
+            let sides = (0..3).flat_map(|a| [(a, false), (a, true)]);
+            let mut open = sides.filter_map(|(axis, upper)| {
+                let low = node + if upper { nodes.stride[axis] } else { 0 };
+                let here = pierced.get(&(low, axis)).map_or(0, Vec::len);
+                (here > 0).then_some((axis, upper, here))
+            });
+            let (Some((axis, upper, here)), None) = (open.next(), open.next()) else {
+                continue;
+            };
+            let plane = nodes.axes[axis][cell[axis] + usize::from(upper)];
+            if here != count || seen.grid.is_laid(axis, plane) {
+                continue;
+            }
+            let behind = if upper {
+                node + nodes.stride[axis]
+            } else if cell[axis] > 0 {
+                node - nodes.stride[axis]
+            } else {
+                continue;
+            };
+            let place = [0, 1, 2].map(|a| within(seen.grid, nodes.axes[a], cell[a], place[a]));
+            found.push((behind, place));
+        }
+        // One for each patch.
+        found.sort_by_key(|f| f.0);
+        for pair in found.chunk_by(|a, b| a.0 == b.0) {
+            if let [(behind, place)] = pair {
+                self.beyond.insert(*behind, *place);
             }
         }
     }
@@ -181,13 +233,14 @@ impl Edges {
         }
     }
 
-    /// The point of a cell over which its patch becomes a cone: on the face's edges there, if any. `rim` are the points
+    /// The point of a cell over which its patch becomes a cone: on the face's edges there, if any; or `beyond`, where a
+    /// corner in a cell beside it is nearer. `rim` are the points
     /// of its rim, `corners` those of them that are corners of sides.
     fn apex(
         &self,
         grid: &Grid,
         nodes: &Nodes,
-        cell: usize,
+        (cell, beyond): (usize, Option<Vec3>),
         field: &dyn Field,
         rim: &[Vec3],
         corners: &[Vec3],
@@ -199,7 +252,7 @@ impl Edges {
             let near = pieces.iter().map(|s| nearest(*s, center));
             tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
         }
-        tried.extend(self.corners.get(&cell).into_iter().flatten());
+        tried.extend(self.corners.get(&cell).into_iter().flatten().map(|c| c.0));
         // An edge that runs through needs no other choice.
         let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
         if !through {
@@ -211,6 +264,7 @@ impl Edges {
                 p[a] = within(grid, nodes.axes[a], at[a], p[a]);
             }
         }
+        tried.extend(beyond);
         if tried.len() == 1 {
             return tried[0];
         }

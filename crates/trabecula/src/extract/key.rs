@@ -30,9 +30,12 @@ impl Key {
         Key::new(node, &[1 << axis], &[face; 3][..2 + which])
     }
 
+    /// How many points of this kind there are in a side.
+    pub const CORNERS: usize = 4;
+
     /// A point in a side, which spans two axes: one of several, those after the first of which name the face.
     pub fn corner(node: usize, span: usize, face: usize, which: usize) -> Key {
-        let faces = Key::new(0, &[], &[face; 3][..which.min(3)]);
+        let faces = Key::new(0, &[], &[face; 3][..which]);
         Key(Key::center(node, span).0 | faces.0)
     }
 

@@ -1,16 +1,16 @@
 //! The lines in which a face meets the side of a cell.
 
 use super::{Edges, Key, Seen};
-use crate::math::{Vec3, add, scale, sub};
+use crate::math::{self, Vec3, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d};
 
 /// A line in a side, from where the side's boundary enters the solid to where it leaves it: the boundary counter-clockwise
-/// about the side's axis. It has a corner at most.
-#[derive(Clone, Copy, Debug)]
+/// about the side's axis; over some corners.
+#[derive(Clone, Debug)]
 pub(in crate::extract) struct Chord {
     pub from: Key,
     pub to: Key,
-    pub via: Option<(Key, Vec3)>,
+    pub via: Vec<(Key, Vec3)>,
 }
 
 /// A point on the boundary of a side.
@@ -25,10 +25,10 @@ struct Point {
 }
 
 /// A chord between two points of a side, and how far it is from the face in the middle of its straight pieces.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Way {
     ends: [usize; 2],
-    via: Option<Vec3>,
+    via: Vec<Vec3>,
     off: f64,
 }
 
@@ -49,18 +49,18 @@ impl Edges {
             let mut found: Vec<Way> = Vec::new();
             for pair in pairs {
                 let of = ways.iter().filter(|w| w.ends == *pair);
-                let free = of.filter(|w| w.via.is_none_or(|v| !taken.contains(&v)));
+                let free = of.filter(|w| !w.via.iter().any(|v| taken.contains(v)));
                 let Some(way) = free.min_by(|a, b| a.off.total_cmp(&b.off)) else {
                     return;
                 };
-                taken.extend(way.via);
-                found.push(*way);
+                taken.extend(&way.via);
+                found.push(way.clone());
             }
             if crossing(&points, &found, side.1) {
                 // Without corners, chords of points that do not alternate keep apart.
                 for w in &mut found {
                     let plain = ways.iter().rfind(|v| v.ends == w.ends);
-                    *w = *plain.unwrap_or(w);
+                    *w = plain.unwrap_or(w).clone();
                 }
             }
             let off = found.iter().fold(0.0f64, |m, w| m.max(w.off));
@@ -70,18 +70,25 @@ impl Edges {
         });
         let (_, ways) = best?;
         let single = points.iter().all(|p| p.key.index() == 0);
-        if single && ways.iter().all(|w| w.via.is_none()) {
+        if single && ways.iter().all(|w| w.via.is_empty()) {
             return None;
         }
         let (low, axis) = side;
-        let chord = |(i, w): (usize, &Way)| Chord {
+        let corners: usize = ways.iter().map(|w| w.via.len()).sum();
+        if corners > Key::CORNERS {
+            return None;
+        }
+        let mut named = 0;
+        let mut name = |p: &Vec3| {
+            named += 1;
+            (Key::corner(low, 7 & !(1 << axis), seen.face, named - 1), *p)
+        };
+        let chord = |w: &Way| Chord {
             from: points[w.ends[0]].key,
             to: points[w.ends[1]].key,
-            via: w
-                .via
-                .map(|p| (Key::corner(low, 7 & !(1 << axis), seen.face, i), p)),
+            via: w.via.iter().map(&mut name).collect(),
         };
-        Some(ways.iter().enumerate().map(chord).collect())
+        Some(ways.iter().map(chord).collect())
     }
 
     /// The points of the boundary of a side, counter-clockwise about its axis; none if cells beside it are not the face's
@@ -149,34 +156,51 @@ impl Edges {
         pierced: &[Vec3],
     ) -> Vec<Way> {
         let mut ways: Vec<Way> = Vec::new();
-        let middle = |p: Vec3, q: Vec3| scale(add(p, q), 0.5);
         let mut places = Vec::new();
+        let mut counts = Vec::new();
+        let pierced = if pierced.len() > Key::CORNERS {
+            &[]
+        } else {
+            pierced
+        };
         for (i, from) in points.iter().enumerate().filter(|p| p.1.enters) {
             for (j, to) in points.iter().enumerate().filter(|p| !p.1.enters) {
-                let mut add = |via: Option<Vec3>| {
-                    let [a, b] = via.map_or([to.place, from.place], |v| [v, v]);
-                    places.extend([middle(from.place, a), middle(b, to.place)]);
+                let mut add = |via: Vec<Vec3>| {
+                    let mut at = from.place;
+                    for p in via.iter().chain([&to.place]) {
+                        places.push(scale(math::add(at, *p), 0.5));
+                        at = *p;
+                    }
+                    counts.push(via.len() + 1);
                     ways.push(Way {
                         ends: [i, j],
                         via,
                         off: 0.0,
                     });
                 };
-                // Straight unless that is farther off.
-                pierced.iter().for_each(|p| add(Some(*p)));
+                for (n, p) in pierced.iter().enumerate() {
+                    add(vec![*p]);
+                    for q in &pierced[..n] {
+                        add(vec![*p, *q]);
+                        add(vec![*q, *p]);
+                    }
+                }
                 if from.edge == to.edge {
                     for by in [0.25, 0.0] {
-                        add(Some(seen.beside(side, from, to, by)));
+                        add(vec![seen.beside(side, from, to, by)]);
                     }
                 } else {
-                    add(None);
+                    add(Vec::new());
                 }
             }
         }
         let mut off = vec![0.0; places.len()];
         seen.field.values(&places, &mut off);
-        for (w, off) in ways.iter_mut().zip(off.chunks_exact(2)) {
-            w.off = off[0].abs().max(off[1].abs());
+        let mut rest = &off[..];
+        for (w, count) in ways.iter_mut().zip(counts) {
+            let (own, others) = rest.split_at(count);
+            w.off = own.iter().fold(0.0, |m, d| m.max(d.abs()));
+            rest = others;
         }
         ways
     }
@@ -188,7 +212,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     fn beside(&self, side: (usize, usize), from: &Point, to: &Point, share: f64) -> Vec3 {
         let along = sub(to.place, from.place);
         let distance = along.iter().map(|x| x.abs()).fold(0.0, f64::max);
-        let mut p = scale(add(from.place, to.place), 0.5);
+        let mut p = scale(math::add(from.place, to.place), 0.5);
         let (u, v) = ((side.1 + 1) % 3, (side.1 + 2) % 3);
         let (across, way) = [(v, 1.0), (u, -1.0), (v, -1.0), (u, 1.0)][from.edge];
         p[across] += way * share * distance;
@@ -236,7 +260,7 @@ fn crossing(points: &[Point], ways: &[Way], axis: usize) -> bool {
     let flat = |p: Vec3| drop_axis(p.map(|x| f64::from(x as f32)), axis);
     let pieces = |w: &Way| {
         let mut path = vec![flat(points[w.ends[0]].place)];
-        path.extend(w.via.map(flat));
+        path.extend(w.via.iter().map(|p| flat(*p)));
         path.push(flat(points[w.ends[1]].place));
         path
     };
@@ -245,6 +269,13 @@ fn crossing(points: &[Point], ways: &[Way], axis: usize) -> bool {
         side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0
     };
     let paths: Vec<_> = ways.iter().map(pieces).collect();
+    // A path with two corners may cross itself, or turn back.
+    let bent = |p: &Vec<[f64; 2]>| {
+        p.len() == 4 && (meet(&p[..2], &p[2..]) || p.windows(3).any(|w| orient2d(w[0], w[1], w[2]) == 0))
+    };
+    if paths.iter().any(bent) {
+        return true;
+    }
     paths.iter().enumerate().any(|(i, a)| {
         paths[..i].iter().any(|b| {
             a.windows(2)

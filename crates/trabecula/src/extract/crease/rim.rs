@@ -55,7 +55,12 @@ impl Knots<'_> {
             let field = &*self.grid.faces[self.local.live[face]].field;
             let node = self.nodes.index(cell);
             let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
-            let apex = edges.apex(grid, nodes, node, field, &places, &corners);
+            let beyond = if rims.len() == 1 {
+                edges.beyond.get(&node).copied()
+            } else {
+                None
+            };
+            let apex = edges.apex(grid, nodes, (node, beyond), field, &places, &corners);
             self.cone(Key::center(node, 7), apex, &names, cut);
         }
         // One cone cannot meet itself, but several may meet each other.
@@ -74,7 +79,11 @@ impl Knots<'_> {
             if let Some(chords) = self.edges.sides.get(&(low, axis)) {
                 steps.extend(chords.iter().map(|c| Step {
                     from: if upper { c.from } else { c.to },
-                    via: c.via.iter().map(|v| v.0).collect(),
+                    via: if upper {
+                        c.via.iter().map(|v| v.0).collect()
+                    } else {
+                        c.via.iter().rev().map(|v| v.0).collect()
+                    },
                     to: if upper { c.to } else { c.from },
                     side: (axis, upper),
                 }));
@@ -117,7 +126,6 @@ impl Knots<'_> {
     /// Fills a cell with several rims: walls run from them half-way to the middle of the cell, where they end at what is
     /// solid of the boundary of a smaller cell. Walls over rims that do not meet keep apart.
     fn hollow(&mut self, cell: [usize; 3], face: usize, steps: &[Step], cut: bool) {
-        eprintln!("hollow");
         let node = self.nodes.index(cell);
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
         let center = scale(add(ends[0], ends[1]), 0.5);

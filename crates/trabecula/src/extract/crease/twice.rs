@@ -42,21 +42,13 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     /// The two points at which the face crosses a grid edge whose ends are on the same side of it.
     fn twice(&self, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
-        let ends = [node, node + nodes.stride[axis]];
         let around = (0..3).filter(|a| *a != axis);
         if at[axis] + 2 > nodes.shape[axis]
             || around.clone().any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a])
-            || ends.map(|n| self.signs.is_negative(self.face, n)) == [true, false]
-            || ends.map(|n| self.signs.is_negative(self.face, n)) == [false, true]
         {
             return None;
         }
-        let length = nodes.axes[axis][at[axis] + 1] - nodes.axes[axis][at[axis]];
-        // A distance falls no faster than the place moves.
-        let [a, b] = ends.map(|n| f64::from(self.samples[n].abs()) / length);
-        if a + b >= 1.0 - CLOSE {
-            return None;
-        }
+        let [a, b] = self.open(node, axis)?;
         let on_plane = around.clone().any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
         let mut beside = around;
         let (u, v) = (beside.next()?, beside.next()?);
@@ -71,22 +63,60 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         if on_plane || !all_alone() {
             return None;
         }
-        let solid = self.signs.is_negative(self.face, node);
-        let place = |t: f64| {
-            let mut p = nodes.place(node);
-            p[axis] += t * length;
-            p
-        };
-        // How far the face is on the ends' side of it; at most this many shares of the edge.
-        let height = |t: f64| {
-            let d = self.field.value(place(t)) / length;
-            if solid { -d } else { d }
-        };
+        let height = |t: f64| self.height(node, axis, t);
         let (t, low) = deepest(&height, a, 1.0 - b)?;
         let margin = self.grid.margin;
         let p = root(&height, (0.0, a.max(1e-12)), (t, low)).max(margin);
         let q = root(&height, (1.0, b.max(1e-12)), (t, low)).min(1.0 - margin);
-        (q - p >= CLOSE).then(|| [place(p), place(q)])
+        (q - p >= CLOSE).then(|| [p, q].map(|t| self.along(node, axis, t)))
+    }
+
+    /// Whether the face crosses none of the grid edges of a cell.
+    pub(super) fn untouched(&self, cell: [usize; 3]) -> bool {
+        let [i, j, k] = cell;
+        let low = self.nodes.index(cell);
+        let edge = |axis: usize, by: usize| {
+            let Some([a, b]) = self.open(low + by, axis) else {
+                return true;
+            };
+            deepest(&|t| self.height(low + by, axis, t), a, 1.0 - b).is_none()
+        };
+        matches!(self.signs.corners(self.face, i, j, k), 0 | 0xff)
+            && (0..3).all(|axis| {
+                let [u, v] = [1, 2].map(|n| self.nodes.stride[(axis + n) % 3]);
+                [0, u, v, u + v].into_iter().all(|by| edge(axis, by))
+            })
+    }
+
+    /// How far from the ends of a grid edge, as shares of it, the face may cross it twice: a distance falls no faster than
+    /// the place moves. None if it may not.
+    fn open(&self, node: usize, axis: usize) -> Option<[f64; 2]> {
+        let ends = [node, node + self.nodes.stride[axis]];
+        let [p, q] = ends.map(|n| self.signs.is_negative(self.face, n));
+        let [a, b] = ends.map(|n| f64::from(self.samples[n].abs()) / self.length(node, axis));
+        (p == q && a + b < 1.0 - CLOSE).then_some([a, b])
+    }
+
+    fn length(&self, node: usize, axis: usize) -> f64 {
+        let (axis, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        axis[at + 1] - axis[at]
+    }
+
+    /// A point of a grid edge.
+    fn along(&self, node: usize, axis: usize, t: f64) -> Vec3 {
+        let mut p = self.nodes.place(node);
+        p[axis] += t * self.length(node, axis);
+        p
+    }
+
+    /// How far a point of a grid edge is on the side of the face on which its lower end is, in shares of the edge.
+    fn height(&self, node: usize, axis: usize, t: f64) -> f64 {
+        let d = self.field.value(self.along(node, axis, t)) / self.length(node, axis);
+        if self.signs.is_negative(self.face, node) {
+            -d
+        } else {
+            d
+        }
     }
 }
 

@@ -18,7 +18,7 @@ pub fn creases(mesh: &Mesh) -> Creases {
     let halves = halves(mesh);
     let mut creases = Creases::default();
     // At each vertex: how many creases end there, and the sum of their directions.
-    let mut about: HashMap<u32, (u32, Vec3)> = HashMap::new();
+    let mut about: HashMap<u32, (usize, Vec3)> = HashMap::new();
     for edge in halves.chunk_by(|a, b| a.0 == b.0) {
         let [(_, a), (_, b)] = edge else { continue };
         let [m, n] = [a, b].map(|h| normal(mesh.corners(*h as usize / 3)));
@@ -36,9 +36,11 @@ pub fn creases(mesh: &Mesh) -> Creases {
             *at = (at.0 + 1, add(at.1, way));
         }
     }
-    let corner = |at: &(u32, Vec3)| at.0 != 2 || norm(at.1) > 2.0 * (BEND / 2.0).sin();
-    let mut corners: Vec<u32> = about.iter().filter(|a| corner(a.1)).map(|a| *a.0).collect();
+    let corner = |at: &(usize, Vec3)| at.0 != 2 || norm(at.1) > 2.0 * (BEND / 2.0).sin();
+    let corners = about.iter().filter(|a| corner(a.1));
+    let mut corners: Vec<(u32, usize)> = corners.map(|(v, at)| (*v, at.0)).collect();
     corners.sort_unstable();
-    creases.corners = corners.into_iter().map(|v| mesh.vertices[v as usize]).collect();
+    let place = |(v, count): (u32, usize)| (mesh.vertices[v as usize], count);
+    creases.corners = corners.into_iter().map(place).collect();
     creases
 }
