@@ -20,6 +20,7 @@ use crate::solid::Solid;
 
 mod bodies;
 mod cap;
+mod crease;
 mod grid;
 mod islands;
 mod key;

@@ -22,6 +22,26 @@ pub struct Face {
     pub cut: bool,
     /// Whether its zero set may have edges, as those of distances have; they are no curvature.
     pub edged: bool,
+    /// Where it has edges, as far as that is known.
+    pub creases: Arc<Creases>,
+}
+
+/// A straight piece of an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Its ends, mm.
+    pub ends: [Vec3; 2],
+    /// How much the normal turns across it, radians.
+    pub turn: f64,
+}
+
+/// The edges of a face's zero set.
+#[derive(Debug, Default)]
+pub struct Creases {
+    /// Straight pieces of them.
+    pub segments: Vec<Segment>,
+    /// Where they end, meet or bend, mm; and how many are there.
+    pub corners: Vec<(Vec3, usize)>,
 }
 
 /// A plane normal to a coordinate axis.
@@ -231,6 +251,7 @@ impl Face {
             plane: None,
             cut: true,
             edged: true,
+            creases: Arc::default(),
         }
     }
 

@@ -86,6 +86,7 @@ impl Solid {
                     field: part,
                     plane: None,
                     cut: false,
+                    creases: Arc::default(),
                 });
             }
             if any.is_empty() {

@@ -276,7 +276,7 @@ impl View<'_> {
             let enters = if key.is_along(0) && mine >> i & 1 == 1 {
                 key.faces()
                     .next()
-                    .map(|f| self.negative(f, k * ny + j) >> i & 1 == 0)
+                    .map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
             } else if key.spans() == 0 {
                 // A node of a cap: on lines that pass through the plane, it is where they do.
                 let caps = self.flat().iter().filter(|f| f.axis == 0);

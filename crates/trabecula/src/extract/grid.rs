@@ -1,11 +1,15 @@
 //! The rectilinear grid: even steps between the planes of the region, and one step of padding around it; and what is
 //! known of the solid in a block of it.
 
+use std::collections::HashMap;
+
 use crate::face::{Face, Sign, Tree};
 use crate::fault::Fault;
 use crate::field::Block;
 use crate::math::Aabb;
 use crate::solid::Solid;
+
+use super::crease;
 
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
 pub(super) const TILE: usize = 61;
@@ -27,6 +31,10 @@ pub(super) struct Grid {
     tree: Tree,
     /// For each face, the number of the node plane that it is, if it is one: then it needs no samples.
     laid: Vec<Option<usize>>,
+    /// For each face, the edges that it has of its own in each tile.
+    creases: Vec<HashMap<usize, Vec<u32>>>,
+    /// Whether one face at most has edges of its own.
+    pub one_creased: bool,
 }
 
 /// What is known of the solid in a block without sampling it.
@@ -168,14 +176,20 @@ impl Grid {
         for (f, p) in planes {
             laid[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
-        let grid = Grid {
+        let mut grid = Grid {
             axes,
             margin: needed.max(1.0 / 4096.0),
             step: edge,
             faces,
             tree,
             laid,
+            creases: Vec::new(),
+            one_creased: true,
         };
+        grid.creases = (grid.faces.iter())
+            .map(|f| crease::by_tile(&grid, &f.creases))
+            .collect();
+        grid.one_creased = grid.creases.iter().filter(|c| !c.is_empty()).count() < 2;
         grid.few_enough().map(|()| grid)
     }
 
@@ -211,6 +225,20 @@ impl Grid {
     /// Number of tiles along each axis.
     pub(super) fn tiles(&self) -> [usize; 3] {
         self.cells().map(|n| n.div_ceil(TILE))
+    }
+
+    /// Whether a plane normal to an axis is a face of the solid.
+    pub(super) fn is_laid(&self, axis: usize, at: f64) -> bool {
+        let planes = self.faces.iter().zip(&self.laid);
+        let mut laid = planes.filter_map(|(f, laid)| laid.and(f.plane));
+        laid.any(|p| p.axis == axis && p.at == at)
+    }
+
+    /// The pieces of edges that a face has of its own near a tile.
+    pub(super) fn creases(&self, face: usize, [i, j, k]: [usize; 3]) -> &[u32] {
+        let n = self.tiles();
+        let found = self.creases[face].get(&(i + n[0] * (j + n[1] * k)));
+        found.map_or(&[], |f| f)
     }
 
     /// The tile at a position in the order x fastest.

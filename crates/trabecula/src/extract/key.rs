@@ -25,6 +25,27 @@ impl Key {
         Key(node as u64 | (Key::CENTER * span as u64) << Key::NODE)
     }
 
+    /// The first or second point of a grid edge that a face crosses twice: the face is named twice or thrice.
+    pub fn crossing(node: usize, axis: usize, face: usize, which: usize) -> Key {
+        Key::new(node, &[1 << axis], &[face; 3][..2 + which])
+    }
+
+    /// How many points of this kind there are in a side.
+    pub const CORNERS: usize = 4;
+
+    /// A point in a side, which spans two axes: one of several, those after the first of which name the face.
+    pub fn corner(node: usize, span: usize, face: usize, which: usize) -> Key {
+        let faces = Key::new(0, &[], &[face; 3][..which]);
+        Key(Key::center(node, span).0 | faces.0)
+    }
+
+    /// Of a point of a grid edge that a face crosses twice: one for the lower, two for the upper one; zero for others.
+    pub fn index(self) -> usize {
+        let mut faces = self.faces();
+        let first = faces.next();
+        faces.take_while(|f| Some(*f) == first).count()
+    }
+
     pub fn node(self) -> usize {
         (self.0 & ((1 << Key::NODE) - 1)) as usize
     }

@@ -23,6 +23,7 @@ use std::ops::Range;
 use crate::math::{Vec3, add, scale};
 use crate::mesh::{Mesh, is_embedded};
 
+use super::crease::Edges;
 use super::grid::{Grid, Local};
 use super::islands::Spread;
 use super::key::Key;
@@ -59,6 +60,7 @@ pub(super) struct Knots<'a> {
     pub numbers: &'a [Numbers],
     pub places: &'a mut Vec<Vec3>,
     pub extra: &'a mut Extra,
+    pub edges: &'a Edges,
     /// Nodes at which the faces are moved a little.
     pub moved: HashSet<usize>,
 }
@@ -74,15 +76,22 @@ const PATHS: [([usize; 2], bool); 6] = [
     ([4, 6], false),
 ];
 
+/// The middle of some points.
+pub(super) fn middle(points: &[Vec3]) -> Vec3 {
+    let sum = points.iter().fold([0.0; 3], |s, p| add(s, *p));
+    scale(sum, 1.0 / points.len() as f64)
+}
+
 impl Knots<'_> {
     /// The vertex of a name; made if it is new.
     pub fn vertex(&mut self, key: Key) -> u32 {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
         }
-        let n = self
-            .numbered(key)
-            .unwrap_or_else(|| self.push(key, self.place(key)));
+        let n = self.numbered(key).unwrap_or_else(|| {
+            let own = self.edges.place(key);
+            self.push(key, own.unwrap_or_else(|| self.place(key)))
+        });
         self.extra.names.insert(key, n);
         n
     }
@@ -98,7 +107,7 @@ impl Knots<'_> {
         self.numbers[key.faces().next()?].get(steps.trailing_zeros() as usize, row, i)
     }
 
-    fn push(&mut self, key: Key, place: Vec3) -> u32 {
+    pub fn push(&mut self, key: Key, place: Vec3) -> u32 {
         self.places.push(place);
         self.extra.keys.push(key);
         self.places.len() as u32 - 1
@@ -168,15 +177,13 @@ impl Knots<'_> {
             );
             return;
         }
-        self.cone(Key::center(node, 7), &names, cut);
+        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
+        self.cone(Key::center(node, 7), middle(&rim), &names, cut);
     }
 
-    /// Adds the cone over a ring of vertices from the point in their middle.
-    fn cone(&mut self, middle: Key, ring: &[u32], cut: bool) {
-        let sum = ring
-            .iter()
-            .fold([0.0; 3], |s, v| add(s, self.places[*v as usize]));
-        let middle = self.push(middle, scale(sum, 1.0 / ring.len() as f64));
+    /// Adds the cone over a ring of vertices from a new one.
+    pub fn cone(&mut self, apex: Key, place: Vec3, ring: &[u32], cut: bool) {
+        let middle = self.push(apex, place);
         for at in 0..ring.len() {
             let (a, b) = (ring[at], ring[(at + 1) % ring.len()]);
             self.extra.triangles.push(([middle, a, b], cut));
@@ -186,7 +193,8 @@ impl Knots<'_> {
     /// Adds a polygon in the side of a cell that spans two axes; it may have straight angles.
     pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[Key]) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
-        self.cone(Key::center(low, span), &names, true);
+        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
+        self.cone(Key::center(low, span), middle(&rim), &names, true);
     }
 
     /// Which signs are solid in a cell.
@@ -266,7 +274,7 @@ impl Knots<'_> {
     }
 
     /// Whether the triangles from the `first` on touch where they should not, once rounded to single precision.
-    fn muddled(&self, first: usize) -> bool {
+    pub fn muddled(&self, first: usize) -> bool {
         let triangles = &self.extra.triangles[first..];
         let mut mesh = Mesh::default();
         let mut names: Vec<u32> = Vec::with_capacity(32);
@@ -339,7 +347,7 @@ impl Knots<'_> {
     }
 
     /// The points between two others on the line in which a face crosses the side of a cell.
-    fn trace(
+    pub fn trace(
         &self,
         cell: [usize; 3],
         axis: usize,

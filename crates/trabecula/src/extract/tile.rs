@@ -28,6 +28,7 @@ use crate::math::Vec3;
 
 use super::bodies::Bodies;
 use super::cap;
+use super::crease::{self, Edges, Seen};
 use super::grid::{Flat, Grid, Local, TILE};
 use super::key::Key;
 use super::knot::{Extra, Knots};
@@ -68,6 +69,7 @@ pub(super) struct Scratch {
     /// For each vertex on an edge: the volume it is to lose, and three times what it loses per mm along its edge.
     moments: Vec<(f32, f32)>,
     extra: Extra,
+    edges: Edges,
 }
 
 /// Numbers of the vertices of one face: those on x-edges, then y, then z, each in node order.
@@ -251,13 +253,14 @@ pub(super) fn extract<'a>(
         solve(s, &nodes, &*grid.faces[face].field, i, first..first + count);
         first += count;
     }
-    list_triangles(s, grid, &local, &own);
     let margin = grid.margin as f32;
     s.places.clear();
     s.places.extend(s.vertices.iter_mut().map(|v| {
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
+    edges(s, grid, &local, &nodes, tile);
+    list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes);
     finish(s, grid, &local, &nodes, &own);
     let own_triangles =
@@ -300,11 +303,44 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
     }
 }
 
+/// Finds the edges that faces have of their own.
+fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
+    let Scratch {
+        edges,
+        samples,
+        signs,
+        numbers,
+        places,
+        ..
+    } = s;
+    edges.clear(nodes.shape);
+    for (face, &id) in local.live.iter().enumerate() {
+        let segments = grid.creases(id, tile);
+        if !segments.is_empty() {
+            let seen = Seen {
+                grid,
+                local,
+                nodes,
+                signs,
+                face,
+                samples: &samples[face],
+                field: &*grid.faces[id].field,
+                place: |node, axis| {
+                    let [i, j, k] = nodes.at(node);
+                    let v = numbers[face].get(axis, k * nodes.shape[1] + j, i)?;
+                    Some(places[v as usize])
+                },
+            };
+            edges.find(&seen, segments, grid.one_creased);
+        }
+    }
+}
+
 /// Adds what plain cells do not make: knots, the seams around them, and caps.
 fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
     s.extra.clear();
     let knotted = s.signs.knotted.iter().any(|w| *w != 0);
-    if !knotted && local.flat.is_empty() {
+    if !knotted && local.flat.is_empty() && !s.edges.any() {
         return;
     }
     let mut knots = Knots {
@@ -316,6 +352,7 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         numbers: &s.numbers,
         places: &mut s.places,
         extra: &mut s.extra,
+        edges: &s.edges,
         moved: HashSet::new(),
     };
     if knotted {
@@ -327,6 +364,9 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
     }
     for &(cell, face) in &s.plain.seams {
         knots.seam(cell, face);
+    }
+    for (cell, face) in crease::cells(knots.edges, nodes, own) {
+        knots.edged(cell, face);
     }
     for flat in 0..local.flat.len() {
         cap::close(&mut knots, flat, own);

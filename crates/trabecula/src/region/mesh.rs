@@ -1,6 +1,6 @@
 //! The solid inside a closed triangle mesh, as an exact signed distance.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::{HalfSpace, Offset, Region, Shape, one_face};
 use crate::face;
@@ -12,6 +12,7 @@ use crate::mesh::Mesh;
 mod cap;
 mod check;
 mod clean;
+mod crease;
 mod cut;
 mod edges;
 mod fair;
@@ -49,6 +50,8 @@ pub struct MeshRegion {
     planes: [Vec<f64>; 3],
     mesh: Mesh,
     repaired: Repaired,
+    /// Found when they are first asked for.
+    creases: OnceLock<Arc<face::Creases>>,
 }
 
 impl MeshRegion {
@@ -81,6 +84,7 @@ impl MeshRegion {
             tree,
             mesh,
             repaired: done,
+            creases: OnceLock::new(),
         })
     }
 
@@ -221,7 +225,16 @@ impl Shape for MeshRegion {
     fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
-            _ => one_face(self, out),
+            _ => {
+                let creases = self
+                    .creases
+                    .get_or_init(|| Arc::new(crease::creases(&self.mesh)));
+                out.push(face::Face {
+                    creases: creases.clone(),
+                    ..face::Face::distance(self.clone())
+                });
+                face::Tree::Face(out.len() - 1)
+            }
         }
     }
 

@@ -47,7 +47,7 @@ pub(super) struct Halves {
 }
 
 impl Knots<'_> {
-    pub(super) fn offset(&self, step: usize) -> usize {
+    pub(in crate::extract) fn offset(&self, step: usize) -> usize {
         (0..3)
             .filter(|a| step >> a & 1 == 1)
             .map(|a| self.nodes.stride[a])

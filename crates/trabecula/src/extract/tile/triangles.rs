@@ -16,6 +16,7 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &
         signs,
         numbers,
         plain,
+        edges,
         ..
     } = s;
     plain.triangles.clear();
@@ -29,7 +30,7 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &
             Kind::Lattice
         };
         let before = plain.triangles.len();
-        list_patches(signs, numbers, face, own, kind, plain);
+        list_patches(signs, &edges.cells, numbers, face, own, kind, plain);
         plain.counts.push(plain.triangles.len() - before);
     }
 }
@@ -37,6 +38,7 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn list_patches(
     signs: &Signs,
+    edged: &[u64],
     numbers: &Numbers,
     face: usize,
     own: &[Range<usize>; 3],
@@ -72,7 +74,9 @@ fn list_patches(
                 // cells of the tile itself, except at the grid's padding.
                 let below =
                     if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
-                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine;
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below)
+                    & mine
+                    & !edged[row];
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
@@ -100,7 +104,9 @@ fn list_patches(
                 } else {
                     Kind::Neighbour
                 };
-                if seam >> i & 1 == 1 {
+                if edged[row] >> i & 1 == 1 {
+                    kind = Kind::Neighbour;
+                } else if seam >> i & 1 == 1 {
                     seams.push(([i, j, k], face));
                     kind = Kind::Neighbour;
                 }

@@ -1,0 +1,411 @@
+//! Edges that a face has of its own, such as those of a mesh, where it alone makes the surface.
+//!
+//! The line in which a face meets the side of a cell runs straight from one grid edge to another. Where an edge of the
+//! face pierces the side it gets a corner there, if it lies nearer to the face with it. A grid edge that the face
+//! crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its rim from a point
+//! of the face's edge inside the cell. A rim is a simple curve on the boundary of a convex cell, so the cone cannot meet
+//! itself. What a side or a grid edge gets depends on nothing but what all cells around it see alike.
+//!
+//! Source: corners in the sides of cells after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares,
+//! Comput. Graph. Forum 24 (2005) 537.
+
+mod chord;
+mod rim;
+mod twice;
+
+use std::collections::HashMap;
+
+use crate::face::Creases;
+use crate::field::Field;
+use crate::math::{Vec3, add, dot, norm, scale, sub};
+
+use super::grid::{Grid, Local, TILE};
+use super::key::Key;
+use super::knot::middle;
+use super::signs::{Signs, bits};
+use super::tile::Nodes;
+pub(super) use chord::Chord;
+
+/// Cells that are this many steps long or more show edges between them, however little the face turns there.
+const LONG: f64 = 3.0;
+/// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
+/// step.
+const SHARP: f64 = 0.436;
+
+/// Edges of faces in the cells of a block.
+#[derive(Default)]
+pub(super) struct Edges {
+    /// For each row of cells: those that have a side with chords.
+    pub cells: Vec<u64>,
+    /// The face that makes the surface in these.
+    pub face: HashMap<usize, usize>,
+    /// The chords of sides, by the lowest node of the side and the axis normal to it.
+    sides: HashMap<(usize, usize), Vec<Chord>>,
+    /// Grid edges that are crossed twice, by their lower nodes and axes: the lower point first.
+    twice: HashMap<(usize, usize), [Vec3; 2]>,
+    /// The places of points that nothing else has.
+    points: HashMap<Key, Vec3>,
+    /// Pieces of edges in cells, by the cells' lowest nodes.
+    pieces: HashMap<usize, Vec<[Vec3; 2]>>,
+    /// Places where edges end, meet or bend, and how many are there, likewise.
+    corners: HashMap<usize, Vec<(Vec3, usize)>>,
+    /// The corner that the patch of a cell has in a cell beside it, likewise.
+    beyond: HashMap<usize, Vec3>,
+}
+
+/// A block, and a face in it.
+pub(super) struct Seen<'a, P: Fn(usize, usize) -> Option<Vec3>> {
+    pub grid: &'a Grid,
+    pub local: &'a Local,
+    pub nodes: &'a Nodes<'a>,
+    pub signs: &'a Signs,
+    /// The face's number among the live ones, its samples and its field.
+    pub face: usize,
+    pub samples: &'a [f32],
+    pub field: &'a dyn Field,
+    /// The vertices of plain cells: by the lower node of their grid edge, and its axis.
+    pub place: P,
+}
+
+impl Edges {
+    pub fn clear(&mut self, shape: [usize; 3]) {
+        self.cells.clear();
+        self.cells.resize(shape[1] * shape[2], 0);
+        self.face.clear();
+        self.sides.clear();
+        self.twice.clear();
+        self.points.clear();
+        self.pieces.clear();
+        self.corners.clear();
+        self.beyond.clear();
+    }
+
+    /// Whether there are any.
+    pub fn any(&self) -> bool {
+        !self.sides.is_empty()
+    }
+
+    /// The place of a point that is none of a plain or a knotted cell.
+    pub fn place(&self, key: Key) -> Option<Vec3> {
+        self.points.get(&key).copied()
+    }
+
+    /// Adds the edges of a face as far as they lie in the block. `all`: whether grid edges may be crossed twice.
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        seen: &Seen<P>,
+        segments: &[u32],
+        all: bool,
+    ) {
+        let nodes = seen.nodes;
+        let of = &seen.grid.faces[seen.local.live[seen.face]].creases;
+        let mut pierced: Vec<((usize, usize), Vec3)> = Vec::new();
+        for &i in segments {
+            self.walk(nodes, of.segments[i as usize].ends, &mut pierced);
+        }
+        if all {
+            let cells: Vec<usize> = self.pieces.keys().copied().collect();
+            self.find_twice(seen, cells);
+        }
+        // In the order of the segments where they pierce one side.
+        pierced.sort_by_key(|p| p.0);
+        let mut at: HashMap<(usize, usize), Vec<Vec3>> = HashMap::new();
+        for (side, p) in pierced {
+            let p = seen.inside(side, p);
+            at.entry(side).or_default().push(p);
+        }
+        for &(node, axis) in self.twice.keys() {
+            for other in (0..3).filter(|a| *a != axis) {
+                // The side is normal to the third axis.
+                let normal = 3 - axis - other;
+                at.entry((node, normal)).or_default();
+                at.entry((node - nodes.stride[other], normal)).or_default();
+            }
+        }
+        for (&side, pierced) in &at {
+            let Some(chords) = self.chords(seen, side, pierced) else {
+                continue;
+            };
+            let mut cell = nodes.at(side.0);
+            for _ in 0..2 {
+                self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
+                self.face.insert(nodes.index(cell), seen.face);
+                cell[side.1] -= 1;
+            }
+            for c in &chords {
+                self.points.extend(c.via.iter().copied());
+            }
+            self.sides.insert(side, chords);
+        }
+        if self.any() {
+            for p in &of.corners {
+                if let Some(cell) = cell_of(nodes, p.0) {
+                    let here = self.corners.entry(nodes.index(cell)).or_default();
+                    here.push(*p);
+                }
+            }
+            self.find_beyond(seen, &at);
+        }
+    }
+
+    /// Finds the corners that lie in cells without any other surface, all their edges coming through one side: the patch
+    /// behind that side reaches through it. Its rim lies on the boundary of the two cells together, which are convex.
+    fn find_beyond<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        seen: &Seen<P>,
+        pierced: &HashMap<(usize, usize), Vec<Vec3>>,
+    ) {
+        let nodes = seen.nodes;
+        let mut found: Vec<(usize, Vec3)> = Vec::new();
+        for (&node, corners) in &self.corners {
+            let cell = nodes.at(node);
+            let [(place, count)] = corners[..] else {
+                continue;
+            };
+            let untouched = || seen.alone(cell) && seen.untouched(cell);
+            if count < 3
+                || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1
+                || !untouched()
+            {
+                continue;
+            }
+            let sides = (0..3).flat_map(|a| [(a, false), (a, true)]);
+            let mut open = sides.filter_map(|(axis, upper)| {
+                let low = node + if upper { nodes.stride[axis] } else { 0 };
+                let here = pierced.get(&(low, axis)).map_or(0, Vec::len);
+                (here > 0).then_some((axis, upper, here))
+            });
+            let (Some((axis, upper, here)), None) = (open.next(), open.next()) else {
+                continue;
+            };
+            let plane = nodes.axes[axis][cell[axis] + usize::from(upper)];
+            if here != count || seen.grid.is_laid(axis, plane) {
+                continue;
+            }
+            let behind = if upper {
+                node + nodes.stride[axis]
+            } else if cell[axis] > 0 {
+                node - nodes.stride[axis]
+            } else {
+                continue;
+            };
+            let place = [0, 1, 2].map(|a| within(seen.grid, nodes.axes[a], cell[a], place[a]));
+            found.push((behind, place));
+        }
+        // One for each patch.
+        found.sort_by_key(|f| f.0);
+        for pair in found.chunk_by(|a, b| a.0 == b.0) {
+            if let [(behind, place)] = pair {
+                self.beyond.insert(*behind, *place);
+            }
+        }
+    }
+
+    /// Follows a piece of an edge through the cells of the block.
+    fn walk(
+        &mut self,
+        nodes: &Nodes,
+        [p, q]: [Vec3; 2],
+        pierced: &mut Vec<((usize, usize), Vec3)>,
+    ) {
+        let along = sub(q, p);
+        let mut stops = vec![0.0, 1.0];
+        for a in 0..3 {
+            let axis = nodes.axes[a];
+            let [from, to] = [p, q].map(|x| axis.partition_point(|n| *n < x[a]));
+            for n in from.min(to)..from.max(to) {
+                let t = (axis[n] - p[a]) / along[a];
+                stops.push(t);
+                let mut at = add(p, scale(along, t));
+                at[a] = axis[n];
+                if let Some(mut cell) = cell_of(nodes, at) {
+                    cell[a] = n;
+                    pierced.push(((nodes.index(cell), a), at));
+                }
+            }
+        }
+        stops.sort_by(f64::total_cmp);
+        for w in stops.windows(2).filter(|w| w[0] < w[1]) {
+            let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
+            if let Some(cell) = cell_of(nodes, scale(add(ends[0], ends[1]), 0.5)) {
+                self.pieces.entry(nodes.index(cell)).or_default().push(ends);
+            }
+        }
+    }
+
+    /// The point of a cell over which its patch becomes a cone: on the face's edges there, if any; or `beyond`, where a
+    /// corner in a cell beside it is nearer. `rim` are the points
+    /// of its rim, `corners` those of them that are corners of sides.
+    fn apex(
+        &self,
+        grid: &Grid,
+        nodes: &Nodes,
+        (cell, beyond): (usize, Option<Vec3>),
+        field: &dyn Field,
+        rim: &[Vec3],
+        corners: &[Vec3],
+    ) -> Vec3 {
+        let center = middle(if corners.is_empty() { rim } else { corners });
+        let far = |p: &Vec3| norm(sub(*p, center));
+        let mut tried = Vec::with_capacity(4);
+        if let Some(pieces) = self.pieces.get(&cell) {
+            let near = pieces.iter().map(|s| nearest(*s, center));
+            tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
+        }
+        tried.extend(self.corners.get(&cell).into_iter().flatten().map(|c| c.0));
+        // An edge that runs through needs no other choice.
+        let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
+        if !through {
+            tried.push(center);
+        }
+        let at = nodes.at(cell);
+        for p in &mut tried {
+            for a in 0..3 {
+                p[a] = within(grid, nodes.axes[a], at[a], p[a]);
+            }
+        }
+        tried.extend(beyond);
+        if tried.len() == 1 {
+            return tried[0];
+        }
+        let spokes: Vec<Vec3> = tried
+            .iter()
+            .flat_map(|p| rim.iter().map(|r| scale(add(*p, *r), 0.5)))
+            .collect();
+        let mut off = vec![0.0; spokes.len()];
+        field.values(&spokes, &mut off);
+        let worst = |i: usize| {
+            let of = &off[i * rim.len()..(i + 1) * rim.len()];
+            of.iter().fold(0.0f64, |m, d| m.max(d.abs()))
+        };
+        let best = (0..tried.len()).min_by(|a, b| worst(*a).total_cmp(&worst(*b)));
+        tried[best.unwrap_or(0)]
+    }
+}
+
+impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
+    /// Whether the face alone makes the surface in a cell of the block, or would if it crossed it.
+    fn alone(&self, cell: [usize; 3]) -> bool {
+        let (signs, [i, j, k]) = (self.signs, cell);
+        let row = k * signs.shape[1] + j;
+        if signs.knotted[row] >> i & 1 == 1 {
+            return false;
+        }
+        if signs.plain[self.face][row] >> i & 1 == 1 {
+            return true;
+        }
+        let live = self.local.live.len();
+        if (0..live).any(|f| signs.plain[f][row] >> i & 1 == 1) {
+            return false;
+        }
+        let (mut varies, mut negative) = (0u64, 0u64);
+        for f in (0..live).filter(|f| *f != self.face) {
+            match signs.corners(f, i, j, k) {
+                0 => {}
+                0xff => negative |= 1 << f,
+                _ => varies |= 1 << f,
+            }
+        }
+        let holds = |mask: u64| {
+            let sign = |f: usize| match f.checked_sub(live) {
+                Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
+                None => mask >> f,
+            };
+            self.local.tree.solid(&sign) & 1 == 1
+        };
+        // The tree never falls when a face becomes negative: so two cases stand for all that vary.
+        let own = 1 << self.face;
+        [negative, negative | varies]
+            .iter()
+            .all(|n| holds(n | own) && !holds(n & !own))
+    }
+
+    /// A point of a side kept within it.
+    fn inside(&self, (low, axis): (usize, usize), mut p: Vec3) -> Vec3 {
+        let at = self.nodes.at(low);
+        for a in (0..3).filter(|a| *a != axis) {
+            p[a] = within(self.grid, self.nodes.axes[a], at[a], p[a]);
+        }
+        p
+    }
+}
+
+/// The point of a segment nearest to another one.
+fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
+    let along = sub(q, p);
+    let square = dot(along, along);
+    let t = if square > 0.0 {
+        (dot(sub(to, p), along) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    add(p, scale(along, t))
+}
+
+/// The cell of the block that a place lies in.
+fn cell_of(nodes: &Nodes, p: Vec3) -> Option<[usize; 3]> {
+    let mut cell = [0; 3];
+    for a in 0..3 {
+        let above = nodes.axes[a].partition_point(|n| *n <= p[a]);
+        if above == 0 || above == nodes.axes[a].len() {
+            return None;
+        }
+        cell[a] = above - 1;
+    }
+    Some(cell)
+}
+
+/// A coordinate kept within a step of the grid, away from its ends.
+fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
+    let (low, high) = (axis[at], axis[at + 1]);
+    let margin = grid.margin * (high - low);
+    x.clamp(low + margin, high - margin)
+}
+
+/// The pieces of a face's edges that the grid shows, by the numbers of the tiles that they come near.
+pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
+    let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
+    let tiles = grid.tiles();
+    for (i, s) in (0..).zip(&creases.segments) {
+        let [p, q] = s.ends;
+        if s.turn < SHARP && norm(sub(q, p)) < LONG * grid.step {
+            continue;
+        }
+        let range = [0, 1, 2].map(|a| {
+            let axis = &grid.axes[a];
+            // The cells it lies in, and more on either side: tiles look one cell beyond themselves.
+            let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
+            let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
+            let tile = |c: usize| (c / TILE).min(tiles[a] - 1);
+            tile(low.saturating_sub(2))..tile(high + 2) + 1
+        });
+        for k in range[2].clone() {
+            for j in range[1].clone() {
+                for t in range[0].clone() {
+                    let tile = t + tiles[0] * (j + tiles[1] * k);
+                    found.entry(tile).or_default().push(i);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The cells that have edges, among some.
+pub(super) fn cells(
+    edges: &Edges,
+    nodes: &Nodes,
+    own: &[std::ops::Range<usize>; 3],
+) -> Vec<([usize; 3], usize)> {
+    let ny = nodes.shape[1];
+    let mut found = Vec::new();
+    for (row, w) in edges.cells.iter().enumerate() {
+        for i in bits(*w) {
+            let cell = [i, row % ny, row / ny];
+            if (0..3).all(|a| own[a].contains(&cell[a])) {
+                found.push((cell, edges.face[&nodes.index(cell)]));
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,295 @@
+//! Patches by their rims: cells in which a face has an edge.
+
+use std::collections::HashMap;
+
+use crate::extract::key::Key;
+use crate::extract::knot::Knots;
+use crate::math::{Vec3, add, scale, sub};
+use crate::mesh::exact::{drop_axis, orient2d};
+
+/// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
+const INNER: f64 = 0.5;
+
+/// A rim's way through a side: from a point on the side's boundary, perhaps over others, to one.
+struct Step {
+    from: Key,
+    via: Vec<Key>,
+    to: Key,
+    /// The side: its axis, and whether it is the upper one.
+    side: (usize, bool),
+}
+
+impl Knots<'_> {
+    /// Fills a cell in which a face has an edge.
+    pub fn edged(&mut self, cell: [usize; 3], face: usize) {
+        let steps = self.steps(cell, face);
+        let mut next: HashMap<Key, usize> = HashMap::new();
+        for (i, s) in steps.iter().enumerate() {
+            next.insert(s.from, i);
+        }
+        let mut used = vec![false; steps.len()];
+        let mut rims: Vec<(Vec<Key>, Vec<Key>)> = Vec::new();
+        for first in 0..steps.len() {
+            let (mut rim, mut corners) = (Vec::new(), Vec::new());
+            let mut at = first;
+            while !used[at] {
+                used[at] = true;
+                rim.push(steps[at].from);
+                rim.extend(&steps[at].via);
+                corners.extend(steps[at].via.iter().filter(|k| k.spans().count_ones() == 2));
+                match next.get(&steps[at].to) {
+                    Some(n) => at = *n,
+                    None => break,
+                }
+            }
+            if !rim.is_empty() {
+                rims.push((rim, corners));
+            }
+        }
+        let cut = self.grid.faces[self.local.live[face]].cut;
+        let first = self.extra.triangles.len();
+        for (rim, corners) in &rims {
+            let names: Vec<u32> = rim.iter().map(|k| self.vertex(*k)).collect();
+            let places: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
+            let corners: Vec<Vec3> = corners
+                .iter()
+                .filter_map(|k| self.edges.place(*k))
+                .collect();
+            let field = &*self.grid.faces[self.local.live[face]].field;
+            let node = self.nodes.index(cell);
+            let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
+            let beyond = if rims.len() == 1 {
+                edges.beyond.get(&node).copied()
+            } else {
+                None
+            };
+            let apex = edges.apex(grid, nodes, (node, beyond), field, &places, &corners);
+            self.cone(Key::center(node, 7), apex, &names, cut);
+        }
+        // One cone cannot meet itself, but several may meet each other.
+        if rims.len() > 1 && self.muddled(first) {
+            self.extra.triangles.truncate(first);
+            self.hollow(cell, face, &steps, cut);
+        }
+    }
+
+    /// The ways of all rims through the sides of a cell: counter-clockwise seen from the void.
+    fn steps(&self, cell: [usize; 3], face: usize) -> Vec<Step> {
+        let node = self.nodes.index(cell);
+        let mut steps = Vec::new();
+        for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
+            let low = node + self.offset(usize::from(upper) << axis);
+            if let Some(chords) = self.edges.sides.get(&(low, axis)) {
+                steps.extend(chords.iter().map(|c| Step {
+                    from: if upper { c.from } else { c.to },
+                    via: if upper {
+                        c.via.iter().map(|v| v.0).collect()
+                    } else {
+                        c.via.iter().rev().map(|v| v.0).collect()
+                    },
+                    to: if upper { c.to } else { c.from },
+                    side: (axis, upper),
+                }));
+                continue;
+            }
+            let (mut from, mut to) = (None, None);
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
+            let ring = [low, low + du, low + du + dv, low + dv];
+            for i in 0..4 {
+                let (a, b) = (ring[i], ring[(i + 1) % 4]);
+                let [p, q] = [a, b].map(|n| self.signs.is_negative(face, n));
+                let along = if i % 2 == 0 { u } else { v };
+                let key = Key::new(a.min(b), &[1 << along], &[face]);
+                // From where the boundary enters the solid, seen from outside the cell.
+                if p != q {
+                    *(if q == upper { &mut from } else { &mut to }) = Some(key);
+                }
+            }
+            let (Some(from), Some(to)) = (from, to) else {
+                continue;
+            };
+            let mut across = cell;
+            across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
+            let via = if across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across)
+            {
+                self.trace(cell, axis, upper, face, from, to)
+            } else {
+                Vec::new()
+            };
+            steps.push(Step {
+                from,
+                via,
+                to,
+                side: (axis, upper),
+            });
+        }
+        steps
+    }
+
+    /// Fills a cell with several rims: walls run from them half-way to the middle of the cell, where they end at what is
+    /// solid of the boundary of a smaller cell. Walls over rims that do not meet keep apart.
+    fn hollow(&mut self, cell: [usize; 3], face: usize, steps: &[Step], cut: bool) {
+        let node = self.nodes.index(cell);
+        let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
+        let center = scale(add(ends[0], ends[1]), 0.5);
+        let mut inner: HashMap<Key, u32> = HashMap::new();
+        let mut pairs: HashMap<Key, u32> = HashMap::new();
+        let mut keys: Vec<Key> = Vec::new();
+        for s in steps {
+            keys.push(s.from);
+            keys.extend(&s.via);
+            keys.push(s.to);
+        }
+        let polygons: Vec<((usize, bool), Vec<Key>)> = self.solid_polygons(cell, face, steps);
+        for &key in &keys {
+            let v = self.vertex(key);
+            pairs.insert(key, v);
+        }
+        keys.extend(polygons.iter().flat_map(|p| p.1.iter().copied()));
+        for key in keys {
+            if inner.contains_key(&key) {
+                continue;
+            }
+            let place = match pairs.get(&key) {
+                Some(v) => self.places[*v as usize],
+                None => self.nodes.place(key.node()),
+            };
+            let place = add(center, scale(sub(place, center), INNER));
+            let v = self.push(Key::center(node, 7), place);
+            inner.insert(key, v);
+        }
+        for s in steps {
+            let path: Vec<Key> = std::iter::once(s.from)
+                .chain(s.via.iter().copied())
+                .chain(std::iter::once(s.to))
+                .collect();
+            for w in path.windows(2) {
+                let (a, b) = (pairs[&w[0]], pairs[&w[1]]);
+                let (c, d) = (inner[&w[0]], inner[&w[1]]);
+                self.extra.triangles.push(([c, a, b], cut));
+                self.extra.triangles.push(([c, b, d], cut));
+            }
+        }
+        for ((axis, upper), ring) in polygons {
+            let mut names: Vec<u32> = ring.iter().map(|k| inner[k]).collect();
+            if upper {
+                names.reverse();
+            }
+            let flat: Vec<[f64; 2]> = names
+                .iter()
+                .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
+                .collect();
+            for t in ears(&flat) {
+                self.extra.triangles.push((t.map(|i| names[i]), cut));
+            }
+        }
+    }
+
+    /// What is solid of the sides of a cell: polygons, counter-clockwise about the side's axis.
+    fn solid_polygons(
+        &self,
+        cell: [usize; 3],
+        face: usize,
+        steps: &[Step],
+    ) -> Vec<((usize, bool), Vec<Key>)> {
+        let node = self.nodes.index(cell);
+        let mut all = Vec::new();
+        for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
+            let low = node + self.offset(usize::from(upper) << axis);
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
+            let ring = [low, low + du, low + du + dv, low + dv];
+            // The boundary: nodes, and where it enters the solid or leaves it.
+            let mut boundary: Vec<Key> = Vec::new();
+            for i in 0..4 {
+                let (a, b) = (ring[i], ring[(i + 1) % 4]);
+                let along = if i % 2 == 0 { u } else { v };
+                boundary.push(Key::new(a, &[], &[]));
+                let [p, q] = [a, b].map(|n| self.signs.is_negative(face, n));
+                if p != q {
+                    boundary.push(Key::new(a.min(b), &[1 << along], &[face]));
+                } else if self.edges.twice.contains_key(&(a.min(b), along)) {
+                    let order = if i < 2 { [0, 1] } else { [1, 0] };
+                    let key = |n| Key::crossing(a.min(b), along, face, n);
+                    boundary.extend(order.map(key));
+                }
+            }
+            let here: Vec<(Key, Vec<Key>, Key)> = steps
+                .iter()
+                .filter(|s| s.side == (axis, upper))
+                .map(|s| {
+                    let mut via = s.via.clone();
+                    if upper {
+                        (s.from, via, s.to)
+                    } else {
+                        via.reverse();
+                        (s.to, via, s.from)
+                    }
+                })
+                .collect();
+            if here.is_empty() {
+                if self.signs.is_negative(face, low) {
+                    all.push(((axis, upper), boundary));
+                }
+                continue;
+            }
+            let mut open: Vec<Key> = here.iter().map(|c| c.0).collect();
+            while let Some(first) = open.pop() {
+                let mut polygon = Vec::new();
+                let mut enter = first;
+                loop {
+                    // Along the boundary to where it leaves the solid, then back along the chord.
+                    let mut i = boundary.iter().position(|k| *k == enter).unwrap_or(0);
+                    let chord = loop {
+                        polygon.push(boundary[i]);
+                        i = (i + 1) % boundary.len();
+                        if let Some(c) = here.iter().find(|c| c.2 == boundary[i]) {
+                            break c;
+                        }
+                        if polygon.len() > boundary.len() {
+                            break &here[0];
+                        }
+                    };
+                    polygon.push(chord.2);
+                    polygon.extend(chord.1.iter().rev());
+                    enter = chord.0;
+                    if enter == first || polygon.len() > 64 {
+                        break;
+                    }
+                    open.retain(|k| *k != enter);
+                }
+                all.push(((axis, upper), polygon));
+            }
+        }
+        all
+    }
+}
+
+/// The triangles of a simple polygon, by clipping ears.
+fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
+    let mut left: Vec<usize> = (0..ring.len()).collect();
+    let area: f64 = (0..ring.len())
+        .map(|i| {
+            let (p, q) = (ring[i], ring[(i + 1) % ring.len()]);
+            p[0] * q[1] - p[1] * q[0]
+        })
+        .sum();
+    let way = if area > 0.0 { 1 } else { -1 };
+    let turn = |a: usize, b: usize, c: usize| orient2d(ring[a], ring[b], ring[c]) * way;
+    let mut found = Vec::with_capacity(ring.len());
+    while left.len() > 3 {
+        let n = left.len();
+        let corner = |i: usize| (left[(i + n - 1) % n], left[i], left[(i + 1) % n]);
+        let ear = (0..n).find(|&i| {
+            let (a, b, c) = corner(i);
+            let holds = |p: usize| turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
+            turn(a, b, c) > 0 && !left.iter().any(|p| ![a, b, c].contains(p) && holds(*p))
+        });
+        let (a, b, c) = corner(ear.unwrap_or(0));
+        found.push([a, b, c]);
+        left.remove(ear.unwrap_or(0));
+    }
+    found.push([left[0], left[1], left[2]]);
+    found
+}

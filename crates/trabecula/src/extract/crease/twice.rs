@@ -1,0 +1,175 @@
+//! Grid edges that a face crosses twice.
+
+use super::{Edges, Seen};
+use crate::math::Vec3;
+
+/// Crossings nearer to each other than this share of the grid edge are left out.
+const CLOSE: f64 = 1.0 / 128.0;
+/// Rounds in which a crossing is found: each at least halves what is left, most of them do far better.
+const ROUNDS: usize = 40;
+
+impl Edges {
+    /// Finds the grid edges that the face crosses twice, of some cells by their lowest nodes.
+    pub(super) fn find_twice<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        seen: &Seen<P>,
+        cells: Vec<usize>,
+    ) {
+        let stride = seen.nodes.stride;
+        let mut edges: Vec<(usize, usize)> = Vec::with_capacity(12 * cells.len());
+        for cell in cells {
+            for axis in 0..3 {
+                let [u, v] = [stride[(axis + 1) % 3], stride[(axis + 2) % 3]];
+                edges.extend([0, u, v, u + v].map(|by| (cell + by, axis)));
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        for (node, axis) in edges {
+            if let Some(points) = seen.twice(node, axis) {
+                self.twice.insert((node, axis), points);
+            }
+        }
+        for ((node, axis), points) in &self.twice {
+            for (i, p) in points.iter().enumerate() {
+                self.points
+                    .insert(super::Key::crossing(*node, *axis, seen.face, i), *p);
+            }
+        }
+    }
+}
+
+impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
+    /// The two points at which the face crosses a grid edge whose ends are on the same side of it.
+    fn twice(&self, node: usize, axis: usize) -> Option<[Vec3; 2]> {
+        let (nodes, at) = (self.nodes, self.nodes.at(node));
+        let around = (0..3).filter(|a| *a != axis);
+        if at[axis] + 2 > nodes.shape[axis]
+            || around
+                .clone()
+                .any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a])
+        {
+            return None;
+        }
+        let [a, b] = self.open(node, axis)?;
+        let on_plane = around
+            .clone()
+            .any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
+        let mut beside = around;
+        let (u, v) = (beside.next()?, beside.next()?);
+        let all_alone = || {
+            [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().all(|(x, y)| {
+                let mut cell = at;
+                cell[u] -= x;
+                cell[v] -= y;
+                self.alone(cell)
+            })
+        };
+        if on_plane || !all_alone() {
+            return None;
+        }
+        let height = |t: f64| self.height(node, axis, t);
+        let (t, low) = deepest(&height, a, 1.0 - b)?;
+        let margin = self.grid.margin;
+        let p = root(&height, (0.0, a.max(1e-12)), (t, low)).max(margin);
+        let q = root(&height, (1.0, b.max(1e-12)), (t, low)).min(1.0 - margin);
+        (q - p >= CLOSE).then(|| [p, q].map(|t| self.along(node, axis, t)))
+    }
+
+    /// Whether the face crosses none of the grid edges of a cell.
+    pub(super) fn untouched(&self, cell: [usize; 3]) -> bool {
+        let [i, j, k] = cell;
+        let low = self.nodes.index(cell);
+        let edge = |axis: usize, by: usize| {
+            let Some([a, b]) = self.open(low + by, axis) else {
+                return true;
+            };
+            deepest(&|t| self.height(low + by, axis, t), a, 1.0 - b).is_none()
+        };
+        matches!(self.signs.corners(self.face, i, j, k), 0 | 0xff)
+            && (0..3).all(|axis| {
+                let [u, v] = [1, 2].map(|n| self.nodes.stride[(axis + n) % 3]);
+                [0, u, v, u + v].into_iter().all(|by| edge(axis, by))
+            })
+    }
+
+    /// How far from the ends of a grid edge, as shares of it, the face may cross it twice: a distance falls no faster than
+    /// the place moves. None if it may not.
+    fn open(&self, node: usize, axis: usize) -> Option<[f64; 2]> {
+        let ends = [node, node + self.nodes.stride[axis]];
+        let [p, q] = ends.map(|n| self.signs.is_negative(self.face, n));
+        let [a, b] = ends.map(|n| f64::from(self.samples[n].abs()) / self.length(node, axis));
+        (p == q && a + b < 1.0 - CLOSE).then_some([a, b])
+    }
+
+    fn length(&self, node: usize, axis: usize) -> f64 {
+        let (axis, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        axis[at + 1] - axis[at]
+    }
+
+    /// A point of a grid edge.
+    fn along(&self, node: usize, axis: usize, t: f64) -> Vec3 {
+        let mut p = self.nodes.place(node);
+        p[axis] += t * self.length(node, axis);
+        p
+    }
+
+    /// How far a point of a grid edge is on the side of the face on which its lower end is, in shares of the edge.
+    fn height(&self, node: usize, axis: usize, t: f64) -> f64 {
+        let d = self.field.value(self.along(node, axis, t)) / self.length(node, axis);
+        if self.signs.is_negative(self.face, node) {
+            -d
+        } else {
+            d
+        }
+    }
+}
+
+/// A place between two where a function is not above zero that falls and rises by no more than its argument; none if
+/// there is none but by a hair.
+fn deepest(height: &impl Fn(f64) -> f64, from: f64, to: f64) -> Option<(f64, f64)> {
+    let mut open = vec![(from, to)];
+    for _ in 0..ROUNDS {
+        // The widest of what is left first.
+        let i = (0..open.len()).max_by(|a, b| {
+            let width = |i: &usize| open[*i].1 - open[*i].0;
+            width(a).total_cmp(&width(b))
+        })?;
+        let (a, b) = open.swap_remove(i);
+        if b - a < CLOSE {
+            return None;
+        }
+        let t = (a + b) / 2.0;
+        let h = height(t);
+        if h <= 0.0 {
+            return Some((t, h));
+        }
+        open.extend([(a, t - h), (t + h, b)].into_iter().filter(|w| w.0 < w.1));
+    }
+    None
+}
+
+/// A root between a place where a function is positive and one where it is not: by chords, or halves where these crawl.
+fn root(height: &impl Fn(f64) -> f64, positive: (f64, f64), other: (f64, f64)) -> f64 {
+    let (mut p, mut q) = (positive, other);
+    for round in 0..ROUNDS {
+        if (p.0 - q.0).abs() < 1e-12 || q.1 == 0.0 {
+            break;
+        }
+        let t = if round % 3 == 2 {
+            (p.0 + q.0) / 2.0
+        } else {
+            p.0 + (q.0 - p.0) * p.1 / (p.1 - q.1)
+        };
+        let h = height(t);
+        if h > 0.0 {
+            p = (t, h);
+        } else {
+            q = (t, h);
+        }
+        if h.abs() < 1e-12 {
+            return t;
+        }
+    }
+    q.0
+}
