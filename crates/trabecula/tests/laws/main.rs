@@ -12,3 +12,4 @@ mod skin;
 mod surface;
 mod tets;
 mod thickness;
+mod tiling;
