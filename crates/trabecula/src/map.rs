@@ -9,7 +9,7 @@ mod round;
 mod spline;
 pub(crate) mod tets;
 
-pub use distortion::{Distortion, Spread};
+pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;

@@ -48,11 +48,11 @@ fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
     for i in (0..m * m * m).filter(|i| place(*i).iter().all(|v| *v < n)) {
         for (k, path) in paths.iter().enumerate() {
             let mut at = place(i);
-            let mut corner = || order[(at[2] * m + at[1]) * m + at[0]] as u32;
-            let mut t = [corner(); 4];
+            let corner = |at: [usize; 3]| order[(at[2] * m + at[1]) * m + at[0]] as u32;
+            let mut t = [corner(at); 4];
             for s in 0..3 {
                 at[path[s]] += 1;
-                t[s + 1] = order[(at[2] * m + at[1]) * m + at[0]] as u32;
+                t[s + 1] = corner(at);
             }
             if k > 2 {
                 t.swap(2, 3);
