@@ -401,10 +401,8 @@ def tell_tets(report: dict) -> None:
     print(f"tetrahedra  {q['tets']}, {q['nodes']} nodes, {counted(q['pieces'])}, by {report['mesher']}")
     print(f"extent      {extent} mm, {figure(q['volume'])} mm³")
     print(f"size        {figure(size['mean'])} mm on average, {figure(size['min'])} to {figure(size['max'])} mm")
-    print(
-        f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; 9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and "
-        f"{angles['max_p95']:.1f}°"
-    )
+    inner = f"9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and {angles['max_p95']:.1f}°"
+    print(f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; {inner}")
     print(f"aspect      {aspect['mean']:.2f} on average, {aspect['max']:.2f} at most (1 is regular)")
     print(f"slivers     {q['slivers']} below 10° or above 170°; {q['inverted']} inverted")
     if fit:
