@@ -69,8 +69,9 @@ def check(args) -> None:
 def tell_tiling(t: dict) -> None:
     """The mesh under a tetrahedral lattice, its walls and its creases."""
     print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
-    ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
-    print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
+    if t["ports"] is not None:
+        ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
+        print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
     if t["thickness"]:
         w = t["thickness"]
         print(f"  walls      {figure(w['mean'])} mm on average, 90 % between {figure(w['low'])} and {figure(w['high'])} mm")

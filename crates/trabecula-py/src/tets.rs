@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use trabecula::design::{DesignError, Node, Joined, TetFileSpec, Tets, Unit};
+use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
 use trabecula::extract::Surface;
 use trabecula::io::{self, Elements};
 use trabecula::tets::TetMesh as Core;

@@ -18,10 +18,10 @@ mod sample;
 mod samples;
 mod schema;
 mod skin;
-mod tiling;
 #[cfg(test)]
 mod tests;
 mod tets;
+mod tiling;
 
 use std::sync::Arc;
 

@@ -26,8 +26,8 @@ mod key;
 mod knot;
 mod sift;
 mod signs;
-mod tets;
 mod table;
+mod tets;
 mod tile;
 
 use bodies::Bodies;

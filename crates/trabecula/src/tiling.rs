@@ -372,8 +372,15 @@ impl Field for Tiling {
         if b.is_finite() && self.map.each_in(b, MOST, |t| near.push(t)) {
             near.sort_unstable();
             near.dedup();
-            let at: Vec<(usize, Bary)> = near.iter().map(|t| (*t, self.map.bary(*t, middle))).collect();
-            let here = if weighted { Vec::new() } else { self.pieces(&at) };
+            let at: Vec<(usize, Bary)> = near
+                .iter()
+                .map(|t| (*t, self.map.bary(*t, middle)))
+                .collect();
+            let here = if weighted {
+                Vec::new()
+            } else {
+                self.pieces(&at)
+            };
             for (i, n) in near.iter().enumerate() {
                 f = f.union(match here.get(i) {
                     None => all,
@@ -384,7 +391,9 @@ impl Field for Tiling {
                 });
                 if let Level::Nodes(of) = &self.level {
                     let v = self.map.tet(*n).map(|n| of[n as usize]);
-                    let (lo, hi) = v.iter().fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
+                    let (lo, hi) = v
+                        .iter()
+                        .fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
                     t = t.union(spread(Interval::new(lo, hi)));
                 }
             }

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::data::*;
 use super::error::DesignError;
 use super::report::Varied;
-use super::{Built, Design, Loader, Tiled, Warning, level, map, region, sample, samples, skin, tiling};
+use super::{
+    Built, Design, Loader, Tiled, Warning, level, map, region, sample, samples, skin, tiling,
+};
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};

@@ -97,9 +97,8 @@ fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
     for t in 0..tets.len() {
         let c = tets.corners(t);
         let largest = c.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
-        let areas = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(|[i, j, k]| {
-            norm(cross(sub(c[j], c[i]), sub(c[k], c[i]))) / 2.0
-        });
+        let areas = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
+            .map(|[i, j, k]| norm(cross(sub(c[j], c[i]), sub(c[k], c[i]))) / 2.0);
         let height = 3.0 * tets.volume(t) / areas.iter().fold(0.0f64, |m, a| m.max(*a));
         // Half a unit in the last place along each axis, for both of two points, and as much again to be safe.
         let rounding = 4.0 * 3f64.sqrt() * largest * f64::from(f32::EPSILON) / 2.0;
@@ -348,9 +347,7 @@ impl Shared {
                 let mut corner = || on.next().unwrap_or(NONE);
                 let first = match (zero as u32).count_ones() {
                     3 => *self.nodes.entry(corner()).or_insert(new),
-                    2 => *self.edges[node]
-                        .entry([corner(), corner()])
-                        .or_insert(new),
+                    2 => *self.edges[node].entry([corner(), corner()]).or_insert(new),
                     // A node of a cap inside a face is nobody else's; a face is looked up once more at most.
                     1 if node == 0 => {
                         let face = [corner(), corner(), corner()];
@@ -387,7 +384,8 @@ pub(super) fn surface(
     progress: &dyn Progress,
 ) -> Result<(Surface, Pieces), Stopped> {
     let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
-    let (mut out, mut links, mut shared) = (Surface::default(), Links::default(), Shared::default());
+    let (mut out, mut links, mut shared) =
+        (Surface::default(), Links::default(), Shared::default());
     work.each(progress, false, |start, chunk| {
         let (mut sums, mut places) = (&chunk.sums[..], &chunk.places[..]);
         for (t, piece) in (start..).zip(&chunk.pieces) {
@@ -403,7 +401,9 @@ pub(super) fn surface(
             }
             let (of, rest) = sums.split_at(piece.bounds.len());
             sums = rest;
-            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+            links
+                .add(&tiling.map, t, work.mask(t), piece, of)
+                .map_err(Stopped::Refused)?;
         }
         Ok(())
     })?;
@@ -441,7 +441,9 @@ pub(super) fn stream_stl<W: Store>(
         for (t, piece) in (start..).zip(&chunk.pieces) {
             let (of, rest) = sums.split_at(piece.bounds.len());
             sums = rest;
-            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+            links
+                .add(&tiling.map, t, work.mask(t), piece, of)
+                .map_err(Stopped::Refused)?;
         }
         out.write_all(&chunk.records).map_err(Stopped::Io)
     })?;
@@ -475,7 +477,11 @@ pub(super) fn estimate(tiling: &Tiling, edge: f64) -> Result<Estimate, Fault> {
     const SAMPLES: usize = 64;
     let work = Work::new(tiling, edge)?;
     let total = tiling.map.len();
-    let step = if tiling.varies() { total.div_ceil(SAMPLES) } else { 1 };
+    let step = if tiling.varies() {
+        total.div_ceil(SAMPLES)
+    } else {
+        1
+    };
     let mut scratch = Scratch::default();
     let (mut count, mut looked) = (0.0, 0.0);
     for t in (step / 2..total).step_by(step) {

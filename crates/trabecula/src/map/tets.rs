@@ -148,8 +148,9 @@ impl Tets {
                 for j in lo[1]..=hi[1] {
                     for i in lo[0]..=hi[0] {
                         let at = [i, j, k];
-                        let middle: Vec3 =
-                            core::array::from_fn(|a| self.boxes.min[a] + (at[a] as f64 + 0.5) * edge);
+                        let middle: Vec3 = core::array::from_fn(|a| {
+                            self.boxes.min[a] + (at[a] as f64 + 0.5) * edge
+                        });
                         // The box lies outside a face if its nearest corner does; a little rounding is allowed for.
                         let out = planes.iter().any(|(n, d)| {
                             let reach = 0.500001 * edge * n.iter().map(|v| v.abs()).sum::<f64>();
@@ -179,7 +180,11 @@ impl Tets {
             }
         }
         while let Some(b) = queue.pop_front() {
-            let at = [b % shape[0], b / shape[0] % shape[1], b / shape[0] / shape[1]];
+            let at = [
+                b % shape[0],
+                b / shape[0] % shape[1],
+                b / shape[0] / shape[1],
+            ];
             for a in 0..3 {
                 for up in [false, true] {
                     if (up && at[a] + 1 == shape[a]) || (!up && at[a] == 0) {
@@ -236,6 +241,21 @@ impl Tets {
     /// The zone of a tetrahedron; 0 where there are none.
     pub fn zone(&self, t: usize) -> u32 {
         self.zones.get(t).copied().unwrap_or(0)
+    }
+
+    /// For each node, the share of the volume about it that is of some zones.
+    pub fn shares(&self, wanted: impl Fn(u32) -> bool) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.nodes.len()];
+        for t in 0..self.len() {
+            let v = self.volume(t);
+            let part = if wanted(self.zone(t)) { v } else { 0.0 };
+            for n in self.tets[t] {
+                let s = &mut sums[n as usize];
+                *s = (s.0 + part, s.1 + v);
+            }
+        }
+        let share = |(part, all): (f64, f64)| if all > 0.0 { part / all } else { 0.0 };
+        sums.into_iter().map(share).collect()
     }
 
     /// The tetrahedron across the face opposite each corner, or [`NONE`].
@@ -386,7 +406,11 @@ fn planes(c: &[Vec3; 4]) -> [(Vec3, f64); 4] {
         let [p, q, r] = FACES[i].map(|k| c[k]);
         let n = cross(sub(q, p), sub(r, p));
         // The corner opposite lies inside, whatever the order.
-        let n = if dot(n, sub(c[i], p)) > 0.0 { scale(n, -1.0) } else { n };
+        let n = if dot(n, sub(c[i], p)) > 0.0 {
+            scale(n, -1.0)
+        } else {
+            n
+        };
         (n, dot(n, p))
     })
 }

@@ -22,7 +22,9 @@ fn tetrahedral() -> Vec<Rotation> {
         (0..3).for_each(|i| r[i][order[i]] = sign[i]);
         r
     };
-    let all = orders.iter().flat_map(|o| signs.iter().map(|s| one(*o, *s)));
+    let all = orders
+        .iter()
+        .flat_map(|o| signs.iter().map(|s| one(*o, *s)));
     all.collect()
 }
 
@@ -72,7 +74,8 @@ impl Group {
             by_rotation[r].contains(&by)
         };
         let steps = || (0..WHOLE).step_by(3);
-        let points = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+        let points =
+            steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
         let sites: Vec<[i32; 3]> = points
             .filter(|c| wanted.iter().all(|r| fixed(*c, r)))
             .collect();

@@ -54,7 +54,10 @@ fn middle(stencil: &Stencil) -> Vec<(Bary, Bary)> {
     let cross = |[a, b]: &[usize; 2]| {
         let (x, y) = (nodes.values[*a], nodes.values[*b]);
         ((x < 0.0) != (y < 0.0)).then(|| {
-            let (p, q) = (nodes.grid.bary(nodes.whole[*a]), nodes.grid.bary(nodes.whole[*b]));
+            let (p, q) = (
+                nodes.grid.bary(nodes.whole[*a]),
+                nodes.grid.bary(nodes.whole[*b]),
+            );
             let s = x / (x - y);
             core::array::from_fn(|i| p[i] + s * (q[i] - p[i]))
         })
@@ -76,7 +79,13 @@ impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in each tetrahedron, and
     /// a node has the mean of the tetrahedra about it.
-    pub fn of(map: &Tets, stencil: &Stencil, part: Part, amount: Amount, values: Vec<f64>) -> Level {
+    pub fn of(
+        map: &Tets,
+        stencil: &Stencil,
+        part: Part,
+        amount: Amount,
+        values: Vec<f64>,
+    ) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
             Amount::Iso => v,
@@ -107,7 +116,11 @@ impl Level {
                 }
             }
             for (v, (sum, count)) in values.iter_mut().zip(about) {
-                *v *= if count > 0 { sum / f64::from(count) } else { 1.0 };
+                *v *= if count > 0 {
+                    sum / f64::from(count)
+                } else {
+                    1.0
+                };
             }
         }
         Level::Nodes(Arc::new(values))

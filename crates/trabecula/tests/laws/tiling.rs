@@ -118,7 +118,12 @@ fn ready_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
         assert!(found.closed, "{}", r.name);
         // By ports and union-find, and by the surface itself.
         let told = (told.pieces as usize, told.cavities as usize, told.euler);
-        assert_eq!(told, (found.pieces, found.cavities, found.euler), "{}", r.name);
+        assert_eq!(
+            told,
+            (found.pieces, found.cavities, found.euler),
+            "{}",
+            r.name
+        );
         assert_eq!(found.pieces, 1, "{}", r.name);
     }
 }
@@ -130,9 +135,24 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
     // Pieces counted elsewhere on 48 tetrahedra: of the P sheet too thin, of loose fragments, of nodes that reach no face, of a
     // cage whose bars have parted.
     for (s, part, t, pieces) in [
-        (plain("221", [1, 0, 0], 0.5, 1.0, false), Part::Sheet, 0.6, 27),
-        (plain("221", [1, 0, 0], 0.5, 1.0, false), Part::Lower, -1.8, 48),
-        (plain("227:2", [1, 1, 1], 0.125, 0.75, true), Part::Lower, -2.2, 75),
+        (
+            plain("221", [1, 0, 0], 0.5, 1.0, false),
+            Part::Sheet,
+            0.6,
+            27,
+        ),
+        (
+            plain("221", [1, 0, 0], 0.5, 1.0, false),
+            Part::Lower,
+            -1.8,
+            48,
+        ),
+        (
+            plain("227:2", [1, 1, 1], 0.125, 0.75, true),
+            Part::Lower,
+            -2.2,
+            75,
+        ),
     ] {
         assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
@@ -141,7 +161,10 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
         let (all, told) =
             extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface");
         assert_eq!(size(&all.mesh).pieces, pieces);
-        assert_eq!((told.pieces as usize, told.others as usize), (pieces, pieces - 1));
+        assert_eq!(
+            (told.pieces as usize, told.others as usize),
+            (pieces, pieces - 1)
+        );
         let (one, told) =
             extract::surface_of(&solid, edge, Islands::Drop, &Silent).expect("surface");
         assert_eq!((size(&one.mesh).pieces, told.pieces), (1, 1));
@@ -153,9 +176,16 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
 #[test]
 fn surfaces_are_embedded_after_rounding_whatever_varies() {
     let mut some = Random(3);
-    for (i, name) in ["diamond", "iwp", "primitive_sheet", "pn3m_sheet", "fm3m_sheet", "diamond_cage"]
-        .into_iter()
-        .enumerate()
+    for (i, name) in [
+        "diamond",
+        "iwp",
+        "primitive_sheet",
+        "pn3m_sheet",
+        "fm3m_sheet",
+        "diamond_cage",
+    ]
+    .into_iter()
+    .enumerate()
     {
         let mesh = shaken(1 + i % 2, 0.2, 7.0, &mut some);
         let (s, part, t) = cell(name);
@@ -214,10 +244,14 @@ fn fields_are_continuous_for_any_numbering() {
                 // A point of the face by its nodes, seen from both sides.
                 let w = [some.share() + 0.1, some.share() + 0.1, some.share() + 0.1];
                 let sum: f64 = w.iter().sum();
-                let on: Vec<u32> = (0..4).filter(|i| *i != face).map(|i| map.tet(t)[i]).collect();
+                let on: Vec<u32> = (0..4)
+                    .filter(|i| *i != face)
+                    .map(|i| map.tet(t)[i])
+                    .collect();
                 let seen = |t: usize| {
                     let of = map.tet(t);
-                    let weight = |n: u32| on.iter().position(|o| *o == n).map_or(0.0, |k| w[k] / sum);
+                    let weight =
+                        |n: u32| on.iter().position(|o| *o == n).map_or(0.0, |k| w[k] / sum);
                     s.values(&[of.map(weight)])[0]
                 };
                 let (a, b) = (seen(t), seen(other as usize));
@@ -268,7 +302,10 @@ fn both_roads_lead_to_one_surface() {
         assert!(b.0.0 < 0.32 * a.0.0, "{name}: explicit {a:?} {b:?}");
         assert!(b.1.0 < 0.45 * a.1.0, "{name}: implicit {a:?} {b:?}");
         let apart = |x: ((f64, f64), (f64, f64))| (x.0.1 - x.1.1).abs() / x.1.1;
-        assert!(apart(b) < 0.4 * apart(a) || apart(b) < 2e-3, "{name}: {a:?} {b:?}");
+        assert!(
+            apart(b) < 0.4 * apart(a) || apart(b) < 2e-3,
+            "{name}: {a:?} {b:?}"
+        );
         assert!(apart(b) < 0.015, "{name}: {a:?} {b:?}");
     }
 }
@@ -277,7 +314,11 @@ fn both_roads_lead_to_one_surface() {
 fn bounds_hold_and_gradients_are_those_of_the_values() {
     let mut some = Random(7);
     let mesh = shaken(2, 0.15, 4.0, &mut some);
-    for (overlap, name) in [(0.0, "diamond_sheet"), (0.1, "primitive_sheet"), (0.1, "iwp")] {
+    for (overlap, name) in [
+        (0.0, "diamond_sheet"),
+        (0.1, "primitive_sheet"),
+        (0.1, "iwp"),
+    ] {
         let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
         let (s, part, t) = cell(name);
         let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.8, 1.2));
@@ -348,7 +389,10 @@ fn overlap_smooths_the_creases() {
     };
     let (sharp, tiling) = turn(0.0);
     let told = tiling.creases().expect("creases");
-    assert!(sharp > 20.0 && told.max > 20.0 && told.mean > 5.0, "{sharp} {told:?}");
+    assert!(
+        sharp > 20.0 && told.max > 20.0 && told.mean > 5.0,
+        "{sharp} {told:?}"
+    );
     let (smooth, tiling) = turn(0.1);
     assert!(smooth < 0.01, "{smooth}");
     // What moves is of the order of the overlap; what is closed stays closed.

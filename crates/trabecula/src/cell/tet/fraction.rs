@@ -85,9 +85,11 @@ impl Table {
     pub fn new(stencil: &Stencil) -> Table {
         let nodes = STEPS.map(|n| Nodes::new(stencil, Grid { n }));
         let fine = &nodes[1].values;
-        let (lo, hi) = fine.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| {
-            (r.0.min(*v), r.1.max(*v))
-        });
+        let (lo, hi) = fine
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| {
+                (r.0.min(*v), r.1.max(*v))
+            });
         let range = Interval::new(lo, hi);
         let [coarse, fine] = [0, 1].map(|i| shares(&nodes[i], range));
         let mut most = 0.0f64;
@@ -158,7 +160,9 @@ pub(super) fn of_face(stencil: &Stencil, part: Part, iso: f64) -> f64 {
                 let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
                 [k[0], k[1], k[2], 0.0]
             };
-            let at: Vec<_> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
+            let at: Vec<_> = (0..=n)
+                .flat_map(|a| (0..=a).map(move |b| place(a, b)))
+                .collect();
             let v = stencil.values(&at);
             let mut sum = 0.0;
             Grid { n }.each_triangle(|t3, _| {

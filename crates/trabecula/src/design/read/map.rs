@@ -99,7 +99,9 @@ const MESHERS: [(&str, &str); 3] = [
 ];
 
 pub(super) fn tets(at: &At) -> Read<TetsSpec> {
-    let keys = ["size", "mesher", "limit", "path", "unit", "split", "overlap", "road"];
+    let keys = [
+        "size", "mesher", "limit", "path", "unit", "split", "overlap", "road",
+    ];
     let f = at.fields("a map over tetrahedra", &keys, &[])?;
     let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
     let joined = Joined {

@@ -70,7 +70,10 @@ impl Links {
             match self.faces.remove(&(t as u32, face as u8)) {
                 Some(theirs) => self.join(&runs, &theirs),
                 None => {
-                    let back = map.across(other as usize).iter().position(|b| *b as usize == t);
+                    let back = map
+                        .across(other as usize)
+                        .iter()
+                        .position(|b| *b as usize == t);
                     self.faces.insert((other, back.unwrap_or(0) as u8), runs);
                 }
             }

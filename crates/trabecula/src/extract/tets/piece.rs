@@ -143,7 +143,11 @@ fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
         // Newton's method, kept between the ends.
         let (mut l, mut h) = (lo, hi);
         let (fl, fh) = (value(l), value(h));
-        let mut s = if fh > fl { l - fl * (h - l) / (fh - fl) } else { l };
+        let mut s = if fh > fl {
+            l - fl * (h - l) / (fh - fl)
+        } else {
+            l
+        };
         for _ in 0..40 {
             let v = value(s);
             if v < 0.0 {
@@ -152,7 +156,11 @@ fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
                 h = s;
             }
             let next = s - v / slope(s);
-            let next = if next > l && next < h { next } else { 0.5 * (l + h) };
+            let next = if next > l && next < h {
+                next
+            } else {
+                0.5 * (l + h)
+            };
             if (next - s).abs() < 1e-13 {
                 return next;
             }
@@ -277,7 +285,8 @@ impl Piece {
                 let n = self.places.len();
                 self.places.swap(n - 1, n - 2);
             }
-            let first = self.places.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
+            let first =
+                self.places.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
             let (ka, kb) = (nodes.whole[*a as usize], nodes.whole[*b as usize]);
             let zero = template.zero[*a as usize] & template.zero[*b as usize];
             let named = scratch.corner[e].iter_mut().filter(|c| **c != NONE);
@@ -310,7 +319,8 @@ impl Piece {
                 if inside == 0 || inside == 15 {
                     continue;
                 }
-                let corner = |a: usize, b: usize| scratch.corner[small.edges[pair(a, b)] as usize][s];
+                let corner =
+                    |a: usize, b: usize| scratch.corner[small.edges[pair(a, b)] as usize][s];
                 let (triangles, quad) = crossing(inside, small.even);
                 let number = if quad { 2 } else { 1 };
                 for t in &triangles[..number] {
@@ -319,7 +329,11 @@ impl Piece {
                     unite(&mut scratch.surface, t[0], t[1]);
                     unite(&mut scratch.surface, t[0], t[2]);
                 }
-                for v in triangles[..number].iter().flatten().map(|[a, b]| corner(*a, *b)) {
+                for v in triangles[..number]
+                    .iter()
+                    .flatten()
+                    .map(|[a, b]| corner(*a, *b))
+                {
                     if first == NONE {
                         first = v;
                     }
@@ -434,7 +448,11 @@ impl Piece {
             }
             for v in 0..count {
                 if self.zero[v] & off == off {
-                    push(&mut self.rims[e], self.body[v], self.bounds[self.body[v] as usize]);
+                    push(
+                        &mut self.rims[e],
+                        self.body[v],
+                        self.bounds[self.body[v] as usize],
+                    );
                 }
             }
         }
@@ -455,10 +473,7 @@ fn crossing(inside: u8, even: bool) -> ([[[usize; 2]; 3]; 2], bool) {
             // (0, 1, 2, 3), (0, 2, 1, 3), … : positive if an even number of pairs is out of order.
             let order = [p, q, r, s];
             let swaps = PAIRS.iter().filter(|[a, b]| order[*a] > order[*b]).count();
-            let two = [
-                [[p, r], [p, s], [q, s]],
-                [[p, r], [q, s], [q, r]],
-            ];
+            let two = [[[p, r], [p, s], [q, s]], [[p, r], [q, s], [q, r]]];
             (two, true, swaps % 2 == 0)
         }
         n => {
