@@ -77,14 +77,19 @@ def tet(
     site: Sequence[float] | None = None,
     dual: bool | None = None,
     edge: float | None = None,
+    zones: dict[int, str] | None = None,
 ) -> dict:
-    """A tetrahedral cell, for ``map.tets``: a ready one by its name, or your own.
+    """A tetrahedral cell, for ``map.tets``: a ready one by its name, your own, or a ready one for each of the mesh's ``zones``.
 
     Your own is what a regular tetrahedron of ``edge`` (in edges of the cubic cell) about ``site`` (turns) cuts out of the sum
     of ``terms`` over ``group``, which must have full tetrahedral symmetry there; ``dual`` turns the tetrahedron upside down.
     """
     given = settings(name=name, group=group, site=site, dual=dual, edge=edge)
-    return {"tet": given | ({} if terms is None else {"terms": list(terms)})}
+    if terms is not None:
+        given["terms"] = list(terms)
+    if zones is not None:
+        given["zones"] = {str(zone): name for zone, name in zones.items()}
+    return {"tet": given}
 
 
 def group(symbol: int | str) -> dict:

@@ -236,7 +236,9 @@ def parser() -> argparse.ArgumentParser:
         "  trabecula tets bracket.inp --unit m -o bracket.vtu",
     )
     p.add_argument("file", type=ending((*DESIGNS, *TETS_IN)), metavar="FILE", help="a design or a file of tetrahedra")
-    p.add_argument("-o", "--output", type=ending(TETS_OUT), metavar="OUT", help="the mesh to write (.vtu, .msh, .inp, .med, .mesh)")
+    p.add_argument(
+        "-o", "--output", type=ending(TETS_OUT), metavar="OUT", help="the mesh to write (.vtu, .msh, .inp, .med, .mesh)"
+    )
     p.add_argument("--lattice", metavar="NAME", help="the lattice whose mesh is meant (default: the first that has one)")
     p.add_argument("--unit", choices=UNITS, help="the unit of a file's coordinates (default: mm)")
     p.add_argument("--split", action="store_true", help="cut a file's hexahedra, wedges and pyramids into tetrahedra")

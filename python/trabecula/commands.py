@@ -102,8 +102,9 @@ def tell_beams(name: str, it: dict) -> None:
 def tell_tiling(t: dict) -> None:
     """The mesh under a tetrahedral lattice, its walls and its creases."""
     print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
-    ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
-    print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
+    if t["ports"] is not None:
+        ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
+        print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
     if t["thickness"]:
         w = t["thickness"]
         print(f"  walls      {figure(w['mean'])} mm on average, 90 % between {figure(w['low'])} and {figure(w['high'])} mm")
@@ -459,10 +460,8 @@ def tell_tets(report: dict) -> None:
     print(f"tetrahedra  {q['tets']}, {q['nodes']} nodes, {counted(q['pieces'])}, by {report['mesher']}")
     print(f"extent      {extent} mm, {figure(q['volume'])} mm³")
     print(f"size        {figure(size['mean'])} mm on average, {figure(size['min'])} to {figure(size['max'])} mm")
-    print(
-        f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; 9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and "
-        f"{angles['max_p95']:.1f}°"
-    )
+    inner = f"9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and {angles['max_p95']:.1f}°"
+    print(f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; {inner}")
     print(f"aspect      {aspect['mean']:.2f} on average, {aspect['max']:.2f} at most (1 is regular)")
     print(f"slivers     {q['slivers']} below 10° or above 170°; {q['inverted']} inverted")
     if fit:

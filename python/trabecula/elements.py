@@ -54,7 +54,9 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray, NDArray, NDArray, NDArr
     name = os.fsdecode(path)
     kind = os.path.splitext(name)[1].lower().lstrip(".")
     if kind not in FORMATS:
-        raise ValueError(f"{name}: the name must end in .vtu, .vtk, {', '.join('.' + f for f in FORMATS)}; found .{kind or ' none'}")
+        raise ValueError(
+            f"{name}: the name must end in .vtu, .vtk, {', '.join('.' + f for f in FORMATS)}; found .{kind or ' none'}"
+        )
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     meshio = needed()

@@ -49,7 +49,7 @@ def tetrahedra(name: str, points: Any, triangles: Any, size: float, limit: float
         outcome = run([sys.executable, "-c", CHILD, given, made], folder, limit)
         if outcome is not None:
             raise ValueError(
-                f"the mesher ftetwild {outcome}; try a greater size, repair the surface, or use mesher = \"background\""
+                f'the mesher ftetwild {outcome}; try a greater size, repair the surface, or use mesher = "background"'
             )
         with np.load(made) as found:
             nodes, tets = found["nodes"], found["tets"]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from . import _core
 from .design import Design
+from .elements import FORMATS
 from .errors import DesignError, DesignWarning
 from .given import whole
 from .input import read_text
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["READS", "WRITES", "TetMesh"]
 
-READS = ("vtu", "vtk", "msh", "inp", "med", "mesh", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+READS = ("vtu", "vtk", *FORMATS)
 WRITES = ("vtu", "msh", "inp", "med", "mesh")
 
 

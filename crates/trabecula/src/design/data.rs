@@ -268,6 +268,10 @@ pub struct TetCellSpec {
     /// Edge of the tetrahedron, in edges of the cubic cell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge: Option<f64>,
+    /// Instead of all else: a ready cell for each zone of the mesh, by its number, such as `{ 1 = "diamond", 2 = "iwp" }`; in the
+    /// tetrahedra between zones they pass into each other.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub zones: BTreeMap<String, String>,
 }
 
 /// A cell from a file: numbers at the nodes of one period, without the repeated end, or a mesh of the solid in one cell.

@@ -1,5 +1,7 @@
 //! Tree to data: every key, kind and word is checked here; values are checked when the design is built.
 
+use std::collections::BTreeMap;
+
 use super::Design;
 use super::data::*;
 use super::error::DesignError;
@@ -415,9 +417,30 @@ fn cell(at: &At) -> Read<CellSpec> {
 
 fn tet(at: &At) -> Read<TetCellSpec> {
     let own = ["group", "terms", "site", "dual", "edge"];
-    let mut keys = vec!["name"];
+    let mut keys = vec!["name", "zones"];
     keys.extend(own);
     let f = at.fields("a tetrahedral cell", &keys, &[])?;
+    if let Some(zones) = f.get("zones") {
+        if let Some(other) = ["name"].iter().chain(&own).find_map(|k| f.get(k)) {
+            return Err(
+                other.error("with zones every cell is a ready one, by its name; leave this out")
+            );
+        }
+        let names: Vec<(&str, &str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
+        let mut of = BTreeMap::new();
+        for (zone, at) in
+            zones.entries("a ready cell for each zone, such as { 1 = \"diamond\" }")?
+        {
+            of.insert(
+                zone.to_string(),
+                at.word("tetrahedral cell", &names)?.to_string(),
+            );
+        }
+        return Ok(TetCellSpec {
+            zones: of,
+            ..TetCellSpec::default()
+        });
+    }
     if let Some(name) = f.get("name") {
         if let Some(other) = own.iter().find_map(|k| f.get(k)) {
             let message =
@@ -447,6 +470,7 @@ fn tet(at: &At) -> Read<TetCellSpec> {
             f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?
                 .number()?,
         ),
+        zones: BTreeMap::new(),
     })
 }
 

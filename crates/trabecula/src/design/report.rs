@@ -185,6 +185,27 @@ fn tiled(it: &Tiled) -> Json {
     };
     let share = iso.map(|t| stencil.fraction(part, t));
     let (volume, solid) = tiling.volumes();
+    if tiling.cells.len() > 1 {
+        // Cells of zones have neither level nor fraction in common.
+        return json!({
+            "part": word(part),
+            "wavelength": tiling.wavelength(),
+            "iso": Json::Null, "fraction": Json::Null, "porosity": Json::Null, "thickness": Json::Null, "folding": Json::Null,
+            "connected_fraction": [],
+            "tets": {
+                "count": tiling.map.len(),
+                "mesh": it.mesh,
+                "edge": tiling.map.mean_edge(),
+                "volume": volume,
+                "solid_fraction": Json::Null,
+                "overlap": tiling.map.overlap(),
+                "thickness": Json::Null,
+                "ports": Json::Null,
+                "face_fraction": Json::Null,
+                "creases": Json::Null,
+            },
+        });
+    }
     let spread = tiling.thickness();
     json!({
         "part": word(part),

@@ -1,5 +1,6 @@
 //! Lattices over tetrahedral meshes: data to [`Tiling`], and what is to be said of one.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
@@ -16,7 +17,7 @@ use crate::grade::Grade;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region, Repair};
 use crate::symmetry::Group;
-use crate::tiling::{Amount, Level, Tiling};
+use crate::tiling::{Amount, Level, Share, Tiling};
 
 /// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
 const OVERLAP: f64 = 0.2;
@@ -151,6 +152,9 @@ pub(super) fn lattice(
     warnings: &mut Vec<Warning>,
 ) -> Result<(Arc<Tiling>, bool), DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
+    if !domain.cell.zones.is_empty() {
+        return zoned(domain, place, warnings);
+    }
     let mut stencil = stencil(domain.cell, &below("cell.tet"))?;
     let part: Part = domain.spec.part.into();
     let spec = &domain.spec.level;
@@ -192,10 +196,92 @@ pub(super) fn lattice(
     let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
+    Ok((Arc::new(tiling), explicit(domain, place)))
+}
+
+/// Whether the surface is made without a grid.
+fn explicit(domain: &Domain, place: &Place) -> bool {
     let joined = domain.joined;
-    let explicit =
-        joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty();
-    Ok((Arc::new(tiling), explicit))
+    joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty()
+}
+
+/// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
+/// zone, so that one passes into the other in the tetrahedra between.
+fn zoned(
+    domain: &Domain,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Arc<Tiling>, bool), DesignError> {
+    let below = |key: &str| format!("{}.{key}", place.path);
+    let at = below("cell.tet.zones");
+    let map = &domain.map;
+    let part: Part = domain.spec.part.into();
+    let key = amount_key(domain.spec);
+    let path = below(&format!("level.{key}"));
+    let value = match &domain.spec.level.amount {
+        AmountSpec::Fraction(v) | AmountSpec::Porosity(v) => v,
+        _ => {
+            let message = "cells of different zones have no level in common; give their fraction";
+            return Err(DesignError::new(path, message));
+        }
+    };
+    if domain.spec.level.mid != 0.0 {
+        return Err(DesignError::new(
+            below("level.mid"),
+            "cells of zones are taken about f = 0",
+        ));
+    }
+    let found: BTreeSet<u32> = (0..map.len()).map(|t| map.zone(t)).collect();
+    let zones = &domain.cell.zones;
+    if let Some(zone) = found.iter().find(|z| !zones.contains_key(&z.to_string())) {
+        let message = format!("the mesh has a zone {zone}, which has no cell; give it one");
+        return Err(DesignError::new(at, message));
+    }
+    if let Some(zone) = zones
+        .keys()
+        .find(|z| !found.iter().any(|f| f.to_string() == **z))
+    {
+        let listed: Vec<String> = found.iter().map(u32::to_string).collect();
+        let message = format!(
+            "no tetrahedron of the mesh is of zone {zone}; its zones are {}",
+            listed.join(", ")
+        );
+        return Err(DesignError::new(format!("{at}.{zone}"), message));
+    }
+    let complement = key == "porosity";
+    let allowed = Allowed::Share(key);
+    let asked = grade(value, &path, place, allowed, complement)?;
+    let values = at_nodes(&asked, allowed, complement, &path, map)?;
+    let names: BTreeSet<&String> = zones.values().collect();
+    let mut levels = vec![0.0; map.nodes().len()];
+    let mut cells = Vec::new();
+    for name in names {
+        let spec = TetCellSpec {
+            name: Some(name.clone()),
+            ..TetCellSpec::default()
+        };
+        let stencil = stencil(&spec, &at)?;
+        let range = stencil.range();
+        let scale = 0.5 * (range.hi - range.lo);
+        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
+        for (i, (level, weight)) in levels.iter_mut().zip(&weights).enumerate() {
+            if *weight > 0.0 {
+                let share = values[i.min(values.len() - 1)];
+                *level += weight * stencil.iso(part, share) / scale;
+            }
+        }
+        let (lo, hi) = values
+            .iter()
+            .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+        apart(&stencil, part, [lo, hi], &path, warnings);
+        cells.push(Share {
+            stencil: Arc::new(stencil),
+            scale,
+            weights: Some(Arc::new(weights)),
+        });
+    }
+    let tiling = Tiling::of(map.clone(), cells, part, Level::Nodes(Arc::new(levels)));
+    Ok((Arc::new(tiling), explicit(domain, place)))
 }
 
 /// The cell about another mid-surface.
@@ -280,9 +366,34 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
     let levels = tiling.levels();
     let share = |t: f64| stencil.fraction(part, t);
     let fraction = Varied::of(&[share(levels.lo), share(levels.hi)]);
+    apart(stencil, part, [fraction.min, fraction.max], path, warnings);
+    if path.ends_with("thickness") {
+        if let Some(s) = tiling.thickness() {
+            let message = format!(
+                "walls follow the tetrahedra: they are {:.4} mm thick on average, 90 % of them between {:.4} and {:.4} mm, all \
+                 between {:.4} and {:.4} mm",
+                s.mean, s.low, s.high, s.min, s.max
+            );
+            warnings.push(Warning {
+                path: path.to_string(),
+                message,
+            });
+        }
+    }
+}
+
+/// Warns of fractions at which a cell falls apart.
+fn apart(
+    stencil: &Stencil,
+    part: Part,
+    [min, max]: [f64; 2],
+    path: &str,
+    warnings: &mut Vec<Warning>,
+) {
+    let fraction = Varied { min, max };
     let whole = stencil.connected_fraction(part);
-    if !gaps([fraction.min, fraction.max], &whole).is_empty() {
-        let count = stencil.count(part, 0.5 * (levels.lo + levels.hi));
+    if !gaps([min, max], &whole).is_empty() {
+        let count = stencil.count(part, stencil.iso(part, 0.5 * (min + max)));
         let texts: Vec<String> = whole
             .iter()
             .map(|&[min, max]| Varied { min, max }.to_string())
@@ -303,18 +414,5 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
             path: path.to_string(),
             message,
         });
-    }
-    if path.ends_with("thickness") {
-        if let Some(s) = tiling.thickness() {
-            let message = format!(
-                "walls follow the tetrahedra: they are {:.4} mm thick on average, 90 % of them between {:.4} and {:.4} mm, all \
-                 between {:.4} and {:.4} mm",
-                s.mean, s.low, s.high, s.min, s.max
-            );
-            warnings.push(Warning {
-                path: path.to_string(),
-                message,
-            });
-        }
     }
 }

@@ -243,6 +243,21 @@ impl Tets {
         self.zones.get(t).copied().unwrap_or(0)
     }
 
+    /// For each node, the share of the volume about it that is of some zones.
+    pub fn shares(&self, wanted: impl Fn(u32) -> bool) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.nodes.len()];
+        for t in 0..self.len() {
+            let v = self.volume(t);
+            let part = if wanted(self.zone(t)) { v } else { 0.0 };
+            for n in self.tets[t] {
+                let s = &mut sums[n as usize];
+                *s = (s.0 + part, s.1 + v);
+            }
+        }
+        let share = |(part, all): (f64, f64)| if all > 0.0 { part / all } else { 0.0 };
+        sums.into_iter().map(share).collect()
+    }
+
     /// The tetrahedron across the face opposite each corner, or [`NONE`].
     pub fn across(&self, t: usize) -> [u32; 4] {
         self.across[t]

@@ -13,3 +13,4 @@ mod skin;
 mod surface;
 mod tets;
 mod thickness;
+mod tiling;

@@ -1,0 +1,481 @@
+//! Tetrahedral cells over meshes: they fit for any numbering, are whole where their ports say so, and both roads agree.
+
+use std::f64::consts::TAU;
+use std::io::Cursor;
+use std::sync::Arc;
+
+use crate::common::{Random, ball, check, fault};
+use trabecula::cell::tet::{Grid, Nodes, Stencil, ready, ready_cells};
+use trabecula::cell::{Part, Series, Term};
+use trabecula::extract::{self, Islands, Silent, Stopped, Surface};
+use trabecula::field::Field;
+use trabecula::grade::Grade;
+use trabecula::map::Tets;
+use trabecula::math::{Aabb, dot, norm, sub};
+use trabecula::measure::size;
+use trabecula::region::{MeshRegion, Repair};
+use trabecula::solid::Solid;
+use trabecula::symmetry::{Group, Side};
+use trabecula::tets::{TetMesh, background};
+use trabecula::tiling::{Amount, Level, Tiling};
+
+/// n³ cubes of six tetrahedra each, nodes moved about and numbered at random.
+fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
+    let m = n + 1;
+    let place = |i: usize| [i % m, i / m % m, i / m / m];
+    let nodes: Vec<[f64; 3]> = (0..m * m * m)
+        .map(|i| place(i).map(|v| edge * (v as f64 + some.between(-by, by))))
+        .collect();
+    let mut order: Vec<usize> = (0..nodes.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, some.below(i + 1));
+    }
+    let mut out = TetMesh {
+        nodes: vec![[0.0; 3]; nodes.len()],
+        ..TetMesh::default()
+    };
+    for (i, to) in order.iter().enumerate() {
+        out.nodes[*to] = nodes[i];
+    }
+    let paths = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [1, 0, 2],
+        [0, 2, 1],
+        [2, 1, 0],
+    ];
+    for i in (0..m * m * m).filter(|i| place(*i).iter().all(|v| *v < n)) {
+        for (k, path) in paths.iter().enumerate() {
+            let mut at = place(i);
+            let corner = |at: [usize; 3]| order[(at[2] * m + at[1]) * m + at[0]] as u32;
+            let mut t = [corner(at); 4];
+            for s in 0..3 {
+                at[path[s]] += 1;
+                t[s + 1] = corner(at);
+            }
+            if k > 2 {
+                t.swap(2, 3);
+            }
+            out.tets.push(t);
+        }
+    }
+    out
+}
+
+fn map(mesh: &TetMesh) -> Arc<Tets> {
+    Arc::new(Tets::new(mesh, 0.0).expect("mesh"))
+}
+
+/// The part as a solid, by the explicit road or the implicit one.
+fn solid(tiling: Tiling, explicit: bool) -> Solid {
+    let region = MeshRegion::new(tiling.map.boundary(), Repair::Refuse).expect("boundary");
+    let wavelength = tiling.wavelength();
+    let tiling = Arc::new(tiling);
+    let mut solid = Solid::new(Arc::new(region), Some(tiling.clone()), wavelength);
+    solid.tiling = explicit.then_some(tiling);
+    solid
+}
+
+fn made(tiling: Tiling, steps: f64, explicit: bool) -> (Surface, extract::Pieces) {
+    let edge = tiling.map.mean_edge() / steps;
+    let solid = solid(tiling, explicit);
+    extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface")
+}
+
+fn cell(name: &str) -> (Arc<Stencil>, Part, f64) {
+    let r = ready(name).expect(name);
+    let s = r.stencil().expect(name);
+    let t = s.iso(r.part, r.fraction);
+    (Arc::new(s), r.part, t)
+}
+
+/// The cell of one real wave of a group.
+fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<Stencil> {
+    let waves = Group::named(group)
+        .expect(group)
+        .orbit(hkl, Side::Re)
+        .expect(group);
+    let terms = waves.into_iter().map(|(hkl, c, s)| Term {
+        hkl,
+        amplitude: c.hypot(s),
+        phase: (-s).atan2(c) / TAU,
+    });
+    let series = Series::new(terms.collect()).expect(group);
+    let stencil = Stencil::new(series, [site; 3], edge * 2f64.sqrt(), dual);
+    Arc::new(stencil.expect(group))
+}
+
+#[test]
+fn ready_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
+    let mut some = Random(1);
+    let mesh = shaken(2, 0.15, 10.0, &mut some);
+    for r in ready_cells() {
+        let (s, part, t) = cell(r.name);
+        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let (surface, told) = made(tiling, 16.0, true);
+        let found = size(&surface.mesh);
+        assert!(found.closed, "{}", r.name);
+        // By ports and union-find, and by the surface itself.
+        let told = (told.pieces as usize, told.cavities as usize, told.euler);
+        assert_eq!(
+            told,
+            (found.pieces, found.cavities, found.euler),
+            "{}",
+            r.name
+        );
+        assert_eq!(found.pieces, 1, "{}", r.name);
+    }
+}
+
+#[test]
+fn cells_that_fall_apart_do_so_on_the_mesh() {
+    let mut some = Random(2);
+    let mesh = shaken(2, 0.15, 10.0, &mut some);
+    // Pieces counted elsewhere on 48 tetrahedra: of the P sheet too thin, of loose fragments, of nodes that reach no face, of a
+    // cage whose bars have parted.
+    for (s, part, t, pieces) in [
+        (
+            plain("221", [1, 0, 0], 0.5, 1.0, false),
+            Part::Sheet,
+            0.6,
+            27,
+        ),
+        (
+            plain("221", [1, 0, 0], 0.5, 1.0, false),
+            Part::Lower,
+            -1.8,
+            48,
+        ),
+        (
+            plain("227:2", [1, 1, 1], 0.125, 0.75, true),
+            Part::Lower,
+            -2.2,
+            75,
+        ),
+    ] {
+        assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
+        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let solid = solid(tiling, true);
+        let edge = 0.75;
+        let (all, told) =
+            extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface");
+        assert_eq!(size(&all.mesh).pieces, pieces);
+        assert_eq!(
+            (told.pieces as usize, told.others as usize),
+            (pieces, pieces - 1)
+        );
+        let (one, told) =
+            extract::surface_of(&solid, edge, Islands::Drop, &Silent).expect("surface");
+        assert_eq!((size(&one.mesh).pieces, told.pieces), (1, 1));
+        let refused = extract::surface_of(&solid, edge, Islands::Error, &Silent);
+        assert!(matches!(refused, Err(Stopped::Refused(_))));
+    }
+}
+
+#[test]
+fn surfaces_are_embedded_after_rounding_whatever_varies() {
+    let mut some = Random(3);
+    for (i, name) in [
+        "diamond",
+        "iwp",
+        "primitive_sheet",
+        "pn3m_sheet",
+        "fm3m_sheet",
+        "diamond_cage",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mesh = shaken(1 + i % 2, 0.2, 7.0, &mut some);
+        let (s, part, t) = cell(name);
+        let spread = 0.3 * t.abs();
+        let each = (0..mesh.nodes.len()).map(|_| t + some.between(-spread, spread));
+        for level in [Level::Same(t), Level::Nodes(Arc::new(each.collect()))] {
+            let tiling = Tiling::new(map(&mesh), s.clone(), part, level);
+            let (surface, told) = made(tiling, 5.0, true);
+            check(name, &surface);
+            let found = size(&surface.mesh);
+            assert_eq!(told.pieces as usize, found.pieces, "{name}");
+            assert_eq!(told.euler, found.euler, "{name}");
+        }
+    }
+    // Walls a hundredth of a step thick keep both their sides.
+    let mesh = shaken(1, 0.2, 7.0, &mut some);
+    let (s, part, _) = cell("diamond_sheet");
+    let tiling = Tiling::new(map(&mesh), s, part, Level::Same(1e-3));
+    check("thin", &made(tiling, 6.0, true).0);
+}
+
+/// The solid share of a tetrahedron is kept by affine maps: the volume is Σ fraction · |T|, at second order in the steps.
+#[test]
+fn volumes_are_those_of_the_cell_at_second_order() {
+    let mut some = Random(4);
+    let mesh = shaken(1, 0.2, 10.0, &mut some);
+    for name in ["primitive", "diamond_sheet", "p43m", "frd"] {
+        let (s, part, t) = cell(name);
+        let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let (_, exact) = tiling.volumes();
+        let error = |n: f64| {
+            let volume = made(tiling.clone(), n, true).0.mesh.volume();
+            (volume - exact).abs() / exact
+        };
+        let (coarse, fine) = (error(12.0), error(48.0));
+        let rate = (coarse / fine).log2() / 2.0;
+        println!("{name}: {coarse:.2e} {fine:.2e} rate {rate:.2}");
+        // Fractions are known to 1e-4.
+        assert!(rate > 1.7 || fine < 4e-4, "{name}: {coarse:.2e} {fine:.2e}");
+        assert!(fine < 6e-3, "{name}: {fine:.2e}");
+    }
+}
+
+#[test]
+fn fields_are_continuous_for_any_numbering() {
+    let mut some = Random(5);
+    let mesh = shaken(2, 0.15, 3.0, &mut some);
+    let map = map(&mesh);
+    for r in ready_cells() {
+        let s = r.stencil().expect(r.name);
+        for t in 0..map.len() {
+            for (face, other) in map.across(t).into_iter().enumerate() {
+                if (other as usize) >= map.len() {
+                    continue;
+                }
+                // A point of the face by its nodes, seen from both sides.
+                let w = [some.share() + 0.1, some.share() + 0.1, some.share() + 0.1];
+                let sum: f64 = w.iter().sum();
+                let on: Vec<u32> = (0..4)
+                    .filter(|i| *i != face)
+                    .map(|i| map.tet(t)[i])
+                    .collect();
+                let seen = |t: usize| {
+                    let of = map.tet(t);
+                    let weight =
+                        |n: u32| on.iter().position(|o| *o == n).map_or(0.0, |k| w[k] / sum);
+                    s.values(&[of.map(weight)])[0]
+                };
+                let (a, b) = (seen(t), seen(other as usize));
+                assert!((a - b).abs() < 1e-12 * s.series().amplitude(), "{}", r.name);
+            }
+        }
+        // The trace on a face has the face's symmetry, and all four are one: to the last bit.
+        let nodes = Nodes::new(&s, Grid { n: 6 });
+        let value = |k: [u16; 4]| {
+            let i = nodes.whole.iter().position(|w| *w == k).expect("a node");
+            nodes.values[i]
+        };
+        let traces = [[3, 2, 1, 0], [0, 3, 2, 1], [1, 0, 3, 2], [2, 3, 0, 1]].map(value);
+        assert!(traces.iter().all(|v| *v == traces[0]), "{}", r.name);
+    }
+}
+
+#[test]
+fn both_roads_lead_to_one_surface() {
+    let mut some = Random(6);
+    let mesh = shaken(1, 0.15, 8.0, &mut some);
+    for name in ["diamond", "diamond_sheet"] {
+        let (s, part, t) = cell(name);
+        let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.9, 1.1));
+        let level = Level::Nodes(Arc::new(each.collect()));
+        let tiling = Tiling::new(map(&mesh), s, part, level);
+        // Mean distance of the surface's triangles from the zero set, to first order, and the volume.
+        let figures = |n: f64, explicit: bool| {
+            let surface = made(tiling.clone(), n, explicit).0;
+            if !explicit {
+                check(name, &surface);
+            }
+            let middles: Vec<[f64; 3]> = (0..surface.mesh.triangles.len())
+                .filter(|i| !surface.cut[*i])
+                .map(|i| {
+                    let [a, b, c] = surface.mesh.corners(i);
+                    [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
+                })
+                .collect();
+            let (mut v, mut g) = (vec![0.0; middles.len()], vec![[0.0; 3]; middles.len()]);
+            tiling.gradients(&middles, &mut v, &mut g);
+            let off: f64 = v.iter().zip(&g).map(|(v, g)| v.abs() / norm(*g)).sum();
+            (off / middles.len() as f64, surface.mesh.volume())
+        };
+        let [a, b] = [10.0, 20.0].map(|n| (figures(n, true), figures(n, false)));
+        println!("{name}: {a:?} {b:?}");
+        // Halving the steps quarters the distances, less what creases cost a grid.
+        assert!(b.0.0 < 0.32 * a.0.0, "{name}: explicit {a:?} {b:?}");
+        assert!(b.1.0 < 0.45 * a.1.0, "{name}: implicit {a:?} {b:?}");
+        let apart = |x: ((f64, f64), (f64, f64))| (x.0.1 - x.1.1).abs() / x.1.1;
+        assert!(
+            apart(b) < 0.4 * apart(a) || apart(b) < 2e-3,
+            "{name}: {a:?} {b:?}"
+        );
+        assert!(apart(b) < 0.015, "{name}: {a:?} {b:?}");
+    }
+}
+
+#[test]
+fn bounds_hold_and_gradients_are_those_of_the_values() {
+    let mut some = Random(7);
+    let mesh = shaken(2, 0.15, 4.0, &mut some);
+    for (overlap, name) in [
+        (0.0, "diamond_sheet"),
+        (0.1, "primitive_sheet"),
+        (0.1, "iwp"),
+    ] {
+        let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
+        let (s, part, t) = cell(name);
+        let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.8, 1.2));
+        let tiling = Tiling::new(map, s, part, Level::Nodes(Arc::new(each.collect())));
+        let mut fields: Vec<Arc<dyn Field>> = tiling.parts();
+        fields.push(Arc::new(tiling.clone()));
+        for _ in 0..600 {
+            let (low, h) = (some.point(5.0).map(|v| v + 4.0), some.share().powi(3));
+            let b = Aabb {
+                min: low,
+                max: low.map(|v| v + h),
+            };
+            for f in &fields {
+                let r = f.bound(&b);
+                for _ in 0..8 {
+                    let p = low.map(|v| v + h * some.share());
+                    let v = f.value(p);
+                    assert!(r.lo <= v + 1e-12 && v <= r.hi + 1e-12, "{name} {r:?} {v}");
+                }
+            }
+        }
+        let mut wrong = 0;
+        for _ in 0..500 {
+            let p = some.point(3.0).map(|v| v + 4.0);
+            let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+            tiling.gradients(&[p], &mut v, &mut g);
+            let difference = core::array::from_fn(|a| {
+                let (mut q, mut r) = (p, p);
+                q[a] += 1e-6;
+                r[a] -= 1e-6;
+                (tiling.value(q) - tiling.value(r)) / 2e-6
+            });
+            // Second derivatives of some (2π / period)² in a millionth, and rounding of values in it.
+            wrong += usize::from(norm(sub(difference, g[0])) > 1e-4);
+        }
+        // A difference may straddle a crease: a face, or the fold of |f|.
+        assert!(wrong <= 2, "{name}: {wrong}");
+    }
+}
+
+/// Overlap leaves no crease: gradients on both sides of a face are the same.
+#[test]
+fn overlap_smooths_the_creases() {
+    let mut some = Random(8);
+    let mesh = shaken(2, 0.1, 4.0, &mut some);
+    let (s, part, t) = cell("primitive");
+    let turn = |overlap: f64| {
+        let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
+        let tiling = Tiling::new(map.clone(), s.clone(), part, Level::Same(t));
+        let mut worst = 0.0f64;
+        for i in 0..map.len() {
+            for (face, other) in map.across(i).into_iter().enumerate() {
+                if other as usize >= map.len() {
+                    continue;
+                }
+                let c = map.corners(i);
+                let on: Vec<[f64; 3]> = (0..4).filter(|k| *k != face).map(|k| c[k]).collect();
+                let middle = [0, 1, 2].map(|a| 0.5 * on[0][a] + 0.3 * on[1][a] + 0.2 * on[2][a]);
+                let away = sub(c[face], middle);
+                let sides = [1e-7, -1e-7].map(|e| [0, 1, 2].map(|a| middle[a] + e * away[a]));
+                let (mut v, mut g) = ([0.0; 2], [[0.0; 3]; 2]);
+                tiling.gradients(&sides, &mut v, &mut g);
+                let cosine = dot(g[0], g[1]) / (norm(g[0]) * norm(g[1]));
+                worst = worst.max(cosine.clamp(-1.0, 1.0).acos().to_degrees());
+            }
+        }
+        (worst, tiling)
+    };
+    let (sharp, tiling) = turn(0.0);
+    let told = tiling.creases().expect("creases");
+    assert!(
+        sharp > 20.0 && told.max > 20.0 && told.mean > 5.0,
+        "{sharp} {told:?}"
+    );
+    let (smooth, tiling) = turn(0.1);
+    assert!(smooth < 0.01, "{smooth}");
+    // What moves is of the order of the overlap; what is closed stays closed.
+    let (_, exact) = tiling.volumes();
+    let surface = made(tiling, 10.0, false).0;
+    check("smooth", &surface);
+    assert!((surface.mesh.volume() / exact - 1.0).abs() < 0.1);
+}
+
+#[test]
+fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
+    let region = ball([1.0, 2.0, 3.0], 6.0);
+    let mut some = Random(9);
+    let inside: Vec<[f64; 3]> = (0..4000)
+        .map(|_| some.point(6.0))
+        .filter(|p| norm(*p) < 5.9)
+        .map(|p| [p[0] + 1.0, p[1] + 2.0, p[2] + 3.0])
+        .collect();
+    let size_mm = Grade::Constant(3.0);
+    let (mesh, _) = background(&*region, &region.bounds(), &size_mm, &inside).expect("mesh");
+    let (s, part, t) = cell("diamond");
+    let solid = solid(Tiling::new(map(&mesh), s, part, Level::Same(t)), true);
+    let (surface, pieces) =
+        extract::surface_of(&solid, 0.5, Islands::Keep, &Silent).expect("surface");
+    assert_eq!(fault(&surface.mesh), None);
+    assert_eq!(pieces.pieces, 1);
+    let streams = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads").install(|| {
+            let mut out = Cursor::new(Vec::new());
+            let told = extract::stream_stl(&solid, 0.5, Islands::Keep, &mut out, &Silent);
+            (told.expect("stream"), out.into_inner())
+        })
+    });
+    assert!(streams[0].1 == streams[1].1, "bytes differ");
+    let (told, bytes) = &streams[0];
+    assert_eq!(told.pieces, pieces);
+    assert!((told.volume / surface.mesh.volume() - 1.0).abs() < 1e-12);
+    let back = trabecula::io::read_mesh(bytes, "stl").expect("STL").mesh;
+    assert_eq!(back.triangles.len(), surface.mesh.triangles.len());
+    assert_eq!(fault(&back), None);
+}
+
+/// A wall's thickness, averaged over the tetrahedra about a node, is met on average.
+#[test]
+fn walls_are_as_thick_as_asked_for_on_average() {
+    let mut some = Random(10);
+    let mesh = shaken(3, 0.1, 6.0, &mut some);
+    let (s, part, _) = cell("diamond_sheet");
+    let map = map(&mesh);
+    let level = Level::of(&map, &s, part, Amount::Thickness, vec![0.4]);
+    let tiling = Tiling::new(map, s, part, level);
+    let spread = tiling.thickness().expect("walls");
+    // The mean of 1/|∇f| is above the inverse of its mean; how much, the spread says.
+    assert!((spread.mean / 0.4 - 1.0).abs() < 0.15, "{spread:?}");
+    assert!(spread.min < 0.4 && spread.max > 0.4 && spread.low < spread.high);
+}
+
+#[test]
+fn meshes_that_are_none_are_refused() {
+    let mut some = Random(11);
+    let good = shaken(1, 0.1, 5.0, &mut some);
+    let refused = |mesh: &TetMesh| Tets::new(mesh, 0.0).err().expect("refused").message;
+    assert!(refused(&TetMesh::default()).contains("no tetrahedron"));
+    let mut inverted = good.clone();
+    inverted.tets[2].swap(0, 1);
+    assert!(refused(&inverted).contains("inverted"));
+    let mut crowded = good.clone();
+    crowded.tets.extend([good.tets[0], good.tets[0]]);
+    assert!(refused(&crowded).contains("belongs to"));
+    // Two tetrahedra of the six about a diagonal share nothing but it.
+    let mut pinched = good.clone();
+    pinched.tets = vec![good.tets[0], good.tets[5]];
+    let shared = |a: [u32; 4], b: [u32; 4]| a.iter().filter(|n| b.contains(n)).count();
+    let apart = good.tets.iter().find(|t| shared(**t, good.tets[0]) == 2);
+    pinched.tets[1] = *apart.expect("one on the other side");
+    let (s, part, t) = cell("diamond");
+    let map = map(&pinched);
+    let tiling = Arc::new(Tiling::new(map, s, part, Level::Same(t)));
+    let mut solid = Solid::new(ball([0.0; 3], 9.0), Some(tiling.clone()), 1.0);
+    solid.tiling = Some(tiling);
+    match extract::surface(&solid, 0.5, &Silent) {
+        Err(Stopped::Refused(f)) => assert!(f.message.contains("an edge alone"), "{}", f.message),
+        other => panic!("{:?}", other.map(|s| s.mesh.triangles.len())),
+    }
+}

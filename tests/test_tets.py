@@ -1,0 +1,181 @@
+"""Tetrahedral meshes: made, read, written, judged; other people's formats and meshers."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trabecula as lt
+from trabecula import elements, meshers
+
+BALL = {"region": {"sphere": {"radius": 5.0}}, "lattice": {"core": {"map": lt.map.tets(size=1.5)}}}
+
+DESIGN = """\
+schema = 1
+[region.sphere]
+radius = 5
+[lattice.core.cell.tet]
+name = "left alone here"
+[lattice.core.map.tets]
+size = 1.5
+"""
+
+
+def command(*words, expected=0):
+    """Runs the command; gives stdout and stderr."""
+    done = subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == expected, f"{words}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout, done.stderr
+
+
+def volumes(nodes, tets):
+    a, b, c, d = (nodes[tets[:, i]] for i in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
+
+
+def faces_of(tets):
+    """How often each face is there."""
+    sides = np.concatenate([np.delete(tets, i, axis=1) for i in range(4)])
+    return np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)[1]
+
+
+def test_a_ball_is_meshed_face_to_face():
+    mesh = lt.TetMesh.of(BALL)
+    report = mesh.report()
+    of = volumes(mesh.nodes, mesh.tets)
+    assert (of > 0).all() and set(faces_of(mesh.tets)) == {1, 2}
+    assert np.isclose(of.sum(), mesh.volume, rtol=1e-12)
+    boundary = mesh.boundary()
+    assert boundary.closed and np.isclose(boundary.volume, of.sum(), rtol=1e-12)
+    # Boundary nodes are on the surface; between them the boundary is a chord, at most size² / 8R and some inside.
+    assert np.abs(np.linalg.norm(boundary.vertices, axis=1) - 5).max() < 1e-6
+    assert report["fit"]["deviation"] < 1.5**2 / 8 and report["warnings"] == []
+    assert np.isclose(mesh.least_dihedral.min(), report["quality"]["dihedral"]["min"])
+    assert np.allclose(mesh.sizes, np.cbrt(72**0.5 * of))
+
+
+def test_the_command_tells_and_writes(tmp_path):
+    design = tmp_path / "ball.toml"
+    design.write_text(DESIGN)
+    out, _ = command("tets", design, "-o", tmp_path / "ball.vtu", "--json")
+    report = json.loads(out)
+    assert report["mesher"] == "background" and report["quality"]["inverted"] == 0
+    out, _ = command("tets", tmp_path / "ball.vtu")
+    assert "dihedral" in out and f"tetrahedra  {report['quality']['tets']}" in out
+    read = lt.TetMesh.read(tmp_path / "ball.vtu")
+    assert read.report()["quality"] == report["quality"] and read.report()["fit"] is None
+    assert "no lattice of the design" in command("tets", design, "--lattice", "other", expected=1)[1]
+    assert "--unit and --split belong" in command("tets", design, "--split", expected=1)[1]
+    same = command("tets", tmp_path / "ball.vtu", "-o", tmp_path / "ball.vtu", expected=1)[1]
+    assert "name another output" in same
+    command("tets", design, "-o", tmp_path / "ball.stl", expected=2)
+
+
+def test_formats_of_finite_elements(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    mesh = lt.TetMesh.of(BALL)
+    for kind in ("vtu", "msh", "inp", "mesh"):
+        path = tmp_path / f"ball.{kind}"
+        mesh.write(path)
+        other = meshio.read(path)
+        tets = np.concatenate([c.data for c in other.cells if c.type == "tetra"])
+        # The formats of text keep all digits but a few.
+        assert np.isclose(volumes(other.points, tets).sum(), mesh.volume, rtol=1e-9), kind
+        again = lt.TetMesh.read(path)
+        assert again.counts == mesh.counts and np.isclose(again.volume, mesh.volume, rtol=1e-9), kind
+
+
+def test_hexahedra_are_offered_a_split(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    x, y, z = np.meshgrid(range(4), range(3), range(3), indexing="ij")
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(float)
+    at = np.arange(len(points)).reshape(4, 3, 3)
+    lower, upper = at[:-1, :-1, :-1].ravel(), at[1:, 1:, 1:].ravel()
+    corners = [lower, at[1:, :-1, :-1].ravel(), at[1:, 1:, :-1].ravel(), at[:-1, 1:, :-1].ravel()]
+    corners += [at[:-1, :-1, 1:].ravel(), at[1:, :-1, 1:].ravel(), upper, at[:-1, 1:, 1:].ravel()]
+    path = tmp_path / "bricks.inp"
+    meshio.write(path, meshio.Mesh(points, [("hexahedron", np.stack(corners, axis=1))]))
+    with pytest.raises(ValueError, match="12 hexahedra beside 0 tetrahedra; give split = true"):
+        lt.TetMesh.read(path)
+    mesh = lt.TetMesh.read(path, split=True)
+    assert mesh.counts[1] == 12 * 12 and np.isclose(mesh.volume, 12) and mesh.boundary().closed
+    # The same brick in metres is a thousand times as long.
+    assert np.isclose(lt.TetMesh.read(path, unit="m", split=True).volume, 12e9)
+
+
+def test_broken_files_are_refused(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    mesh = lt.TetMesh.of(BALL)
+    nodes, tets = np.array(mesh.nodes), np.array(mesh.tets).astype(int)
+
+    def refused(nodes, tets, words, kind="msh"):
+        path = tmp_path / f"broken.{kind}"
+        meshio.write(path, meshio.Mesh(nodes, [("tetra", tets)]), **({"file_format": "gmsh22"} if kind == "msh" else {}))
+        with pytest.raises(ValueError, match=words):
+            lt.TetMesh.read(path)
+
+    some = tets.copy()
+    some[5, [0, 1]] = some[5, [1, 0]]
+    refused(nodes, some, "1 of .* tetrahedra are inverted .* the first number 5 at")
+    apart = np.vstack([nodes, nodes[tets[7, 0]]])
+    slit = tets.copy()
+    slit[7, 0] = len(nodes)
+    refused(apart, slit, "in one place")
+    refused(nodes, np.vstack([tets, tets[3]]), "overlap|shared by")
+    middle = nodes[tets[0]].mean(axis=0)
+    inner = next(i for i in range(len(tets)) if np.linalg.norm(nodes[tets[i]], axis=1).max() < 3)
+    a, b, c, d = tets[inner]
+    hung = np.vstack([nodes, (nodes[a] + nodes[b]) / 2])
+    two = [[len(nodes), b, c, d], [a, len(nodes), c, d]]
+    refused(hung, np.vstack([np.delete(tets, inner, axis=0), two]), "hanging")
+    with pytest.warns(lt.DesignWarning, match="numbered the other way round"):
+        meshio.write(tmp_path / "turned.msh", meshio.Mesh(nodes, [("tetra", tets[:, [0, 1, 3, 2]])]), file_format="gmsh22")
+        turned = lt.TetMesh.read(tmp_path / "turned.msh")
+    assert np.isclose(turned.volume, mesh.volume) and len(middle) == 3
+    (tmp_path / "nothing.msh").write_text("not a mesh")
+    with pytest.raises(ValueError, match=r"nothing\.msh cannot be read"):
+        lt.TetMesh.read(tmp_path / "nothing.msh")
+    with pytest.raises(ValueError, match="does not exist"):
+        lt.TetMesh.read(tmp_path / "missing.inp")
+
+
+def test_what_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(ValueError, match=r"pip install 'trabecula\[fe\]'"):
+        elements.needed()
+    monkeypatch.setattr(meshers, "installed", lambda: "pytetwild")
+    data = {**BALL, "lattice": {"core": {"map": lt.map.tets(size=1.5, mesher="ftetwild")}}}
+    with pytest.raises(lt.DesignError, match=r"needs pytetwild, not installed here: pip install 'trabecula\[tets\]'"):
+        lt.TetMesh.of(data)
+
+
+def test_a_mesher_that_hangs_or_falls_is_stopped(tmp_path):
+    def told(program, limit):
+        return meshers.run([sys.executable, "-c", program], str(tmp_path), limit)
+
+    assert told("pass", 60) is None
+    assert told("import time; time.sleep(60)", 0.5) == "did not finish within 0.5 s and was stopped"
+    assert told("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", 60) == "was ended by signal 9"
+    assert told("raise SystemExit('no inside')", 60) == "failed: no inside"
+
+
+def test_ftetwild_takes_a_soup(tmp_path):
+    pytest.importorskip("pytetwild")
+    pytest.importorskip("pyvista")
+    box = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    lines = []
+    # Two boxes that overlap, every triangle on its own.
+    for at, size in ((0.0, 10.0), (6.0, 8.0)):
+        for q in quads:
+            for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3])):
+                lines += ["facet normal 0 0 0", "outer loop"]
+                lines += [f"vertex {at + size * box[i][0]} {at + size * box[i][1]} {at + size * box[i][2]}" for i in t]
+                lines += ["endloop", "endfacet"]
+    (tmp_path / "soup.stl").write_text("solid s\n" + "\n".join(lines) + "\nendsolid s\n")
+    region = {"mesh": {"path": str(tmp_path / "soup.stl")}}
+    mesh = lt.TetMesh.of({"region": region, "lattice": {"core": {"map": lt.map.tets(size=3, mesher="ftetwild")}}})
+    # The union; the envelope is a thousandth of the diagonal or less.
+    assert mesh.volume == pytest.approx(1000 + 512 - 64, rel=0.02)
+    assert mesh.report()["mesher"] == "ftetwild" and (volumes(mesh.nodes, mesh.tets) > 0).all()
