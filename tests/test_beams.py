@@ -219,7 +219,21 @@ def test_a_pattern_is_the_graph_that_it_stands_for(fillet):
     points = np.random.default_rng(3).uniform([-10, -10, -1], [10, 10, 6], (20000, 3))
     a, b = laid.field(points), whole.field(points)
     assert np.array_equal(a < 0, b < 0)
-    assert laid.mesh(edge=0.25).volume == pytest.approx(whole.mesh(edge=0.25).volume, rel=1e-3)
+    mesh = laid.mesh(edge=0.2)
+    assert mesh.closed and mesh.volume == pytest.approx(whole.mesh(edge=0.2).volume, rel=1e-3)
+
+
+def test_the_exact_volume_of_a_pattern_is_that_of_its_graph():
+    """Of one hub of each kind with geometric sums, against all hubs one by one, and against a mesh."""
+    steps = [{"count": 4, "by": [3, 0, 0]}, {"count": 5, "by": [0.5, 3, 0]}, {"count": 3, "scale": 1.1, "about": [0, 0, -20]}]
+    pattern = {"nodes": [[0, 0, 0, 0.4]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]], "repeat": steps}
+    region = lt.region.box(min=[-2, -2, -2], max=[18, 18, 8])
+    laid = built(region, pattern=pattern, fillet="auto", profile="cone")
+    graph = laid.beams["core"]
+    nodes = np.column_stack([graph["centers"], graph["radii"]])
+    whole = built(region, nodes=nodes, struts=graph["struts"], fillet="auto", profile="cone")
+    assert told(laid)["volume"] == pytest.approx(told(whole)["volume"], rel=1e-9)
+    assert told(laid)["volume"] == pytest.approx(whole.mesh(edge=0.12).volume, rel=5e-3)
 
 
 def test_a_thousand_million_hubs_are_checked_at_once():
@@ -228,6 +242,9 @@ def test_a_thousand_million_hubs_are_checked_at_once():
     pattern = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0, 1]], "repeat": steps}
     report = told(built(pattern=pattern, radius=0.2))
     assert (report["hubs"], report["beams"], report["kinds"]) == (1e9, 3 * 1000 * 1000 * 999, 27)
+    # Equal cylinders of radius x on a simple cubic graph: π x² ΣL − 8√2 x³ for each node, but for the ends.
+    exact = 1e9 * (3 * math.pi * 0.2**2 - 8 * math.sqrt(2) * 0.2**3)
+    assert report["volume"] == pytest.approx(exact, rel=2e-3)
     with pytest.raises(lt.DesignError, match="beams would fill the region's bounds; at most 10000000 are made"):
         built(lt.region.box(size=[1000, 1000, 1000]), cell="sc", map=lt.map.affine(wavelength=1), radius=0.2)
 

@@ -78,7 +78,13 @@ pub(super) fn beams(
         .collect();
     let narrow = fillets.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
     let wide = fillets.iter().map(|f| f.1).fold(0.0, f64::max);
+    // A hub and its stubs lie within a box, and that within a ball.
+    let whole = (0..quadors.len()).into_par_iter().all(|i| {
+        let b = quadors.hold(i);
+        space.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
+    });
     let truss = Truss {
+        whole,
         facts: wire.facts(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
@@ -501,6 +507,8 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
         "hub_radius": [least, most],
         "length": facts.length,
         "total_length": facts.total,
+        // Of a part that the region cuts there is no closed form.
+        "volume": (truss.whole).then(|| quadors.volume().ok()).flatten(),
         "valence": valence,
         "fillet_radius": truss.fillet,
         "smallest_angle": facts.angle.map(|a| a.0),

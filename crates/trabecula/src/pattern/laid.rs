@@ -1,5 +1,7 @@
 //! A pattern as a field, without its beams being written out.
 
+use rayon::prelude::*;
+
 use super::{MOST, Pattern, Similarity, Strut};
 use crate::fault::{Fault, number};
 use crate::field::Field;
@@ -339,6 +341,33 @@ impl Laid {
             (kind.hub, sum(0, a) * sum(1, b) * sum(2, c))
         });
         (&self.quadors, each.collect())
+    }
+
+    /// The volume of the whole pattern (mm³), to 1e-10: of one hub of each kind, and the sum of the cubes of scales. Beams must
+    /// not meet but in hubs.
+    ///
+    /// # Errors
+    /// Beams that overlap too far for closed forms.
+    pub fn volume(&self) -> Result<f64, Fault> {
+        if let Some(o) = self.quadors.overlaps().first() {
+            let message = format!(
+                "two beams of the hub at {} (as it lies at [0, 0, 0]) still overlap halfway along: there is no closed form for that",
+                crate::graph::place(self.aside_of(o.hub))
+            );
+            return Err(Fault::new("", message));
+        }
+        let each = self.kinds().1;
+        let parts = each
+            .par_iter()
+            .map(|(hub, n)| Ok(n * self.quadors.hub_volume(*hub)?));
+        let parts = parts.collect::<Result<Vec<f64>, Fault>>()?;
+        Ok(parts.iter().sum())
+    }
+
+    /// Where a hub of a kind lies at [0, 0, 0].
+    fn aside_of(&self, hub: usize) -> Vec3 {
+        let kind = self.kinds.iter().rfind(|k| k.hub <= hub);
+        sub(self.quadors.center(hub), kind.map_or([0.0; 3], |k| k.aside))
     }
 
     /// The least and the greatest scale.
