@@ -114,6 +114,7 @@ docs: $(VENV)/.installed
 	$(BIN)/python scripts/thickness_accuracy.py
 	$(BIN)/python scripts/turning_tables.py
 	$(BIN)/python scripts/blend_tables.py
+	$(BIN)/python scripts/beam_tables.py
 	$(BIN)/python scripts/design_reference.py
 
 clean:

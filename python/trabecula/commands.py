@@ -80,12 +80,22 @@ def check(args) -> None:
 
 def tell_beams(name: str, it: dict) -> None:
     """What a graph of beams is."""
+    least, most = it["hub_radius"]
+    if "repeats" in it:
+        times = " × ".join(map(str, it["repeats"]))
+        print(f"beams {name}: a pattern of {times}, {it['hubs']:.9g} hubs of {it['kinds']} kinds, {it['beams']:.9g} beams")
+        print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
+        print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
+        print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+        return
     print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
     low, high = it["length"]
     print(f"  length     {span(low if low == high else [low, high])} mm, {figure(it['total_length'])} mm in all")
     print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
-    least, most = it["hub_radius"]
     print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
+    if it["fillet_radius"]:
+        tight, wide = it["fillet_radius"]
+        print(f"  fillets    radius {span(tight if tight == wide else [tight, wide])} mm in the tightest places")
     print(f"  valence    {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}")
     if it["smallest_angle"] is not None:
         x, y, z = map(figure, it["smallest_angle_at"])

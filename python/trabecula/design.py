@@ -48,7 +48,8 @@ class Beams:
     length and ``hub`` that of the balls in which beams meet (mm, numbers or grades). ``profile`` is "cone", "cylinder",
     {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v}, {"alpha": v},
     {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within
-    ``merge`` (mm) are one.
+    ``merge`` (mm) are one. ``pattern``, instead of a cell or nodes and struts, is a program of repeats: ``nodes``, ``struts``
+    (two nodes and how many repeats on the second lies) and ``repeat``, up to three steps {count, by, rotate, scale, about}.
     """
 
     cell: str | None = None
@@ -62,6 +63,7 @@ class Beams:
     trim: str | None = None
     dangling: str | None = None
     merge: float | None = None
+    pattern: dict | None = None
 
     def to_dict(self) -> dict:
         """The beams as plain data."""

@@ -43,6 +43,11 @@ impl Similarity {
         }
     }
 
+    /// Whether it only moves.
+    pub fn moves(&self) -> bool {
+        self.turn == IDENTITY && self.scale == 1.0
+    }
+
     /// The image of a point.
     pub fn apply(&self, p: Vec3) -> Vec3 {
         add(scale(apply(&self.turn, p), self.scale), self.shift)

@@ -9,10 +9,13 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
+pub mod complex;
 mod field;
 pub mod hub;
 mod index;
+pub mod integral;
 pub mod pencil;
+pub mod quadric;
 
 use hub::{Affine, Hub, Stub};
 use index::Index;

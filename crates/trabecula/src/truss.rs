@@ -49,6 +49,8 @@ pub struct Truss {
     pub facts: Facts,
     /// Least and greatest of the hubs' fillets in their tightest places (mm), of hubs inside the region; none without.
     pub fillet: Option<[f64; 2]>,
+    /// Whether all of it lies in the region.
+    pub whole: bool,
     /// What was taken out of it.
     pub cleaned: Cleaned,
     /// What was trimmed.

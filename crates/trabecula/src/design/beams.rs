@@ -47,7 +47,8 @@ pub(super) fn beams(
         reach,
     } = frame(spec, &radii, place, warnings)?;
     let mut cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
-    check_left(&wire, "", place)?;
+    let source = if spec.cell.is_some() { "map" } else { "struts" };
+    check_left(&wire, source, place)?;
     if spec.cell.is_none() {
         tell_cleaned(&cleaned, &place.path, warnings);
     }
@@ -69,16 +70,23 @@ pub(super) fn beams(
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
     let inside = |p: Vec3| space.value(p) <= slack;
-    let rounded = (0..quadors.len())
+    let fillets: Vec<(usize, f64)> = (0..quadors.len())
         .into_par_iter()
-        .filter(|i| inside(quadors.center(*i)))
-        .map(|i| quadors.fillet_radius(i))
-        .filter(|r| r.is_finite())
-        .map(|r| [r, r])
-        .reduce_with(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        .filter(|i| spec.fillet != FilletSpec::None && inside(quadors.center(*i)))
+        .map(|i| (i, quadors.fillet_radius(i)))
+        .filter(|f| f.1.is_finite())
+        .collect();
+    let narrow = fillets.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
+    let wide = fillets.iter().map(|f| f.1).fold(0.0, f64::max);
+    // A hub and its stubs lie within a box, and that within a ball.
+    let whole = (0..quadors.len()).into_par_iter().all(|i| {
+        let b = quadors.hold(i);
+        space.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
+    });
     let truss = Truss {
+        whole,
         facts: wire.facts(&inside),
-        fillet: rounded.filter(|_| spec.fillet != FilletSpec::None),
+        fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
         graph,
         quadors: Arc::new(quadors),
@@ -88,7 +96,7 @@ pub(super) fn beams(
         dangling: wire.dangling(&held),
     };
     check_open(&*truss.quadors, place)?;
-    warn(&truss, spec, place, warnings);
+    warn(&truss, &fillets, spec, place, warnings);
     Ok(Beams::Truss(Arc::new(truss)))
 }
 
@@ -405,7 +413,13 @@ fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     }
 }
 
-fn warn(truss: &Truss, spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>) {
+fn warn(
+    truss: &Truss,
+    fillets: &[(usize, f64)],
+    spec: &BeamsSpec,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) {
     let mut say = |message: String| {
         warnings.push(Warning {
             path: place.path.clone(),
@@ -420,19 +434,25 @@ fn warn(truss: &Truss, spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warni
         ));
     }
     let inside = |hub: usize| place.region.value(truss.quadors.center(hub)) <= 0.0;
-    let short: Vec<_> = (truss.quadors.shortfalls().iter())
-        .filter(|s| inside(s.hub))
-        .collect();
-    if let Some(worst) = short.iter().min_by(|a, b| a.radius.total_cmp(&b.radius)) {
+    let short: Vec<(usize, f64)> = match spec.fillet {
+        FilletSpec::Radius(r) => {
+            let less = |f: &&(usize, f64)| f.1 < r * (1.0 - 1e-9);
+            fillets.iter().filter(less).copied().collect()
+        }
+        _ => (truss.quadors.shortfalls().iter())
+            .filter(|s| inside(s.hub))
+            .map(|s| (s.hub, s.radius))
+            .collect(),
+    };
+    if let Some((hub, radius)) = short.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
         let asked = match spec.fillet {
             FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
             _ => "the fillet asked for".into(),
         };
         say(format!(
-            "{} cannot have {asked}, only the largest that fits; the tightest has {:.3} mm, at {}",
+            "{} cannot have {asked}, only the largest that fits; the tightest has {radius:.3} mm, at {}",
             counted(short.len(), "hub"),
-            worst.radius,
-            at(truss.quadors.center(worst.hub))
+            at(truss.quadors.center(*hub))
         ));
     }
     let over: Vec<_> = (truss.quadors.overlaps().iter())
@@ -487,6 +507,8 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
         "hub_radius": [least, most],
         "length": facts.length,
         "total_length": facts.total,
+        // Of a part that the region cuts there is no closed form.
+        "volume": (truss.whole).then(|| quadors.volume().ok()).flatten(),
         "valence": valence,
         "fillet_radius": truss.fillet,
         "smallest_angle": facts.angle.map(|a| a.0),

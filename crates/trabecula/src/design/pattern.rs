@@ -133,6 +133,7 @@ pub(super) fn report(laid: &Laid, fraction: f64) -> Json {
         "hubs": hubs,
         "beams": beams,
         "kinds": laid.kinds().1.len(),
+        "volume": laid.volume().ok(),
         "fraction": fraction,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * laid.thinnest(),

@@ -1,10 +1,12 @@
 //! A pattern as a field, without its beams being written out.
 
+use rayon::prelude::*;
+
 use super::{MOST, Pattern, Similarity, Strut};
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::graph::Graph;
-use crate::math::{Aabb, IDENTITY, Interval, Vec3, add, apply, norm, scale, sub};
+use crate::math::{Aabb, Interval, Vec3, add, apply, norm, scale, sub};
 use crate::quador::{Fillet, Quadors};
 
 /// Which hubs along a step differ: the first and the last few, and one for all between; or every one.
@@ -72,15 +74,15 @@ pub struct Laid {
     quadors: Quadors,
     /// By class of k, j, i, and node.
     kinds: Vec<Kind>,
-    /// Powers of U, V, W, undone.
+    /// Powers of U, V, W, undone, where they do more than move.
     undone: [Vec<Similarity>; 3],
-    /// For each class of j, for each i, what holds its hubs, pulled back by Wᵏ Vʲ.
-    rows: Vec<Vec<Aabb>>,
-    /// For each class of j what holds a row, pulled back by Wᵏ Vʲ.
+    /// For each class of j what holds the hubs of a row, pulled back by Wᵏ Vʲ, where U does more than move.
+    rows: Vec<Row>,
+    /// For each class of j what holds a whole row.
     lines: Vec<Aabb>,
-    /// What holds any of the lines, and any row's first.
+    /// What holds any of the lines, and any hub at [0, 0, 0].
     widest: Aabb,
-    first: Aabb,
+    home: Aabb,
     /// What holds a layer, pulled back by Wᵏ.
     layer: Aabb,
     bounds: Aabb,
@@ -104,7 +106,7 @@ impl Laid {
             .map(|h| norm(h.center))
             .fold(0.0, f64::max);
         let free = [
-            u.commutes(&v, size) && u.commutes(&w, size) && v.commutes(&w, size),
+            u.commutes(&v, size) && u.commutes(&w, size),
             v.commutes(&w, size),
             true,
         ];
@@ -154,9 +156,9 @@ impl Laid {
             }
         }
         let quadors = Quadors::new(&graph, fillet)?;
-        let undone: [Vec<Similarity>; 3] = core::array::from_fn(|a| {
-            let (step, count) = pattern.steps[a];
-            step.inverse().powers(count as usize)
+        let undone: [Vec<Similarity>; 3] = core::array::from_fn(|a| match &pattern.steps[a] {
+            (step, _) if step.moves() => Vec::new(),
+            (step, count) => step.inverse().powers(*count as usize),
         });
         let smallest = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1).min(1.0);
         let least = pattern.steps.iter().map(smallest).product();
@@ -169,7 +171,7 @@ impl Laid {
             rows: Vec::new(),
             lines: Vec::new(),
             widest: Aabb::EMPTY,
-            first: Aabb::EMPTY,
+            home: Aabb::EMPTY,
             layer: Aabb::EMPTY,
             bounds: Aabb::EMPTY,
             cap: 2.0 * thick,
@@ -181,48 +183,70 @@ impl Laid {
         Ok(laid)
     }
 
+    /// What undoes n of a step.
+    fn undo(&self, step: usize, n: usize) -> Similarity {
+        match self.undone[step].get(n) {
+            Some(done) => *done,
+            None => Similarity {
+                shift: scale(self.pattern.steps[step].0.shift, -(n as f64)),
+                ..Similarity::STILL
+            },
+        }
+    }
+
     /// The boxes in which what is near is looked for.
     fn hold(&mut self) {
         let [lu, lv, lw] = self.classes.map(|c| c.len());
         let nodes = self.pattern.nodes.len();
-        let u = self.pattern.steps[0].0.powers(self.classes[0].count);
-        let v = self.pattern.steps[1].0.powers(self.classes[1].count);
+        let kinds_at = |a: usize, b: usize| {
+            (0..lw).flat_map(move |c| (0..nodes).map(move |n| ((c * lv + b) * lu + a) * nodes + n))
+        };
+        // What is solid lies within, and values count up to the cap.
+        let own = |a: usize, b: usize| {
+            kinds_at(a, b).fold(Aabb::EMPTY, |all, m| {
+                let kind = &self.kinds[m];
+                let b = self.quadors.hold(kind.hub).grown(self.cap);
+                all.union(Aabb {
+                    min: sub(b.min, kind.aside),
+                    max: sub(b.max, kind.aside),
+                })
+            })
+        };
+        let steps = self.pattern.steps;
+        // The first and the last of a class hold all of it where a step only moves.
+        let spread = |step: usize, class: usize, b: Aabb| {
+            let ((by, _), (first, n)) = (&steps[step], self.classes[step].members(class));
+            let power = |n: usize| self.undo(step, n).inverse();
+            let last = first + n - 1;
+            let between = if by.moves() {
+                first..first
+            } else {
+                first..last
+            };
+            let ends = carried(&power(first), &b).union(carried(&power(last), &b));
+            between.fold(ends, |all, n| all.union(carried(&power(n), &b)))
+        };
+        let (mut rows, mut lines, mut home) = (Vec::new(), Vec::new(), Aabb::EMPTY);
         for b in 0..lv {
-            let mut row = vec![Aabb::EMPTY; self.classes[0].count];
-            for (i, held) in row.iter_mut().enumerate() {
-                let a = self.classes[0].of(i);
-                for c in 0..lw {
-                    for n in 0..nodes {
-                        let kind = &self.kinds[((c * lv + b) * lu + a) * nodes + n];
-                        let own = self.quadors.hold(kind.hub).grown(self.cap);
-                        let home = Aabb {
-                            min: sub(own.min, kind.aside),
-                            max: sub(own.max, kind.aside),
-                        };
-                        *held = held.union(carried(&u[i], &home));
-                    }
-                }
-            }
-            self.lines
-                .push(row.iter().fold(Aabb::EMPTY, |all, b| all.union(*b)));
-            self.rows.push(row);
-        }
-        self.widest = self.lines.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
-        // Every hub of a row, brought back to its first place.
-        for row in &self.rows {
-            for (b, undone) in row.iter().zip(&self.undone[0]) {
-                self.first = self.first.union(carried(undone, b));
+            let at: Vec<Aabb> = (0..lu).map(|a| own(a, b)).collect();
+            home = at.iter().fold(home, |all, b| all.union(*b));
+            if steps[0].0.moves() {
+                let line = (0..lu).map(|a| spread(0, a, at[a]));
+                lines.push(line.fold(Aabb::EMPTY, Aabb::union));
+            } else {
+                let of = |i: usize| carried(&self.undo(0, i).inverse(), &at[self.classes[0].of(i)]);
+                let row = Row::of((0..self.classes[0].count).map(of).collect());
+                lines.push(row.all());
+                rows.push(row);
             }
         }
-        for (j, v) in v.iter().enumerate() {
-            self.layer = self
-                .layer
-                .union(carried(v, &self.lines[self.classes[1].of(j)]));
-        }
-        let w = self.pattern.steps[2].0.powers(self.classes[2].count);
-        self.bounds = w
-            .iter()
-            .fold(Aabb::EMPTY, |all, w| all.union(carried(w, &self.layer)));
+        let layer = (0..lv).map(|b| spread(1, b, lines[b]));
+        let layer = layer.fold(Aabb::EMPTY, Aabb::union);
+        let all = (0..lw).map(|c| spread(2, c, layer));
+        let bounds = all.fold(Aabb::EMPTY, Aabb::union);
+        let widest = lines.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
+        (self.bounds, self.widest) = (bounds, widest);
+        (self.rows, self.lines, self.layer, self.home) = (rows, lines, layer, home);
     }
 
     /// Calls `found` with each kind of hub that may lie near a box, the box as that kind sees it, and how much larger the
@@ -233,34 +257,38 @@ impl Laid {
         let [u, v, w] = &self.pattern.steps;
         let meets = |b: &Aabb, held: &Aabb| !b.intersection(*held).is_empty();
         for k in span(w, p, &self.layer) {
-            let in_layer = carried(&self.undone[2][k], p);
+            let undone_w = self.undo(2, k);
+            let in_layer = carried(&undone_w, p);
             if !meets(&in_layer, &self.layer) {
                 continue;
             }
             let c = self.classes[2].of(k);
             for j in span(v, &in_layer, &self.widest) {
                 let b = self.classes[1].of(j);
-                let in_line = carried(&self.undone[1][j], &in_layer);
+                let undone_v = self.undo(1, j);
+                let in_line = carried(&undone_v, &in_layer);
                 if !meets(&in_line, &self.lines[b]) {
                     continue;
                 }
-                for i in span(u, &in_line, &self.first) {
-                    if !meets(&in_line, &self.rows[b][i]) {
-                        continue;
-                    }
-                    let home = carried(&self.undone[0][i], &in_line);
-                    let undone = [(0, i), (1, j), (2, k)].map(|(a, n)| self.undone[a][n].scale);
-                    let s = 1.0 / undone.iter().product::<f64>();
+                let mut one = |i: usize| {
+                    let undone_u = self.undo(0, i);
+                    let home = carried(&undone_u, &in_line);
+                    let s = 1.0 / (undone_u.scale * undone_v.scale * undone_w.scale);
                     let first = ((c * lv + b) * lu + self.classes[0].of(i)) * nodes;
-                    for kind in &self.kinds[first..first + nodes] {
+                    self.kinds[first..first + nodes].iter().all(|kind| {
                         let seen = Aabb {
                             min: add(home.min, kind.aside),
                             max: add(home.max, kind.aside),
                         };
-                        if !found(kind, seen, s) {
-                            return;
-                        }
-                    }
+                        found(kind, seen, s)
+                    })
+                };
+                let more = match self.rows.get(b) {
+                    Some(row) => row.near(&in_line, &mut one),
+                    None => span(u, &in_line, &self.home).all(one),
+                };
+                if !more {
+                    return;
                 }
             }
         }
@@ -315,6 +343,33 @@ impl Laid {
         (&self.quadors, each.collect())
     }
 
+    /// The volume of the whole pattern (mm³), to 1e-10: of one hub of each kind, and the sum of the cubes of scales. Beams must
+    /// not meet but in hubs.
+    ///
+    /// # Errors
+    /// Beams that overlap too far for closed forms.
+    pub fn volume(&self) -> Result<f64, Fault> {
+        if let Some(o) = self.quadors.overlaps().first() {
+            let message = format!(
+                "two beams of the hub at {} (as it lies at [0, 0, 0]) still overlap halfway along: there is no closed form for that",
+                crate::graph::place(self.aside_of(o.hub))
+            );
+            return Err(Fault::new("", message));
+        }
+        let each = self.kinds().1;
+        let parts = each
+            .par_iter()
+            .map(|(hub, n)| Ok(n * self.quadors.hub_volume(*hub)?));
+        let parts = parts.collect::<Result<Vec<f64>, Fault>>()?;
+        Ok(parts.iter().sum())
+    }
+
+    /// Where a hub of a kind lies at [0, 0, 0].
+    fn aside_of(&self, hub: usize) -> Vec3 {
+        let kind = self.kinds.iter().rfind(|k| k.hub <= hub);
+        sub(self.quadors.center(hub), kind.map_or([0.0; 3], |k| k.aside))
+    }
+
     /// The least and the greatest scale.
     pub fn scales(&self) -> [f64; 2] {
         let last = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1);
@@ -349,10 +404,65 @@ impl Laid {
     }
 }
 
+/// Boxes in a row, by a tree over their order: what is next in order is near in space.
+struct Row {
+    count: usize,
+    /// The root is 1, below n are 2n and 2n + 1, the boxes are the last.
+    tree: Vec<Aabb>,
+}
+
+impl Row {
+    fn of(boxes: Vec<Aabb>) -> Row {
+        let leaves = boxes.len().next_power_of_two();
+        let mut tree = vec![Aabb::EMPTY; 2 * leaves];
+        tree[leaves..leaves + boxes.len()].copy_from_slice(&boxes);
+        for n in (1..leaves).rev() {
+            tree[n] = tree[2 * n].union(tree[2 * n + 1]);
+        }
+        Row {
+            count: boxes.len(),
+            tree,
+        }
+    }
+
+    fn all(&self) -> Aabb {
+        self.tree[1]
+    }
+
+    /// Calls `found` with the number of each box that meets p, until it says that it has enough; whether it never did.
+    fn near(&self, p: &Aabb, found: &mut impl FnMut(usize) -> bool) -> bool {
+        let leaves = self.tree.len() / 2;
+        let mut open = [0usize; 64];
+        let mut count = 1;
+        open[0] = 1;
+        while count > 0 {
+            count -= 1;
+            let n = open[count];
+            if p.intersection(self.tree[n]).is_empty() {
+                continue;
+            }
+            if n < leaves {
+                open[count] = 2 * n + 1;
+                open[count + 1] = 2 * n;
+                count += 2;
+            } else if n - leaves < self.count && !found(n - leaves) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
 /// The box that holds a box carried by a similarity.
 fn carried(by: &Similarity, b: &Aabb) -> Aabb {
     if b.is_empty() {
         return *b;
+    }
+    if by.moves() {
+        return Aabb {
+            min: add(b.min, by.shift),
+            max: add(b.max, by.shift),
+        };
     }
     let (middle, half) = (by.apply(b.center()), scale(b.size(), 0.5 * by.scale));
     let reach = apply(&by.turn.map(|row| row.map(f64::abs)), half);
@@ -365,7 +475,7 @@ fn carried(by: &Similarity, b: &Aabb) -> Aabb {
 /// The repeats n for which a part of p, n steps undone, may lie in b: by division where a step only moves, else all.
 fn span((step, count): &(Similarity, u32), p: &Aabb, b: &Aabb) -> std::ops::Range<usize> {
     let count = *count as usize;
-    if step.turn != IDENTITY || step.scale != 1.0 {
+    if !step.moves() {
         return 0..count;
     }
     let (mut low, mut high) = (0.0f64, count as f64 - 1.0);

@@ -1,0 +1,448 @@
+//! Volume, area, centroid and inertia, from the faces.
+//!
+//! By the divergence theorem ∫ dV = ⅓∮ x·n dA, ∫ x dV = ¼∮ x (x·n) dA and ∫ xxᵀ dV = ⅕∮ xxᵀ (x·n) dA over a closed surface.
+//! On a stub, x·n dA = (Bz/2 + C) dz dψ. On any other face the surface is its quadric seen from the hub's centre: a fan of
+//! segments from a point of the face to its seams, each taken out to the quadric by the root of a quadratic. What is
+//! integrated is analytic in each piece, so Gauss's rule gains digits in proportion to its nodes; it is given enough that
+//! the whole comes out to 1e-10.
+
+use core::f64::consts::{FRAC_PI_4, PI};
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use crate::fault::Fault;
+use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+
+use super::Quadors;
+use super::complex::{Complex, Face};
+use super::hub::Hub;
+use super::quadric::Conic;
+
+/// Integrals over a solid of density one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mass {
+    /// Volume, mm³.
+    pub volume: f64,
+    /// Area of the surface, mm².
+    pub area: f64,
+    /// ∫ x dV, mm⁴.
+    pub first: Vec3,
+    /// ∫ x xᵀ dV, mm⁵.
+    pub second: Mat3,
+}
+
+impl Mass {
+    /// The centroid, mm.
+    pub fn centroid(&self) -> Vec3 {
+        scale(self.first, 1.0 / self.volume)
+    }
+
+    /// The inertia about the centroid, ∫ (|y|² I − y yᵀ) dV, mm⁵.
+    pub fn inertia(&self) -> Mat3 {
+        let c = self.centroid();
+        let about = |i: usize, j: usize| self.second[i][j] - self.volume * c[i] * c[j];
+        let trace: f64 = (0..3).map(|i| about(i, i)).sum();
+        [0, 1, 2].map(|i| {
+            [0, 1, 2].map(|j| {
+                if i == j {
+                    trace - about(i, i)
+                } else {
+                    -about(i, j)
+                }
+            })
+        })
+    }
+
+    /// The same solid moved by `by`.
+    pub fn moved(&self, by: Vec3) -> Mass {
+        let mut out = *self;
+        for i in 0..3 {
+            out.first[i] += self.volume * by[i];
+            for j in 0..3 {
+                out.second[i][j] +=
+                    self.first[i] * by[j] + by[i] * self.first[j] + self.volume * by[i] * by[j];
+            }
+        }
+        out
+    }
+
+    /// Both solids.
+    pub fn plus(mut self, o: &Mass) -> Mass {
+        self.volume += o.volume;
+        self.area += o.area;
+        self.first = add(self.first, o.first);
+        for i in 0..3 {
+            self.second[i] = add(self.second[i], o.second[i]);
+        }
+        self
+    }
+
+    /// The share of the surface at x: `flux` is x·n dA, `area` dA.
+    #[inline]
+    fn surface(&mut self, x: Vec3, flux: f64, area: f64) {
+        self.volume += flux / 3.0;
+        self.area += area;
+        for i in 0..3 {
+            self.first[i] += x[i] * flux / 4.0;
+            for j in 0..3 {
+                self.second[i][j] += x[i] * x[j] * flux / 5.0;
+            }
+        }
+    }
+}
+
+/// Nodes and weights of Gauss's rule on [0, 1].
+pub(super) fn gauss(n: usize) -> &'static [(f64, f64)] {
+    static RULES: OnceLock<Vec<Vec<(f64, f64)>>> = OnceLock::new();
+    let rules = RULES.get_or_init(|| (0..=64).map(rule).collect());
+    &rules[n]
+}
+
+/// Newton's method on the Legendre polynomial, from Tricomi's estimates of its roots.
+fn rule(n: usize) -> Vec<(f64, f64)> {
+    (0..n)
+        .map(|k| {
+            let mut x = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
+            let mut slope = 1.0;
+            for _ in 0..8 {
+                let (mut p, mut before) = (1.0, 0.0);
+                for j in 1..=n {
+                    let j = j as f64;
+                    (p, before) = (((2.0 * j - 1.0) * x * p - (j - 1.0) * before) / j, p);
+                }
+                slope = n as f64 * (x * p - before) / (x * x - 1.0);
+                x -= p / slope;
+            }
+            ((1.0 + x) / 2.0, 1.0 / ((1.0 - x * x) * slope * slope))
+        })
+        .collect()
+}
+
+/// How fine the quadrature is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Order {
+    /// Nodes of the rule whose result is taken.
+    pub nodes: usize,
+    /// Nodes of the rule that it is compared with.
+    pub check: usize,
+    /// How far they may differ, of the hub's volume (and area, and second moment), in each part.
+    pub differ: f64,
+}
+
+/// Enough for 1e-10: a rule of ten nodes has half as many digits again as one of seven, with which it agrees to eight.
+pub(super) const USUAL: Order = Order {
+    nodes: 10,
+    check: 7,
+    differ: 2e-9,
+};
+
+/// Integrals over a hub's part about its centre; with `ALL` unset only the volume.
+pub(super) fn hub_mass<const ALL: bool>(hub: &Hub, complex: &Complex, order: Order) -> Mass {
+    let mut out = Mass::default();
+    // A guess of the whole, for what is small beside it.
+    let mut size = Mass {
+        volume: hub.radius.powi(3),
+        area: hub.radius.powi(2),
+        ..Mass::default()
+    };
+    for s in &hub.stubs[..] {
+        size.volume += PI * s.squared(s.split) * s.split;
+        size.area += PI * s.squared(s.split).sqrt() * s.split;
+        size.second[0][0] += s.squared(s.split) * s.split.powi(3);
+    }
+    size.second[0][0] += hub.radius.powi(5);
+    let work = Work {
+        hub,
+        complex,
+        order,
+        size,
+    };
+    for face in &complex.faces {
+        match face.rim {
+            Some(stub) => work.stub::<ALL>(face, stub as usize, &mut out),
+            None => work.fan::<ALL>(face, &mut out),
+        }
+    }
+    out
+}
+
+struct Work<'a> {
+    hub: &'a Hub<'a>,
+    complex: &'a Complex,
+    order: Order,
+    size: Mass,
+}
+
+impl Work<'_> {
+    /// Adds what `part` gives, for a number of nodes and ranges along a seam and across the face, halving ranges until two
+    /// rules agree.
+    fn halve<const ALL: bool>(
+        &self,
+        part: &impl Fn(usize, [f64; 2], [f64; 2]) -> Mass,
+        along: [f64; 2],
+        across: [f64; 2],
+        depth: u32,
+        out: &mut Mass,
+    ) {
+        let (rough, fine) = (
+            part(self.order.check, along, across),
+            part(self.order.nodes, along, across),
+        );
+        let near = |a: f64, b: f64, size: f64| (a - b).abs() <= self.order.differ * size;
+        let trace = |m: &Mass| m.second[0][0] + m.second[1][1] + m.second[2][2];
+        let agree = near(rough.volume, fine.volume, self.size.volume)
+            && (!ALL
+                || near(rough.area, fine.area, self.size.area)
+                    && near(trace(&rough), trace(&fine), self.size.second[0][0]));
+        if agree || depth == 0 {
+            *out = out.plus(&fine);
+            return;
+        }
+        // The side that says more about the difference.
+        let (t, u) = ((along[0] + along[1]) / 2.0, (across[0] + across[1]) / 2.0);
+        let halves = [
+            part(self.order.check, [along[0], t], across),
+            part(self.order.check, [t, along[1]], across),
+        ];
+        let gained = (halves[0].volume + halves[1].volume - rough.volume).abs();
+        if gained > 0.5 * (fine.volume - rough.volume).abs() || depth % 4 == 0 {
+            self.halve::<ALL>(part, [along[0], t], across, depth - 1, out);
+            self.halve::<ALL>(part, [t, along[1]], across, depth - 1, out);
+        } else {
+            self.halve::<ALL>(part, along, [across[0], u], depth - 1, out);
+            self.halve::<ALL>(part, along, [u, across[1]], depth - 1, out);
+        }
+    }
+
+    /// Calls `part` for each seam of a face, as it is walked.
+    fn seams<const ALL: bool>(
+        &self,
+        face: &Face,
+        part: &impl Fn(&Conic, f64, usize, [f64; 2], [f64; 2]) -> Mass,
+        out: &mut Mass,
+    ) {
+        for &(arc, forward) in face.loops.iter().flatten() {
+            let conic = &self.complex.arcs[arc as usize].conic;
+            let turn = if forward { 1.0 } else { -1.0 };
+            // At most a quarter of a circle at a time.
+            let parts = (conic.end / FRAC_PI_4).ceil().max(1.0);
+            for p in 0..parts as usize {
+                let along = [
+                    conic.end / parts * p as f64,
+                    conic.end / parts * (p + 1) as f64,
+                ];
+                self.halve::<ALL>(
+                    &|n, a, b| part(conic, turn, n, a, b),
+                    along,
+                    [0.0, 1.0],
+                    16,
+                    out,
+                );
+            }
+        }
+    }
+
+    fn stub<const ALL: bool>(&self, face: &Face, stub: usize, out: &mut Mass) {
+        let s = &self.hub.stubs[stub];
+        let [a, b, c] = s.section;
+        let primitive = |z: f64| (b / 4.0 * z + c) * z;
+        let top = primitive(s.split);
+        self.seams::<ALL>(
+            face,
+            &|conic, sign, n, along, across| {
+                let mut out = Mass::default();
+                for &(t, w) in gauss(n) {
+                    let (x, dx) = conic.with_slope(along[0] + t * (along[1] - along[0]));
+                    let z = dot(x, s.axis);
+                    let side = sub(x, scale(s.axis, z));
+                    let turn = sign * w * (along[1] - along[0]) * dot(s.axis, cross(side, dx))
+                        / dot(side, side);
+                    if !ALL {
+                        out.volume += turn * (top - primitive(z)) / 3.0;
+                        continue;
+                    }
+                    let side = unit(side);
+                    let (from, height) = (
+                        z + across[0] * (s.split - z),
+                        (across[1] - across[0]) * (s.split - z),
+                    );
+                    for &(t, w) in gauss(n) {
+                        let at = from + t * height;
+                        let rho = s.squared(at).max(0.0).sqrt();
+                        let half = a * at + b / 2.0;
+                        let weight = w * height * turn;
+                        let place = add(scale(s.axis, at), scale(side, rho));
+                        out.surface(
+                            place,
+                            weight * (b / 2.0 * at + c),
+                            weight * (rho * rho + half * half).sqrt(),
+                        );
+                    }
+                }
+                out
+            },
+            out,
+        );
+        // The disc in the split plane: no surface of the lattice, but of the hub's part.
+        let (z, disc) = (s.split, PI * s.squared(s.split));
+        out.volume += z * disc / 3.0;
+        if ALL {
+            for i in 0..3 {
+                out.first[i] += s.axis[i] * z * z * disc / 4.0;
+                for j in 0..3 {
+                    let square = s.axis[i] * s.axis[j];
+                    let same = f64::from(i == j);
+                    out.second[i][j] += z / 5.0
+                        * (z * z * square * disc + (same - square) * disc * s.squared(z) / 4.0);
+                }
+            }
+        }
+    }
+
+    fn fan<const ALL: bool>(&self, face: &Face, out: &mut Mass) {
+        let q = &face.quadric;
+        if face.loops.is_empty() {
+            // A whole ball.
+            let r = (-q.c).sqrt();
+            out.volume += 4.0 / 3.0 * PI * r.powi(3);
+            out.area += 4.0 * PI * r * r;
+            for i in 0..3 {
+                out.second[i][i] += 4.0 / 15.0 * PI * r.powi(5);
+            }
+            return;
+        }
+        let apex = middle(self.complex, face);
+        let (o, far) = (unit(apex), norm(apex));
+        let (bo, oo) = (dot(q.b, apex), q.form(apex, apex));
+        self.seams::<ALL>(
+            face,
+            &|conic, sign, n, along, across| {
+                let mut out = Mass::default();
+                for &(t, w) in gauss(n) {
+                    let (x, dx) = conic.with_slope(along[0] + t * (along[1] - along[0]));
+                    let turn = sign
+                        * w
+                        * (along[1] - along[0])
+                        * (across[1] - across[0])
+                        * dot(apex, cross(x, dx));
+                    let length = norm(x);
+                    let cos = dot(o, x) / length;
+                    if cos > 0.5 {
+                        // Straight segments p = (1 − t) o + t x: the solid angle is t det(o, x, dx) dt/|p|³.
+                        let (bx, ox, xx) = (dot(q.b, x), q.form(apex, x), q.form(x, x));
+                        for &(t, w) in gauss(n) {
+                            let t = across[0] + t * (across[1] - across[0]);
+                            let u = 1.0 - t;
+                            let (one, two) =
+                                (u * bo + t * bx, u * u * oo + 2.0 * u * t * ox + t * t * xx);
+                            let exit = -q.c / (one + (one * one - q.c * two).max(0.0).sqrt());
+                            let flux = turn * w * t * exit * exit * exit;
+                            if ALL {
+                                let place = scale(add(scale(apex, u), scale(x, t)), exit);
+                                let h = q.half_slope(place);
+                                out.surface(place, flux, flux * norm(h) / dot(place, h));
+                            } else {
+                                out.volume += flux / 3.0;
+                            }
+                        }
+                    } else {
+                        // Great circles, as a segment would pass near the centre: β sin(tβ) det/sin²β of unit vectors.
+                        let e = scale(x, 1.0 / length);
+                        let beta = cos.clamp(-1.0, 1.0).acos();
+                        let sin = beta.sin();
+                        let turn = turn / (far * length * length * sin * sin);
+                        for &(t, w) in gauss(n) {
+                            let t = across[0] + t * (across[1] - across[0]);
+                            let p = add(
+                                scale(o, ((1.0 - t) * beta).sin() / sin),
+                                scale(e, (t * beta).sin() / sin),
+                            );
+                            let exit = q.exit(p);
+                            let place = scale(p, exit);
+                            let h = q.half_slope(place);
+                            let flux = turn * w * beta * (t * beta).sin() * exit * exit * exit;
+                            out.surface(place, flux, flux * norm(h) / dot(place, h));
+                        }
+                    }
+                }
+                out
+            },
+            out,
+        );
+    }
+}
+
+/// A place on a face, in the middle of its seams: on the ball the far side of a lone cap.
+pub(super) fn middle(complex: &Complex, face: &Face) -> Vec3 {
+    let mut sum = [0.0; 3];
+    let mut arrow = [0.0; 3];
+    for &(arc, forward) in face.loops.iter().flatten() {
+        let conic = &complex.arcs[arc as usize].conic;
+        for &(t, w) in gauss(4) {
+            let (x, dx) = conic.with_slope(t * conic.end);
+            let turn = w * conic.end * if forward { 1.0 } else { -1.0 };
+            sum = add(sum, scale(unit(x), w * conic.end * norm(dx)));
+            arrow = add(arrow, scale(cross(x, dx), turn));
+        }
+    }
+    // Where the seams go round more than half the sphere their middle is on the wrong side.
+    let p = if face.label == 0 && dot(sum, arrow) < 0.0 {
+        arrow
+    } else {
+        sum
+    };
+    let p = unit(if norm(p) > 1e-9 { p } else { arrow });
+    scale(p, face.quadric.exit(p))
+}
+
+impl Quadors {
+    /// Volume, area, centroid and inertia of the whole, to 1e-10: of the parts of all hubs. Beams must not meet but in hubs.
+    ///
+    /// # Errors
+    /// Beams that overlap too far for closed forms.
+    pub fn mass(&self) -> Result<Mass, Fault> {
+        self.sum(|i| {
+            let hub = self.hub(i);
+            Ok(hub_mass::<true>(&hub, &self.complex(i)?, USUAL).moved(self.center(i)))
+        })
+    }
+
+    /// The volume alone, mm³.
+    ///
+    /// # Errors
+    /// As for `mass`.
+    pub fn volume(&self) -> Result<f64, Fault> {
+        let all = self.sum(|i| Ok(hub_mass::<false>(&self.hub(i), &self.complex(i)?, USUAL)));
+        Ok(all?.volume)
+    }
+
+    /// The volume of the part of one hub, mm³.
+    ///
+    /// # Errors
+    /// Hubs whose seams do not close.
+    pub fn hub_volume(&self, hub: usize) -> Result<f64, Fault> {
+        Ok(hub_mass::<false>(&self.hub(hub), &self.complex(hub)?, USUAL).volume)
+    }
+
+    /// The surface of a hub as faces, arcs and vertices.
+    ///
+    /// # Errors
+    /// Hubs whose seams do not close.
+    pub fn complex(&self, hub: usize) -> Result<Complex, Fault> {
+        Complex::new(&self.hub(hub)).map_err(|f| f.under(&format!("hubs[{hub}]")))
+    }
+
+    fn sum(&self, of: impl Fn(usize) -> Result<Mass, Fault> + Sync) -> Result<Mass, Fault> {
+        self.exact()?;
+        const RUN: usize = 64;
+        let runs: Vec<Mass> = (0..self.len().div_ceil(RUN))
+            .into_par_iter()
+            .map(|r| {
+                (r * RUN..((r + 1) * RUN).min(self.len()))
+                    .try_fold(Mass::default(), |sum, i| Ok(sum.plus(&of(i)?)))
+            })
+            .collect::<Result<_, Fault>>()?;
+        Ok(runs.iter().fold(Mass::default(), |a, b| a.plus(b)))
+    }
+}

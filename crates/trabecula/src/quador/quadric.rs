@@ -1,0 +1,209 @@
+//! Quadrics, and the conics that planes cut out of them.
+
+use crate::math::{Mat3, Vec3, add, apply, dot, scale};
+
+use super::hub::{Affine, Hub};
+
+/// x ↦ xᵀMx + 2 b·x + c.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quadric {
+    /// M, symmetric.
+    pub m: Mat3,
+    /// b.
+    pub b: Vec3,
+    /// c.
+    pub c: f64,
+}
+
+impl Quadric {
+    /// The value at x.
+    #[inline]
+    pub fn at(&self, x: Vec3) -> f64 {
+        dot(x, add(apply(&self.m, x), scale(self.b, 2.0))) + self.c
+    }
+
+    /// Half the gradient at x.
+    #[inline]
+    pub fn half_slope(&self, x: Vec3) -> Vec3 {
+        add(apply(&self.m, x), self.b)
+    }
+
+    /// uᵀMv.
+    #[inline]
+    pub fn form(&self, u: Vec3, v: Vec3) -> f64 {
+        dot(u, apply(&self.m, v))
+    }
+
+    /// Adds w g².
+    pub fn square(&mut self, w: f64, g: &Affine) {
+        for i in 0..3 {
+            for j in 0..3 {
+                self.m[i][j] += w * g.a[i] * g.a[j];
+            }
+            self.b[i] += w * g.a[i] * g.b;
+        }
+        self.c += w * g.b * g.b;
+    }
+
+    /// The factor t > 0 that takes a point out of the hub's centre to the surface, t p; infinite where there is none.
+    #[inline]
+    pub fn exit(&self, p: Vec3) -> f64 {
+        let (one, two) = (dot(self.b, p), self.form(p, p));
+        // c < 0 at the centre: of the two roots 1/t the greater is the first exit.
+        -self.c / (one + (one * one - self.c * two).max(0.0).sqrt())
+    }
+}
+
+/// What a hub is made of where the stubs of `label` are active: its quadric, and σ.
+pub fn piece(hub: &Hub, label: u64) -> (Quadric, Affine) {
+    let mut q = Quadric {
+        m: crate::math::IDENTITY,
+        b: [0.0; 3],
+        c: -hub.radius * hub.radius,
+    };
+    let (mut sigma, mut t) = (Affine::default(), 1.0);
+    for (i, s) in hub.stubs.iter().enumerate() {
+        if label >> i & 1 == 0 {
+            continue;
+        }
+        if hub.sharp {
+            q.square(-1.0, &s.g);
+        } else {
+            q.square(-s.weight, &s.g);
+            sigma = sigma.plus(s.share * s.weight, &s.g);
+            t += s.share * s.share * s.weight;
+        }
+    }
+    if !hub.sharp {
+        q.square(1.0 / t, &sigma);
+        sigma = Affine::default().plus(1.0 / t, &sigma);
+    }
+    (q, sigma)
+}
+
+/// An arc of a conic: from a place on it, by the angle θ of the lines through that place, from its tangent on.
+///
+/// X(θ) = v − q sinθ (cosθ e₁ + sinθ e₂)/(m₁₁ cos² + 2 m₁₂ sin cos + m₂₂ sin²). On a circle θ is half the arc.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Conic {
+    /// Where it starts.
+    pub v: Vec3,
+    /// The tangent there, and its normal in the plane.
+    pub e: [Vec3; 2],
+    /// Derivative of the quadric along e₂, at v.
+    pub q: f64,
+    /// The form in the plane: m₁₁, m₁₂, m₂₂.
+    pub m: [f64; 3],
+    /// Where it ends; π if it closes.
+    pub end: f64,
+}
+
+impl Conic {
+    /// The conic of a quadric in the plane normal to `normal`, from `v`, which lies on both, along `tangent`; `None` where it is
+    /// a straight line.
+    pub fn new(q: &Quadric, normal: Vec3, v: Vec3, tangent: Vec3) -> Option<Conic> {
+        let m11 = q.form(tangent, tangent);
+        let mut e2 = crate::math::cross(normal, tangent);
+        let mut slope = 2.0 * dot(q.half_slope(v), e2);
+        // Growing θ moves along +e₁: −q/m₁₁ > 0.
+        if slope * m11 > 0.0 {
+            (e2, slope) = (scale(e2, -1.0), -slope);
+        }
+        let m = [m11, q.form(tangent, e2), q.form(e2, e2)];
+        let size = m[1].abs() + m[2].abs();
+        (m11.abs() > 1e-13 * size && slope != 0.0).then_some(Conic {
+            v,
+            e: [tangent, e2],
+            q: slope,
+            m,
+            end: core::f64::consts::PI,
+        })
+    }
+
+    /// The place at θ.
+    #[inline]
+    pub fn at(&self, theta: f64) -> Vec3 {
+        let (s, c) = theta.sin_cos();
+        let f = -self.q * s / (self.m[0] * c * c + 2.0 * self.m[1] * s * c + self.m[2] * s * s);
+        add(
+            self.v,
+            add(scale(self.e[0], f * c), scale(self.e[1], f * s)),
+        )
+    }
+
+    /// The place at θ and its derivative.
+    #[inline]
+    pub fn with_slope(&self, theta: f64) -> (Vec3, Vec3) {
+        let (s, c) = theta.sin_cos();
+        let d = self.m[0] * c * c + 2.0 * self.m[1] * s * c + self.m[2] * s * s;
+        let dd = 2.0 * ((self.m[2] - self.m[0]) * s * c + self.m[1] * (c * c - s * s));
+        let f = -self.q / d;
+        let g = f * dd / d;
+        let at = add(
+            self.v,
+            add(scale(self.e[0], f * s * c), scale(self.e[1], f * s * s)),
+        );
+        let slope = add(
+            scale(self.e[0], f * (c * c - s * s) - g * s * c),
+            scale(self.e[1], 2.0 * f * s * c - g * s * s),
+        );
+        (at, slope)
+    }
+
+    /// The angles in (0, π) where a function of the plane vanishes, given its value at v and its derivatives along e₁, e₂,
+    /// in order. With `zero` the start itself, where the function is known to vanish, is not among them.
+    pub fn roots(&self, f: [f64; 3], zero: bool) -> impl Iterator<Item = f64> {
+        let f0 = if zero { 0.0 } else { f[0] };
+        let c = [
+            f0 * self.m[0],
+            2.0 * f0 * self.m[1] - self.q * f[1],
+            f0 * self.m[2] - self.q * f[2],
+        ];
+        let found = if zero {
+            [angle(-c[1], c[2]), f64::NAN]
+        } else {
+            angles(c)
+        };
+        let (a, b) = (found[0].min(found[1]), found[0].max(found[1]));
+        let keep = move |t: &f64| *t > 0.0 && *t < core::f64::consts::PI;
+        [
+            a,
+            if found[0].is_nan() || found[1].is_nan() {
+                f64::NAN
+            } else {
+                b
+            },
+        ]
+        .into_iter()
+        .filter(keep)
+    }
+
+    /// Where it first runs to infinity.
+    pub fn open(&self) -> Option<f64> {
+        let [a, b] = angles([self.m[0], 2.0 * self.m[1], self.m[2]]);
+        let t = a.min(b);
+        (t > 0.0).then_some(t)
+    }
+}
+
+/// atan(s/c) in [0, π).
+fn angle(s: f64, c: f64) -> f64 {
+    let t = s.atan2(c);
+    if t < 0.0 {
+        t + core::f64::consts::PI
+    } else if t >= core::f64::consts::PI {
+        0.0
+    } else {
+        t
+    }
+}
+
+/// The angles at which c₀ cos² + c₁ sin cos + c₂ sin² vanishes.
+fn angles([c0, c1, c2]: [f64; 3]) -> [f64; 2] {
+    let square = c1 * c1 - 4.0 * c0 * c2;
+    if square < 0.0 {
+        return [f64::NAN; 2];
+    }
+    let q = -(c1 + square.sqrt().copysign(c1)) / 2.0;
+    [angle(q, c2), angle(c0, q)]
+}

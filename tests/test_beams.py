@@ -1,0 +1,353 @@
+"""Beams through every door: the catalogue, graphs, radii, trimming, patterns, and what is refused."""
+
+import json
+import math
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+import trabecula as lt
+
+BOX = lt.region.box(min=[0, 0, 0], max=[10, 10, 10])
+SQUARE = [[1, 1, 5], [9, 1, 5], [9, 9, 5], [1, 9, 5]]
+RING = [[0, 1], [1, 2], [2, 3], [3, 0]]
+
+
+def built(region=BOX, **beams):
+    """The solid of beams in a region, its warnings kept in it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return lt.Design(region=region, beams=lt.Beams(**beams)).build()
+
+
+def told(solid):
+    """The report of the beams named core."""
+    return solid.report()["beams"]["core"]
+
+
+def share(solid, n=60):
+    """The solid share of the box, by samples at the middles of small cubes."""
+    low, high = map(np.array, solid.bounds)
+    at = (np.arange(n) + 0.5) / n
+    points = np.stack(np.meshgrid(at, at, at, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.count_nonzero(solid.field(low + points * (high - low)) <= 0) / n**3
+
+
+# Solid fraction of a cell of edge 1 with beams of radius x, from an independent sampling at 100³, good to 2 %.
+SAMPLED = {
+    "sc": {0.05: 0.0225, 0.10: 0.0834, 0.12: 0.1151},
+    "bcc": {0.05: 0.0506, 0.10: 0.1793, 0.12: 0.2419},
+    "fcc": {0.05: 0.0633, 0.10: 0.2119, 0.12: 0.2895},
+    "octet": {0.05: 0.1204, 0.10: 0.3783, 0.12: 0.5001},
+    "kelvin": {0.05: 0.0625, 0.10: 0.2063, 0.12: 0.2797},
+    "diamond": {0.05: 0.0505, 0.10: 0.1792, 0.12: 0.2418},
+}
+
+
+@pytest.mark.parametrize("cell", SAMPLED)
+def test_fractions_are_those_of_an_independent_sampling(cell):
+    """Ours is good to 1 % at 60³ (beams of six samples and more), the other to 2 %."""
+    for radius, known in SAMPLED[cell].items():
+        found = share(built(cell=cell, map=lt.map.affine(wavelength=10), radius=10 * radius))
+        assert found == pytest.approx(known, rel=0.03), (cell, radius)
+
+
+def test_the_closed_form_of_equal_cylinders_is_met():
+    """V = π x² ΣL − c x³; a mesh of 50 steps a cell is good to a few parts in a thousand."""
+    solid = built(cell="octet", map=lt.map.affine(wavelength=10, offset=[2.5, 2.5, 2.5]), radius=0.5)
+    mesh = solid.mesh(edge=0.2)
+    x = 0.05
+    exact = 12 * math.sqrt(2) * math.pi * x**2 - 64 * (1 + math.sqrt(2)) * x**3
+    assert mesh.volume / 1000 == pytest.approx(exact, rel=5e-3)
+    assert mesh.closed and mesh.self_intersections == 0 and mesh.pieces == 1
+
+
+@pytest.mark.parametrize("cell", [it["name"] for it in lt.beams.cells()])
+def test_every_cell_fills_a_region(cell):
+    """Nodes well inside have the valence of the cell, the field is solid on beams and open in the middle of nothing."""
+    wave = [4 * v for v in lt.beams.cell(cell)["aspect"]]
+    solid = built(cell=cell, map=lt.map.affine(wavelength=wave, rotate=[5, 6, 7]), radius=0.12)
+    report = told(solid)
+    known = lt.beams.cell(cell)["valence"]
+    assert set(report["valence"]) <= {str(v) for v in known}
+    assert 0.001 < report["fraction"] < 0.3
+    graph = solid.beams["core"]
+    ends = graph["centers"][graph["struts"]]
+    middles = ends.mean(axis=1)
+    inside = np.all((middles > 0.1) & (middles < 9.9), axis=1)
+    assert np.all(solid.field(middles[inside]) < 0)
+
+
+def test_fillets_add_only_where_beams_meet():
+    """A filleted lattice holds the sharp one; at mid length nothing is added."""
+    args = {"cell": "bcc", "map": lt.map.affine(wavelength=10, offset=[2.5, 2.5, 2.5]), "radius": 0.6}
+    sharp, round_ = built(**args), built(**args, fillet={"radius": 0.5})
+    points = np.random.default_rng(1).uniform(0, 10, (20000, 3))
+    a, b = sharp.field(points), round_.field(points)
+    assert np.all(b[a < 0] < 0)
+    assert np.count_nonzero(b < 0) > np.count_nonzero(a < 0)
+    assert told(round_)["fillet_radius"][0] == pytest.approx(0.5, rel=1e-6)
+    mesh = round_.mesh(edge=0.3)
+    assert mesh.closed and mesh.pieces == 1
+
+
+@pytest.mark.parametrize("map_", ["cylinder", "sphere", "phase"])
+def test_other_maps_carry_nodes(map_):
+    """Round an axis, about a centre, turned by a solved map: nodes have the phases of nodes."""
+    maps = {
+        "cylinder": lt.map.cylinder(wavelength=2.5, around=12, center=[5, 5, 0]),
+        "sphere": lt.map.sphere(wavelength=2.5, around=12, center=[5, 5, 5]),
+        "phase": lt.map.phase(wavelength=4, rotate_z={"linear": {"along": [0, 0, 1], "stops": [[0, 0], [10, 30]]}}),
+    }
+    solid = built(cell="bcc", map=maps[map_], radius=0.2)
+    assert told(solid)["valence"].get("8", 0) > 10
+    assert solid.mesh(edge=0.25).closed
+    graph = solid.beams["core"]
+    if map_ == "cylinder":
+        off = np.hypot(graph["centers"][:, 0] - 5, graph["centers"][:, 1] - 5) / 1.25
+        assert np.allclose(off, np.round(off), atol=1e-9)
+
+
+def test_tables_rows_and_arrays_are_one(tmp_path):
+    """The same graph from CSV, from lists, from arrays; saved and loaded again."""
+    (tmp_path / "n.csv").write_text("id,x,y,z,r\n" + "".join(f"n{i},{x},{y},{z},0.9\n" for i, (x, y, z) in enumerate(SQUARE)))
+    (tmp_path / "s.csv").write_text("".join(f"n{a};n{b}\n" for a, b in RING))
+    rows = built(nodes=[[*p, 0.9] for p in SQUARE], struts=RING, radius=0.5)
+    arrays = built(nodes=np.column_stack([SQUARE, [0.9] * 4]), struts=np.array(RING), radius=0.5)
+    design = lt.Design(region=BOX, beams=lt.Beams(nodes="n.csv", struts="s.csv", radius=0.5), folder=str(tmp_path))
+    (tmp_path / "below").mkdir()
+    design.save(tmp_path / "below" / "d.toml")
+    points = np.random.default_rng(2).uniform(0, 10, (2000, 3))
+    for other in (arrays, design.build(), lt.load(tmp_path / "below" / "d.toml").build()):
+        assert np.array_equal(rows.field(points), other.field(points))
+        assert np.array_equal(rows.beams["core"]["radii"], np.full(4, 0.9))
+
+
+def test_radii_vary_with_place():
+    """A grade is taken at mid length; hubs are as large as the largest beam that meets there."""
+    thick = {"linear": {"along": [0, 0, 1], "stops": [[0, 0.2], [10, 0.6]]}}
+    solid = built(cell="sc", map=lt.map.affine(wavelength=2.5), radius=thick)
+    graph = solid.beams["core"]
+    z = graph["centers"][:, 2]
+    inner = (z > 0.1) & (z < 9.9)
+    assert np.allclose(graph["radii"][inner], 0.2 + 0.04 * np.minimum(z[inner] + 1.25, 10))
+    assert told(solid)["thickness"] == pytest.approx(0.4, abs=0.02)
+    waisted = built(cell="sc", map=lt.map.affine(wavelength=5), radius=0.3, hub=0.8)
+    assert told(waisted)["thickness"] == pytest.approx(0.6, rel=1e-9)
+    on, off = waisted.field([[2.5, 0.01, 0.29], [2.5, 0.01, 0.31]])
+    assert on < 0 < off
+
+
+@pytest.mark.parametrize("trim", ["cut", "drop", "snap"])
+def test_what_leaves_the_region(trim):
+    """Cut: solid up to the surface. Drop: no beam leaves. Snap: free ends lie on the surface."""
+    ball = lt.region.sphere(radius=6)
+    solid = built(ball, cell="bcc", map=lt.map.affine(wavelength=4), radius=0.3, trim=trim)
+    graph, report = solid.beams["core"], told(solid)
+    far = np.linalg.norm(graph["centers"], axis=1)
+    assert solid.mesh(edge=0.2).closed
+    if trim == "cut":
+        assert far.max() > 6 and report["trimmed"]["outside"] > 0
+    else:
+        assert far.max() <= 6 + 1e-9 and report["trimmed"]["dropped" if trim == "drop" else "snapped"] > 0
+    if trim == "snap":
+        valence = np.bincount(graph["struts"].ravel(), minlength=len(far))
+        assert np.all(np.abs(far[valence == 1] - 6) < 1e-7)
+        assert report["dangling"] == 0
+
+
+def test_loose_ends_are_told_and_dropped():
+    """A ring with a tail of two beams."""
+    nodes = [*SQUARE, [5, 5, 5], [5, 5, 8]]
+    tail = [*RING, [0, 4], [4, 5]]
+    with pytest.warns(lt.DesignWarning, match="1 node inside the region with a single beam"):
+        kept = lt.Design(region=BOX, beams=lt.Beams(nodes=nodes, struts=tail, radius=0.5)).build()
+    assert told(kept)["dangling"] == 1
+    dropped = told(built(nodes=nodes, struts=tail, radius=0.5, dangling="drop"))
+    assert dropped["dangling"] == 0 and dropped["beams"] == 4 and dropped["cleaned"]["dangling"] == 2
+
+
+def test_what_is_twice_is_told():
+    """Merged nodes, beams of no length, beams that are there already, nodes without beams; beams within others."""
+    nodes = [*SQUARE, [1, 1, 5], [2, 2, 2]]
+    with pytest.warns(lt.DesignWarning, match="1 node merged .* 1 strut of no length .* 1 strut left out .* 1 node left out"):
+        lt.Design(region=BOX, beams=lt.Beams(nodes=nodes, struts=[*RING, [1, 4], [0, 4]], radius=0.5)).build()
+    nodes = [*SQUARE, [5, 1, 5]]
+    with pytest.warns(lt.DesignWarning, match="1 beam lie within another one .* about"):
+        lt.Design(region=BOX, beams=lt.Beams(nodes=nodes, struts=[*RING, [0, 4], [4, 2]], radius=0.5)).build()
+    with pytest.warns(lt.DesignWarning, match="cannot have a fillet of 9 mm, only the largest that fits; the tightest has"):
+        lt.Design(region=BOX, beams=lt.Beams(nodes=SQUARE, struts=RING, radius=0.5, fillet={"radius": 9})).build()
+
+
+def test_skin_keep_and_islands_work_on_beams():
+    """What stands beside a lattice stands beside beams."""
+    beams = lt.Beams(cell="octet", map=lt.map.affine(wavelength=5), radius=0.35)
+    design = lt.Design(
+        region=BOX, beams=beams, skin=lt.skin(0.5, open=["-z"]), keep={"boss": lt.region.sphere(center=[5, 5, 5], radius=2)}
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solid = design.build()
+        mesh = solid.mesh(edge=0.2, islands="drop")
+    assert mesh.closed and mesh.pieces == 1
+    assert np.all(solid.field([[5, 5, 5], [0.2, 5, 5]]) < 0)
+    assert solid.voxels(step=0.25).volume == pytest.approx(mesh.volume, rel=0.05)
+
+
+SWIRL = {
+    "nodes": [[9, 0, 0, 0.5]],
+    "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]],
+    "repeat": [
+        {"count": 12, "rotate": [0, 0, 25]},
+        {"count": 5, "scale": 0.85, "rotate": [0, 0, 10]},
+        {"count": 3, "by": [0, 0, 2.5]},
+    ],
+}
+
+
+@pytest.mark.parametrize("fillet", ["none", {"tau": 0.8}])
+def test_a_pattern_is_the_graph_that_it_stands_for(fillet):
+    """Written out and built as nodes and struts, beams are the same."""
+    region = lt.region.box(min=[-10, -10, -1], max=[10, 10, 6])
+    laid = built(region, pattern=SWIRL, profile="cone", fillet=fillet)
+    graph = laid.beams["core"]
+    nodes = np.column_stack([graph["centers"], graph["radii"]])
+    assert (len(nodes), told(laid)["hubs"], told(laid)["beams"]) == (180, 180, len(graph["struts"]))
+    whole = built(region, nodes=nodes, struts=graph["struts"], profile="cone", fillet=fillet)
+    points = np.random.default_rng(3).uniform([-10, -10, -1], [10, 10, 6], (20000, 3))
+    a, b = laid.field(points), whole.field(points)
+    assert np.array_equal(a < 0, b < 0)
+    mesh = laid.mesh(edge=0.2)
+    assert mesh.closed and mesh.volume == pytest.approx(whole.mesh(edge=0.2).volume, rel=1e-3)
+
+
+def test_the_exact_volume_of_a_pattern_is_that_of_its_graph():
+    """Of one hub of each kind with geometric sums, against all hubs one by one, and against a mesh."""
+    steps = [{"count": 4, "by": [3, 0, 0]}, {"count": 5, "by": [0.5, 3, 0]}, {"count": 3, "scale": 1.1, "about": [0, 0, -20]}]
+    pattern = {"nodes": [[0, 0, 0, 0.4]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]], "repeat": steps}
+    region = lt.region.box(min=[-2, -2, -2], max=[18, 18, 8])
+    laid = built(region, pattern=pattern, fillet="auto", profile="cone")
+    graph = laid.beams["core"]
+    nodes = np.column_stack([graph["centers"], graph["radii"]])
+    whole = built(region, nodes=nodes, struts=graph["struts"], fillet="auto", profile="cone")
+    assert told(laid)["volume"] == pytest.approx(told(whole)["volume"], rel=1e-9)
+    assert told(laid)["volume"] == pytest.approx(whole.mesh(edge=0.12).volume, rel=5e-3)
+
+
+def test_a_thousand_million_hubs_are_checked_at_once():
+    """A pattern is not written out; a graph of that size is refused before it is made."""
+    steps = [{"count": 1000, "by": by} for by in ([1, 0, 0], [0, 1, 0], [0, 0, 1])]
+    pattern = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0, 1]], "repeat": steps}
+    report = told(built(pattern=pattern, radius=0.2))
+    assert (report["hubs"], report["beams"], report["kinds"]) == (1e9, 3 * 1000 * 1000 * 999, 27)
+    # Equal cylinders of radius x on a simple cubic graph: π x² ΣL − 8√2 x³ for each node, but for the ends.
+    exact = 1e9 * (3 * math.pi * 0.2**2 - 8 * math.sqrt(2) * 0.2**3)
+    assert report["volume"] == pytest.approx(exact, rel=2e-3)
+    with pytest.raises(lt.DesignError, match="beams would fill the region's bounds; at most 10000000 are made"):
+        built(lt.region.box(size=[1000, 1000, 1000]), cell="sc", map=lt.map.affine(wavelength=1), radius=0.2)
+
+
+GOOD = {"cell": "octet", "map": {"affine": {"wavelength": 5}}, "radius": 0.4}
+OWN = {"nodes": SQUARE, "struts": RING, "radius": 0.5}
+PATTERN = {"pattern": SWIRL, "radius": 0.3}
+
+
+def but(of, **change):
+    """The same with some keys changed, or left out where None."""
+    return {k: v for k, v in (of | change).items() if v is not None}
+
+
+CASES = [
+    (but(GOOD, cell="octett"), "cell", ['did you mean "octet"']),
+    (but(GOOD, cell="gyroid"), "cell", ["gyroid is a surface"]),
+    (but(GOOD, cell="fluorite"), "cell", ['"rhombic_dodecahedron"']),
+    (but(GOOD, cel="octet"), "cel", ['did you mean "cell"']),
+    (but(GOOD, map=None), "", ['"map" is missing']),
+    (but(GOOD, radius=None), "", ['"radius" is missing']),
+    (but(GOOD, radius=0), "radius", ["radius is 0 mm", "greater than 0"]),
+    (but(GOOD, radius=math.nan), "radius", ["radius is NaN"]),
+    (but(GOOD, radius=-1), "radius", ["radius is -1"]),
+    (but(GOOD, radius=9), "radius", ["solid everywhere"]),
+    (but(GOOD, radius={"formula": "x - 5"}), "radius.formula", ["radius is -", "greater than 0"]),
+    (but(GOOD, nodes=SQUARE), "nodes", ["either a cell on a map, or nodes and struts"]),
+    (but(GOOD, fillet=0.3), "fillet", ["fillet = { radius = 0.5 }"]),
+    (but(GOOD, fillet={"radius": -1}), "fillet", ["above zero"]),
+    (but(GOOD, fillet={"tau": 1}), "fillet", ["up to, not including, 1"]),
+    (but(GOOD, fillet="round"), "fillet", ["unknown fillet", "none, auto"]),
+    (but(GOOD, profile="tube"), "profile", ["unknown profile"]),
+    (but(GOOD, profile={"waist": 2}), "profile", ["must lie between", "the beam from"]),
+    (but(GOOD, merge=-1), "merge", ["0 or more"]),
+    (but(GOOD, trim="clip"), "trim", ["unknown trim", "cut, drop, snap"]),
+    (but(GOOD, map={"affine": {"wavelength": 0.001}}), "map", ["at most 10000000 are made"]),
+    (but(GOOD, map={"affine": {"wavelength": 500, "offset": [100, 100, 100]}}, radius=1), "map", ["no beam lies in the region"]),
+    (but(OWN, struts=[[0, 9]]), "struts[0]", ["there is no node 9; there are 4 nodes"]),
+    (but(OWN, struts=[[0, 0]]), "struts", ["two different ends"]),
+    (but(OWN, struts=[[0, 1.5]]), "struts[0]", ["whole numbers", "1.5"]),
+    (but(OWN, struts=None), "", ['"struts" is missing']),
+    (but(OWN, nodes=[[0, 0]]), "nodes[0]", ["x, y, z"]),
+    (but(OWN, nodes=[[0, 0, math.inf]]), "nodes[0]", ["finite", "inf"]),
+    (but(OWN, nodes=[[1, 1, 5, 0], *SQUARE[1:]]), "nodes[0]", ["radius is 0"]),
+    (but(OWN, radius=None), "", ["no node has a radius"]),
+    (but(OWN, map=GOOD["map"]), "map", ["a map belongs to a cell"]),
+    (but(OWN, nodes="missing.csv"), "nodes", ["missing.csv"]),
+    (but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4), "radius", ["the beam from", "holds the hub"]),
+    (but(OWN, profile="cylinder", hub={"formula": "0.5 + x/20"}), "profile", ["cylinder needs hubs of one radius"]),
+    (but(OWN, nodes=[[x + 50, y, z] for x, y, z in SQUARE]), "trim", ["no beam lies in the region"]),
+    (but(PATTERN, trim="drop"), "trim", ["leave trim out"]),
+    (but(PATTERN, radius={"formula": "1 + x"}), "radius", ["one number"]),
+    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 1, 0, 0, 0]]}), "pattern.struts[0]", ["no node 1"]),
+    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 0, 40]]}), "pattern.struts", ["no strut has both its ends"]),
+    (but(PATTERN, pattern=SWIRL | {"repeat": []}), "pattern.repeat", ["one to three steps"]),
+    (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 0}]}), "pattern.repeat[0].count", ["from 1 to"]),
+    (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 200, "scale": 0.5}]}), "pattern.repeat[0].scale", ["times as large"]),
+    ({}, "", ["no graph given"]),
+]
+
+
+@pytest.mark.parametrize(("beams", "place", "parts"), CASES, ids=[f"{i}-{c[1]}" for i, c in enumerate(CASES)])
+def test_each_slip_gets_one_error(beams, place, parts):
+    """The place, what was found, what is allowed."""
+    with pytest.raises(lt.DesignError) as caught:
+        lt.Design(region=BOX, beams={"core": beams}).build()
+    assert caught.value.path == ".".join(filter(None, ["beams.core", place])), caught.value
+    for part in parts:
+        assert part in str(caught.value), str(caught.value)
+
+
+def test_a_lattice_and_beams_need_a_blend():
+    """And a lattice whose cell is one of beams is told where it belongs."""
+    lattice = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
+    with pytest.raises(lt.DesignError, match="blend"):
+        lt.Design(region=BOX, lattice=lattice, beams=lt.Beams(**GOOD)).build()
+    lattice = lt.Lattice(cell="octet", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
+    with pytest.raises(lt.DesignError, match="octet is a cell of beams"):
+        lt.Design(region=BOX, lattice=lattice).build()
+    with pytest.raises(lt.DesignError, match='such as .*or \\[beams.core\\]'):
+        lt.Design(region=BOX).build()
+
+
+def run(*words):
+    """The command's exit status, output and words."""
+    done = subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_the_command(tmp_path):
+    """cells --beams, check, mesh."""
+    status, out, _ = run("cells", "--beams", "--json")
+    cells = json.loads(out)
+    assert status == 0 and len(cells) == len(lt.beams.names()) and cells[0]["name"] == "sc"
+    status, out, _ = run("cells", "octet", "--beams")
+    assert status == 0 and "4 of 12" in out and "Maxwell  +12" in out
+    status, _, words = run("cells", "octed", "--beams")
+    assert status == 1 and 'did you mean "octet"' in words
+    file = tmp_path / "d.toml"
+    lt.Design(region=BOX, beams=lt.Beams(**GOOD)).save(file)
+    status, out, _ = run("check", file)
+    assert status == 0 and "beams core: octet" in out and "of 12" in out
+    status, out, _ = run("check", file, "--json")
+    assert json.loads(out)["beams"]["core"]["smallest_angle"] == pytest.approx(60)
+    status, out, _ = run("mesh", file, "-o", tmp_path / "d.stl", "--edge", 0.3, "--json")
+    assert status == 0 and json.loads(out)["pieces"] == 1
