@@ -53,7 +53,7 @@ pub use tets::{TetReport, Tets};
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["lattice"] }, { "required": ["beams"] }]))]
+#[schemars(extend("anyOf" = [{ "required": ["lattice"] }, { "required": ["beams"] }]))]
 pub struct Design {
     /// Version of this format; 1.
     #[schemars(range(min = 1, max = 1))]
@@ -67,9 +67,9 @@ pub struct Design {
     #[serde(default, skip_serializing_if = "Lattices::is_empty")]
     #[schemars(extend("minProperties" = 1))]
     pub lattice: Lattices,
-    /// What fills the region instead of a lattice: one graph of beams, under a name of your own.
+    /// Graphs of beams, under names of your own: instead of a lattice, or blended with others.
     #[serde(default, skip_serializing_if = "BeamsSpecs::is_empty")]
-    #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+    #[schemars(extend("minProperties" = 1))]
     pub beams: BeamsSpecs,
     /// Which lattice is where, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]

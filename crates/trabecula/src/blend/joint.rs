@@ -23,9 +23,9 @@ pub enum Phases {
 
 /// Places looked at where one distribution serves all, and in each neighbourhood.
 const EVERYWHERE: usize = 1 << 16;
-const NEARBY: usize = 1 << 12;
+const NEARBY: usize = 1 << 10;
 /// Most neighbourhoods.
-const MOST: f64 = 20_000.0;
+const MOST: f64 = 100_000.0;
 /// Most waves of a series whose beats are looked at.
 const WAVES: usize = 64;
 
@@ -64,7 +64,8 @@ impl Joint {
         };
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
-        let mut step = longest;
+        // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
+        let mut step = 0.5 * longest;
         while fine(step).iter().product::<f64>() > MOST {
             step *= 1.1;
         }
@@ -92,31 +93,26 @@ impl Joint {
     }
 
     /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
-    /// ever fewer up to one step away along each axis (a raised cosine, in which whole waves leave no trace).
+    /// ever fewer up to two steps away along each axis (a raised cosine, in which whole waves leave no trace).
     pub fn places(&self, i: usize) -> Vec<Vec3> {
-        let even = |n: usize| {
-            move |k: usize| -> Vec3 {
-                // Multiples of the powers of the root of x⁴ = x + 1: the most even such sequence.
-                [
-                    0.819_172_513_396_164_4,
-                    0.671_043_606_703_789_2,
-                    0.549_700_477_901_970_3,
-                ]
-                .map(|a| (0.5 + a * (k % n) as f64).fract())
-            }
+        // Multiples of the powers of the root of x⁴ = x + 1, the most even such sequence; each neighbourhood goes on in it.
+        let even = |k: usize| -> Vec3 {
+            [
+                0.819_172_513_396_164_4,
+                0.671_043_606_703_789_2,
+                0.549_700_477_901_970_3,
+            ]
+            .map(|a| (0.5 + a * (k + i * NEARBY) as f64).fract())
         };
         if let Some(back) = &self.common {
-            return (0..EVERYWHERE)
-                .map(even(EVERYWHERE))
-                .map(|u| apply(back, u))
-                .collect();
+            return (0..EVERYWHERE).map(even).map(|u| apply(back, u)).collect();
         }
         let [nx, ny, _] = self.shape;
         let at = [i % nx, i / nx % ny, i / nx / ny];
         let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
         let table = raised_cosine();
         (0..NEARBY)
-            .map(even(NEARBY))
+            .map(even)
             .map(|u| {
                 core::array::from_fn(|a| {
                     let x = u[a] * (table.len() - 1) as f64;
@@ -124,7 +120,7 @@ impl Joint {
                     let s = table[j] + (table[j + 1] - table[j]) * (x - j as f64);
                     // Solved maps end where the region does: what would lie beyond is mirrored.
                     let (lo, hi) = (self.bounds.min[a], self.bounds.max[a]);
-                    let p = middle[a] + self.step * s;
+                    let p = middle[a] + 2.0 * self.step * s;
                     let p = if p > hi { 2.0 * hi - p } else { p };
                     let p = if p < lo { 2.0 * lo - p } else { p };
                     p.clamp(lo, hi)

@@ -21,6 +21,16 @@ pub enum Constituent {
     },
 }
 
+impl Constituent {
+    /// The greatest length of its cells, mm.
+    pub fn longest(&self) -> f64 {
+        match self {
+            Constituent::Lattice(l) => l.map.longest(),
+            Constituent::Field { wavelength, .. } => *wavelength,
+        }
+    }
+}
+
 /// How far below all its values the lower end of a network's interval lies, in shares of its range; also how far below
 /// zero its quantile is counted.
 pub(super) const BELOW: f64 = 0.1;
@@ -72,10 +82,7 @@ impl Strand {
 
     /// The greatest length of a cell, mm.
     pub fn longest(&self) -> f64 {
-        match &self.of {
-            Constituent::Lattice(l) => l.map.longest(),
-            Constituent::Field { wavelength, .. } => *wavelength,
-        }
+        self.of.longest()
     }
 
     /// A bound of the steepness of g, per mm.

@@ -11,7 +11,6 @@ use super::grade::{Allowed, grade};
 use super::sample;
 use crate::blend::{Blend, By, Constituent, Weights};
 use crate::fault::number;
-use crate::lattice::Lattice;
 use crate::math::{Vec3, add, norm, scale, sub};
 
 impl BlendSpec {
@@ -34,6 +33,16 @@ impl BlendSpec {
                 .collect(),
         }
     }
+}
+
+/// What may be named in a blend.
+pub(super) struct Member {
+    /// Where it stands in the design: `lattice` or `beams`.
+    pub table: &'static str,
+    /// Its name there.
+    pub name: String,
+    /// What it is.
+    pub of: Constituent,
 }
 
 /// A blend and the lattices in it, in the order of their weights.
@@ -90,25 +99,26 @@ fn functions(
 /// Builds the blend.
 pub(super) fn blend(
     spec: &BlendSpec,
-    lattices: &[(String, Arc<Lattice>)],
+    members: &[Member],
     place: &Place,
     warnings: &mut Vec<Warning>,
 ) -> Result<Blended, DesignError> {
     let names = spec.names();
-    if let Some((name, _)) = lattices.iter().find(|(n, _)| !names.contains(&n.as_str())) {
-        let message = format!(
-            "the blend does not use this lattice; it is of {}",
-            names.join(", ")
-        );
-        return Err(DesignError::new(format!("lattice.{name}"), message));
+    if let Some(idle) = members.iter().find(|m| !names.contains(&m.name.as_str())) {
+        let message = format!("the blend does not use this; it is of {}", names.join(", "));
+        return Err(DesignError::new(
+            format!("{}.{}", idle.table, idle.name),
+            message,
+        ));
     }
     let mut of = Vec::new();
     for name in &names {
-        let (_, lattice) = lattices
+        let message = || DesignError::new("blend", format!("there is no lattice \"{name}\""));
+        let member = members
             .iter()
-            .find(|(n, _)| n == name)
-            .ok_or_else(|| DesignError::new("blend", format!("there is no lattice \"{name}\"")))?;
-        of.push(Constituent::Lattice(lattice.clone()));
+            .find(|m| m.name == *name)
+            .ok_or_else(message)?;
+        of.push(member.of.clone());
     }
     let (mut grades, mut rbf) = (Vec::new(), Vec::new());
     for (path, spec) in spec.weights() {
@@ -130,12 +140,9 @@ pub(super) fn blend(
     };
     let bounds = place.region.bounds();
     let width = narrowest(&weights, place.points);
-    let longest = lattices
-        .iter()
-        .map(|l| l.1.map.longest())
-        .fold(0.0, f64::max);
+    let longest = members.iter().map(|m| m.of.longest()).fold(0.0, f64::max);
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
-    unused(&blend, &names, place, warnings);
+    unused(&blend, &names, members, place, warnings);
     if let Some(width) = width.filter(|w| *w < 2.0 * longest) {
         let message = format!(
             "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
@@ -192,7 +199,13 @@ fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(
 }
 
 /// Warns of lattices that count nowhere.
-fn unused(blend: &Blend, names: &[&str], place: &Place, warnings: &mut Vec<Warning>) {
+fn unused(
+    blend: &Blend,
+    names: &[&str],
+    members: &[Member],
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) {
     let n = names.len();
     let mut w = vec![0.0; n * place.points.len()];
     blend.weights().values(place.points, &mut w);
@@ -201,8 +214,12 @@ fn unused(blend: &Blend, names: &[&str], place: &Place, warnings: &mut Vec<Warni
             let message =
                 "this lattice has no weight at any place that was looked at in the region"
                     .to_string();
+            let table = members
+                .iter()
+                .find(|m| m.name == *name)
+                .map_or("lattice", |m| m.table);
             warnings.push(Warning {
-                path: format!("lattice.{name}"),
+                path: format!("{table}.{name}"),
                 message,
             });
         }

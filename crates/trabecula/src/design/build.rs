@@ -10,6 +10,7 @@ use super::{
     Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, samples, skin,
     tiling,
 };
+use crate::blend::Constituent;
 use crate::cell::{Cell, Distance, Part, Series, Term, named};
 use crate::face::Body;
 use crate::fault::{Fault, number};
@@ -19,6 +20,7 @@ use crate::math::sin_cos_turns;
 use crate::region::Region;
 use crate::solid::Solid;
 use crate::symmetry::{Group, Side};
+use crate::truss::Beams;
 
 /// Points at which a design is looked at.
 pub(super) const LOOKS: usize = 8_000;
@@ -182,7 +184,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
     let mut blended = None;
     let field: Arc<dyn Field> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
-        (Some(spec), _, []) => {
+        (Some(spec), ..) => {
             let place = Place {
                 path: "blend".into(),
                 region: &space,
@@ -190,7 +192,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
                 filled: &filled,
                 loader,
             };
-            let made = blend::blend(spec, &lattices, &place, &mut warnings)?;
+            let made = blend::blend(spec, &members(&lattices, &graphs), &place, &mut warnings)?;
             let field = made.blend.clone();
             blended = Some(made);
             field
@@ -201,8 +203,8 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             let message = "several lattices need a blend to say where each is";
             return Err(DesignError::new(format!("lattice.{name}"), message));
         }
-        (_, _, [.., (name, _)]) => {
-            let message = "beams fill a region alone; keep either one block of beams or lattices";
+        (None, _, [.., (name, _)]) => {
+            let message = "several blocks of beams, or beams and a lattice, need a blend to say where each is";
             return Err(DesignError::new(format!("beams.{name}"), message));
         }
         (None, [], []) => return Err(DesignError::new("lattice", "no lattice given; give one")),
@@ -220,6 +222,24 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         warnings,
         repairs,
     })
+}
+
+/// What may be named in a blend.
+fn members(lattices: &[(String, Arc<Lattice>)], graphs: &[(String, Beams)]) -> Vec<blend::Member> {
+    let lattices = lattices.iter().map(|(name, l)| blend::Member {
+        table: "lattice",
+        name: name.clone(),
+        of: Constituent::Lattice(l.clone()),
+    });
+    let graphs = graphs.iter().map(|(name, b)| blend::Member {
+        table: "beams",
+        name: name.clone(),
+        of: Constituent::Field {
+            field: b.field(),
+            wavelength: b.wavelength(),
+        },
+    });
+    lattices.chain(graphs).collect()
 }
 
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {

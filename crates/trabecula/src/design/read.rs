@@ -76,20 +76,24 @@ pub(super) fn design(node: &Node) -> Read<Design> {
     if entries.is_empty() && beams.is_empty() {
         return Err(DesignError::new("lattice", missing));
     }
-    if let (Some((name, _)), Some(other)) = (entries.first(), beams.keys().next()) {
-        let message = format!(
-            "a lattice and beams ({name}, {other}) in one part need a blend, and blends of lattices with beams come in a later version; keep one"
-        );
-        return Err(f.need("beams", "")?.error(message));
+    let mut names: Vec<&str> = entries.iter().map(|e| e.0).collect();
+    for name in beams.keys() {
+        if names.contains(&name.as_str()) {
+            let message =
+                format!("\"{name}\" names a lattice already; give the beams another name");
+            return Err(f.need("beams", "")?.error(message));
+        }
+        names.push(name);
     }
-    if let ([(a, _), (b, at), ..], None) = (entries.as_slice(), f.get("blend")) {
+    if let ([a, b, ..], None) = (names.as_slice(), f.get("blend")) {
         let message = format!(
             "several lattices ({a}, {b}) need a blend to say where each is, such as [blend] with between = [\"{a}\", \"{b}\"] \
              and a weight"
         );
-        return Err(at.error(message));
+        let second = entries.get(1).map(|e| &e.1).or(f.get("beams"));
+        return Err(second.unwrap_or(&f.at).error(message));
     }
-    let names: Vec<&str> = entries.iter().map(|e| e.0).collect();
+    let blend = f.read("blend", None, |at| blend::blend(at, &names).map(Some))?;
     let mut lattices = Lattices::new();
     for (name, at) in &entries {
         lattices.insert(name.to_string(), lattice(at)?);
@@ -100,7 +104,7 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         region: spec,
         lattice: lattices,
         beams,
-        blend: f.read("blend", None, |at| blend::blend(at, &names).map(Some))?,
+        blend,
         skin: f.read("skin", None, |at| skin(at).map(Some))?,
         keep: f.read("keep", Keeps::new(), keeps)?,
         lines: node.lines(),

@@ -229,11 +229,6 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 fn words_of_later_versions_are_not_slips() {
     for (line, instead, path) in [
         ("units = \"mm\"", "beams = { a = { radius = 1 } }", "beams"),
-        (
-            "units = \"mm\"",
-            "blend = { between = [\"a\", \"b\"] }",
-            "blend",
-        ),
         ("map.affine", "map.tets", "lattice.core.map.tets"),
         (
             "cell = \"gyroid\"",

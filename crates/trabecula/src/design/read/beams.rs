@@ -273,13 +273,6 @@ pub(super) fn all(at: &At) -> Read<BeamsSpecs> {
         let message = format!("a name comes first, such as [beams.core] with {key}");
         return Err(at.error(message));
     }
-    if let [_, (_, second), ..] = entries.as_slice() {
-        let message = format!(
-            "{} of beams at once; one fills the region, so join them in one, or keep one",
-            counted(entries.len(), "graph")
-        );
-        return Err(second.error(message));
-    }
     let mut found = BeamsSpecs::new();
     for (name, at) in &entries {
         found.insert(name.to_string(), beams(at)?);
