@@ -64,12 +64,15 @@ impl Tets {
             let region_spec = read::region_of(node)?;
             let mut notes = region::Notes::default();
             let space = region::region(&region_spec, "region", loader, &mut notes)?;
+            let bounds = space.bounds();
+            if !bounds.is_empty() && !bounds.is_finite() {
+                let message =
+                    "the region has no end; intersect it with a box or another bounded region";
+                return Err(DesignError::new("region", message));
+            }
             let (mut points, _) = sample::inside(&space, LOOKS);
-            if points.is_empty() {
-                return Err(DesignError::new(
-                    "region",
-                    "the region is empty, or has no end",
-                ));
+            if bounds.is_empty() || points.is_empty() {
+                return Err(DesignError::new("region", "the region is empty"));
             }
             points.extend(sample::nodes(&space));
             let place = Place {
@@ -322,9 +325,9 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
     let Some(fit) = &report.fit else { return out };
     if fit.mended > 0.0 {
         say(format!(
-            "{:.3} mm³ were left out where the boundary would have met itself: the region is thin there for tetrahedra of this \
-             size",
-            fit.mended
+            "{} mm³ were left out where the region is too thin for tetrahedra of this size: the boundary would meet itself, or \
+             crumbs come loose; use a smaller one",
+            number(fit.mended)
         ));
     }
     if fit.lost > LOST {
