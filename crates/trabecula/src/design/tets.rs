@@ -16,8 +16,13 @@ use crate::mesh::Mesh;
 use crate::solid::Solid;
 use crate::tets::{Checked, Fit, Quality, SLIVER, TetMesh, background};
 
-/// The share of the region that a mesh may leave out before it is warned of: curved faces are cut short by flat ones.
+/// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
+/// short by flat ones, which takes much of a coarse mesh but nothing deep.
 const LOST: f64 = 0.02;
+/// What is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
+const DEEP: f64 = 0.17;
+/// The share that is warned of however shallow.
+const MUCH: f64 = 0.1;
 /// Names under which programs write the zones of cells.
 const ZONES: [&str; 7] = [
     "zone",
@@ -330,7 +335,7 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
             number(fit.mended)
         ));
     }
-    if fit.lost > LOST {
+    if fit.lost > MUCH || (fit.lost > LOST && fit.lost_depth > DEEP * q.size.mean) {
         say(format!(
             "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
             100.0 * fit.lost,
