@@ -22,15 +22,13 @@ pub(super) fn mend(mesh: &mut TetMesh) -> f64 {
         if away.is_empty() {
             return lost;
         }
-        let mut i = 0;
         let mut kept = Vec::with_capacity(mesh.tets.len());
-        for t in &mesh.tets {
+        for (i, t) in (0..).zip(&mesh.tets) {
             if away.contains(&i) {
                 lost += volume(t.map(|n| mesh.nodes[n as usize]));
             } else {
                 kept.push(*t);
             }
-            i += 1;
         }
         mesh.tets = kept;
     }
