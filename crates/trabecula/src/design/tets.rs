@@ -395,7 +395,7 @@ mod tests {
         wrong(
             "path = \"hex.vtk\"",
             ".split",
-            None,
+            Some(6),
             "1 hexahedron beside 0 tetrahedra; give split = true",
         );
         wrong(
