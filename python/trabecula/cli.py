@@ -30,6 +30,7 @@ VOXELS_OUT = ("npy", "vti")
 TETS_OUT = ("vtu", "msh", "inp", "med", "mesh")
 TETS_IN = (*TETS_OUT, "vtk", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
 UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
+SHOWN = ("angle", "spacing", "density")
 
 
 class Parser(argparse.ArgumentParser):
@@ -281,6 +282,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--size", type=size, default=(1600, 1200), metavar="WxH", help="pixels (default: 1600x1200)")
     p.add_argument("--azimuth", type=angle, default=30.0, metavar="DEG", help="camera about +z (default: 30)")
     p.add_argument("--elevation", type=angle, default=25.0, metavar="DEG", help="camera above xy (default: 25)")
+    p.add_argument("--show", choices=SHOWN, help="colour by how far a solved map is from what was asked for")
     resolution(p)
     return top
 
