@@ -114,7 +114,7 @@ pub(super) fn from_file(
         };
         let zones = ZONES
             .iter()
-            .find_map(|n| named(n))
+            .find_map(named)
             .map(|a| a.values.iter().map(|v| *v as u32).collect());
         (elements, zones.unwrap_or_default())
     } else {
