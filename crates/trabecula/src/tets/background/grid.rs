@@ -4,8 +4,8 @@
 //! opposite edges (long, the cube's edge) and four between them (short, √3/2 of it); its dihedral angles are 60° and 90°.
 //! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007.
 //!
-//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first half of one at half the size
-//! (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
+//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first of them at half
+//! the size (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
 
 use std::collections::HashMap;
 
