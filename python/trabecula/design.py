@@ -18,6 +18,9 @@ from .output import extension, whole_file
 if TYPE_CHECKING:
     from .solid import Solid
 
+#: Keys whose text names a file.
+PATHS = ("path", "nodes", "struts")
+
 __all__ = ["Beams", "Design", "Lattice", "load", "skin"]
 
 
@@ -121,7 +124,7 @@ class Design:
 
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
-        data = _moved_all(data, lambda path: os.path.abspath(os.path.join(folder, path)))
+        data = _moved(data, lambda path: os.path.abspath(os.path.join(folder, path)))
         try:
             return _core.Design.from_data(data).to_json()
         except DesignError:
@@ -148,14 +151,14 @@ class Design:
         return made
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the design as TOML, or as JSON if the name ends so. Relative mesh paths are kept right.
+        """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right.
 
         Raises DesignError for a design that cannot be built: nothing else is written.
         """
         kind = extension(path, ("toml", "json"))
         old, new = self.folder or os.getcwd(), os.path.dirname(os.path.realpath(os.fsdecode(path)))
         data = self.to_dict()
-        data = _moved_all(data, lambda path: _relative(os.path.join(old, path), new))
+        data = _moved(data, lambda path: _relative(os.path.join(old, path), new))
         checked = _core.Design.from_data(data)
         checked.build(new)
         text = checked.to_toml() if kind == "toml" else json.dumps(json.loads(checked.to_json()), indent=2) + "\n"
@@ -189,30 +192,16 @@ def load(path: str | os.PathLike[str]) -> Design:
     return design
 
 
-def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
-    """The design with every relative mesh path turned."""
-    data["region"] = _moved(data["region"], turn)
-    for graph in (data.get("beams") or {}).values():
-        for key in ("nodes", "struts"):
-            if isinstance(graph, dict) and isinstance(graph.get(key), str) and not os.path.isabs(graph[key]):
-                graph[key] = turn(graph[key])
-    if isinstance(data.get("keep"), dict):
-        data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
-    if isinstance(data.get("blend"), dict):
-        data["blend"] = _moved(data["blend"], turn)
-    return data
-
-
-def _moved(region: Any, turn: Callable[[str], str]) -> Any:
-    """The region with every relative mesh path turned."""
-    if isinstance(region, list):
-        return [_moved(r, turn) for r in region]
-    if not isinstance(region, dict):
-        return region
-    mesh = region.get("mesh")
-    if isinstance(mesh, dict) and isinstance(mesh.get("path"), str) and not os.path.isabs(mesh["path"]):
-        return {**region, "mesh": {**mesh, "path": turn(mesh["path"])}}
-    return {k: _moved(v, turn) for k, v in region.items()}
+def _moved(data: Any, turn: Callable[[str], str]) -> Any:
+    """The data with every relative path of a file turned: what stands under ``path``, or as a table of beams."""
+    if isinstance(data, list):
+        return [_moved(item, turn) for item in data]
+    if not isinstance(data, dict):
+        return data
+    return {
+        key: turn(item) if key in PATHS and isinstance(item, str) and not os.path.isabs(item) else _moved(item, turn)
+        for key, item in data.items()
+    }
 
 
 def _relative(path: str, folder: str) -> str:
