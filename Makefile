@@ -111,6 +111,7 @@ bench: $(VENV)/.installed
 docs: $(VENV)/.installed
 	$(BIN)/python scripts/figure_porosity.py
 	$(BIN)/python scripts/cell_tables.py
+	$(BIN)/python scripts/tetcell_tables.py
 	$(BIN)/python scripts/thickness_accuracy.py
 	$(BIN)/python scripts/turning_tables.py
 	$(BIN)/python scripts/blend_tables.py

@@ -14,7 +14,7 @@ from difflib import get_close_matches
 
 from .given import plain, settings
 
-__all__ = ["file", "group", "names", "series", "term", "tet", "tet_names"]
+__all__ = ["file", "group", "names", "series", "term", "tet", "tet_facts", "tet_names"]
 
 
 def names() -> list[str]:
@@ -67,6 +67,16 @@ def tet_names() -> list[str]:
     from . import _core
 
     return _core.tet_cells()
+
+
+def tet_facts(name: str) -> dict:
+    """What is known of a ready tetrahedral cell: ``terms``, ``site``, ``edge``, ``dual``; the ``part`` and ``fraction`` it is made
+    for, its ``ports`` on each face there; and the fractions at which each part is one piece that reaches all faces."""
+    import json
+
+    from . import _core
+
+    return json.loads(_core.tet_cell_facts(name))
 
 
 def tet(

@@ -416,7 +416,7 @@ def tet_cells(args) -> None:
     if args.name:
         known_cell(args.name, names)
         names = [args.name]
-    facts = [json.loads(_core.tet_cell_facts(name)) for name in names]
+    facts = [cell.tet_facts(name) for name in names]
     if args.json:
         return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
     for it in facts:

@@ -13,9 +13,10 @@
 
 mod census;
 mod piece;
+mod root;
+mod shared;
 mod template;
 
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -36,6 +37,7 @@ use crate::tets::TetMesh;
 use crate::tiling::{Level, Tiling};
 use census::Links;
 use piece::{Core, Levels, MARGIN, Piece, Scratch};
+use shared::Shared;
 use template::Template;
 
 /// Tetrahedra done at once by a thread.
@@ -309,71 +311,6 @@ impl<'a> Work<'a> {
 #[inline]
 fn turned([a, b, c]: [u32; 3], flipped: bool) -> [u32; 3] {
     if flipped { [a, c, b] } else { [a, b, c] }
-}
-
-/// Where the vertices that tetrahedra share stand in the whole mesh: the first of those on each simplex of the tetrahedral
-/// mesh. They come in the same order in every tetrahedron.
-#[derive(Default)]
-struct Shared {
-    faces: HashMap<[u32; 3], u32>,
-    /// Corners on edges, and nodes of caps, which only tetrahedra with a boundary face have.
-    edges: [HashMap<[u32; 2], u32>; 2],
-    nodes: HashMap<u32, u32>,
-}
-
-impl Shared {
-    /// The number of each vertex of a piece; new ones are put to the mesh.
-    fn names(
-        &mut self,
-        ids: [u32; 4],
-        piece: &Piece,
-        places: &[Vec3],
-        vertices: &mut Vec<Vec3>,
-    ) -> Result<Vec<u32>, Stopped> {
-        if vertices.len() + places.len() > u32::MAX as usize {
-            let message = "more than 2^32 vertices; use a larger edge, or STL";
-            return Err(Stopped::Refused(Fault::new("edge", message)));
-        }
-        let mut counts = [[0u32; 16]; 2];
-        for (v, zero) in piece.zero.iter().enumerate() {
-            counts[usize::from(v >= piece.crossings)][usize::from(*zero)] += 1;
-        }
-        // For every simplex, where its vertices begin and whether they are new.
-        let mut next = [[(0, false); 16]; 2];
-        for (node, (counts, next)) in counts.iter().zip(&mut next).enumerate() {
-            for zero in (0..16).filter(|z| counts[*z] > 0) {
-                let new = vertices.len() as u32;
-                let mut on = (0..4).filter(|i| zero >> i & 1 == 0).map(|i| ids[i]);
-                let mut corner = || on.next().unwrap_or(NONE);
-                let first = match (zero as u32).count_ones() {
-                    3 => *self.nodes.entry(corner()).or_insert(new),
-                    2 => *self.edges[node].entry([corner(), corner()]).or_insert(new),
-                    // A node of a cap inside a face is nobody else's; a face is looked up once more at most.
-                    1 if node == 0 => {
-                        let face = [corner(), corner(), corner()];
-                        let known = self.faces.remove(&face);
-                        known.unwrap_or_else(|| *self.faces.entry(face).or_insert(new))
-                    }
-                    _ => new,
-                };
-                if first == new {
-                    vertices.resize(vertices.len() + counts[zero] as usize, [0.0; 3]);
-                }
-                next[zero] = (first, first == new);
-            }
-        }
-        let name = |(v, (place, zero)): (usize, (&Vec3, &u8))| {
-            let next = &mut next[usize::from(v >= piece.crossings)][usize::from(*zero)];
-            let name = next.0;
-            if next.1 {
-                vertices[name as usize] = *place;
-            }
-            next.0 += 1;
-            name
-        };
-        let all = places.iter().zip(&piece.zero).enumerate();
-        Ok(all.map(name).collect())
-    }
 }
 
 /// The surface of a tiling, held in memory, with steps of about `edge` (mm): as [`super::surface_of`].

@@ -41,7 +41,7 @@ pub struct Ready {
 static READY: [Ready; 20] = [
     Ready {
         name: "primitive",
-        title: "node with four arms, of the P surface",
+        title: "ball with a port on each face, of the P surface",
         group: "221",
         terms: &[([1, 0, 0], Re, 1.0)],
         site: 0.5,
@@ -85,7 +85,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "diamond_sheet",
-        title: "the D surface's walls",
+        title: "the D surface's walls: a tube to each face",
         group: "227:2",
         terms: &[([1, 1, 1], Re, 1.0)],
         site: 0.125,
@@ -96,7 +96,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "diamond_triple",
-        title: "node with three arms to each face",
+        title: "four arms to the corners, each cut by three faces, of the D surface",
         group: "227:2",
         terms: &[([1, 1, 1], Re, 1.0)],
         site: 0.125,
@@ -107,7 +107,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "diamond_cage",
-        title: "cage with three ports on each face",
+        title: "four thick arms into the corners, of the D surface",
         group: "227:2",
         terms: &[([1, 1, 1], Re, 1.0)],
         site: 0.125,
@@ -118,7 +118,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "iwp",
-        title: "struts to the middles and corners of the faces",
+        title: "arms into the corners and thinner ones to the faces, of the I-WP surface",
         group: "229",
         terms: &[([1, 1, 0], Re, -1.0), ([2, 0, 0], Re, 1.0)],
         site: 0.0,
@@ -140,7 +140,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "i43m_sheet",
-        title: "walls",
+        title: "walls with many windows",
         group: "217",
         terms: &[([2, 1, 1], Im, 1.0)],
         site: 0.0,
@@ -162,7 +162,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "p43m_sheet",
-        title: "walls",
+        title: "walls that leave the corners",
         group: "215",
         terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Im, 1.0)],
         site: 0.0,
@@ -184,7 +184,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "f43m_sheet",
-        title: "walls",
+        title: "walls: a tube to each face",
         group: "216",
         terms: &[([1, 1, 1], Re, 1.0), ([1, 1, 1], Im, -0.5)],
         site: 0.25,
@@ -195,7 +195,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "pn3m",
-        title: "struts to three points of each face",
+        title: "four thin arms into the corners",
         group: "224:2",
         terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Re, 1.0)],
         site: 0.25,
@@ -206,7 +206,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "pn3m_dual",
-        title: "node with four arms",
+        title: "ball with a port on each face",
         group: "224:2",
         terms: &[([1, 1, 0], Re, 1.0), ([1, 1, 1], Re, 1.0)],
         site: 0.25,
@@ -217,7 +217,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "pn3m_sheet",
-        title: "walls",
+        title: "walls with a window to each face",
         group: "224:2",
         terms: &[([1, 1, 0], Re, 1.0)],
         site: 0.25,
@@ -239,7 +239,7 @@ static READY: [Ready; 20] = [
     },
     Ready {
         name: "fm3m",
-        title: "frame along the edges",
+        title: "frame along the edges, open in the middle of the cell",
         group: "225",
         terms: &[([1, 1, 1], Re, -4.0), ([2, 2, 0], Re, 1.0)],
         site: 0.25,

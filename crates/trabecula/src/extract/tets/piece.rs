@@ -11,6 +11,7 @@
 //! whichever tetrahedron looks at them.
 
 use super::super::bodies::{find, unite};
+use super::root::first_root;
 use super::template::{FACES, PAIRS, Template, Tile, pair};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
@@ -114,61 +115,6 @@ fn sides(part: Part) -> &'static [Side] {
         Part::Upper => &[ABOVE],
         Part::Sheet => &[BELOW, BACK],
     }
-}
-
-/// The first place in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
-fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
-    // a + s (c1 + s (c2 + s c3)).
-    let c1 = slope_a;
-    let c2 = 3.0 * (b - a) - 2.0 * slope_a - slope_b;
-    let c3 = slope_a + slope_b - 2.0 * (b - a);
-    let value = |s: f64| a + s * (c1 + s * (c2 + s * c3));
-    let slope = |s: f64| c1 + s * (2.0 * c2 + 3.0 * s * c3);
-    // Between its turning points the cubic is monotone.
-    let mut stops = [1.0; 3];
-    let root = c2 * c2 - 3.0 * c1 * c3;
-    if root > 0.0 {
-        let q = -(c2 + root.sqrt().copysign(c2));
-        let (x, y) = (q / (3.0 * c3), c1 / q);
-        let inside = |s: f64| if s > 0.0 && s < 1.0 { s } else { 1.0 };
-        let (x, y) = (inside(x), inside(y));
-        stops = [x.min(y), x.max(y), 1.0];
-    }
-    let mut lo = 0.0;
-    for hi in stops {
-        if value(hi) < 0.0 && hi < 1.0 {
-            lo = hi;
-            continue;
-        }
-        // Newton's method, kept between the ends.
-        let (mut l, mut h) = (lo, hi);
-        let (fl, fh) = (value(l), value(h));
-        let mut s = if fh > fl {
-            l - fl * (h - l) / (fh - fl)
-        } else {
-            l
-        };
-        for _ in 0..40 {
-            let v = value(s);
-            if v < 0.0 {
-                l = s;
-            } else {
-                h = s;
-            }
-            let next = s - v / slope(s);
-            let next = if next > l && next < h {
-                next
-            } else {
-                0.5 * (l + h)
-            };
-            if (next - s).abs() < 1e-13 {
-                return next;
-            }
-            s = next;
-        }
-        return s;
-    }
-    1.0
 }
 
 /// What is used for one tetrahedron after another.

@@ -1,0 +1,104 @@
+"""Tetrahedral cells through the Python door and the command."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trabecula as lt
+
+
+def design(cell=None, part="lower", level=None, region=None, **keys):
+    lattice = lt.Lattice(
+        cell=cell or lt.cell.tet("diamond"),
+        part=part,
+        map=lt.map.tets(**({"size": 4} | keys)),
+        level=level or lt.level.fraction(0.25),
+    )
+    return lt.Design(region=region or lt.region.sphere(radius=8), lattice={"a": lattice})
+
+
+def test_a_part_is_closed_whole_and_as_full_as_asked():
+    solid = design().build()
+    report = solid.report()["lattices"]["a"]
+    assert report["tets"]["solid_fraction"] == pytest.approx(0.25, abs=1e-9)
+    mesh = solid.mesh(edge=0.25)
+    assert mesh.closed and mesh.pieces == 1
+    # Second order in the steps, of which there are sixteen to an edge.
+    assert mesh.volume == pytest.approx(0.25 * report["tets"]["volume"], rel=0.02)
+    assert solid.field(np.array([[20.0, 0, 0]]))[0] > 0
+
+
+def test_the_stream_is_the_same_surface(tmp_path):
+    solid = design(level=lt.level.fraction(lt.grade.linear([0, 0, 1], {-8: 0.15, 8: 0.4}))).build()
+    told = solid.save_stl(tmp_path / "a.stl", edge=0.4)
+    mesh = solid.mesh(edge=0.4)
+    back = lt.Mesh.read(tmp_path / "a.stl")
+    assert told["triangles"] == len(mesh.triangles) == len(back.triangles)
+    assert back.closed and back.pieces == mesh.pieces == told["pieces"]
+    assert told["volume"] == pytest.approx(mesh.volume, rel=1e-12)
+
+
+def test_skins_join_by_the_implicit_road():
+    lattice = lt.Lattice(
+        cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=6), level=lt.level.fraction(0.25)
+    )
+    plain = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}).build()
+    skinned = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}, skin=lt.skin(0.8)).build()
+    edge = 0.3
+    thin, thick = plain.mesh(edge=edge), skinned.mesh(edge=edge)
+    assert thick.closed and thick.pieces == 1
+    # The skin alone has the share 1 - (1 - 0.8 / 6)^3 of a ball, 0.35.
+    assert thick.volume > thin.volume + 0.2 * plain.report()["lattices"]["a"]["tets"]["volume"]
+
+
+def test_own_cells_equal_the_ready_ones():
+    facts = lt.cell.tet_facts("f43m")
+    terms = [lt.cell.term(t["hkl"], t["amplitude"], component=t["component"]) for t in facts["terms"]]
+    mine = lt.cell.tet(group=216, terms=terms, site=facts["site"], dual=True, edge=facts["edge"])
+    ready = design(lt.cell.tet("f43m")).build().report()["lattices"]["a"]
+    own = design(mine).build().report()["lattices"]["a"]
+    assert own["iso"] == pytest.approx(ready["iso"], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("cell", "word"),
+    [
+        (lt.cell.tet(group=214, terms=[lt.cell.term([1, 1, 0])], edge=1), "chiral"),
+        (lt.cell.tet(group=230, terms=[lt.cell.term([2, 1, 1])], edge=1), "glides"),
+        (lt.cell.tet(group=221, terms=[lt.cell.term([1, 0, 0])], site=[0.25, 0.25, 0.25], edge=1), "no point of full"),
+        (lt.cell.tet(group="227:2", terms=[lt.cell.term([1, 0, 0])], edge=1), "absent"),
+        (lt.cell.tet(group=221, terms=[lt.cell.term([1, 0, 0])], edge=0), "edge of the tetrahedron"),
+        ("gyroid", "tetrahedral"),
+        (lt.cell.tet("diamnd"), "diamond"),
+        (lt.cell.tet(zones={1: "diamond"}), "zone 0"),
+    ],
+)
+def test_cells_that_do_not_fit_are_refused_with_the_reason(cell, word):
+    with pytest.raises(lt.DesignError) as error:
+        design(cell).build()
+    assert word in str(error.value)
+
+
+def test_a_cell_that_falls_apart_is_warned_of():
+    solid = design(lt.cell.tet("primitive"), part="sheet", level=lt.level.iso(0.6)).build()
+    assert any("4 pieces" in w["message"] and "3 ports" in w["message"] for w in solid.report()["warnings"])
+
+
+def test_the_command_lists_them():
+    def run(*args):
+        done = subprocess.run([sys.executable, "-m", "trabecula", "cells", "--tet", *args], capture_output=True, text=True)
+        return done.returncode, done.stdout, done.stderr
+
+    code, out, _ = run("--json")
+    cells = json.loads(out)
+    assert code == 0 and len(cells) >= 14
+    assert {str(c["group"]).split(":")[0] for c in cells} == {"215", "216", "217", "221", "224", "225", "227", "229"}
+    assert {c["part"] for c in cells} == {"sheet", "lower"}
+    for c in cells:
+        assert any(a < c["fraction"] < b for a, b in c["connected_fraction"][c["part"]]), c["name"]
+        assert c["ports"] > 0
+    assert "one piece that reaches all faces" in run("diamond")[1]
+    code, _, words = run("dimond")
+    assert code == 1 and "diamond" in words
