@@ -113,8 +113,11 @@ def main():
         row = [f"`{it['name']}`", it["title"], it["group"], len(it["nodes"]), len(it["struts"]), valence, f"{it['maxwell']:+d}"]
         lines.append("| " + " | ".join(map(str, [*row, f"{it['length']:.6f}"])) + " |")
     lines += ["", "## Solid fraction against radius", ""]
-    lines += [f"Radius over cell edge; beams without fillets. By {SAMPLES}³ samples; below, where it is known, the closed form"]
-    lines += ["π x² ΣL − c x³ for equal cylinders, which holds as long as no two beams overlap at mid length. The thin limit is π ΣL x².", ""]
+    lines += [
+        f"Radius over cell edge; beams without fillets. By {SAMPLES}³ samples; below, where it is known, the closed form",
+        "π x² ΣL − c x³ for equal cylinders, which holds as long as no two beams overlap at mid length. Thin limit: π ΣL x².",
+        "",
+    ]
     lines += ["| cell | thin limit | " + " | ".join(f"{r:.2f}" for r in RADII) + " |", "|---" * (len(RADII) + 2) + "|"]
     for it in cells:
         if it["aspect"] != [1.0, 1.0, 1.0]:

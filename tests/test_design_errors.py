@@ -183,7 +183,7 @@ CASES = [
         "blend",
         ["not in this version yet"],
     ),
-    ('units = "mm"', "beams.a.radius = 1", "beams", ["not in this version yet"]),
+    ('units = "mm"', "beams.a.radius = 1", "beams.a", ["no graph given"]),
     ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "later version"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]

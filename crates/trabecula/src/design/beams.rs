@@ -154,6 +154,15 @@ fn frame(
     };
     let made = map::map(map, &at)?;
     map::warn(&made, map, &place.path, warnings);
+    if thick > made.longest() {
+        let key = if radii.hub.is_some() { "hub" } else { "radius" };
+        let message = format!(
+            "{key} is {} mm; it must be greater than 0 and at most the wavelength, {} mm",
+            number(thick),
+            number(made.longest())
+        );
+        return Err(DesignError::new(below(key), message).found(number(thick)));
+    }
     let longest = net
         .lengths([made.longest(); 3])
         .into_iter()
@@ -380,7 +389,7 @@ pub(super) fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignE
     if mixed(share(place.points)) {
         return Ok(());
     }
-    match share(&sample::inside(place.region, 50 * LOOKS).0) {
+    match share(&sample::inside(place.region, 10 * LOOKS).0) {
         v if v >= 1.0 => Err(DesignError::new(
             format!("{}.radius", place.path),
             "the beams are so thick that the region is solid everywhere: nothing is open",

@@ -228,7 +228,6 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 #[test]
 fn words_of_later_versions_are_not_slips() {
     for (line, instead, path) in [
-        ("units = \"mm\"", "beams = { a = { radius = 1 } }", "beams"),
         (
             "units = \"mm\"",
             "blend = { between = [\"a\", \"b\"] }",
