@@ -154,14 +154,16 @@ fn frame(
     };
     let made = map::map(map, &at)?;
     map::warn(&made, map, &place.path, warnings);
-    if thick > made.longest() {
-        let key = if radii.hub.is_some() { "hub" } else { "radius" };
-        let message = format!(
-            "{key} is {} mm; it must be greater than 0 and at most the wavelength, {} mm",
-            number(thick),
-            number(made.longest())
-        );
-        return Err(DesignError::new(below(key), message).found(number(thick)));
+    for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
+        let most = grade.as_ref().map_or(0.0, |g| greatest(g, place));
+        if most > made.longest() {
+            let message = format!(
+                "{key} is {} mm; it must be greater than 0 and at most the wavelength, {} mm",
+                number(most),
+                number(made.longest())
+            );
+            return Err(DesignError::new(below(key), message).found(number(most)));
+        }
     }
     let longest = net
         .lengths([made.longest(); 3])
@@ -249,15 +251,18 @@ fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
     })
 }
 
+/// The greatest value at points in the region.
+fn greatest(grade: &Grade, place: &Place) -> f64 {
+    let mut values = vec![0.0; place.points.len()];
+    grade.values(place.points, &mut values);
+    values.into_iter().fold(0.0, f64::max)
+}
+
 /// A bound of the radius of balls in the region.
 fn thickest(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
     let most = |g: &Grade| match g.bound(bounds).hi {
         v if v.is_finite() => v,
-        _ => {
-            let mut values = vec![0.0; place.points.len()];
-            g.values(place.points, &mut values);
-            2.0 * values.into_iter().fold(0.0, f64::max)
-        }
+        _ => 2.0 * greatest(g, place),
     };
     let of = [&radii.radius, &radii.hub].into_iter().flatten();
     of.map(most).fold(0.0, f64::max).min(norm(bounds.size()))
