@@ -297,7 +297,11 @@ impl Laid {
     fn at(&self, p: Vec3) -> f64 {
         let mut least = self.cap * self.least;
         self.near(&Aabb { min: p, max: p }, &mut |kind, q, s| {
-            least = least.min(self.quadors.share(kind.hub, q.min) * s);
+            // No hub gives less than the distance from what holds it.
+            let away = self.quadors.hold(kind.hub).distance(q.min) * s;
+            if away == 0.0 || away < least {
+                least = least.min(self.quadors.share(kind.hub, q.min) * s);
+            }
             true
         });
         least
