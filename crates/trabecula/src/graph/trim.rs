@@ -128,19 +128,19 @@ fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
     least
 }
 
-/// How far along a segment (0 to 1) that begins inside it first leaves the region.
+/// How far along a segment (0 to 1) that begins inside it first leaves the region, by more than `slack`.
 fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
     let along = sub(b, a);
     let length = norm(along);
-    let value = |t: f64| region.value(add(a, scale(along, t))) - slack;
+    let value = |t: f64| region.value(add(a, scale(along, t)));
     let mut t = 0.0;
-    loop {
+    while t < 1.0 {
         let next = (t + (-value(t) / length).max(1.0 / STEPS)).min(1.0);
-        if value(next) > 0.0 {
+        if value(next) > slack {
             let (mut low, mut high) = (t, next);
             while high - low > NEAR {
                 let middle = 0.5 * (low + high);
-                if value(middle) > -slack {
+                if value(middle) > 0.0 {
                     high = middle;
                 } else {
                     low = middle;
@@ -148,11 +148,9 @@ fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
             }
             return Some(low);
         }
-        if next >= 1.0 {
-            return None;
-        }
         t = next;
     }
+    None
 }
 
 #[cfg(test)]

@@ -326,18 +326,19 @@ impl Laid {
     }
 
     /// The different hubs, each with its neighbours, and which hubs count, each with the sum of s³ over its class, s being
-    /// how much larger a member is than the one that is there.
+    /// how much larger a member is than at [0, 0, 0].
     pub fn kinds(&self) -> (&Quadors, Vec<(usize, f64)>) {
         let nodes = self.pattern.nodes.len();
         let [lu, lv, _] = self.classes.map(|c| c.len());
         let sum = |step: usize, class: usize| {
             let s = self.pattern.steps[step].0.scale.powi(3);
-            let n = self.classes[step].members(class).1;
-            if s == 1.0 {
+            let (first, n) = self.classes[step].members(class);
+            let all = if s == 1.0 {
                 n as f64
             } else {
                 (s.powi(n as i32) - 1.0) / (s - 1.0)
-            }
+            };
+            s.powi(first as i32) * all
         };
         let each = self.kinds.iter().enumerate().map(|(m, kind)| {
             let class = m / nodes;
