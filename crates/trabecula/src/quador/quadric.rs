@@ -52,6 +52,13 @@ impl Quadric {
         // c < 0 at the centre: of the two roots 1/t the greater is the first exit.
         -self.c / (one + (one * one - self.c * two).max(0.0).sqrt())
     }
+
+    /// How far along n from p the nearer of the two places on the quadric lies; NaN if there is none.
+    #[inline]
+    pub fn along(&self, p: Vec3, n: Vec3) -> f64 {
+        let (none, one, two) = (self.at(p), dot(self.half_slope(p), n), self.form(n, n));
+        -none / (one + (one * one - two * none).sqrt().copysign(one))
+    }
 }
 
 /// What a hub is made of where the stubs of `label` are active: its quadric, and σ.
