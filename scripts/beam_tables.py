@@ -9,9 +9,11 @@ import trabecula as lt
 
 ROOT = Path(__file__).resolve().parent.parent
 RADII = (0.02, 0.05, 0.08, 0.10, 0.12)
-#: Samples along an edge of a cell: the fraction is good to about one in a thousand of itself.
-SAMPLES = 120
+#: Samples along an edge of a cell, one anywhere in each small cube: good to a hundredth of the fraction at 0.02, and to less
+#: than a half of that from 0.05 on.
+SAMPLES = 64
 
+TABLED = ("sc", "bcc", "fcc", "octet", "diamond", "kelvin", "rhombic_dodecahedron")
 # For equal cylinders of radius x (cell edge 1) V = π x² ΣL − c x³ holds as long as no two beams overlap at mid length.
 CUBIC = {
     "sc": 8 * math.sqrt(2),
@@ -24,15 +26,13 @@ CUBIC = {
 
 
 def fraction(cell, radius):
-    """The solid share of one cell, by samples at the middles of small cubes."""
+    """The solid share of one cell, by a sample anywhere in each of many small cubes."""
     beams = lt.Beams(cell=cell, map=lt.map.affine(wavelength=1), radius=radius)
     solid = lt.Design(region=lt.region.box(min=[0, 0, 0], max=[1, 1, 1]), beams=beams).build()
-    at = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    plane = np.stack(np.meshgrid(at, at, indexing="ij"), axis=-1).reshape(-1, 2)
-    inside = 0
-    for z in at:
-        inside += np.count_nonzero(solid.field(np.column_stack([plane, np.full(len(plane), z)])) <= 0)
-    return inside / SAMPLES**3
+    at = np.arange(SAMPLES) / SAMPLES
+    points = np.stack(np.meshgrid(at, at, at, indexing="ij"), axis=-1).reshape(-1, 3)
+    points += np.random.default_rng(1).uniform(0, 1 / SAMPLES, points.shape)
+    return np.count_nonzero(solid.field(points) <= 0) / len(points)
 
 
 def drawing(cells, across=6, size=150):
@@ -113,11 +113,14 @@ def main():
         row = [f"`{it['name']}`", it["title"], it["group"], len(it["nodes"]), len(it["struts"]), valence, f"{it['maxwell']:+d}"]
         lines.append("| " + " | ".join(map(str, [*row, f"{it['length']:.6f}"])) + " |")
     lines += ["", "## Solid fraction against radius", ""]
-    lines += [f"Radius over cell edge; beams without fillets. By {SAMPLES}³ samples; below, where it is known, the closed form"]
-    lines += ["π x² ΣL − c x³ for equal cylinders, which holds as long as no two beams overlap at mid length. The thin limit is π ΣL x².", ""]
+    lines += [
+        f"Radius over cell edge; beams without fillets. By {SAMPLES}³ samples; below, where it is known, the closed form",
+        "π x² ΣL − c x³ for equal cylinders, which holds as long as no two beams overlap at mid length. Thin limit: π ΣL x².",
+        "",
+    ]
     lines += ["| cell | thin limit | " + " | ".join(f"{r:.2f}" for r in RADII) + " |", "|---" * (len(RADII) + 2) + "|"]
     for it in cells:
-        if it["aspect"] != [1.0, 1.0, 1.0]:
+        if it["name"] not in TABLED:
             continue
         name, limit = it["name"], math.pi * it["length"]
         found = [fraction(name, r) for r in RADII]

@@ -28,35 +28,38 @@ def told(solid):
 
 
 def share(solid, n=60):
-    """The solid share of the box, by samples at the middles of small cubes."""
+    """The solid share of the box, by a sample anywhere in each of n³ cubes."""
     low, high = map(np.array, solid.bounds)
-    at = (np.arange(n) + 0.5) / n
+    at = np.arange(n) / n
     points = np.stack(np.meshgrid(at, at, at, indexing="ij"), axis=-1).reshape(-1, 3)
+    points += np.random.default_rng(7).uniform(0, 1 / n, points.shape)
     return np.count_nonzero(solid.field(low + points * (high - low)) <= 0) / n**3
 
 
-# Solid fraction of a cell of edge 1 with beams of radius x, from an independent sampling at 100³, good to 2 %.
-SAMPLED = {
-    "sc": {0.05: 0.0225, 0.10: 0.0834, 0.12: 0.1151},
-    "bcc": {0.05: 0.0506, 0.10: 0.1793, 0.12: 0.2419},
-    "fcc": {0.05: 0.0633, 0.10: 0.2119, 0.12: 0.2895},
-    "octet": {0.05: 0.1204, 0.10: 0.3783, 0.12: 0.5001},
-    "kelvin": {0.05: 0.0625, 0.10: 0.2063, 0.12: 0.2797},
-    "diamond": {0.05: 0.0505, 0.10: 0.1792, 0.12: 0.2418},
+# For equal cylinders of radius x in a cell of edge 1: fraction = π x² ΣL − c x³, c by integrating the start of each cylinder
+# round its rim (a polygon's perimeter for each), as long as no two overlap at mid length.
+CLOSED = {
+    "sc": 8 * math.sqrt(2),
+    "bcc": 16 * math.sqrt(6),
+    "octet": 64 * (1 + math.sqrt(2)),
+    "diamond": 16 * math.sqrt(6),
+    "kelvin": 12 * 5.0283148884,
+    "rhombic_dodecahedron": 48 * math.sqrt(6),
 }
 
 
-@pytest.mark.parametrize("cell", SAMPLED)
-def test_fractions_are_those_of_an_independent_sampling(cell):
-    """Ours is good to 1 % at 60³ (beams of six samples and more), the other to 2 %."""
-    for radius, known in SAMPLED[cell].items():
-        found = share(built(cell=cell, map=lt.map.affine(wavelength=10), radius=10 * radius))
-        assert found == pytest.approx(known, rel=0.03), (cell, radius)
+@pytest.mark.parametrize("cell", CLOSED)
+def test_fractions_are_those_of_the_closed_form(cell):
+    """A cube on the surface is in or out by chance, and there are thousands: ours is good to a few parts in a thousand."""
+    total = lt.beams.cell(cell)["length"]
+    for x in (0.05, 0.08, 0.12):
+        found = share(built(cell=cell, map=lt.map.affine(wavelength=10), radius=10 * x))
+        assert found == pytest.approx(math.pi * total * x**2 - CLOSED[cell] * x**3, rel=0.01), x
 
 
 def test_the_closed_form_of_equal_cylinders_is_met():
     """V = π x² ΣL − c x³; a mesh of 50 steps a cell is good to a few parts in a thousand."""
-    solid = built(cell="octet", map=lt.map.affine(wavelength=10, offset=[2.5, 2.5, 2.5]), radius=0.5)
+    solid = built(cell="octet", map=lt.map.affine(wavelength=10), radius=0.5)
     mesh = solid.mesh(edge=0.2)
     x = 0.05
     exact = 12 * math.sqrt(2) * math.pi * x**2 - 64 * (1 + math.sqrt(2)) * x**3
@@ -82,13 +85,13 @@ def test_every_cell_fills_a_region(cell):
 
 def test_fillets_add_only_where_beams_meet():
     """A filleted lattice holds the sharp one; at mid length nothing is added."""
-    args = {"cell": "bcc", "map": lt.map.affine(wavelength=10, offset=[2.5, 2.5, 2.5]), "radius": 0.6}
-    sharp, round_ = built(**args), built(**args, fillet={"radius": 0.5})
+    args = {"cell": "bcc", "map": lt.map.affine(wavelength=10), "radius": 0.6}
+    sharp, round_ = built(**args), built(**args, fillet={"radius": 0.2})
     points = np.random.default_rng(1).uniform(0, 10, (20000, 3))
     a, b = sharp.field(points), round_.field(points)
     assert np.all(b[a < 0] < 0)
     assert np.count_nonzero(b < 0) > np.count_nonzero(a < 0)
-    assert told(round_)["fillet_radius"][0] == pytest.approx(0.5, rel=1e-6)
+    assert told(round_)["fillet_radius"][0] == pytest.approx(0.2, rel=1e-6)
     mesh = round_.mesh(edge=0.3)
     assert mesh.closed and mesh.pieces == 1
 
@@ -131,7 +134,7 @@ def test_radii_vary_with_place():
     solid = built(cell="sc", map=lt.map.affine(wavelength=2.5), radius=thick)
     graph = solid.beams["core"]
     z = graph["centers"][:, 2]
-    inner = (z > 0.1) & (z < 9.9)
+    inner = np.all((graph["centers"] > -1e-9) & (graph["centers"] < 10 + 1e-9), axis=1) & (z < 9.9)
     assert np.allclose(graph["radii"][inner], 0.2 + 0.04 * np.minimum(z[inner] + 1.25, 10))
     assert told(solid)["thickness"] == pytest.approx(0.4, abs=0.02)
     waisted = built(cell="sc", map=lt.map.affine(wavelength=5), radius=0.3, hub=0.8)
@@ -193,7 +196,7 @@ def test_skin_keep_and_islands_work_on_beams():
         mesh = solid.mesh(edge=0.2, islands="drop")
     assert mesh.closed and mesh.pieces == 1
     assert np.all(solid.field([[5, 5, 5], [0.2, 5, 5]]) < 0)
-    assert solid.voxels(step=0.25).volume == pytest.approx(mesh.volume, rel=0.05)
+    assert solid.voxels(step=0.1).volume == pytest.approx(mesh.volume, rel=0.03)
 
 
 SWIRL = {
@@ -219,21 +222,21 @@ def test_a_pattern_is_the_graph_that_it_stands_for(fillet):
     points = np.random.default_rng(3).uniform([-10, -10, -1], [10, 10, 6], (20000, 3))
     a, b = laid.field(points), whole.field(points)
     assert np.array_equal(a < 0, b < 0)
-    mesh = laid.mesh(edge=0.2)
-    assert mesh.closed and mesh.volume == pytest.approx(whole.mesh(edge=0.2).volume, rel=1e-3)
+    mesh = laid.mesh(edge=0.35)
+    assert mesh.closed and mesh.volume == pytest.approx(whole.mesh(edge=0.35).volume, rel=5e-3)
 
 
 def test_the_exact_volume_of_a_pattern_is_that_of_its_graph():
     """Of one hub of each kind with geometric sums, against all hubs one by one, and against a mesh."""
     steps = [{"count": 4, "by": [3, 0, 0]}, {"count": 5, "by": [0.5, 3, 0]}, {"count": 3, "scale": 1.1, "about": [0, 0, -20]}]
     pattern = {"nodes": [[0, 0, 0, 0.4]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]], "repeat": steps}
-    region = lt.region.box(min=[-2, -2, -2], max=[18, 18, 8])
+    region = lt.region.box(min=[-6, -6, -8], max=[20, 24, 14])
     laid = built(region, pattern=pattern, fillet="auto", profile="cone")
     graph = laid.beams["core"]
     nodes = np.column_stack([graph["centers"], graph["radii"]])
     whole = built(region, nodes=nodes, struts=graph["struts"], fillet="auto", profile="cone")
     assert told(laid)["volume"] == pytest.approx(told(whole)["volume"], rel=1e-9)
-    assert told(laid)["volume"] == pytest.approx(whole.mesh(edge=0.12).volume, rel=5e-3)
+    assert told(laid)["volume"] == pytest.approx(whole.mesh(edge=0.2).volume, rel=5e-3)
 
 
 def test_a_thousand_million_hubs_are_checked_at_once():
@@ -269,7 +272,8 @@ CASES = [
     (but(GOOD, radius=0), "radius", ["radius is 0 mm", "greater than 0"]),
     (but(GOOD, radius=math.nan), "radius", ["radius is NaN"]),
     (but(GOOD, radius=-1), "radius", ["radius is -1"]),
-    (but(GOOD, radius=9), "radius", ["solid everywhere"]),
+    (but(GOOD, radius=2.4), "radius", ["solid everywhere"]),
+    (but(GOOD, radius=9), "radius", ["radius is 9 mm", "at most the wavelength, 5 mm"]),
     (but(GOOD, radius={"formula": "x - 5"}), "radius.formula", ["radius is -", "greater than 0"]),
     (but(GOOD, nodes=SQUARE), "nodes", ["either a cell on a map, or nodes and struts"]),
     (but(GOOD, fillet=0.3), "fillet", ["fillet = { radius = 0.5 }"]),
@@ -280,8 +284,12 @@ CASES = [
     (but(GOOD, profile={"waist": 2}), "profile", ["must lie between", "the beam from"]),
     (but(GOOD, merge=-1), "merge", ["0 or more"]),
     (but(GOOD, trim="clip"), "trim", ["unknown trim", "cut, drop, snap"]),
-    (but(GOOD, map={"affine": {"wavelength": 0.001}}), "map", ["at most 10000000 are made"]),
-    (but(GOOD, map={"affine": {"wavelength": 500, "offset": [100, 100, 100]}}, radius=1), "map", ["no beam lies in the region"]),
+    (but(GOOD, map={"affine": {"wavelength": 0.001}}, radius=0.0001), "map", ["at most 10000000 are made"]),
+    (
+        but(GOOD, map={"affine": {"wavelength": 500, "offset": [100, 100, 100]}}, radius=1),
+        "map",
+        ["no beam lies in the region"],
+    ),
     (but(OWN, struts=[[0, 9]]), "struts[0]", ["there is no node 9; there are 4 nodes"]),
     (but(OWN, struts=[[0, 0]]), "struts", ["two different ends"]),
     (but(OWN, struts=[[0, 1.5]]), "struts[0]", ["whole numbers", "1.5"]),
@@ -324,7 +332,7 @@ def test_a_lattice_and_beams_need_a_blend():
     lattice = lt.Lattice(cell="octet", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
     with pytest.raises(lt.DesignError, match="octet is a cell of beams"):
         lt.Design(region=BOX, lattice=lattice).build()
-    with pytest.raises(lt.DesignError, match='such as .*or \\[beams.core\\]'):
+    with pytest.raises(lt.DesignError, match=r"such as .*or \[beams.core\]"):
         lt.Design(region=BOX).build()
 
 

@@ -14,8 +14,10 @@ mod field;
 pub mod hub;
 mod index;
 pub mod integral;
+mod mesh;
 pub mod pencil;
 pub mod quadric;
+mod tiling;
 
 use hub::{Affine, Hub, Stub};
 use index::Index;

@@ -154,6 +154,17 @@ fn frame(
     };
     let made = map::map(map, &at)?;
     map::warn(&made, map, &place.path, warnings);
+    for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
+        let most = grade.as_ref().map_or(0.0, |g| greatest(g, place));
+        if most > made.longest() {
+            let message = format!(
+                "{key} is {} mm; it must be greater than 0 and at most the wavelength, {} mm",
+                number(most),
+                number(made.longest())
+            );
+            return Err(DesignError::new(below(key), message).found(number(most)));
+        }
+    }
     let longest = net
         .lengths([made.longest(); 3])
         .into_iter()
@@ -240,15 +251,18 @@ fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
     })
 }
 
+/// The greatest value at points in the region.
+fn greatest(grade: &Grade, place: &Place) -> f64 {
+    let mut values = vec![0.0; place.points.len()];
+    grade.values(place.points, &mut values);
+    values.into_iter().fold(0.0, f64::max)
+}
+
 /// A bound of the radius of balls in the region.
 fn thickest(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
     let most = |g: &Grade| match g.bound(bounds).hi {
         v if v.is_finite() => v,
-        _ => {
-            let mut values = vec![0.0; place.points.len()];
-            g.values(place.points, &mut values);
-            2.0 * values.into_iter().fold(0.0, f64::max)
-        }
+        _ => 2.0 * greatest(g, place),
     };
     let of = [&radii.radius, &radii.hub].into_iter().flatten();
     of.map(most).fold(0.0, f64::max).min(norm(bounds.size()))
@@ -380,7 +394,7 @@ pub(super) fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignE
     if mixed(share(place.points)) {
         return Ok(());
     }
-    match share(&sample::inside(place.region, 50 * LOOKS).0) {
+    match share(&sample::inside(place.region, 10 * LOOKS).0) {
         v if v >= 1.0 => Err(DesignError::new(
             format!("{}.radius", place.path),
             "the beams are so thick that the region is solid everywhere: nothing is open",

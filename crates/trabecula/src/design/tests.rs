@@ -226,20 +226,7 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 }
 
 #[test]
-fn words_of_later_versions_are_not_slips() {
-    for (line, instead, path) in [
-        ("units = \"mm\"", "beams = { a = { radius = 1 } }", "beams"),
-        ("map.affine", "map.tets", "lattice.core.map.tets"),
-        (
-            "cell = \"gyroid\"",
-            "cell.tet = { }",
-            "lattice.core.cell.tet",
-        ),
-    ] {
-        let e = with(line, instead);
-        assert_eq!((e.path.as_str(), e.nearest.as_deref()), (path, None));
-        assert!(e.message.contains("not in this version yet"), "{e}");
-    }
+fn several_lattices_need_a_blend() {
     let two = GOOD.to_string() + "[lattice.rim]\ncell = \"gyroid\"\n";
     let e = refused(&two);
     assert!(

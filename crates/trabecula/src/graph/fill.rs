@@ -38,8 +38,7 @@ pub fn expected(net: &Net, map: &Map, bounds: &Aabb) -> f64 {
 /// More than [`MOST`] struts; a map whose inverse is not found.
 pub fn fill(net: &Net, map: &Map, bounds: &Aabb, reach: f64) -> Result<Wire, Fault> {
     let about = expected(net, map, bounds);
-    // NaN is refused as well.
-    if !(about <= MOST) {
+    if about.is_nan() || about > MOST {
         return Err(Fault::new(
             "",
             format!(

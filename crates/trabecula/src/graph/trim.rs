@@ -1,8 +1,10 @@
 //! A wire frame cut to a region.
 
+use rayon::prelude::*;
+
 use super::wire::Wire;
 use crate::field::Field;
-use crate::math::{Vec3, add, scale, sub};
+use crate::math::{Vec3, add, norm, scale, sub};
 
 /// What becomes of struts that leave the region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,6 +29,17 @@ pub struct Trimmed {
     pub snapped: usize,
 }
 
+/// What becomes of a strut.
+enum Fate {
+    Stays,
+    Outside,
+    Dropped,
+    /// From the node inside it goes so far towards the other.
+    Shortened([u32; 2], f64),
+}
+
+/// Nodes whose distance is taken at once.
+const BATCH: usize = 1024;
 /// Steps along a strut at least: beyond it a bay of the region is overlooked.
 const STEPS: f64 = 256.0;
 /// How near the surface (of the strut's length) a crossing is found.
@@ -44,55 +57,52 @@ impl Trim {
         slack: f64,
         radii: &mut Vec<f64>,
     ) -> Trimmed {
-        let mut done = Trimmed::default();
         let mut depth = vec![0.0; wire.nodes.len()];
-        region.values(&wire.nodes, &mut depth);
+        let pieces = depth
+            .par_chunks_mut(BATCH)
+            .zip(wire.nodes.par_chunks(BATCH));
+        pieces.for_each(|(d, p)| region.values(p, d));
         let inside = |n: u32| depth[n as usize] <= slack;
-        let nodes = wire.nodes.clone();
-        let mut struts = std::mem::take(&mut wire.struts);
-        match self {
-            Trim::Cut => struts.retain(|s| {
-                let at = s.map(|n| nodes[n as usize]);
-                let nearest = if s.iter().any(|n| inside(*n)) {
-                    0.0
-                } else {
-                    least(region, at, reach)
-                };
-                done.outside += usize::from(nearest > reach);
-                nearest <= reach
-            }),
-            Trim::Drop => struts.retain(|s| {
-                let at = s.map(|n| nodes[n as usize]);
-                let keep = s.iter().all(|n| inside(*n)) && leaves(region, at, slack).is_none();
-                done.dropped += usize::from(!keep);
-                keep
-            }),
-            Trim::Snap => {
-                let mut kept = Vec::with_capacity(struts.len());
-                for s in struts {
-                    match s.map(inside) {
-                        [false, false] => done.outside += 1,
-                        ends => {
-                            let [from, to] = if ends[0] { s } else { [s[1], s[0]] };
-                            let at = [nodes[from as usize], nodes[to as usize]];
-                            match leaves(region, at, slack) {
-                                None => kept.push(s),
-                                Some(_) if ends == [true; 2] => done.dropped += 1,
-                                Some(t) => {
-                                    let end = add(at[0], scale(sub(at[1], at[0]), t));
-                                    kept.push([from, wire.nodes.len() as u32]);
-                                    wire.nodes.push(end);
-                                    if !radii.is_empty() {
-                                        let [a, b] = [from, to].map(|n| radii[n as usize]);
-                                        radii.push(a + t * (b - a));
-                                    }
-                                    done.snapped += 1;
-                                }
-                            }
-                        }
+        let at = |s: &[u32; 2]| s.map(|n| wire.nodes[n as usize]);
+        let fate = |s: &[u32; 2]| {
+            let ends = s.map(inside);
+            match self {
+                Trim::Cut if ends.contains(&true) => Fate::Stays,
+                Trim::Cut if least(region, at(s), reach) <= reach => Fate::Stays,
+                Trim::Cut => Fate::Outside,
+                Trim::Drop | Trim::Snap if ends == [true; 2] => {
+                    match leaves(region, at(s), slack) {
+                        None => Fate::Stays,
+                        Some(_) => Fate::Dropped,
                     }
                 }
-                struts = kept;
+                Trim::Drop => Fate::Dropped,
+                Trim::Snap if ends == [false; 2] => Fate::Outside,
+                Trim::Snap => {
+                    let from = if ends[0] { *s } else { [s[1], s[0]] };
+                    // The far end is outside, so it leaves.
+                    Fate::Shortened(from, leaves(region, at(&from), slack).unwrap_or(1.0))
+                }
+            }
+        };
+        let fates: Vec<Fate> = wire.struts.par_iter().map(fate).collect();
+        let mut done = Trimmed::default();
+        let mut struts = Vec::with_capacity(wire.struts.len());
+        for (s, fate) in wire.struts.iter().zip(fates) {
+            match fate {
+                Fate::Stays => struts.push(*s),
+                Fate::Outside => done.outside += 1,
+                Fate::Dropped => done.dropped += 1,
+                Fate::Shortened([from, to], t) => {
+                    let [a, b] = [from, to].map(|n| wire.nodes[n as usize]);
+                    struts.push([from, wire.nodes.len() as u32]);
+                    wire.nodes.push(add(a, scale(sub(b, a), t)));
+                    if !radii.is_empty() {
+                        let [a, b] = [from, to].map(|n| radii[n as usize]);
+                        radii.push(a + t * (b - a));
+                    }
+                    done.snapped += 1;
+                }
             }
         }
         wire.struts = struts;
@@ -104,7 +114,7 @@ impl Trim {
 /// The least distance along a segment, or some distance not above `enough`.
 fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
     let along = sub(b, a);
-    let length = crate::math::norm(along);
+    let length = norm(along);
     let (mut t, mut least) = (0.0, f64::INFINITY);
     while t < 1.0 {
         let d = region.value(add(a, scale(along, t)));
@@ -118,15 +128,15 @@ fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
     least
 }
 
-/// How far along a segment (0 to 1) that begins inside it first leaves the region.
+/// How far along a segment (0 to 1) that begins inside it first leaves the region, by more than `slack`.
 fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
     let along = sub(b, a);
-    let length = crate::math::norm(along);
-    let value = |t: f64| region.value(add(a, scale(along, t))) - slack;
+    let length = norm(along);
+    let value = |t: f64| region.value(add(a, scale(along, t)));
     let mut t = 0.0;
-    loop {
+    while t < 1.0 {
         let next = (t + (-value(t) / length).max(1.0 / STEPS)).min(1.0);
-        if value(next) > 0.0 {
+        if value(next) > slack {
             let (mut low, mut high) = (t, next);
             while high - low > NEAR {
                 let middle = 0.5 * (low + high);
@@ -138,17 +148,14 @@ fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
             }
             return Some(low);
         }
-        if next >= 1.0 {
-            return None;
-        }
         t = next;
     }
+    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::norm;
     use crate::region::Sphere;
 
     fn comb() -> Wire {

@@ -156,6 +156,7 @@ mod tests {
             wavelength: [wave.clone(), wave.clone(), wave],
             orientation: Orientation::Angles([still.clone(), still, turn]),
             offset: [0.2, 0.3, -0.1],
+            weight: None,
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

@@ -297,7 +297,11 @@ impl Laid {
     fn at(&self, p: Vec3) -> f64 {
         let mut least = self.cap * self.least;
         self.near(&Aabb { min: p, max: p }, &mut |kind, q, s| {
-            least = least.min(self.quadors.share(kind.hub, q.min) * s);
+            // No hub gives less than the distance from what holds it.
+            let away = self.quadors.hold(kind.hub).distance(q.min) * s;
+            if away == 0.0 || away < least {
+                least = least.min(self.quadors.share(kind.hub, q.min) * s);
+            }
             true
         });
         least
@@ -322,18 +326,19 @@ impl Laid {
     }
 
     /// The different hubs, each with its neighbours, and which hubs count, each with the sum of s³ over its class, s being
-    /// how much larger a member is than the one that is there.
+    /// how much larger a member is than at [0, 0, 0].
     pub fn kinds(&self) -> (&Quadors, Vec<(usize, f64)>) {
         let nodes = self.pattern.nodes.len();
         let [lu, lv, _] = self.classes.map(|c| c.len());
         let sum = |step: usize, class: usize| {
             let s = self.pattern.steps[step].0.scale.powi(3);
-            let n = self.classes[step].members(class).1;
-            if s == 1.0 {
+            let (first, n) = self.classes[step].members(class);
+            let all = if s == 1.0 {
                 n as f64
             } else {
                 (s.powi(n as i32) - 1.0) / (s - 1.0)
-            }
+            };
+            s.powi(first as i32) * all
         };
         let each = self.kinds.iter().enumerate().map(|(m, kind)| {
             let class = m / nodes;
