@@ -71,7 +71,7 @@ def main():
         "",
         "## Figures 5 and 6: one border by radial basis functions and by distance",
         "",
-        "Cells of 4 mm, 30 % asked for everywhere. The widest way's narrowest neck in mm, bodies with their volume in mm³.",
+        "Cells of 3 mm, 30 % asked for everywhere. The widest way's narrowest neck in mm, bodies with their volume in mm³.",
         "",
         "| example | by | least fraction | most off, in a tenth of the weights | neck | loose | dangling | volume, mm³ |",
         "|---|---|---|---|---|---|---|---|",

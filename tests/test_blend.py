@@ -98,7 +98,8 @@ def test_grades_of_boundaries(tmp_path):
 
     def value(grade, points):
         core = lt.Lattice("primitive", "lower", lt.map.affine(wavelength=4.0), lt.level.iso(grade))
-        design = lt.Design(region=lt.region.box(size=[20, 20, 20]), lattice={"a": core})
+        # So wide that the region's own distance is nowhere the greater.
+        design = lt.Design(region=lt.region.box(size=[400, 400, 400]), lattice={"a": core})
         x, y, z = np.asarray(points, dtype=float).T
         f = np.cos(np.pi * x / 2) + np.cos(np.pi * y / 2) + np.cos(np.pi * z / 2)
         return f - design.build().field(points)
@@ -116,7 +117,7 @@ def test_grades_of_boundaries(tmp_path):
     assert step[1] == pytest.approx(0.5) and step[2] == pytest.approx(1.0) and 0 < step[0] < step[3] < 0.5
     (tmp_path / "points.csv").write_text("x,y,z,value\n0,0,0,2\n4,0,0,1\n")
     table = lt.Design(
-        region=lt.region.box(size=[20, 20, 20]),
+        region=lt.region.box(size=[400, 400, 400]),
         lattice={
             "a": lt.Lattice(
                 "primitive",

@@ -65,8 +65,9 @@ impl Rbf {
         let size = size.fold(0.0, f64::max);
         if let Some(i) = (0..n).find(|i| nearest[*i].0 <= 1e-9 * size) {
             let message = format!(
-                "points {} and {i} coincide{}: no function passes through both; leave one out",
-                nearest[i].1,
+                "points {} and {} coincide{}: no function passes through both; leave one out",
+                i.min(nearest[i].1),
+                i.max(nearest[i].1),
                 if axis.is_some() {
                     " seen along the axis"
                 } else {

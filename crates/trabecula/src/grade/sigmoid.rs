@@ -5,10 +5,10 @@ use crate::field::Field;
 use crate::math::{Aabb, Interval, Vec3, scale};
 
 /// The share of a logistic curve that is left out at either end, so that the step has ends.
-const TAIL: f64 = 1e-3;
+const TAIL: f64 = 0.02;
 
 /// The logistic function of a number, 1/(1 + e^(−k (v − at))), as in equation 17 of the hybrid paper as corrected: stretched
-/// by a thousandth at either end so that it is 0 below at − width/2 and 1 above at + width/2. A negative width falls.
+/// by a fiftieth at either end so that it is 0 below at − width/2 and 1 above at + width/2. A negative width falls.
 pub struct Sigmoid {
     of: Grade,
     at: f64,

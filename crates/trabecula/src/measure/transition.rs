@@ -13,7 +13,7 @@ use crate::math::Vec3;
 use crate::solid::Solid;
 
 /// Most points looked at, and steps on the shortest wavelength where they suffice.
-const MOST: f64 = 3e6;
+const MOST: f64 = 6e5;
 const FINE: f64 = 16.0;
 /// Shares of the second lattice at which the fraction is told.
 const BINS: usize = 10;
@@ -101,34 +101,32 @@ fn look(
         .into_par_iter()
         .map(|r| {
             let places: Vec<Vec3> = (r * row..(r + 1) * row).map(at).collect();
-            let zeros = || vec![0.0; row];
-            let (mut region, mut value, mut asked) = (zeros(), zeros(), zeros());
+            let mut region = vec![0.0; row];
             solid.region.values(&places, &mut region);
-            if region.iter().all(|d| *d > 0.0) {
-                return vec![None; row];
-            }
-            let mut w = vec![0.0; n * row];
+            let inside: Vec<usize> = (0..row).filter(|i| region[*i] <= 0.0).collect();
+            let places: Vec<Vec3> = inside.iter().map(|i| places[*i]).collect();
+            let zeros = || vec![0.0; places.len()];
+            let (mut w, mut value, mut asked) = (vec![0.0; n * places.len()], zeros(), zeros());
             blend.weights().values(&places, &mut w);
             blend.values(&places, &mut value);
             blend.fractions(&places, &mut asked);
-            (0..row)
-                .map(|i| {
-                    let w = &w[i * n..][..n];
-                    let first = (0..n).fold(0, |m, k| if w[k] > w[m] { k } else { m });
-                    let rest = (0..n).filter(|k| *k != first);
-                    let second = rest.fold(None, |m: Option<usize>, k| match m {
-                        Some(m) if w[m] >= w[k] => Some(m),
-                        _ => Some(k),
-                    })?;
-                    (region[i] <= 0.0).then(|| Point {
-                        first: first as u8,
-                        second: second as u8,
-                        share: (w[second] / (w[first] + w[second])) as f32,
-                        asked: asked[i] as f32,
-                        solid: value[i] <= 0.0,
-                    })
-                })
-                .collect()
+            let mut found = vec![None; row];
+            for (k, i) in inside.into_iter().enumerate() {
+                let w = &w[k * n..][..n];
+                let first = (0..n).fold(0, |m, k| if w[k] > w[m] { k } else { m });
+                let rest = (0..n).filter(|k| *k != first);
+                let Some(second) = rest.reduce(|m, k| if w[k] > w[m] { k } else { m }) else {
+                    continue;
+                };
+                found[i] = Some(Point {
+                    first: first as u8,
+                    second: second as u8,
+                    share: (w[second] / (w[first] + w[second])) as f32,
+                    asked: asked[k] as f32,
+                    solid: value[k] <= 0.0,
+                });
+            }
+            found
         })
         .collect();
     Points {
