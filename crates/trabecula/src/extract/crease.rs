@@ -123,11 +123,7 @@ impl Edges {
     }
 
     /// Adds the edges of a face that were followed. `all`: whether grid edges may be crossed twice.
-    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(
-        &mut self,
-        seen: &Seen<P>,
-        all: bool,
-    ) {
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>, all: bool) {
         let nodes = seen.nodes;
         let of = &seen.grid.faces[seen.local.live[seen.face]].creases;
         if all {
@@ -195,7 +191,10 @@ impl Edges {
                 continue;
             };
             let untouched = || seen.alone(cell) && seen.untouched(cell);
-            if count < 3 || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
+            if count < 3
+                || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1
+                || !untouched()
+            {
                 continue;
             }
             let sides = (0..3).flat_map(|a| [(a, false), (a, true)]);
@@ -252,10 +251,7 @@ impl Edges {
         for w in stops.windows(2).filter(|w| w[0] < w[1]) {
             let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
             if let Some(cell) = cell_of(nodes, scale(add(ends[0], ends[1]), 0.5)) {
-                self.pieces
-                    .entry(nodes.index(cell))
-                    .or_default()
-                    .push(ends);
+                self.pieces.entry(nodes.index(cell)).or_default().push(ends);
             }
         }
     }
@@ -425,7 +421,11 @@ pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>
 }
 
 /// The cells that have edges, among some.
-pub(super) fn cells(edges: &Edges, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
+pub(super) fn cells(
+    edges: &Edges,
+    nodes: &Nodes,
+    own: &[std::ops::Range<usize>; 3],
+) -> Vec<([usize; 3], usize)> {
     let ny = nodes.shape[1];
     let mut found = Vec::new();
     for (row, w) in edges.cells.iter().enumerate() {

@@ -88,12 +88,10 @@ impl Knots<'_> {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
         }
-        let n = self
-            .numbered(key)
-            .unwrap_or_else(|| {
-                let own = self.edges.place(key);
-                self.push(key, own.unwrap_or_else(|| self.place(key)))
-            });
+        let n = self.numbered(key).unwrap_or_else(|| {
+            let own = self.edges.place(key);
+            self.push(key, own.unwrap_or_else(|| self.place(key)))
+        });
         self.extra.names.insert(key, n);
         n
     }

@@ -309,7 +309,8 @@ fn follow(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usi
     s.edges.clear(nodes.shape);
     for (face, &id) in local.live.iter().enumerate() {
         if let Some(segments) = grid.creases(id, tile) {
-            s.edges.follow(nodes, &grid.faces[id].creases, face, segments);
+            s.edges
+                .follow(nodes, &grid.faces[id].creases, face, segments);
             s.edges.take(local, &mut s.signs, nodes, face);
         }
     }

@@ -226,7 +226,9 @@ impl Shape for MeshRegion {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
             _ => {
-                let creases = self.creases.get_or_init(|| Arc::new(crease::creases(&self.mesh)));
+                let creases = self
+                    .creases
+                    .get_or_init(|| Arc::new(crease::creases(&self.mesh)));
                 out.push(face::Face {
                     creases: creases.clone(),
                     ..face::Face::distance(self.clone())

@@ -56,7 +56,12 @@ impl Edges {
                 taken.extend(&way.via);
                 found.push(way.clone());
             }
-            if crossing(&points, &found, side.1, seen.grid.margin * seen.grid.step / 4.0) {
+            if crossing(
+                &points,
+                &found,
+                side.1,
+                seen.grid.margin * seen.grid.step / 4.0,
+            ) {
                 // Without corners, chords of points that do not alternate keep apart.
                 for w in &mut found {
                     let plain = ways.iter().rfind(|v| v.ends == w.ends);

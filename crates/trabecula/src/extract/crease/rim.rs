@@ -51,7 +51,10 @@ impl Knots<'_> {
         for (rim, corners) in &rims {
             let names: Vec<u32> = rim.iter().map(|k| self.vertex(*k)).collect();
             let places: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
-            let corners: Vec<Vec3> = corners.iter().filter_map(|k| self.edges.place(*k)).collect();
+            let corners: Vec<Vec3> = corners
+                .iter()
+                .filter_map(|k| self.edges.place(*k))
+                .collect();
             let field = &*self.grid.faces[self.local.live[face]].field;
             let node = self.nodes.index(cell);
             let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);

@@ -32,7 +32,8 @@ impl Edges {
         }
         for ((node, axis), points) in &self.twice {
             for (i, p) in points.iter().enumerate() {
-                self.points.insert(super::Key::crossing(*node, *axis, seen.face, i), *p);
+                self.points
+                    .insert(super::Key::crossing(*node, *axis, seen.face, i), *p);
             }
         }
     }
@@ -44,12 +45,16 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
         if at[axis] + 2 > nodes.shape[axis]
-            || around.clone().any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a])
+            || around
+                .clone()
+                .any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a])
         {
             return None;
         }
         let [a, b] = self.open(node, axis)?;
-        let on_plane = around.clone().any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
+        let on_plane = around
+            .clone()
+            .any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
         let mut beside = around;
         let (u, v) = (beside.next()?, beside.next()?);
         let all_alone = || {

@@ -74,7 +74,9 @@ fn list_patches(
                 // cells of the tile itself, except at the grid's padding.
                 let below =
                     if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
-                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below ) & mine & !edged[row];
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below)
+                    & mine
+                    & !edged[row];
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
