@@ -45,6 +45,8 @@ pub(super) struct Edges {
     twice: HashMap<(usize, usize), [Vec3; 2]>,
     /// The places of points that nothing else has.
     points: HashMap<Key, Vec3>,
+    /// Where edges of live faces pierce sides.
+    pierced: Vec<(usize, (usize, usize), Vec3)>,
     /// Pieces of edges in cells, by the cells' lowest nodes.
     pieces: HashMap<usize, Vec<[Vec3; 2]>>,
     /// Places where edges end, meet or bend, and how many are there, likewise.
@@ -75,14 +77,20 @@ impl Edges {
         self.sides.clear();
         self.twice.clear();
         self.points.clear();
+        self.pierced.clear();
         self.pieces.clear();
         self.corners.clear();
         self.beyond.clear();
     }
 
+    /// Whether a live face has edges here.
+    pub fn has(&self, face: usize) -> bool {
+        self.pierced.iter().any(|p| p.0 == face) || self.face.values().any(|f| *f == face)
+    }
+
     /// Whether there are any.
     pub fn any(&self) -> bool {
-        !self.sides.is_empty()
+        !self.face.is_empty()
     }
 
     /// The place of a point that is none of a plain or a knotted cell.
@@ -90,29 +98,49 @@ impl Edges {
         self.points.get(&key).copied()
     }
 
-    /// Adds the edges of a face as far as they lie in the block. `all`: whether grid edges may be crossed twice.
-    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(
-        &mut self,
-        seen: &Seen<P>,
-        segments: &[u32],
-        all: bool,
-    ) {
+    /// Follows the edges of a live face through the cells of the block.
+    pub fn follow(&mut self, nodes: &Nodes, of: &Creases, face: usize, segments: &[u32]) {
+        for &i in segments {
+            self.walk(nodes, face, of.segments[i as usize].ends);
+        }
+    }
+
+    /// Takes the cells that a face with edges alone crosses, in several patches, out of those to be cut up: such are
+    /// beside edges, mostly, where distances at nodes say little of where the face is.
+    pub fn take(&mut self, local: &Local, signs: &mut Signs, nodes: &Nodes, face: usize) {
+        let knotted: Vec<[usize; 3]> = signs.knotted_cells().collect();
+        for cell in knotted {
+            let [i, j, k] = cell;
+            let (row, node) = (k * nodes.shape[1] + j, nodes.index(cell));
+            let crossed = !matches!(signs.corners(face, i, j, k), 0 | 0xff);
+            if crossed && decides(local, signs, face, cell) {
+                signs.knotted[row] &= !(1 << i);
+                signs.plain[face][row] |= 1 << i;
+                self.cells[row] |= 1 << i;
+                self.face.insert(node, face);
+            }
+        }
+    }
+
+    /// Adds the edges of a face that were followed. `all`: whether grid edges may be crossed twice.
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>, all: bool) {
         let nodes = seen.nodes;
         let of = &seen.grid.faces[seen.local.live[seen.face]].creases;
-        let mut pierced: Vec<((usize, usize), Vec3)> = Vec::new();
-        for &i in segments {
-            self.walk(nodes, of.segments[i as usize].ends, &mut pierced);
-        }
         if all {
             let cells: Vec<usize> = self.pieces.keys().copied().collect();
             self.find_twice(seen, cells);
         }
         // In the order of the segments where they pierce one side.
-        pierced.sort_by_key(|p| p.0);
         let mut at: HashMap<(usize, usize), Vec<Vec3>> = HashMap::new();
-        for (side, p) in pierced {
-            let p = seen.inside(side, p);
-            at.entry(side).or_default().push(p);
+        for (_, side, p) in self.pierced.iter().filter(|p| p.0 == seen.face) {
+            at.entry(*side).or_default().push(seen.inside(*side, *p));
+        }
+        // Sides whose four grid edges are all crossed.
+        for &node in self.face.iter().filter(|f| *f.1 == seen.face).map(|f| f.0) {
+            for axis in 0..3 {
+                at.entry((node, axis)).or_default();
+                at.entry((node + nodes.stride[axis], axis)).or_default();
+            }
         }
         for &(node, axis) in self.twice.keys() {
             for other in (0..3).filter(|a| *a != axis) {
@@ -202,12 +230,7 @@ impl Edges {
     }
 
     /// Follows a piece of an edge through the cells of the block.
-    fn walk(
-        &mut self,
-        nodes: &Nodes,
-        [p, q]: [Vec3; 2],
-        pierced: &mut Vec<((usize, usize), Vec3)>,
-    ) {
+    fn walk(&mut self, nodes: &Nodes, face: usize, [p, q]: [Vec3; 2]) {
         let along = sub(q, p);
         let mut stops = vec![0.0, 1.0];
         for a in 0..3 {
@@ -220,7 +243,7 @@ impl Edges {
                 at[a] = axis[n];
                 if let Some(mut cell) = cell_of(nodes, at) {
                     cell[a] = n;
-                    pierced.push(((nodes.index(cell), a), at));
+                    self.pierced.push((face, (nodes.index(cell), a), at));
                 }
             }
         }
@@ -298,26 +321,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         if (0..live).any(|f| signs.plain[f][row] >> i & 1 == 1) {
             return false;
         }
-        let (mut varies, mut negative) = (0u64, 0u64);
-        for f in (0..live).filter(|f| *f != self.face) {
-            match signs.corners(f, i, j, k) {
-                0 => {}
-                0xff => negative |= 1 << f,
-                _ => varies |= 1 << f,
-            }
-        }
-        let holds = |mask: u64| {
-            let sign = |f: usize| match f.checked_sub(live) {
-                Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
-                None => mask >> f,
-            };
-            self.local.tree.solid(&sign) & 1 == 1
-        };
-        // The tree never falls when a face becomes negative: so two cases stand for all that vary.
-        let own = 1 << self.face;
-        [negative, negative | varies]
-            .iter()
-            .all(|n| holds(n | own) && !holds(n & !own))
+        decides(self.local, signs, self.face, cell)
     }
 
     /// A point of a side kept within it.
@@ -328,6 +332,31 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         }
         p
     }
+}
+
+/// Whether a face alone would make the surface in a cell if it crossed it, whatever the other faces are there.
+fn decides(local: &Local, signs: &Signs, face: usize, [i, j, k]: [usize; 3]) -> bool {
+    let live = local.live.len();
+    let (mut varies, mut negative) = (0u64, 0u64);
+    for f in (0..live).filter(|f| *f != face) {
+        match signs.corners(f, i, j, k) {
+            0 => {}
+            0xff => negative |= 1 << f,
+            _ => varies |= 1 << f,
+        }
+    }
+    let holds = |mask: u64| {
+        let sign = |f: usize| match f.checked_sub(live) {
+            Some(flat) => Signs::beside(local, flat, j, k) >> i,
+            None => mask >> f,
+        };
+        local.tree.solid(&sign) & 1 == 1
+    };
+    // The tree never falls when a face becomes negative: so two cases stand for all that vary.
+    let own = 1 << face;
+    [negative, negative | varies]
+        .iter()
+        .all(|n| holds(n | own) && !holds(n & !own))
 }
 
 /// The point of a segment nearest to another one.

@@ -234,11 +234,11 @@ impl Grid {
         laid.any(|p| p.axis == axis && p.at == at)
     }
 
-    /// The pieces of edges that a face has of its own near a tile.
-    pub(super) fn creases(&self, face: usize, [i, j, k]: [usize; 3]) -> &[u32] {
+    /// The pieces of edges that a face has of its own near a tile; none if it has no edges at all.
+    pub(super) fn creases(&self, face: usize, [i, j, k]: [usize; 3]) -> Option<&[u32]> {
         let n = self.tiles();
         let found = self.creases[face].get(&(i + n[0] * (j + n[1] * k)));
-        found.map_or(&[], |f| f)
+        (!self.creases[face].is_empty()).then(|| found.map_or(&[][..], |f| f))
     }
 
     /// The tile at a position in the order x fastest.

@@ -157,8 +157,8 @@ impl Knots<'_> {
             }
             let key =
                 |k: &Self, c: usize, d: usize| Key::new(node + k.offset(c & d), &[c ^ d], &[face]);
-            let (from, to) = (key(self, a, b), key(self, c, d));
-            ring.extend(self.trace(cell, axis, upper, face, from, to));
+            let from = key(self, a, b);
+            ring.extend(self.trace(cell, axis, upper, face, from).0);
         }
         let cut = self.grid.faces[self.local.live[face]].cut;
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
@@ -346,7 +346,8 @@ impl Knots<'_> {
         }
     }
 
-    /// The points between two others on the line in which a face crosses the side of a cell.
+    /// The points after one on the line in which a face crosses the side of a cell, up to the next grid edge; and the one
+    /// there.
     pub fn trace(
         &self,
         cell: [usize; 3],
@@ -354,8 +355,7 @@ impl Knots<'_> {
         upper: bool,
         face: usize,
         from: Key,
-        to: Key,
-    ) -> Vec<Key> {
+    ) -> (Vec<Key>, Option<Key>) {
         let mut steps: Vec<(Key, Key)> = Vec::new();
         let on = |k: &Key| k.faces().any(|f| f == face);
         for (negative, ring) in self.side_pieces(cell, axis, upper) {
@@ -373,13 +373,14 @@ impl Knots<'_> {
                 _ => None,
             });
             match next {
-                Some(n) if n != to => {
+                Some(n) if (0..3).any(|a| n.is_along(a)) => return (path, Some(n)),
+                Some(n) => {
                     path.push(n);
                     (before, at) = (at, n);
                 }
-                _ => break,
+                None => break,
             }
         }
-        path
+        (path, None)
     }
 }

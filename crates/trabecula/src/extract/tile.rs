@@ -243,6 +243,7 @@ pub(super) fn extract<'a>(
     if !crossed && local.flat.is_empty() {
         return None;
     }
+    follow(s, grid, &local, &nodes, tile);
     list_vertices(s, &nodes);
     let mut first = 0;
     for (i, &face) in local.live.iter().enumerate() {
@@ -259,7 +260,7 @@ pub(super) fn extract<'a>(
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
-    edges(s, grid, &local, &nodes, tile);
+    edges(s, grid, &local, &nodes);
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes);
     finish(s, grid, &local, &nodes, &own);
@@ -303,8 +304,20 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
     }
 }
 
-/// Finds the edges that faces have of their own.
-fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
+/// Follows the edges that faces have of their own.
+fn follow(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
+    s.edges.clear(nodes.shape);
+    for (face, &id) in local.live.iter().enumerate() {
+        if let Some(segments) = grid.creases(id, tile) {
+            s.edges
+                .follow(nodes, &grid.faces[id].creases, face, segments);
+            s.edges.take(local, &mut s.signs, nodes, face);
+        }
+    }
+}
+
+/// Finds what becomes of the edges that faces have of their own.
+fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
     let Scratch {
         edges,
         samples,
@@ -313,10 +326,8 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usiz
         places,
         ..
     } = s;
-    edges.clear(nodes.shape);
     for (face, &id) in local.live.iter().enumerate() {
-        let segments = grid.creases(id, tile);
-        if !segments.is_empty() {
+        if edges.has(face) {
             let seen = Seen {
                 grid,
                 local,
@@ -331,7 +342,7 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usiz
                     Some(places[v as usize])
                 },
             };
-            edges.find(&seen, segments, grid.one_creased);
+            edges.find(&seen, grid.one_creased);
         }
     }
 }

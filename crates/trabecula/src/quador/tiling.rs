@@ -36,7 +36,9 @@ impl Seams {
                 while let Some(&to) = todo.last() {
                     let there = direction(to);
                     let mid = direction((from.0 + to) / 2.0);
-                    let plain = dot(from.1, mid) > least && dot(mid, there) > least && dot(from.1, there) > least;
+                    let plain = dot(from.1, mid) > least
+                        && dot(mid, there) > least
+                        && dot(from.1, there) > least;
                     if !plain && todo.len() < 12 {
                         todo.push((from.0 + to) / 2.0);
                         continue;
@@ -71,32 +73,56 @@ impl Seams {
     /// may where seams are drawn too coarsely. Not for faces with a rim.
     pub fn triangles(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
         let m = unit(middle);
-        let side = unit(cross(m, if m[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
+        let side = unit(cross(
+            m,
+            if m[0].abs() < 0.6 {
+                [1.0, 0.0, 0.0]
+            } else {
+                [0.0, 1.0, 0.0]
+            },
+        ));
         let other = cross(m, side);
         let drawn = |i: u32| {
             let p = unit(self.points[i as usize]);
             let f = 1.0 / (1.0 + dot(p, m)).max(1e-12);
             [dot(p, side) * f, dot(p, other) * f]
         };
-        let mut loops: Vec<Vec<(u32, [f64; 2])>> =
-            face.loops.iter().map(|l| self.walk(l).into_iter().map(|i| (i, drawn(i))).collect()).collect();
+        let mut loops: Vec<Vec<(u32, [f64; 2])>> = face
+            .loops
+            .iter()
+            .map(|l| self.walk(l).into_iter().map(|i| (i, drawn(i))).collect())
+            .collect();
         loops.retain(|l| l.len() > 2);
         let mut outline = loops.pop()?;
         // A ring is opened along the shortest bridge.
         for inner in loops {
             let gap = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
             let pairs = (0..outline.len()).flat_map(|i| (0..inner.len()).map(move |j| (i, j)));
-            let (i, j) = pairs.min_by(|&(a, b), &(c, d)| gap(&outline[a].1, &inner[b].1).total_cmp(&gap(&outline[c].1, &inner[d].1)))?;
-            let bridge: Vec<_> = inner[j..].iter().chain(&inner[..=j]).chain(&outline[i..=i]).copied().collect();
+            let (i, j) = pairs.min_by(|&(a, b), &(c, d)| {
+                gap(&outline[a].1, &inner[b].1).total_cmp(&gap(&outline[c].1, &inner[d].1))
+            })?;
+            let bridge: Vec<_> = inner[j..]
+                .iter()
+                .chain(&inner[..=j])
+                .chain(&outline[i..=i])
+                .copied()
+                .collect();
             outline.splice(i + 1..i + 1, bridge);
         }
-        ears(outline, &|a, c| closeness(face, self.points[a as usize], self.points[c as usize]))
+        ears(outline, &|a, c| {
+            closeness(face, self.points[a as usize], self.points[c as usize])
+        })
     }
 }
 
 /// Cuts a polygon into triangles, the best shaped ear first.
-fn ears(mut outline: Vec<(u32, [f64; 2])>, fit: &impl Fn(u32, u32) -> f64) -> Option<Vec<[u32; 3]>> {
-    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+fn ears(
+    mut outline: Vec<(u32, [f64; 2])>,
+    fit: &impl Fn(u32, u32) -> f64,
+) -> Option<Vec<[u32; 3]>> {
+    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     let mut out = Vec::with_capacity(outline.len());
     while outline.len() > 3 {
         let n = outline.len();
@@ -114,15 +140,23 @@ fn ears(mut outline: Vec<(u32, [f64; 2])>, fit: &impl Fn(u32, u32) -> f64) -> Op
                 continue;
             }
             let free = outline.iter().all(|p| {
-                p.0 == a.0 || p.0 == b.0 || p.0 == c.0
-                    || turn(a.1, b.1, p.1) < 0.0 || turn(b.1, c.1, p.1) < 0.0 || turn(c.1, a.1, p.1) < 0.0
+                p.0 == a.0
+                    || p.0 == b.0
+                    || p.0 == c.0
+                    || turn(a.1, b.1, p.1) < 0.0
+                    || turn(b.1, c.1, p.1) < 0.0
+                    || turn(c.1, a.1, p.1) < 0.0
             });
             if free {
                 best = (shape, Some(i));
             }
         }
         let i = best.1?;
-        out.push([outline[(i + n - 1) % n].0, outline[i].0, outline[(i + 1) % n].0]);
+        out.push([
+            outline[(i + n - 1) % n].0,
+            outline[i].0,
+            outline[(i + 1) % n].0,
+        ]);
         outline.remove(i);
     }
     let [a, b, c] = [outline[0], outline[1], outline[2]];
@@ -146,7 +180,11 @@ pub fn middle(complex: &Complex, face: &Face) -> Vec3 {
         }
     }
     // Where seams go round more than half the sphere their middle is on the wrong side.
-    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 { arrow } else { sum };
+    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 {
+        arrow
+    } else {
+        sum
+    };
     let p = unit(p);
     let at = face.quadric.exit(p);
     scale(p, if at.is_finite() { at } else { 1.0 })
@@ -216,7 +254,11 @@ impl Tiles {
                 sides.insert(key(p.0, q.0), Side::Arc(i as u32, from, to));
             }
         }
-        Tiles { points: seams.points.clone(), triangles: Vec::new(), sides }
+        Tiles {
+            points: seams.points.clone(),
+            triangles: Vec::new(),
+            sides,
+        }
     }
 
     /// What a side lies on.
@@ -236,10 +278,17 @@ impl Tiles {
             Side::Rim => (chord, 0.0),
             Side::Inner => {
                 let quadric = &complex.faces[face as usize].quadric;
-                let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+                let up = unit(add(
+                    unit(quadric.half_slope(p)),
+                    unit(quadric.half_slope(q)),
+                ));
                 let away = quadric.along(chord, up);
                 let x = add(chord, scale(up, away));
-                let away = if away.is_nan() { f64::INFINITY } else { away.abs() };
+                let away = if away.is_nan() {
+                    f64::INFINITY
+                } else {
+                    away.abs()
+                };
                 (x, away)
             }
         }
@@ -254,7 +303,10 @@ impl Tiles {
         }
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let quadric = &face.quadric;
-        let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+        let up = unit(add(
+            unit(quadric.half_slope(p)),
+            unit(quadric.half_slope(q)),
+        ));
         Curve::Section(p, sub(q, p), up, *quadric)
     }
 
@@ -318,7 +370,9 @@ impl Tiles {
                     2 => {
                         put(p, b, q);
                         // The shorter diagonal of what is left.
-                        let d = |i: u32, j: u32| norm(sub(self.points[i as usize], self.points[j as usize]));
+                        let d = |i: u32, j: u32| {
+                            norm(sub(self.points[i as usize], self.points[j as usize]))
+                        };
                         if d(a, q) < d(p, c) {
                             put(a, p, q);
                             put(a, q, c);
@@ -344,7 +398,14 @@ impl Tiles {
 /// How well a chord between two places stays with a face's quadric: 0 if it loses it, 1 if it lies on it.
 fn closeness(face: &Face, p: Vec3, q: Vec3) -> f64 {
     let quadric = &face.quadric;
-    let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+    let up = unit(add(
+        unit(quadric.half_slope(p)),
+        unit(quadric.half_slope(q)),
+    ));
     let away = quadric.along(scale(add(p, q), 0.5), up);
-    if away.is_nan() { 0.0 } else { 1.0 / (1.0 + 8.0 * away.abs() / norm(sub(p, q))) }
+    if away.is_nan() {
+        0.0
+    } else {
+        1.0 / (1.0 + 8.0 * away.abs() / norm(sub(p, q)))
+    }
 }

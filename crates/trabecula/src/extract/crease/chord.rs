@@ -1,7 +1,7 @@
 //! The lines in which a face meets the side of a cell.
 
-use super::{Edges, Key, Seen};
-use crate::math::{self, Vec3, scale, sub};
+use super::{Edges, Key, Seen, nearest};
+use crate::math::{self, Vec3, norm, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d};
 
 /// A line in a side, from where the side's boundary enters the solid to where it leaves it: the boundary counter-clockwise
@@ -56,7 +56,12 @@ impl Edges {
                 taken.extend(&way.via);
                 found.push(way.clone());
             }
-            if crossing(&points, &found, side.1) {
+            if crossing(
+                &points,
+                &found,
+                side.1,
+                seen.grid.margin * seen.grid.step / 4.0,
+            ) {
                 // Without corners, chords of points that do not alternate keep apart.
                 for w in &mut found {
                     let plain = ways.iter().rfind(|v| v.ends == w.ends);
@@ -70,7 +75,7 @@ impl Edges {
         });
         let (_, ways) = best?;
         let single = points.iter().all(|p| p.key.index() == 0);
-        if single && ways.iter().all(|w| w.via.is_empty()) {
+        if single && points.len() < 4 && ways.iter().all(|w| w.via.is_empty()) {
             return None;
         }
         let (low, axis) = side;
@@ -255,9 +260,9 @@ fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
     rest(points, &all, &mut Vec::new(), found, &mut Vec::new());
 }
 
-/// Whether chords of a side meet, once rounded to single precision.
-fn crossing(points: &[Point], ways: &[Way], axis: usize) -> bool {
-    let flat = |p: Vec3| drop_axis(p.map(|x| f64::from(x as f32)), axis);
+/// Whether chords of a side come as near to each other as points come to nodes, or one turns back.
+fn crossing(points: &[Point], ways: &[Way], axis: usize, apart: f64) -> bool {
+    let flat = |p: Vec3| drop_axis(p, axis);
     let pieces = |w: &Way| {
         let mut path = vec![flat(points[w.ends[0]].place)];
         path.extend(w.via.iter().map(|p| flat(*p)));
@@ -266,20 +271,29 @@ fn crossing(points: &[Point], ways: &[Way], axis: usize) -> bool {
     };
     let meet = |a: &[[f64; 2]], b: &[[f64; 2]]| {
         let side = |p: &[[f64; 2]], q: [f64; 2]| orient2d(p[0], p[1], q);
-        side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0
+        let cross = side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0;
+        let near = |p: [f64; 2], s: &[[f64; 2]]| {
+            let [p, q, r] = [p, s[0], s[1]].map(|p| [p[0], p[1], 0.0]);
+            norm(sub(p, nearest([q, r], p))) < apart
+        };
+        cross || a.iter().any(|p| near(*p, b)) || b.iter().any(|p| near(*p, a))
     };
     let paths: Vec<_> = ways.iter().map(pieces).collect();
-    // A path with two corners may cross itself, or turn back.
+    // A path with two corners may cross itself, and any may turn back.
     let bent = |p: &Vec<[f64; 2]>| {
-        p.len() == 4
-            && (meet(&p[..2], &p[2..]) || p.windows(3).any(|w| orient2d(w[0], w[1], w[2]) == 0))
+        (p.len() == 4 && meet(&p[..2], &p[2..]))
+            || p.windows(3).any(|w| {
+                let [u, v] = [[w[1], w[0]], [w[2], w[1]]].map(|[a, b]| [a[0] - b[0], a[1] - b[1]]);
+                let (cross, dot) = (u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]);
+                dot < 0.0 && cross.abs() < -1e-3 * dot
+            })
     };
-    if paths.iter().any(bent) {
-        return true;
-    }
-    paths.iter().enumerate().any(|(i, a)| {
-        paths[..i]
-            .iter()
-            .any(|b| a.windows(2).any(|s| b.windows(2).any(|t| meet(s, t))))
-    })
+    paths.iter().any(bent)
+        || paths.iter().enumerate().any(|(i, a)| {
+            let meets = |s: &[[f64; 2]]| {
+                let others = paths[..i].iter().flat_map(|b| b.windows(2));
+                others.into_iter().any(|t| meet(s, t))
+            };
+            a.windows(2).any(meets)
+        })
 }

@@ -92,7 +92,7 @@ impl Knots<'_> {
                 }));
                 continue;
             }
-            let (mut from, mut to) = (None, None);
+            let (mut enters, mut leaves) = (Vec::new(), Vec::new());
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
             let ring = [low, low + du, low + du + dv, low + dv];
@@ -103,26 +103,27 @@ impl Knots<'_> {
                 let key = Key::new(a.min(b), &[1 << along], &[face]);
                 // From where the boundary enters the solid, seen from outside the cell.
                 if p != q {
-                    *(if q == upper { &mut from } else { &mut to }) = Some(key);
+                    (if q == upper { &mut enters } else { &mut leaves }).push(key);
                 }
             }
-            let (Some(from), Some(to)) = (from, to) else {
-                continue;
-            };
             let mut across = cell;
             across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
-            let via = if across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across)
-            {
-                self.trace(cell, axis, upper, face, from, to)
-            } else {
-                Vec::new()
-            };
-            steps.push(Step {
-                from,
-                via,
-                to,
-                side: (axis, upper),
-            });
+            let knotted =
+                across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across);
+            for from in enters {
+                let (via, to) = if knotted {
+                    self.trace(cell, axis, upper, face, from)
+                } else {
+                    (Vec::new(), leaves.first().copied())
+                };
+                let Some(to) = to else { continue };
+                steps.push(Step {
+                    from,
+                    via,
+                    to,
+                    side: (axis, upper),
+                });
+            }
         }
         steps
     }

@@ -8,8 +8,8 @@ use crate::face::{Creases, Segment};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 
-/// The least turn of the normal across a crease, radians (6°): below it a rounded edge is off by a fortieth of a step.
-const TURN: f64 = 0.105;
+/// The least turn of the normal across a crease, radians (10°): below it a rounded edge is off by a twentieth of a step.
+const TURN: f64 = 0.175;
 /// Two creases that meet and turn by more than this, radians (20°), meet in a corner.
 const BEND: f64 = 0.35;
 
