@@ -152,7 +152,6 @@ mod tests {
         let still = Grade::Constant(0.0);
         let wave = Grade::Constant(3.0);
         let wanted = Wanted {
-            weight: None,
             wavelength: [wave.clone(), wave.clone(), wave],
             orientation: Orientation::Angles([still.clone(), still, turn]),
             offset: [0.2, 0.3, -0.1],
