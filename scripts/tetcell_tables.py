@@ -44,7 +44,7 @@ def main():
     head = [
         "# The ready tetrahedral cells",
         "",
-        "Written by `scripts/tetcell_tables.py`; what they are is explained in [tetrahedral cells](../concepts/tetcells.md). Each is",
+        "Written by `scripts/tetcell_tables.py`; what they are: [tetrahedral cells](../concepts/tetcells.md). Each is",
         f"shown in a regular tetrahedron, its faces capped, in {STEPS} steps to the edge.",
         "",
     ]
