@@ -179,3 +179,10 @@ def test_ftetwild_takes_a_soup(tmp_path):
     # The union; the envelope is a thousandth of the diagonal or less.
     assert mesh.volume == pytest.approx(1000 + 512 - 64, rel=0.02)
     assert mesh.report()["mesher"] == "ftetwild" and (volumes(mesh.nodes, mesh.tets) > 0).all()
+
+
+def test_paths_of_tetrahedra_go_with_their_design():
+    from trabecula.design import _moved_all
+
+    data = lt.Design(lt.region.sphere(radius=1), {"core": {"map": lt.map.tets(path="part.vtu")}}).to_dict()
+    assert _moved_all(data, lambda path: "../" + path)["lattice"]["core"]["map"]["tets"]["path"] == "../part.vtu"

@@ -147,10 +147,15 @@ def load(path: str | os.PathLike[str]) -> Design:
 
 
 def _moved_all(data: dict, turn: Callable[[str], str]) -> dict:
-    """The design with every relative mesh path turned."""
+    """The design with every relative mesh path turned, those of tetrahedra too."""
     data["region"] = _moved(data["region"], turn)
     if isinstance(data.get("keep"), dict):
         data["keep"] = {name: _moved(zone, turn) for name, zone in data["keep"].items()}
+    for lattice in data["lattice"].values() if isinstance(data["lattice"], dict) else ():
+        map_ = lattice.get("map") if isinstance(lattice, dict) else None
+        tets = map_.get("tets") if isinstance(map_, dict) else None
+        if isinstance(tets, dict) and isinstance(tets.get("path"), str) and not os.path.isabs(tets["path"]):
+            tets["path"] = turn(tets["path"])
     return data
 
 

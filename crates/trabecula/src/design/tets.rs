@@ -1,5 +1,7 @@
 //! Tetrahedral meshes: made or read, checked, and judged before anything is made of them.
 
+mod source;
+
 use serde::Serialize;
 use serde_json::Value as Json;
 
@@ -8,26 +10,18 @@ use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::{Loader, Node, Warning, read, region, sample};
-use crate::extract::{self, Silent, Stopped};
 use crate::fault::{Fault, counted, number};
-use crate::io::{self, Elements, Shape};
-use crate::math::{Vec3, scale};
-use crate::mesh::Mesh;
-use crate::solid::Solid;
+use crate::math::Vec3;
 use crate::tets::{Checked, Fit, Quality, SLIVER, TetMesh, background};
+use source::{from_file, surface, triangles, wild};
 
-/// The share of the region that a mesh may leave out before it is warned of: curved faces are cut short by flat ones.
+/// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
+/// short by flat ones, which takes much of a coarse mesh but nothing deep.
 const LOST: f64 = 0.02;
-/// Names under which programs write the zones of cells.
-const ZONES: [&str; 7] = [
-    "zone",
-    "gmsh:physical",
-    "medit:ref",
-    "cell_tags",
-    "MaterialIds",
-    "material",
-    "zones",
-];
+/// What is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
+const DEEP: f64 = 0.17;
+/// The share that is warned of however shallow.
+const MUCH: f64 = 0.1;
 
 /// A tetrahedral mesh of a region, and what is to be told of it.
 #[derive(Clone, Debug)]
@@ -63,13 +57,19 @@ impl Tets {
             let (path, spec) = read::tets_in(node, lattice)?;
             let region_spec = read::region_of(node)?;
             let mut notes = region::Notes::default();
-            let space = region::region(&region_spec, "region", loader, &mut notes)?;
+            let space = match region::region(&region_spec, "region", loader, &mut notes) {
+                Ok(space) => space,
+                Err(e) => return of_soup(&spec, &region_spec, &path, loader, e),
+            };
+            let bounds = space.bounds();
+            if !bounds.is_empty() && !bounds.is_finite() {
+                let message =
+                    "the region has no end; intersect it with a box or another bounded region";
+                return Err(DesignError::new("region", message));
+            }
             let (mut points, _) = sample::inside(&space, LOOKS);
-            if points.is_empty() {
-                return Err(DesignError::new(
-                    "region",
-                    "the region is empty, or has no end",
-                ));
+            if bounds.is_empty() || points.is_empty() {
+                return Err(DesignError::new("region", "the region is empty"));
             }
             points.extend(sample::nodes(&space));
             let place = Place {
@@ -142,19 +142,8 @@ pub(super) fn tets(
                     let message = "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
                     return Err(DesignError::new(below("size"), message));
                 };
-                if !(made.limit > 0.0 && made.limit.is_finite()) {
-                    let message = format!(
-                        "limit is {} s; it must be a finite number greater than 0",
-                        number(made.limit)
-                    );
-                    return Err(DesignError::new(below("limit"), message));
-                }
                 let surface = surface(space, place, size)?;
-                let mesh = place
-                    .loader
-                    .tetrahedra("ftetwild", &surface, size, made.limit)
-                    .map_err(|m| DesignError::new(below("mesher"), m).found("ftetwild"))?;
-                let (mesh, checked) = mesh.checked().map_err(wrong)?;
+                let (mesh, checked) = wild(made, &surface, size, &place.path, place.loader)?;
                 (mesh, None, checked, "ftetwild".to_string())
             }
         }
@@ -198,88 +187,41 @@ fn told(
     })
 }
 
-/// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
-/// the region's.
-fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Mesh, DesignError> {
-    if let RegionSpec::Mesh(m) = space {
-        let path = "region.mesh.path";
-        let bytes = place
-            .loader
-            .load(&m.path)
-            .map_err(|e| DesignError::new(path, e).found(&m.path))?;
-        let kind = m.path.rsplit_once('.').map_or("", |(_, e)| e);
-        let loaded = io::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
-        let unit = m.unit.map_or(1.0, Unit::in_mm) * m.scale;
-        let mut mesh = loaded.mesh;
-        mesh.vertices.iter_mut().for_each(|p| *p = scale(*p, unit));
-        return Ok(mesh);
-    }
-    let solid = Solid::new(place.region.clone(), None, size);
-    match extract::surface(&solid, size / 4.0, &Silent) {
-        Ok(made) => Ok(made.mesh),
-        Err(Stopped::Refused(f)) => Err(DesignError::fault(&place.path, f)),
-        Err(_) => Err(DesignError::new(
-            &place.path,
-            "the region's surface could not be made",
-        )),
-    }
-}
-
-fn from_file(
-    file: &TetFileSpec,
+/// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one.
+fn of_soup(
+    spec: &TetsSpec,
+    space: &RegionSpec,
     path: &str,
     loader: &dyn Loader,
-) -> Result<(TetMesh, Checked), DesignError> {
-    let at = if path.is_empty() {
-        String::new()
-    } else {
-        format!("{path}.path")
+    why: DesignError,
+) -> Result<Tets, DesignError> {
+    let (TetsSpec::Made(made), RegionSpec::Mesh(file)) = (spec, space) else {
+        return Err(why);
     };
-    let wrong = |f: Fault| {
-        if f.at == "split" {
-            return DesignError::fault(path, f);
-        }
-        DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
+    let Ok(surface) = triangles(file, loader) else {
+        return Err(why);
     };
-    let kind = file
-        .path
-        .rsplit_once('.')
-        .map_or("", |(_, e)| e)
-        .to_lowercase();
-    let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
-        let bytes = loader
-            .load(&file.path)
-            .map_err(|m| DesignError::new(&at, m).found(&file.path))?;
-        let data = io::read_vtk(&bytes).map_err(wrong)?;
-        let Shape::Mesh(elements) = data.shape else {
-            let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
-            return Err(DesignError::new(at, message).found(&file.path));
-        };
-        let named = |name: &&str| {
-            data.arrays
-                .iter()
-                .find(|a| a.of_cells && a.components == 1 && a.name == **name)
-        };
-        let zones = ZONES
-            .iter()
-            .find_map(|n| named(&n))
-            .map(|a| a.values.iter().map(|v| *v as u32).collect());
-        (elements, zones.unwrap_or_default())
-    } else {
-        loader
-            .elements(&file.path)
-            .map_err(|m| DesignError::new(&at, m).found(&file.path))?
-    };
-    elements.check().map_err(wrong)?;
-    let (mut mesh, of) = elements.tet_mesh(file.split).map_err(wrong)?;
-    if zones.len() == elements.kinds.len() {
-        mesh.zones = of.iter().map(|c| zones[*c as usize]).collect();
+    if made.mesher == MesherSpec::Background {
+        let message = format!(
+            "{}; `trabecula tets` with mesher = \"ftetwild\" takes such triangles too, and the boundary of its mesh is a region",
+            why.message
+        );
+        return Err(DesignError { message, ..why });
     }
-    let unit = file.unit.map_or(1.0, Unit::in_mm);
-    if unit != 1.0 {
-        mesh.nodes.iter_mut().for_each(|p| *p = scale(*p, unit));
-    }
-    mesh.checked().map_err(wrong)
+    let GradeSpec::Constant(size) = made.size else {
+        return Err(why);
+    };
+    let size = Allowed::Positive("size").check(&format!("{path}.size"), size, "")?;
+    let (mesh, checked) = wild(made, &surface, size, path, loader)?;
+    let mut made = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
+    made.warnings.push(Warning {
+        path: "region.mesh".into(),
+        message: format!(
+            "no region, so how the mesh fits is not told: {}",
+            why.message
+        ),
+    });
+    Ok(made)
 }
 
 /// What may not be meant.
@@ -322,12 +264,12 @@ fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Ve
     let Some(fit) = &report.fit else { return out };
     if fit.mended > 0.0 {
         say(format!(
-            "{:.3} mm³ were left out where the boundary would have met itself: the region is thin there for tetrahedra of this \
-             size",
-            fit.mended
+            "{} mm³ were left out where the region is too thin for tetrahedra of this size: the boundary would meet itself, or \
+             crumbs come loose; use a smaller one",
+            number(fit.mended)
         ));
     }
-    if fit.lost > LOST {
+    if fit.lost > MUCH || (fit.lost > LOST && fit.lost_depth > DEEP * q.size.mean) {
         say(format!(
             "{:.1} % of the region is in no tetrahedron, up to {:.3} mm below the surface, at {}; {todo}",
             100.0 * fit.lost,
@@ -453,7 +395,7 @@ mod tests {
         wrong(
             "path = \"hex.vtk\"",
             ".split",
-            None,
+            Some(6),
             "1 hexahedron beside 0 tetrahedra; give split = true",
         );
         wrong(

@@ -29,6 +29,8 @@ use shape::Around;
 const MOST: usize = 20_000_000;
 /// Shapes that fitting may leave (1 where the worst angle is one of `ANGLES`).
 const LEAST: f64 = 1.0;
+/// How often edges and corners are looked for: better shapes make room for more of them.
+const ROUNDS: usize = 3;
 /// The lattice is stretched by at most this share to fit the bounds.
 const FIT: f64 = 0.08;
 
@@ -48,7 +50,7 @@ pub struct Fit {
     pub lost_depth: f64,
     /// Where it is (mm).
     pub lost_at: Vec3,
-    /// Volume taken away where the boundary would have met itself (mm³).
+    /// Volume taken away where the boundary would have met itself, and of crumbs beside the main pieces (mm³).
     pub mended: f64,
 }
 
@@ -95,7 +97,7 @@ pub fn background(
     }
     let around = Around::new(&mesh);
     let mut fixed = vec![false; mesh.nodes.len()];
-    for _ in 0..2 {
+    for _ in 0..ROUNDS {
         features::features(&mut mesh, region, &around, &mut fixed, LEAST);
         smooth::smooth(&mut mesh, region, &around, &on, &fixed);
     }

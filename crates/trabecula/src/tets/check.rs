@@ -40,9 +40,9 @@ impl TetMesh {
         }
         if !self.zones.is_empty() && self.zones.len() != self.tets.len() {
             return fault(format!(
-                "{} for {}; give one for each",
+                "{} for {} tetrahedra; give one for each",
                 counted(self.zones.len(), "zone"),
-                counted(self.tets.len(), "tetrahedron")
+                self.tets.len()
             ));
         }
         let count = self.nodes.len();
@@ -345,7 +345,7 @@ mod tests {
         );
         let mut m = cube();
         m.zones = vec![1, 2];
-        refused(m, "2 zones for 6 tetrahedrons");
+        refused(m, "2 zones for 6 tetrahedra");
     }
 
     #[test]

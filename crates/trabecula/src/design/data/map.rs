@@ -57,7 +57,7 @@ pub enum MesherSpec {
     /// A body-centred cubic lattice fitted to the region: nodes moved onto its surface, the rest cut. Takes any region.
     #[default]
     Background,
-    /// fTetWild (Hu et al. 2020), which takes soups of triangles; in the extra \"tets\" of the Python package.
+    /// fTetWild (Hu et al. 2020), which takes soups of triangles; in the extra "tets" of the Python package.
     FTetWild,
 }
 
@@ -65,7 +65,7 @@ pub enum MesherSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TetFileSpec {
-    /// Path of the file, relative to the design file: vtu, vtk; with the extra \"fe\" of the Python package also msh, inp, med,
+    /// Path of the file, relative to the design file: vtu, vtk; with the extra "fe" of the Python package also msh, inp, med,
     /// mesh and others.
     pub path: String,
     /// Unit of the file's coordinates (mm unless given).

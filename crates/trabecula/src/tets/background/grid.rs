@@ -4,8 +4,8 @@
 //! opposite edges (long, the cube's edge) and four between them (short, √3/2 of it); its dihedral angles are 60° and 90°.
 //! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007.
 //!
-//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first half of one at half the size
-//! (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
+//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first of them at half
+//! the size (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
 
 use std::collections::HashMap;
 
@@ -50,9 +50,9 @@ impl Grid {
     pub fn new(region: &dyn Field, bounds: &Aabb, cube: f64, most: usize) -> Result<Grid, Fault> {
         let size = bounds.size();
         // The lattice is laid evenly about the region, planes on both sides of its bounds where it fits.
-        let halves = size.map(|l| (2.0 * l / cube).round());
+        let steps = size.map(|l| (2.0 * l / cube).round());
         let origin =
-            core::array::from_fn(|a| bounds.min[a] + (size[a] - halves[a] * cube / 2.0) / 2.0);
+            core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
         let mut grid = Grid {
             keys: Vec::new(),
             tets: Vec::new(),
@@ -65,25 +65,18 @@ impl Grid {
             return Err(many());
         }
         let end = size.map(|l| (l / cube).ceil() as i32 + 1);
+        if grid.surely_more(region, end, most) {
+            return Err(many());
+        }
         let mut names = HashMap::new();
         let mut todo = vec![([-1; 3], end)];
         while let Some((low, high)) = todo.pop() {
-            let reach = |c: [i32; 3]| grid.place(c.map(|c| c * UNIT));
-            let block = Aabb {
-                min: reach(low),
-                max: reach(high),
-            };
+            let block = grid.block(low, high);
             if region.bound(&block.grown(0.5 * cube)).lo > 0.0 {
                 continue;
             }
-            let extent: [i32; 3] = core::array::from_fn(|a| high[a] - low[a]);
-            let axis = (0..3).fold(0, |m, a| if extent[a] > extent[m] { a } else { m });
-            if extent[axis] > BLOCK {
-                let (mut left, mut right) = (high, low);
-                left[axis] = low[axis] + extent[axis] / 2;
-                right[axis] = left[axis];
-                todo.push((right, high));
-                todo.push((low, left));
+            if (0..3).any(|a| high[a] - low[a] > BLOCK) {
+                todo.extend(halves(low, high));
                 continue;
             }
             for z in low[2]..high[2] {
@@ -98,6 +91,34 @@ impl Grid {
             }
         }
         Ok(grid)
+    }
+
+    /// Whether blocks that lie in the region hold more than `most` tetrahedra: told without making them.
+    fn surely_more(&self, region: &dyn Field, end: [i32; 3], most: usize) -> bool {
+        let mut count = 0.0;
+        let mut todo = vec![([-1; 3], end)];
+        while let Some((low, high)) = todo.pop() {
+            let range = region.bound(&self.block(low, high));
+            let extent: [i32; 3] = core::array::from_fn(|a| high[a] - low[a]);
+            if range.hi < 0.0 {
+                count += 12.0 * extent.iter().map(|e| f64::from(*e)).product::<f64>();
+                if count > most as f64 {
+                    return true;
+                }
+            } else if range.lo <= 0.0 && extent.iter().any(|e| *e > 8 * BLOCK) {
+                todo.extend(halves(low, high));
+            }
+        }
+        false
+    }
+
+    /// The box of a block of cubes.
+    fn block(&self, low: [i32; 3], high: [i32; 3]) -> Aabb {
+        let reach = |c: [i32; 3]| self.place(c.map(|c| c * UNIT));
+        Aabb {
+            min: reach(low),
+            max: reach(high),
+        }
     }
 
     /// The tetrahedra about the three faces on a cube's upper sides.
@@ -160,6 +181,7 @@ impl Grid {
     /// **Errors**: a size that is not positive; more than `most` tetrahedra.
     pub fn refine(&mut self, region: &dyn Field, size: &Grade, most: usize) -> Result<(), Fault> {
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut fine = vec![false; self.tets.len()];
         loop {
             let mut changed = false;
             let mut i = 0;
@@ -168,7 +190,8 @@ impl Grid {
                 let torn = super::super::EDGES
                     .iter()
                     .any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
-                if !torn && !self.coarse(t, region, size)? {
+                if !torn && (fine[i] || !self.coarse(t, region, size)?) {
+                    fine[i] = true;
                     i += 1;
                     continue;
                 }
@@ -195,6 +218,8 @@ impl Grid {
                 let mut other = t;
                 other[a] = m;
                 self.tets.push(other);
+                fine[i] = false;
+                fine.push(false);
                 changed = true;
                 self.bisected = true;
                 if self.tets.len() > most {
@@ -243,6 +268,16 @@ impl Grid {
         }
         Ok(true)
     }
+}
+
+/// A block's halves along its longest side, the upper one first.
+fn halves(low: [i32; 3], high: [i32; 3]) -> [([i32; 3], [i32; 3]); 2] {
+    let extent = |a: usize| high[a] - low[a];
+    let axis = (0..3).fold(0, |m, a| if extent(a) > extent(m) { a } else { m });
+    let (mut left, mut right) = (high, low);
+    left[axis] = low[axis] + extent(axis) / 2;
+    right[axis] = left[axis];
+    [(right, high), (low, left)]
 }
 
 fn named(a: u32, b: u32) -> [u32; 2] {

@@ -5,24 +5,47 @@ use std::collections::HashSet;
 use super::super::{FACES, TetMesh, volume};
 use super::shape::Around;
 
-/// Takes tetrahedra away until no two sheets of the boundary share a node; gives their volume (mm³).
+/// A piece is a crumb if it has less than this share of the largest one's volume,
+const CRUMB: f64 = 0.01;
+/// and at most so many tetrahedra: too few to show a body of its own.
+const FEW: usize = 100;
+
+/// Takes tetrahedra away until no two sheets of the boundary share a node, and crumbs that this or thin places leave; gives
+/// their volume (mm³).
 pub(super) fn mend(mesh: &mut TetMesh) -> f64 {
     let mut lost = 0.0;
     loop {
-        let away = pinches(mesh);
+        let mut away = pinches(mesh);
+        if away.is_empty() {
+            away = crumbs(mesh);
+        }
         if away.is_empty() {
             return lost;
         }
-        lost += away
-            .iter()
-            .map(|i| volume(mesh.corners(*i as usize)))
-            .sum::<f64>();
-        let mut i = 0;
-        mesh.tets.retain(|_| {
-            i += 1;
-            !away.contains(&(i - 1))
-        });
+        let mut kept = Vec::with_capacity(mesh.tets.len());
+        for (i, t) in (0..).zip(&mesh.tets) {
+            if away.contains(&i) {
+                lost += volume(t.map(|n| mesh.nodes[n as usize]));
+            } else {
+                kept.push(*t);
+            }
+        }
+        mesh.tets = kept;
     }
+}
+
+/// The tetrahedra of pieces that are crumbs.
+fn crumbs(mesh: &TetMesh) -> HashSet<u32> {
+    let (count, piece) = mesh.pieces();
+    let (mut size, mut tets) = (vec![0.0; count], vec![0; count]);
+    for (i, p) in piece.iter().enumerate() {
+        size[*p as usize] += volume(mesh.corners(i));
+        tets[*p as usize] += 1;
+    }
+    let most = size.iter().copied().fold(0.0, f64::max);
+    let crumb = |p: u32| size[p as usize] < CRUMB * most && tets[p as usize] <= FEW;
+    let of = piece.iter().enumerate().filter(|(_, p)| crumb(**p));
+    of.map(|(i, _)| i as u32).collect()
 }
 
 /// The tetrahedra to be taken away at nodes with more than one sheet.

@@ -3,6 +3,7 @@
 //! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007; the diagonals by an order
 //! of the edges instead of their parity rule, which does the same and serves bisected tetrahedra too.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use rayon::prelude::*;
@@ -255,7 +256,7 @@ impl Filler<'_> {
             }
             (&[a, b, c], _, &[d]) => {
                 let mut order = [a, b, c];
-                order.sort_by(|x, y| self.rank(t, [*y, d]).cmp(&self.rank(t, [*x, d])));
+                order.sort_by_key(|x| Reverse(self.rank(t, [*x, d])));
                 let [a, b, c] = order;
                 self.emit(t, [node(a), node(b), node(c), [a, d]]);
                 self.emit(t, [node(b), node(c), [a, d], [b, d]]);

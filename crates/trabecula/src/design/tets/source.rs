@@ -1,0 +1,135 @@
+//! Where tetrahedral meshes come from that are not made here: files, and another mesher.
+
+use crate::design::Loader;
+use crate::design::build::Place;
+use crate::design::data::*;
+use crate::design::error::DesignError;
+use crate::extract::{self, Silent, Stopped};
+use crate::fault::{Fault, number};
+use crate::io::{self, Elements, Shape};
+use crate::math::scale;
+use crate::mesh::Mesh;
+use crate::solid::Solid;
+use crate::tets::{Checked, TetMesh};
+
+/// Names under which programs write the zones of cells.
+const ZONES: [&str; 7] = [
+    "zone",
+    "gmsh:physical",
+    "medit:ref",
+    "cell_tags",
+    "MaterialIds",
+    "material",
+    "zones",
+];
+
+/// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
+/// the region's.
+pub(super) fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Mesh, DesignError> {
+    if let RegionSpec::Mesh(file) = space {
+        return triangles(file, place.loader);
+    }
+    let solid = Solid::new(place.region.clone(), None, size);
+    match extract::surface(&solid, size / 4.0, &Silent) {
+        Ok(made) => Ok(made.mesh),
+        Err(Stopped::Refused(f)) => Err(DesignError::fault(&place.path, f)),
+        Err(_) => Err(DesignError::new(
+            &place.path,
+            "the region's surface could not be made",
+        )),
+    }
+}
+
+/// The triangles of a file as they are, mm.
+pub(super) fn triangles(file: &MeshSpec, loader: &dyn Loader) -> Result<Mesh, DesignError> {
+    let path = "region.mesh.path";
+    let bytes = loader
+        .load(&file.path)
+        .map_err(|e| DesignError::new(path, e).found(&file.path))?;
+    let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e);
+    let loaded = io::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
+    let unit = file.unit.map_or(1.0, Unit::in_mm) * file.scale;
+    let mut mesh = loaded.mesh;
+    mesh.vertices.iter_mut().for_each(|p| *p = scale(*p, unit));
+    Ok(mesh)
+}
+
+/// What fTetWild makes of a surface.
+pub(super) fn wild(
+    made: &MadeTetsSpec,
+    surface: &Mesh,
+    size: f64,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<(TetMesh, Checked), DesignError> {
+    if !(made.limit > 0.0 && made.limit.is_finite()) {
+        let message = format!(
+            "limit is {} s; it must be a finite number greater than 0",
+            number(made.limit)
+        );
+        return Err(DesignError::new(format!("{path}.limit"), message));
+    }
+    loader
+        .tetrahedra("ftetwild", surface, size, made.limit)
+        .map_err(|m| DesignError::new(format!("{path}.mesher"), m).found("ftetwild"))?
+        .checked()
+        .map_err(|f| DesignError::fault(path, f))
+}
+
+/// The tetrahedra of a file.
+pub(super) fn from_file(
+    file: &TetFileSpec,
+    path: &str,
+    loader: &dyn Loader,
+) -> Result<(TetMesh, Checked), DesignError> {
+    let at = if path.is_empty() {
+        String::new()
+    } else {
+        format!("{path}.path")
+    };
+    let wrong = |f: Fault| {
+        if f.at == "split" {
+            return DesignError::fault(path, f);
+        }
+        DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
+    };
+    let kind = file
+        .path
+        .rsplit_once('.')
+        .map_or("", |(_, e)| e)
+        .to_lowercase();
+    let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
+        let bytes = loader
+            .load(&file.path)
+            .map_err(|m| DesignError::new(&at, m).found(&file.path))?;
+        let data = io::read_vtk(&bytes).map_err(wrong)?;
+        let Shape::Mesh(elements) = data.shape else {
+            let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
+            return Err(DesignError::new(at, message).found(&file.path));
+        };
+        let named = |name: &&str| {
+            data.arrays
+                .iter()
+                .find(|a| a.of_cells && a.components == 1 && a.name == **name)
+        };
+        let zones = ZONES
+            .iter()
+            .find_map(named)
+            .map(|a| a.values.iter().map(|v| *v as u32).collect());
+        (elements, zones.unwrap_or_default())
+    } else {
+        loader
+            .elements(&file.path)
+            .map_err(|m| DesignError::new(&at, m).found(&file.path))?
+    };
+    elements.check().map_err(wrong)?;
+    let (mut mesh, of) = elements.tet_mesh(file.split).map_err(wrong)?;
+    if zones.len() == elements.kinds.len() {
+        mesh.zones = of.iter().map(|c| zones[*c as usize]).collect();
+    }
+    let unit = file.unit.map_or(1.0, Unit::in_mm);
+    if unit != 1.0 {
+        mesh.nodes.iter_mut().for_each(|p| *p = scale(*p, unit));
+    }
+    mesh.checked().map_err(wrong)
+}
