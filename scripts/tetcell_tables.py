@@ -26,8 +26,8 @@ def entry(name):
         "",
         f"![{name}](../images/tetcells/{name}.png)",
         "",
-        f"{it['title'][0].upper() + it['title'][1:]}. Made for part `{it['part']}` at fraction {it['fraction']:g} (iso {it['iso']:.4f}), where each face has "
-        f"{ports}, {100 * it['face_fraction']:.1f} % of it.",
+        f"{it['title'][0].upper() + it['title'][1:]}. Made for part `{it['part']}` at fraction {it['fraction']:g} "
+        f"(iso {it['iso']:.4f}), where each face has {ports}, {100 * it['face_fraction']:.1f} % of it.",
         "",
         f"- Group {it['group']}: {terms}; values from {it['range'][0]:.4f} to {it['range'][1]:.4f}",
         f"- Tetrahedron of edge {it['edge']:.4f} cells about ({', '.join(f'{c:g}' for c in it['site'])})"

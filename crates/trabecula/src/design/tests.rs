@@ -234,11 +234,10 @@ fn words_of_later_versions_are_not_slips() {
             "blend = { between = [\"a\", \"b\"] }",
             "blend",
         ),
-        ("map.affine", "map.tets", "lattice.core.map.tets"),
         (
             "cell = \"gyroid\"",
-            "cell.tet = { }",
-            "lattice.core.cell.tet",
+            "cell.waves = { }",
+            "lattice.core.cell.waves",
         ),
     ] {
         let e = with(line, instead);
