@@ -26,8 +26,8 @@ def entry(name):
         "",
         f"![{name}](../images/tetcells/{name}.png)",
         "",
-        f"{it['title'].capitalize()}. Made for part `{it['part']}` at fraction {it['fraction']:g} (iso {it['iso']:.4f}), where each face has "
-        f"{ports}, {100 * it['face_fraction']:.1f} % of it.",
+        f"{it['title'][0].upper() + it['title'][1:]}. Made for part `{it['part']}` at fraction {it['fraction']:g} "
+        f"(iso {it['iso']:.4f}), where each face has {ports}, {100 * it['face_fraction']:.1f} % of it.",
         "",
         f"- Group {it['group']}: {terms}; values from {it['range'][0]:.4f} to {it['range'][1]:.4f}",
         f"- Tetrahedron of edge {it['edge']:.4f} cells about ({', '.join(f'{c:g}' for c in it['site'])})"
@@ -44,7 +44,7 @@ def main():
     head = [
         "# The ready tetrahedral cells",
         "",
-        "Written by `scripts/tetcell_tables.py`; what they are is explained in [tetrahedral cells](../concepts/tetcells.md). Each is",
+        "Written by `scripts/tetcell_tables.py`; what they are: [tetrahedral cells](../concepts/tetcells.md). Each is",
         f"shown in a regular tetrahedron, its faces capped, in {STEPS} steps to the edge.",
         "",
     ]

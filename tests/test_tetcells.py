@@ -41,9 +41,7 @@ def test_the_stream_is_the_same_surface(tmp_path):
 
 
 def test_skins_join_by_the_implicit_road():
-    lattice = lt.Lattice(
-        cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=6), level=lt.level.fraction(0.25)
-    )
+    lattice = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=6), level=lt.level.fraction(0.25))
     plain = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}).build()
     skinned = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}, skin=lt.skin(0.8)).build()
     edge = 0.3

@@ -70,8 +70,8 @@ def tet_names() -> list[str]:
 
 
 def tet_facts(name: str) -> dict:
-    """What is known of a ready tetrahedral cell: ``terms``, ``site``, ``edge``, ``dual``; the ``part`` and ``fraction`` it is made
-    for, its ``ports`` on each face there; and the fractions at which each part is one piece that reaches all faces."""
+    """What is known of a ready tetrahedral cell: ``terms``, ``site``, ``edge``, ``dual``; the ``part`` and ``fraction`` it is
+    made for, its ``ports`` on each face there; and the fractions at which each part is one piece that reaches all faces."""
     import json
 
     from . import _core

@@ -121,7 +121,5 @@ def tets(
     ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
     tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
     """
-    given = settings(
-        size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road
-    )
+    given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road)
     return {"tets": given}

@@ -367,18 +367,18 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
     let share = |t: f64| stencil.fraction(part, t);
     let fraction = Varied::of(&[share(levels.lo), share(levels.hi)]);
     apart(stencil, part, [fraction.min, fraction.max], path, warnings);
-    if path.ends_with("thickness") {
-        if let Some(s) = tiling.thickness() {
-            let message = format!(
-                "walls follow the tetrahedra: they are {:.4} mm thick on average, 90 % of them between {:.4} and {:.4} mm, all \
+    if path.ends_with("thickness")
+        && let Some(s) = tiling.thickness()
+    {
+        let message = format!(
+            "walls follow the tetrahedra: they are {:.4} mm thick on average, 90 % of them between {:.4} and {:.4} mm, all \
                  between {:.4} and {:.4} mm",
-                s.mean, s.low, s.high, s.min, s.max
-            );
-            warnings.push(Warning {
-                path: path.to_string(),
-                message,
-            });
-        }
+            s.mean, s.low, s.high, s.min, s.max
+        );
+        warnings.push(Warning {
+            path: path.to_string(),
+            message,
+        });
     }
 }
 

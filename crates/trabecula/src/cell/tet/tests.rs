@@ -225,9 +225,9 @@ fn worked_cells_are_met() {
                     lo - 0.1
                 };
                 assert!(found[0] > low && found[0] < lo + 0.05, "{id}: {found:?}");
-                // A scan that went up by 3 ended there, not at a break.
-                let scanned = hi > t + 2.9 && found[1] > hi;
-                assert!(scanned || (found[1] - hi).abs() < 0.1, "{id}: {found:?}");
+                // The scan went up by 3 at most, or to a level that f has all along the edges, where rounding stopped it.
+                let end = hi.min(s.range().abs().hi);
+                assert!(found[1] > end - 0.1, "{id}: {found:?}");
             }
         }
     }
