@@ -31,6 +31,8 @@ pub struct Mass {
     pub first: Vec3,
     /// ∫ x xᵀ dV, mm⁵.
     pub second: Mat3,
+    /// Solid angle at the hub's centre, of patches: what shows that they were filled.
+    angle: f64,
 }
 
 impl Mass {
@@ -63,6 +65,7 @@ impl Mass {
     pub fn plus(mut self, o: &Mass) -> Mass {
         self.volume += o.volume;
         self.area += o.area;
+        self.angle += o.angle;
         self.first = add(self.first, o.first);
         for i in 0..3 {
             self.second[i] = add(self.second[i], o.second[i]);
@@ -124,6 +127,9 @@ pub(super) struct Order {
 
 /// Enough for 1e-10: a rule of ten nodes has half as many digits again as one of seven, with which it agrees to eight.
 pub(super) const USUAL: Order = Order { nodes: 10, check: 7, differ: 2e-9 };
+
+/// How far the solid angle of a face may be from what its seams go round: what it is integrated to, times a few pieces.
+const FILLED: f64 = 1e-9;
 
 /// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be cut into
 /// triangles.
@@ -263,21 +269,38 @@ impl Work<'_> {
             return Some(());
         }
         let number = self.complex.faces.iter().position(|f| core::ptr::eq(f, face))? as u32;
-        let tiles = [0.8, 0.4, 0.2, 0.1, 0.05].iter().find_map(|&turn| {
-            let seams = Seams::new(self.complex, turn);
-            let mut tiles = Tiles::new(&seams);
-            tiles.triangles = seams.triangles(face, apex)?.into_iter().map(|t| (t, number)).collect();
-            // An arc of a circle of 50 degrees is a ninth of its chord high.
-            // An arc of a circle of 50 degrees is a ninth of its chord high.
-            tiles.refine(self.complex, &|away, length| away > length / 9.0)?;
-            Some(tiles)
-        })?;
-        for &(t, _) in &tiles.triangles {
-            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                let side = tiles.curve(self.complex, face, a, b);
-                sector::<ALL>(&face.quadric, t.map(|i| tiles.points[i as usize]), &side, self.order.nodes, out);
+        // Seen from the centre the face is as large as its seams go round: ∮ det(o, x, dx)/(1 + cos β) on the sphere.
+        let o = unit(apex);
+        let mut round = 0.0;
+        for &(arc, forward) in face.loops.iter().flatten() {
+            let conic = &self.complex.arcs[arc as usize].conic;
+            let parts = 8;
+            for p in 0..parts {
+                for &(t, w) in gauss(16) {
+                    let step = conic.end / f64::from(parts);
+                    let (x, dx) = conic.with_slope((f64::from(p) + t) * step);
+                    let e = unit(x);
+                    let sign = if forward { 1.0 } else { -1.0 };
+                    round += sign * w * step * dot(o, cross(e, dx)) / (norm(x) * (1.0 + dot(o, e)));
+                }
             }
         }
+        let made = [0.8, 0.4, 0.2, 0.1, 0.05].iter().find_map(|&turn| {
+            let seams = Seams::new(self.complex, turn);
+            let mut tiles = Tiles::new(&seams);
+            tiles.put(seams.triangles(face, apex)?, apex, number);
+            // An arc of a circle of 50 degrees is a ninth of its chord high.
+            tiles.refine(self.complex, &|away, length| away > length / 9.0)?;
+            let mut made = Mass::default();
+            for &(t, _) in &tiles.triangles {
+                for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                    let side = tiles.curve(self.complex, face, a, b);
+                    sector::<ALL>(&face.quadric, t.map(|i| tiles.points[i as usize]), &side, self.order.nodes, &mut made);
+                }
+            }
+            ((made.angle - round).abs() < FILLED).then_some(made)
+        })?;
+        *out = out.plus(&made);
         Some(())
     }
 }
@@ -307,6 +330,7 @@ fn sector<const ALL: bool>(q: &Quadric, [a, b, c]: [Vec3; 3], side: &Curve, n: u
             // Half the slope along `up` is the root itself.
             let steep = turn * v * s / root.copysign(one);
             let flux = dot(place, slope) * steep;
+            out.angle += flux / dot(place, place).powf(1.5);
             if ALL {
                 out.surface(place, flux, norm(slope) * steep.abs() * turn.signum());
             } else {

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::fault::{Fault, number};
-use crate::math::{Vec3, add, cross, dot, scale, sub, unit};
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
 use super::Quadors;
@@ -174,8 +174,8 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
                 }
             }
             None => {
-                let triangles = seams.triangles(face, middle(complex, face))?;
-                tiles.triangles.extend(triangles.into_iter().map(|t| (t, number)));
+                let middle = middle(complex, face);
+                tiles.put(seams.triangles(face, middle)?, middle, number);
             }
         }
     }
@@ -184,9 +184,17 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
         let q = &complex.faces[face as usize].quadric;
         let [a, b, c] = t.map(|v| tiles.points[v as usize]);
         let up = unit([a, b, c].iter().fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))));
+        // A triangle that lies on its back was cut across a fold: the seams are drawn finer and it is tried again.
+        let flat = cross(sub(b, a), sub(c, a));
+        if dot(flat, up) < -0.2 * norm(flat) && norm(flat) > chord * chord {
+            return None;
+        }
         for x in [scale(add(a, add(b, c)), 1.0 / 3.0), scale(add(a, b), 0.5), scale(add(b, c), 0.5), scale(add(c, a), 0.5)] {
             error = error.max(q.along(x, up).abs());
         }
+    }
+    if !(error < 3.0 * chord) {
+        return None;
     }
     let triangles = tiles.triangles.into_iter().map(|(t, _)| t).collect();
     Some(Part { points: tiles.points, rims: shift, triangles, error })
