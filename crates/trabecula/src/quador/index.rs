@@ -134,19 +134,34 @@ impl Index {
             return;
         }
         let size = [0, 1, 2].map(|a| self.cells[a] as f64 / self.per[a]);
-        let all = Aabb { min: self.origin, max: [0, 1, 2].map(|a| self.origin[a] + size[a]) };
-        let Some((from, _)) = super::query::crossed(&all, origin, way) else { return };
+        let all = Aabb {
+            min: self.origin,
+            max: [0, 1, 2].map(|a| self.origin[a] + size[a]),
+        };
+        let Some((from, _)) = super::query::crossed(&all, origin, way) else {
+            return;
+        };
         let start = [0, 1, 2].map(|a| origin[a] + way[a] * from.max(0.0));
         let mut at = [0, 1, 2].map(|a| self.step(a, start[a]));
         loop {
             // Where the ray leaves the cell along each axis.
             let leave = [0, 1, 2].map(|a| {
                 let wall = at[a] + usize::from(way[a] > 0.0);
-                if way[a] == 0.0 { f64::INFINITY } else { (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / way[a] }
+                if way[a] == 0.0 {
+                    f64::INFINITY
+                } else {
+                    (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / way[a]
+                }
             });
-            let a = (0..3).min_by(|&a, &b| leave[a].total_cmp(&leave[b])).unwrap_or(0);
+            let a = (0..3)
+                .min_by(|&a, &b| leave[a].total_cmp(&leave[b]))
+                .unwrap_or(0);
             let c = self.cell(at);
-            if !f(&self.items[self.starts[c] as usize..self.starts[c + 1] as usize], leave[a]) || leave[a].is_infinite() {
+            if !f(
+                &self.items[self.starts[c] as usize..self.starts[c + 1] as usize],
+                leave[a],
+            ) || leave[a].is_infinite()
+            {
                 return;
             }
             match way[a] > 0.0 {

@@ -7,6 +7,7 @@
 //! the whole comes out to 1e-10.
 
 use core::f64::consts::{FRAC_PI_4, PI};
+use std::cell::Cell;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
@@ -16,9 +17,9 @@ use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
 use super::complex::{Complex, Face};
+use super::hub::Hub;
 use super::quadric::{Conic, Quadric};
 use super::tiling::{Curve, Seams, Tiles, middle};
-use super::hub::Hub;
 
 /// Integrals over a solid of density one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,7 +47,15 @@ impl Mass {
         let c = self.centroid();
         let about = |i: usize, j: usize| self.second[i][j] - self.volume * c[i] * c[j];
         let trace: f64 = (0..3).map(|i| about(i, i)).sum();
-        [0, 1, 2].map(|i| [0, 1, 2].map(|j| if i == j { trace - about(i, i) } else { -about(i, j) }))
+        [0, 1, 2].map(|i| {
+            [0, 1, 2].map(|j| {
+                if i == j {
+                    trace - about(i, i)
+                } else {
+                    -about(i, j)
+                }
+            })
+        })
     }
 
     /// The same solid moved by `by`.
@@ -55,7 +64,8 @@ impl Mass {
         for i in 0..3 {
             out.first[i] += self.volume * by[i];
             for j in 0..3 {
-                out.second[i][j] += self.first[i] * by[j] + by[i] * self.first[j] + self.volume * by[i] * by[j];
+                out.second[i][j] +=
+                    self.first[i] * by[j] + by[i] * self.first[j] + self.volume * by[i] * by[j];
             }
         }
         out
@@ -126,56 +136,103 @@ pub(super) struct Order {
 }
 
 /// Enough for 1e-10: a rule of ten nodes has half as many digits again as one of seven, with which it agrees to eight.
-pub(super) const USUAL: Order = Order { nodes: 10, check: 7, differ: 2e-9 };
+pub(super) const USUAL: Order = Order {
+    nodes: 10,
+    check: 7,
+    differ: 2e-9,
+};
 
 /// How far the solid angle of a face may be from what its seams go round: what it is integrated to, times a few pieces.
 const FILLED: f64 = 1e-9;
 
 /// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be cut into
 /// triangles.
-pub(super) fn hub_mass<const ALL: bool>(hub: &Hub, complex: &Complex, order: Order) -> Option<Mass> {
+pub(super) fn hub_mass<const ALL: bool>(
+    hub: &Hub,
+    complex: &Complex,
+    order: Order,
+) -> Option<Mass> {
+    filled::<ALL>(hub, complex, order).map(|f| f.0)
+}
+
+/// As `hub_mass`, and how coarsely (radians of turn) seams may be drawn for every face to be filled.
+pub(super) fn filled<const ALL: bool>(
+    hub: &Hub,
+    complex: &Complex,
+    order: Order,
+) -> Option<(Mass, f64)> {
     let mut out = Mass::default();
     // A guess of the whole, for what is small beside it.
-    let mut size = Mass { volume: hub.radius.powi(3), area: hub.radius.powi(2), ..Mass::default() };
+    let mut size = Mass {
+        volume: hub.radius.powi(3),
+        area: hub.radius.powi(2),
+        ..Mass::default()
+    };
     for s in &hub.stubs[..] {
         size.volume += PI * s.squared(s.split) * s.split;
         size.area += PI * s.squared(s.split).sqrt() * s.split;
         size.second[0][0] += s.squared(s.split) * s.split.powi(3);
     }
     size.second[0][0] += hub.radius.powi(5);
-    let work = Work { hub, complex, order, size };
+    let work = Work {
+        hub,
+        complex,
+        order,
+        size,
+        turn: Cell::new(TURNS[0]),
+    };
     for face in &complex.faces {
         match face.rim {
             Some(stub) => work.stub::<ALL>(face, stub as usize, &mut out),
             None => work.patch::<ALL>(face, &mut out)?,
         }
     }
-    Some(out)
+    Some((out, work.turn.get()))
 }
+
+/// How far seams turn between points of their drawings, radians, coarsest first.
+const TURNS: [f64; 5] = [0.8, 0.4, 0.2, 0.1, 0.05];
 
 struct Work<'a> {
     hub: &'a Hub<'a>,
     complex: &'a Complex,
     order: Order,
     size: Mass,
+    /// The finest turn that a face needed.
+    turn: Cell<f64>,
 }
 
 impl Work<'_> {
     /// Adds what `part` gives, for a number of nodes and ranges along a seam and across the face, halving ranges until two
     /// rules agree.
-    fn halve<const ALL: bool>(&self, part: &impl Fn(usize, [f64; 2], [f64; 2]) -> Mass, along: [f64; 2], across: [f64; 2], depth: u32, out: &mut Mass) {
-        let (rough, fine) = (part(self.order.check, along, across), part(self.order.nodes, along, across));
+    fn halve<const ALL: bool>(
+        &self,
+        part: &impl Fn(usize, [f64; 2], [f64; 2]) -> Mass,
+        along: [f64; 2],
+        across: [f64; 2],
+        depth: u32,
+        out: &mut Mass,
+    ) {
+        let (rough, fine) = (
+            part(self.order.check, along, across),
+            part(self.order.nodes, along, across),
+        );
         let near = |a: f64, b: f64, size: f64| (a - b).abs() <= self.order.differ * size;
         let trace = |m: &Mass| m.second[0][0] + m.second[1][1] + m.second[2][2];
         let agree = near(rough.volume, fine.volume, self.size.volume)
-            && (!ALL || near(rough.area, fine.area, self.size.area) && near(trace(&rough), trace(&fine), self.size.second[0][0]));
+            && (!ALL
+                || near(rough.area, fine.area, self.size.area)
+                    && near(trace(&rough), trace(&fine), self.size.second[0][0]));
         if agree || depth == 0 {
             *out = out.plus(&fine);
             return;
         }
         // The side that says more about the difference.
         let (t, u) = ((along[0] + along[1]) / 2.0, (across[0] + across[1]) / 2.0);
-        let halves = [part(self.order.check, [along[0], t], across), part(self.order.check, [t, along[1]], across)];
+        let halves = [
+            part(self.order.check, [along[0], t], across),
+            part(self.order.check, [t, along[1]], across),
+        ];
         let gained = (halves[0].volume + halves[1].volume - rough.volume).abs();
         if gained > 0.5 * (fine.volume - rough.volume).abs() || depth % 4 == 0 {
             self.halve::<ALL>(part, [along[0], t], across, depth - 1, out);
@@ -187,15 +244,29 @@ impl Work<'_> {
     }
 
     /// Calls `part` for each seam of a face, as it is walked.
-    fn seams<const ALL: bool>(&self, face: &Face, part: &impl Fn(&Conic, f64, usize, [f64; 2], [f64; 2]) -> Mass, out: &mut Mass) {
+    fn seams<const ALL: bool>(
+        &self,
+        face: &Face,
+        part: &impl Fn(&Conic, f64, usize, [f64; 2], [f64; 2]) -> Mass,
+        out: &mut Mass,
+    ) {
         for &(arc, forward) in face.loops.iter().flatten() {
             let conic = &self.complex.arcs[arc as usize].conic;
             let turn = if forward { 1.0 } else { -1.0 };
             // At most a quarter of a circle at a time.
             let parts = (conic.end / FRAC_PI_4).ceil().max(1.0);
             for p in 0..parts as usize {
-                let along = [conic.end / parts * p as f64, conic.end / parts * (p + 1) as f64];
-                self.halve::<ALL>(&|n, a, b| part(conic, turn, n, a, b), along, [0.0, 1.0], 16, out);
+                let along = [
+                    conic.end / parts * p as f64,
+                    conic.end / parts * (p + 1) as f64,
+                ];
+                self.halve::<ALL>(
+                    &|n, a, b| part(conic, turn, n, a, b),
+                    along,
+                    [0.0, 1.0],
+                    16,
+                    out,
+                );
             }
         }
     }
@@ -205,30 +276,42 @@ impl Work<'_> {
         let [a, b, c] = s.section;
         let primitive = |z: f64| (b / 4.0 * z + c) * z;
         let top = primitive(s.split);
-        self.seams::<ALL>(face, &|conic, sign, n, along, across| {
-            let mut out = Mass::default();
-            for &(t, w) in gauss(n) {
-                let (x, dx) = conic.with_slope(along[0] + t * (along[1] - along[0]));
-                let z = dot(x, s.axis);
-                let side = sub(x, scale(s.axis, z));
-                let turn = sign * w * (along[1] - along[0]) * dot(s.axis, cross(side, dx)) / dot(side, side);
-                if !ALL {
-                    out.volume += turn * (top - primitive(z)) / 3.0;
-                    continue;
-                }
-                let side = unit(side);
-                let (from, height) = (z + across[0] * (s.split - z), (across[1] - across[0]) * (s.split - z));
+        self.seams::<ALL>(
+            face,
+            &|conic, sign, n, along, across| {
+                let mut out = Mass::default();
                 for &(t, w) in gauss(n) {
-                    let at = from + t * height;
-                    let rho = s.squared(at).max(0.0).sqrt();
-                    let half = a * at + b / 2.0;
-                    let weight = w * height * turn;
-                    let place = add(scale(s.axis, at), scale(side, rho));
-                    out.surface(place, weight * (b / 2.0 * at + c), weight * (rho * rho + half * half).sqrt());
+                    let (x, dx) = conic.with_slope(along[0] + t * (along[1] - along[0]));
+                    let z = dot(x, s.axis);
+                    let side = sub(x, scale(s.axis, z));
+                    let turn = sign * w * (along[1] - along[0]) * dot(s.axis, cross(side, dx))
+                        / dot(side, side);
+                    if !ALL {
+                        out.volume += turn * (top - primitive(z)) / 3.0;
+                        continue;
+                    }
+                    let side = unit(side);
+                    let (from, height) = (
+                        z + across[0] * (s.split - z),
+                        (across[1] - across[0]) * (s.split - z),
+                    );
+                    for &(t, w) in gauss(n) {
+                        let at = from + t * height;
+                        let rho = s.squared(at).max(0.0).sqrt();
+                        let half = a * at + b / 2.0;
+                        let weight = w * height * turn;
+                        let place = add(scale(s.axis, at), scale(side, rho));
+                        out.surface(
+                            place,
+                            weight * (b / 2.0 * at + c),
+                            weight * (rho * rho + half * half).sqrt(),
+                        );
+                    }
                 }
-            }
-            out
-        }, out);
+                out
+            },
+            out,
+        );
         // The disc in the split plane: no surface of the lattice, but of the hub's part.
         let (z, disc) = (s.split, PI * s.squared(s.split));
         out.volume += z * disc / 3.0;
@@ -238,7 +321,8 @@ impl Work<'_> {
                 for j in 0..3 {
                     let square = s.axis[i] * s.axis[j];
                     let same = f64::from(i == j);
-                    out.second[i][j] += z / 5.0 * (z * z * square * disc + (same - square) * disc * s.squared(z) / 4.0);
+                    out.second[i][j] += z / 5.0
+                        * (z * z * square * disc + (same - square) * disc * s.squared(z) / 4.0);
                 }
             }
         }
@@ -268,7 +352,11 @@ impl Work<'_> {
             self.seams::<ALL>(face, &ball, out);
             return Some(());
         }
-        let number = self.complex.faces.iter().position(|f| core::ptr::eq(f, face))? as u32;
+        let number = self
+            .complex
+            .faces
+            .iter()
+            .position(|f| core::ptr::eq(f, face))? as u32;
         // Seen from the centre the face is as large as its seams go round: ∮ det(o, x, dx)/(1 + cos β) on the sphere.
         let o = unit(apex);
         let mut round = 0.0;
@@ -285,7 +373,7 @@ impl Work<'_> {
                 }
             }
         }
-        let made = [0.8, 0.4, 0.2, 0.1, 0.05].iter().find_map(|&turn| {
+        let (made, turn) = TURNS.iter().find_map(|&turn| {
             let seams = Seams::new(self.complex, turn);
             let mut tiles = Tiles::new(&seams);
             tiles.put(seams.triangles(face, apex)?, apex, number);
@@ -295,11 +383,18 @@ impl Work<'_> {
             for &(t, _) in &tiles.triangles {
                 for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                     let side = tiles.curve(self.complex, face, a, b);
-                    sector::<ALL>(&face.quadric, t.map(|i| tiles.points[i as usize]), &side, self.order.nodes, &mut made);
+                    sector::<ALL>(
+                        &face.quadric,
+                        t.map(|i| tiles.points[i as usize]),
+                        &side,
+                        self.order.nodes,
+                        &mut made,
+                    );
                 }
             }
-            ((made.angle - round).abs() < FILLED).then_some(made)
+            ((made.angle - round).abs() < FILLED).then_some((made, turn))
         })?;
+        self.turn.set(self.turn.get().min(turn));
         *out = out.plus(&made);
         Some(())
     }
@@ -307,9 +402,19 @@ impl Work<'_> {
 
 /// The share of the surface over a triangle that lies before one of its sides, seen from the triangle's middle: the surface is
 /// a height over a plane, and the side a curve on it.
-fn sector<const ALL: bool>(q: &Quadric, [a, b, c]: [Vec3; 3], side: &Curve, n: usize, out: &mut Mass) {
+fn sector<const ALL: bool>(
+    q: &Quadric,
+    [a, b, c]: [Vec3; 3],
+    side: &Curve,
+    n: usize,
+    out: &mut Mass,
+) {
     // The mean normal of the surface: a thin triangle's own may be any across its length.
-    let up = unit([a, b, c].iter().fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))));
+    let up = unit(
+        [a, b, c]
+            .iter()
+            .fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))),
+    );
     let middle = scale(add(a, add(b, c)), 1.0 / 3.0);
     let middle = sub(middle, scale(up, dot(sub(middle, a), up)));
     let two = q.form(up, up);
@@ -320,9 +425,16 @@ fn sector<const ALL: bool>(q: &Quadric, [a, b, c]: [Vec3; 3], side: &Curve, n: u
         let turn = w * dot(up, cross(way, dx));
         // Along the way the height solves two h² + 2 one h + none = 0, whose terms are polynomials.
         let ones = [dot(q.half_slope(middle), up), q.form(way, up)];
-        let nones = [q.at(middle), 2.0 * dot(q.half_slope(middle), way), q.form(way, way)];
+        let nones = [
+            q.at(middle),
+            2.0 * dot(q.half_slope(middle), way),
+            q.form(way, way),
+        ];
         for &(s, v) in gauss(n) {
-            let (one, none) = (ones[0] + s * ones[1], nones[0] + s * (nones[1] + s * nones[2]));
+            let (one, none) = (
+                ones[0] + s * ones[1],
+                nones[0] + s * (nones[1] + s * nones[2]),
+            );
             let root = (one * one - two * none).max(0.0).sqrt();
             let h = -none / (one + root.copysign(one));
             let place = add(add(middle, scale(way, s)), scale(up, h));
@@ -342,7 +454,13 @@ fn sector<const ALL: bool>(q: &Quadric, [a, b, c]: [Vec3; 3], side: &Curve, n: u
 
 /// The share of the part of a quadric that a fan of segments from `apex` to a curve (place and derivative over [0, 1]) fills, as
 /// far across as told.
-fn fan<const ALL: bool>(q: &Quadric, apex: Vec3, curve: &dyn Fn(f64) -> (Vec3, Vec3), n: usize, across: [f64; 2]) -> Mass {
+fn fan<const ALL: bool>(
+    q: &Quadric,
+    apex: Vec3,
+    curve: &dyn Fn(f64) -> (Vec3, Vec3),
+    n: usize,
+    across: [f64; 2],
+) -> Mass {
     let mut out = Mass::default();
     let (o, far) = (unit(apex), norm(apex));
     let (bo, oo) = (dot(q.b, apex), q.form(apex, apex));
@@ -376,7 +494,10 @@ fn fan<const ALL: bool>(q: &Quadric, apex: Vec3, curve: &dyn Fn(f64) -> (Vec3, V
             let turn = turn / (far * length * length * sin * sin);
             for &(t, w) in gauss(n) {
                 let t = across[0] + t * (across[1] - across[0]);
-                let p = add(scale(o, ((1.0 - t) * beta).sin() / sin), scale(e, (t * beta).sin() / sin));
+                let p = add(
+                    scale(o, ((1.0 - t) * beta).sin() / sin),
+                    scale(e, (t * beta).sin() / sin),
+                );
                 let exit = q.exit(p);
                 let place = scale(p, exit);
                 let h = q.half_slope(place);
@@ -390,7 +511,10 @@ fn fan<const ALL: bool>(q: &Quadric, apex: Vec3, curve: &dyn Fn(f64) -> (Vec3, V
 
 /// A hub one of whose faces could not be cut up.
 pub(super) fn tangled(hub: usize) -> Fault {
-    Fault::new(format!("hubs[{hub}]"), "a face of it is so thin that its seams cannot be told apart: move its beams apart, or use the field")
+    Fault::new(
+        format!("hubs[{hub}]"),
+        "a face of it is so thin that its seams cannot be told apart: move its beams apart, or use the field",
+    )
 }
 
 impl Quadors {
@@ -410,7 +534,9 @@ impl Quadors {
     /// # Errors
     /// As for `mass`.
     pub fn volume(&self) -> Result<f64, Fault> {
-        let all = self.sum(|i| hub_mass::<false>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i)))?;
+        let all = self.sum(|i| {
+            hub_mass::<false>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
+        })?;
         Ok(all.volume)
     }
 

@@ -16,7 +16,7 @@ use crate::mesh::Mesh;
 use super::Quadors;
 use super::complex::Complex;
 use super::hub::Hub;
-use super::integral::tangled;
+use super::integral::{USUAL, filled, tangled};
 use super::tiling::{Seams, Side, Tiles, middle};
 
 /// A hub in triangles.
@@ -31,7 +31,11 @@ struct Part {
 
 /// A direction across an axis, the same for an axis and its opposite.
 fn across(axis: Vec3) -> Vec3 {
-    let pole = if axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let pole = if axis[0].abs() < 0.6 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
+    };
     unit(sub(pole, scale(axis, dot(pole, axis))))
 }
 
@@ -50,7 +54,13 @@ impl Quadors {
     /// A chord error that is no length, beams that overlap too far, and more points than 32 bits can number.
     pub fn mesh(&self, chord: f64) -> Result<(Mesh, f64), Fault> {
         if !(chord > 0.0 && chord.is_finite()) {
-            return Err(Fault::new("chord", format!("{} mm is no chord error: give a finite number above zero", number(chord))));
+            return Err(Fault::new(
+                "chord",
+                format!(
+                    "{} mm is no chord error: give a finite number above zero",
+                    number(chord)
+                ),
+            ));
         }
         self.exact()?;
         // Hubs that are equal to a billionth, one of each.
@@ -61,7 +71,18 @@ impl Quadors {
                 let hub = self.hub(i);
                 let mut key = vec![(hub.radius * 1e9).round() as i64];
                 for s in hub.stubs {
-                    let numbers = [s.axis[0], s.axis[1], s.axis[2], s.g.b, s.contact, s.split, s.section[0], s.section[1], s.section[2], s.share];
+                    let numbers = [
+                        s.axis[0],
+                        s.axis[1],
+                        s.axis[2],
+                        s.g.b,
+                        s.contact,
+                        s.split,
+                        s.section[0],
+                        s.section[1],
+                        s.section[2],
+                        s.share,
+                    ];
                     key.extend(numbers.map(|v| (v * 1e9).round() as i64));
                     key.push(s.end as i64);
                 }
@@ -76,8 +97,16 @@ impl Quadors {
             .map(|&i| {
                 let hub = self.hub(i);
                 let complex = self.complex(i)?;
-                let rings: Vec<usize> = hub.stubs.iter().map(|s| self.ring(s.beam as usize, chord)).collect();
-                [0.6, 0.3, 0.15, 0.075]
+                let rings: Vec<usize> = hub
+                    .stubs
+                    .iter()
+                    .map(|s| self.ring(s.beam as usize, chord))
+                    .collect();
+                // As finely as quadrature needed to fill every face, or finer.
+                let turn = filled::<false>(&hub, &complex, USUAL)
+                    .ok_or_else(|| tangled(i))?
+                    .1;
+                [turn, turn / 2.0, turn / 4.0]
                     .iter()
                     .find_map(|&turn| part(&hub, &complex, &rings, chord, turn))
                     .ok_or_else(|| tangled(i))
@@ -90,7 +119,14 @@ impl Quadors {
             let ends = self.ends[i].map(|h| self.center(h as usize));
             let axis = scale(sub(ends[1], ends[0]), 1.0 / p.length);
             let center = add(ends[0], scale(axis, p.split()));
-            mesh.vertices.extend(circle(axis, self.ring(i, chord), p.squared(p.split()).max(0.0).sqrt()).map(|x| add(center, x)));
+            mesh.vertices.extend(
+                circle(
+                    axis,
+                    self.ring(i, chord),
+                    p.squared(p.split()).max(0.0).sqrt(),
+                )
+                .map(|x| add(center, x)),
+            );
         }
         let mut error = 0.0f64;
         for (i, &c) in class.iter().enumerate() {
@@ -106,9 +142,13 @@ impl Quadors {
                 mesh.vertices.push(add(center, *p));
             }
             if mesh.vertices.len() > u32::MAX as usize / 2 {
-                return Err(Fault::new("chord", "the mesh would have more than two billion points: allow a larger chord error"));
+                return Err(Fault::new(
+                    "chord",
+                    "the mesh would have more than two billion points: allow a larger chord error",
+                ));
             }
-            mesh.triangles.extend(part.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+            mesh.triangles
+                .extend(part.triangles.iter().map(|t| t.map(|v| names[v as usize])));
         }
         Ok((mesh, error))
     }
@@ -134,17 +174,32 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
     for (s, &n) in hub.stubs.iter().zip(rings) {
         let r = s.squared(s.split).max(0.0).sqrt();
         // The beam's own frame runs from its first end.
-        let axis = if s.end == 0 { s.axis } else { scale(s.axis, -1.0) };
+        let axis = if s.end == 0 {
+            s.axis
+        } else {
+            scale(s.axis, -1.0)
+        };
         let center = scale(s.axis, s.split);
         points.extend(circle(axis, n, r).map(|x| add(center, x)));
         error = error.max(r * (1.0 - (PI / n as f64).cos()));
     }
     points.extend(seams.points.iter());
-    seams.chains.iter_mut().flatten().for_each(|p| p.0 += shift as u32);
+    seams
+        .chains
+        .iter_mut()
+        .flatten()
+        .for_each(|p| p.0 += shift as u32);
     seams.points = points;
     let mut tiles = Tiles::new(&seams);
     let mut first = 0u32;
-    let firsts: Vec<u32> = rings.iter().map(|&n| { let f = first; first += n as u32; f }).collect();
+    let firsts: Vec<u32> = rings
+        .iter()
+        .map(|&n| {
+            let f = first;
+            first += n as u32;
+            f
+        })
+        .collect();
     for (number, face) in complex.faces.iter().enumerate() {
         let number = number as u32;
         match face.rim {
@@ -155,8 +210,15 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
                     let (a, b) = (ring[k], ring[(k + 1) % ring.len()]);
                     tiles.sides.insert([a.min(b), a.max(b)], Side::Rim);
                 }
-                let strip = strip(hub.stubs[stub].axis, &seams.points, &seams.walk(face.loops.first()?), &ring);
-                tiles.triangles.extend(strip.into_iter().map(|t| (t, number)));
+                let strip = strip(
+                    hub.stubs[stub].axis,
+                    &seams.points,
+                    &seams.walk(face.loops.first()?),
+                    &ring,
+                );
+                tiles
+                    .triangles
+                    .extend(strip.into_iter().map(|t| (t, number)));
             }
             None if face.loops.is_empty() => {
                 // A ball starts as an octahedron.
@@ -169,7 +231,11 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
                 for k in 0..8u32 {
                     let [x, y, z] = [k & 1, k >> 1 & 1, k >> 2].map(|s| 3 * s);
                     let t = [n + x, n + 1 + y, n + 2 + z];
-                    let t = if k.count_ones() % 2 == 0 { t } else { [t[0], t[2], t[1]] };
+                    let t = if k.count_ones() % 2 == 0 {
+                        t
+                    } else {
+                        [t[0], t[2], t[1]]
+                    };
                     tiles.triangles.push((t, number));
                 }
             }
@@ -183,13 +249,22 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
     for &(t, face) in &tiles.triangles {
         let q = &complex.faces[face as usize].quadric;
         let [a, b, c] = t.map(|v| tiles.points[v as usize]);
-        let up = unit([a, b, c].iter().fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))));
+        let up = unit(
+            [a, b, c]
+                .iter()
+                .fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))),
+        );
         // A triangle that lies on its back was cut across a fold: the seams are drawn finer and it is tried again.
         let flat = cross(sub(b, a), sub(c, a));
         if dot(flat, up) < -0.2 * norm(flat) && norm(flat) > chord * chord {
             return None;
         }
-        for x in [scale(add(a, add(b, c)), 1.0 / 3.0), scale(add(a, b), 0.5), scale(add(b, c), 0.5), scale(add(c, a), 0.5)] {
+        for x in [
+            scale(add(a, add(b, c)), 1.0 / 3.0),
+            scale(add(a, b), 0.5),
+            scale(add(b, c), 0.5),
+            scale(add(c, a), 0.5),
+        ] {
             error = error.max(q.along(x, up).abs());
         }
     }
@@ -197,7 +272,12 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
         return None;
     }
     let triangles = tiles.triangles.into_iter().map(|(t, _)| t).collect();
-    Some(Part { points: tiles.points, rims: shift, triangles, error })
+    Some(Part {
+        points: tiles.points,
+        rims: shift,
+        triangles,
+        error,
+    })
 }
 
 /// Triangles between a loop around an axis and the rim beyond it, by azimuth.

@@ -36,7 +36,9 @@ impl Seams {
                 while let Some(&to) = todo.last() {
                     let there = direction(to);
                     let mid = direction((from.0 + to) / 2.0);
-                    let plain = dot(from.1, mid) > least && dot(mid, there) > least && dot(from.1, there) > least;
+                    let plain = dot(from.1, mid) > least
+                        && dot(mid, there) > least
+                        && dot(from.1, there) > least;
                     if !plain && todo.len() < 12 {
                         todo.push((from.0 + to) / 2.0);
                         continue;
@@ -71,7 +73,13 @@ impl Seams {
     /// may where seams are drawn too coarsely. `MIDDLE` stands for the middle, where a fan from it stays nearer to the surface than
     /// any cut from seam to seam. Not for faces with a rim.
     pub fn triangles(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
-        let place = |i: u32| if i == MIDDLE { middle } else { self.points[i as usize] };
+        let place = |i: u32| {
+            if i == MIDDLE {
+                middle
+            } else {
+                self.points[i as usize]
+            }
+        };
         let worst = |triangles: &[[u32; 3]]| {
             let mut seam = std::collections::HashSet::new();
             for l in &face.loops {
@@ -80,53 +88,87 @@ impl Seams {
                     seam.insert(key(w[k], w[(k + 1) % w.len()]));
                 });
             }
-            let sides = triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]);
+            let sides = triangles
+                .iter()
+                .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]);
             let inner = sides.filter(|&(a, b)| !seam.contains(&key(a, b)));
-            inner.map(|(a, b)| closeness(face, place(a), place(b))).fold(1.0, f64::min)
+            inner
+                .map(|(a, b)| closeness(face, place(a), place(b)))
+                .fold(1.0, f64::min)
         };
         let cut = self.cut(face, middle);
-        if cut.as_ref().is_some_and(|c| face.label != 0 && worst(c) > 0.4) {
+        if cut
+            .as_ref()
+            .is_some_and(|c| face.label != 0 && worst(c) > 0.4)
+        {
             return cut;
         }
         let fan = self.fan(face, middle);
         match (cut, fan) {
-            (Some(c), Some(f)) => Some(if face.label == 0 || worst(&f) > worst(&c) { f } else { c }),
+            (Some(c), Some(f)) => Some(if face.label == 0 || worst(&f) > worst(&c) {
+                f
+            } else {
+                c
+            }),
             (c, f) => f.or(c),
         }
     }
 
     /// A fan from the middle, if the seams go round it without turning back.
     fn fan(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
-        let [walked] = &face.loops[..] else { return None };
+        let [walked] = &face.loops[..] else {
+            return None;
+        };
         let w = self.walk(walked);
         let place = |i: u32| self.points[i as usize];
         let all = (0..w.len()).map(|k| [MIDDLE, w[k], w[(k + 1) % w.len()]]);
-        let round = all.clone().all(|[_, a, b]| dot(middle, cross(place(a), place(b))) > 0.0);
+        let round = all
+            .clone()
+            .all(|[_, a, b]| dot(middle, cross(place(a), place(b))) > 0.0);
         (round && w.len() > 2).then(|| all.collect())
     }
 
     fn cut(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
         let m = unit(middle);
-        let side = unit(cross(m, if m[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
+        let side = unit(cross(
+            m,
+            if m[0].abs() < 0.6 {
+                [1.0, 0.0, 0.0]
+            } else {
+                [0.0, 1.0, 0.0]
+            },
+        ));
         let other = cross(m, side);
         let drawn = |i: u32| {
             let p = unit(self.points[i as usize]);
             let f = 1.0 / (1.0 + dot(p, m)).max(1e-12);
             [dot(p, side) * f, dot(p, other) * f]
         };
-        let mut loops: Vec<Vec<(u32, [f64; 2])>> =
-            face.loops.iter().map(|l| self.walk(l).into_iter().map(|i| (i, drawn(i))).collect()).collect();
+        let mut loops: Vec<Vec<(u32, [f64; 2])>> = face
+            .loops
+            .iter()
+            .map(|l| self.walk(l).into_iter().map(|i| (i, drawn(i))).collect())
+            .collect();
         loops.retain(|l| l.len() > 2);
         let mut outline = loops.pop()?;
         // A ring is opened along the shortest bridge.
         for inner in loops {
             let gap = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
             let pairs = (0..outline.len()).flat_map(|i| (0..inner.len()).map(move |j| (i, j)));
-            let (i, j) = pairs.min_by(|&(a, b), &(c, d)| gap(&outline[a].1, &inner[b].1).total_cmp(&gap(&outline[c].1, &inner[d].1)))?;
-            let bridge: Vec<_> = inner[j..].iter().chain(&inner[..=j]).chain(&outline[i..=i]).copied().collect();
+            let (i, j) = pairs.min_by(|&(a, b), &(c, d)| {
+                gap(&outline[a].1, &inner[b].1).total_cmp(&gap(&outline[c].1, &inner[d].1))
+            })?;
+            let bridge: Vec<_> = inner[j..]
+                .iter()
+                .chain(&inner[..=j])
+                .chain(&outline[i..=i])
+                .copied()
+                .collect();
             outline.splice(i + 1..i + 1, bridge);
         }
-        ears(outline, &|a, c| closeness(face, self.points[a as usize], self.points[c as usize]))
+        ears(outline, &|a, c| {
+            closeness(face, self.points[a as usize], self.points[c as usize])
+        })
     }
 }
 
@@ -134,8 +176,13 @@ impl Seams {
 pub const MIDDLE: u32 = u32::MAX;
 
 /// Cuts a polygon into triangles, the best shaped ear first.
-fn ears(mut outline: Vec<(u32, [f64; 2])>, fit: &impl Fn(u32, u32) -> f64) -> Option<Vec<[u32; 3]>> {
-    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+fn ears(
+    mut outline: Vec<(u32, [f64; 2])>,
+    fit: &impl Fn(u32, u32) -> f64,
+) -> Option<Vec<[u32; 3]>> {
+    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     let mut out = Vec::with_capacity(outline.len());
     while outline.len() > 3 {
         let n = outline.len();
@@ -153,15 +200,23 @@ fn ears(mut outline: Vec<(u32, [f64; 2])>, fit: &impl Fn(u32, u32) -> f64) -> Op
                 continue;
             }
             let free = outline.iter().all(|p| {
-                p.0 == a.0 || p.0 == b.0 || p.0 == c.0
-                    || turn(a.1, b.1, p.1) < 0.0 || turn(b.1, c.1, p.1) < 0.0 || turn(c.1, a.1, p.1) < 0.0
+                p.0 == a.0
+                    || p.0 == b.0
+                    || p.0 == c.0
+                    || turn(a.1, b.1, p.1) < 0.0
+                    || turn(b.1, c.1, p.1) < 0.0
+                    || turn(c.1, a.1, p.1) < 0.0
             });
             if free {
                 best = (shape, Some(i));
             }
         }
         let i = best.1?;
-        out.push([outline[(i + n - 1) % n].0, outline[i].0, outline[(i + 1) % n].0]);
+        out.push([
+            outline[(i + n - 1) % n].0,
+            outline[i].0,
+            outline[(i + 1) % n].0,
+        ]);
         outline.remove(i);
     }
     let [a, b, c] = [outline[0], outline[1], outline[2]];
@@ -185,7 +240,11 @@ pub fn middle(complex: &Complex, face: &Face) -> Vec3 {
         }
     }
     // Where seams go round more than half the sphere their middle is on the wrong side.
-    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 { arrow } else { sum };
+    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 {
+        arrow
+    } else {
+        sum
+    };
     let p = unit(p);
     let at = face.quadric.exit(p);
     scale(p, if at.is_finite() { at } else { 1.0 })
@@ -255,7 +314,11 @@ impl Tiles {
                 sides.insert(key(p.0, q.0), Side::Arc(i as u32, from, to));
             }
         }
-        Tiles { points: seams.points.clone(), triangles: Vec::new(), sides }
+        Tiles {
+            points: seams.points.clone(),
+            triangles: Vec::new(),
+            sides,
+        }
     }
 
     /// Adds the triangles of a face, and its middle if they use it.
@@ -265,7 +328,8 @@ impl Tiles {
             self.points.push(middle);
         }
         let named = |t: [u32; 3]| t.map(|i| if i == MIDDLE { number } else { i });
-        self.triangles.extend(triangles.into_iter().map(|t| (named(t), face)));
+        self.triangles
+            .extend(triangles.into_iter().map(|t| (named(t), face)));
     }
 
     /// What a side lies on.
@@ -285,10 +349,17 @@ impl Tiles {
             Side::Rim => (chord, 0.0),
             Side::Inner => {
                 let quadric = &complex.faces[face as usize].quadric;
-                let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+                let up = unit(add(
+                    unit(quadric.half_slope(p)),
+                    unit(quadric.half_slope(q)),
+                ));
                 let away = quadric.along(chord, up);
                 let x = add(chord, scale(up, away));
-                let away = if away.is_nan() { f64::INFINITY } else { away.abs() };
+                let away = if away.is_nan() {
+                    f64::INFINITY
+                } else {
+                    away.abs()
+                };
                 (x, away)
             }
         }
@@ -303,7 +374,10 @@ impl Tiles {
         }
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let quadric = &face.quadric;
-        let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+        let up = unit(add(
+            unit(quadric.half_slope(p)),
+            unit(quadric.half_slope(q)),
+        ));
         Curve::Section(p, sub(q, p), up, *quadric)
     }
 
@@ -367,7 +441,9 @@ impl Tiles {
                     2 => {
                         put(p, b, q);
                         // The shorter diagonal of what is left.
-                        let d = |i: u32, j: u32| norm(sub(self.points[i as usize], self.points[j as usize]));
+                        let d = |i: u32, j: u32| {
+                            norm(sub(self.points[i as usize], self.points[j as usize]))
+                        };
                         if d(a, q) < d(p, c) {
                             put(a, p, q);
                             put(a, q, c);
@@ -393,7 +469,14 @@ impl Tiles {
 /// How well a chord between two places stays with a face's quadric: 0 if it loses it, 1 if it lies on it.
 fn closeness(face: &Face, p: Vec3, q: Vec3) -> f64 {
     let quadric = &face.quadric;
-    let up = unit(add(unit(quadric.half_slope(p)), unit(quadric.half_slope(q))));
+    let up = unit(add(
+        unit(quadric.half_slope(p)),
+        unit(quadric.half_slope(q)),
+    ));
     let away = quadric.along(scale(add(p, q), 0.5), up);
-    if away.is_nan() { 0.0 } else { 1.0 / (1.0 + 8.0 * away.abs() / norm(sub(p, q))) }
+    if away.is_nan() {
+        0.0
+    } else {
+        1.0 / (1.0 + 8.0 * away.abs() / norm(sub(p, q)))
+    }
 }
