@@ -78,3 +78,25 @@ def test_a_cell_meshed_once_comes_back_as_a_series(tmp_path):
     assert many[0] < 0.75 * few[0] and many[1] < few[1]
     # A layer of a fortieth of a cell on a surface of 2.35 cells² in a cell is a share of 0.06: half of it on each side.
     assert many[1] < 0.03
+
+
+def test_the_distortion_is_seen_and_had_by_the_point():
+    turn = lt.grade.formula("25*sin(pi*x/12)*cos(pi*y/12)")
+    solid = design(lt.map.phase(wavelength=3, rotate_z=turn)).build()
+    d = solid.report()["lattices"]["core"]["distortion"]
+    mesh = solid.mesh(per_cell=16)
+    found = solid.misfits(mesh.vertices)
+    # Points between nodes are not far beyond what the nodes have.
+    assert found["angle"].max() < 1.2 * max(a["max"] for a in d["angle"])
+    assert found["angle"].max() > 0.8 * max(a["max"] for a in d["angle"])
+    assert found["density"].min() > 0
+    plain = mesh.png((320, 240))
+    coloured = mesh.png((320, 240), color=found["angle"], label="angle off")
+    assert plain != coloured
+    with pytest.raises(ValueError, match="one for each vertex"):
+        mesh.png(color=found["angle"][1:])
+    with pytest.raises(ValueError, match="span"):
+        mesh.png(color=found["angle"], span=(2, 1))
+    still = design(lt.map.affine(wavelength=3)).build()
+    with pytest.raises(ValueError, match="solved for"):
+        still.misfits(mesh.vertices)

@@ -27,6 +27,7 @@ DESIGNS = ("toml", "json")
 MESH_OUT = ("stl", "3mf", "ply", "obj")
 MESH_IN = (*MESH_OUT, "off")
 VOXELS_OUT = ("npy", "vti")
+SHOWN = ("angle", "spacing", "density")
 
 
 class Parser(argparse.ArgumentParser):
@@ -260,6 +261,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--size", type=size, default=(1600, 1200), metavar="WxH", help="pixels (default: 1600x1200)")
     p.add_argument("--azimuth", type=angle, default=30.0, metavar="DEG", help="camera about +z (default: 30)")
     p.add_argument("--elevation", type=angle, default=25.0, metavar="DEG", help="camera above xy (default: 25)")
+    p.add_argument("--show", choices=SHOWN, help="colour by how far a solved map is from what was asked for")
     resolution(p)
     return top
 

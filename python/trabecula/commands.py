@@ -22,6 +22,8 @@ from .words import Progress, figure, say, span
 __all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "voxels"]
 
 DESIGNS = ("toml", "json")
+#: How far a solved map is from what was asked for: names on the scale of a picture.
+SHOWN = {"angle": "angle off, degrees", "spacing": "spacing off, ratio", "density": "cells for each one wanted"}
 
 
 class Refused(Exception):
@@ -324,7 +326,19 @@ def cells(args) -> None:
 def render(args) -> None:
     """``trabecula render``."""
     check_place(args.output)
-    surface(args).render(args.output, args.size, args.azimuth, args.elevation)
+    view = args.size, args.azimuth, args.elevation
+    if args.show is None:
+        surface(args).render(args.output, *view)
+    elif kind_of(args.file) not in DESIGNS:
+        raise Refused(f"{args.file} is a mesh; --show is for a design with a map that is solved for")
+    else:
+        solid = build(args.file)
+        made = meshed(solid, args)
+        try:
+            found = solid.misfits(made.vertices)
+        except ValueError as error:
+            raise Refused(f"{args.file}: {error}") from None
+        made.render(args.output, *view, found[args.show], SHOWN[args.show])
     say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels")
 
 
@@ -395,14 +409,18 @@ def resolved(args) -> dict:
 def surface(args):
     """The mesh of a design or a mesh file."""
     if kind_of(args.file) in DESIGNS:
-        solid = build(args.file)
-        with Progress("meshing", args.progress) as progress, warnings.catch_warnings():
-            # Measures count the pieces and a picture shows them; nothing is made that somebody would print.
-            warnings.filterwarnings("ignore", "the result is not in one piece", DesignWarning)
-            return solid.mesh(threads=args.threads, progress=progress, **resolved(args))
+        return meshed(build(args.file), args)
     if args.edge is not None or args.per_cell is not None:
         raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
     return Mesh.read(args.file)
+
+
+def meshed(solid: Solid, args) -> Mesh:
+    """The mesh of a solid, to be measured or seen."""
+    with Progress("meshing", args.progress) as progress, warnings.catch_warnings():
+        # Measures count the pieces and a picture shows them; nothing is made that somebody would print.
+        warnings.filterwarnings("ignore", "the result is not in one piece", DesignWarning)
+        return solid.mesh(threads=args.threads, progress=progress, **resolved(args))
 
 
 def region(path: str):

@@ -45,6 +45,7 @@ def phase(
     direction: Sequence[float | dict] | None = None,
     frame: dict | None = None,
     stress: Sequence[float | dict] | dict | None = None,
+    weight: dict | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: str | None = None,
@@ -54,7 +55,8 @@ def phase(
 
     Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
     ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
-    components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``step`` is the spacing in mm
+    components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``weight`` says how much it
+    matters where: what no map can follow is left to where it is small. ``step`` is the spacing in mm
     of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
     """
     given = settings(
@@ -66,6 +68,7 @@ def phase(
         direction=direction,
         frame=frame,
         stress=stress,
+        weight=weight,
         offset=offset,
         step=step,
         domain=domain,

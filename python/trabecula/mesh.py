@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["READS", "WRITES", "Mesh"]
 
@@ -336,13 +336,41 @@ class Mesh(Picture):
         with whole_file(path) as temporary:
             self._core.write(temporary, kind, title)
 
-    def png(self, size: tuple[int, int] = (1600, 1200), azimuth: float = 30, elevation: float = 25) -> bytes:
-        """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees."""
+    def png(
+        self,
+        size: tuple[int, int] = (1600, 1200),
+        azimuth: float = 30,
+        elevation: float = 25,
+        color: ArrayLike | None = None,
+        label: str = "",
+        span: tuple[float, float] | None = None,
+    ) -> bytes:
+        """A picture as the bytes of a PNG file; the camera looks from ``azimuth`` about +z and ``elevation``, degrees.
+
+        ``color`` is a number for each vertex, shown on a scale that says ``label`` and goes over ``span``, or from the least
+        to the greatest.
+        """
         width, height = (whole("size", v, 1, 16384) for v in size)
         angles = number("azimuth", azimuth), number("elevation", elevation)
         if not all(map(math.isfinite, angles)):
             raise ValueError(f"azimuth and elevation are {angles}; they must be finite, degrees")
-        return self._core.png(width, height, *angles)
+        return self._core.png(width, height, *angles, self._tint(color, label, span))
+
+    def _tint(self, color: ArrayLike | None, label: str, span: tuple[float, float] | None) -> tuple | None:
+        if color is None:
+            return None
+        import numpy as np
+
+        values = np.asarray(color, dtype=np.float64)
+        if values.shape != (self.counts[0],):
+            raise ValueError(f"color must be {self.counts[0]} numbers, one for each vertex, found shape {values.shape}")
+        if span is None:
+            finite = values[np.isfinite(values)]
+            span = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
+        low, high = (number("span", v) for v in span)
+        if not -math.inf < low <= high < math.inf:
+            raise ValueError(f"span is {span}; it must be two finite numbers, the lower first")
+        return label, values.tolist(), (low, high if high > low else low + 1.0)
 
     def render(
         self,
@@ -350,11 +378,14 @@ class Mesh(Picture):
         size: tuple[int, int] = (1600, 1200),
         azimuth: float = 30,
         elevation: float = 25,
+        color: ArrayLike | None = None,
+        label: str = "",
+        span: tuple[float, float] | None = None,
     ) -> None:
-        """Writes a picture to a .png file."""
+        """Writes a picture to a .png file; see ``png``."""
         extension(path, ("png",))
         with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png(size, azimuth, elevation))
+            out.write(self.png(size, azimuth, elevation, color, label, span))
 
     def _picture(self) -> Mesh:
         return self

@@ -92,6 +92,25 @@ class Solid(Picture):
         flat = np.ascontiguousarray(given.reshape(-1, 3))
         return self._core.field(flat).reshape(given.shape[:-1])
 
+    def misfits(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
+        """How far a map that was solved for is from what was asked for, at points (n, 3) in mm.
+
+        ``angle``: between a grating and the wanted one, the worst of three, degrees; ``spacing``: the ratio of their spacings
+        or its inverse, the worst of three; ``density``: cells for each cell wanted, det J over the one wanted. ``lattice``
+        names the lattice; by default the first one with such a map.
+        """
+        import numpy as np
+
+        if lattice is None:
+            solved = (name for name, it in self.report()["lattices"].items() if "distortion" in it)
+            lattice = next(solved, None)
+            if lattice is None:
+                raise ValueError("no lattice has a map that was solved for; only map.phase can be off what was asked for")
+        given = np.asarray(points, dtype=np.float64)
+        if given.ndim != 2 or given.shape[-1] != 3:
+            raise ValueError(f"points must have shape (n, 3), found {given.shape}")
+        return self._core.misfits(lattice, np.ascontiguousarray(given))
+
     def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
         """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell`` (32)."""
         if edge is not None and per_cell is not None:

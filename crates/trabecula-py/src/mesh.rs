@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use trabecula::extract::Surface;
 use trabecula::math::{cross, norm, sub};
-use trabecula::render::{View, png, render};
+use trabecula::render::{Tint, View, png, render};
 use trabecula::simplify::{Goal, simplify};
 use trabecula::{io, measure};
 
@@ -279,7 +279,8 @@ impl Mesh {
         Ok(written?)
     }
 
-    /// A picture as PNG bytes.
+    /// A picture as PNG bytes; with a number at each vertex to be seen as a colour, between the two ends of a scale.
+    #[pyo3(signature = (width, height, azimuth, elevation, tint=None))]
     fn png<'py>(
         &self,
         py: Python<'py>,
@@ -287,15 +288,21 @@ impl Mesh {
         height: usize,
         azimuth: f64,
         elevation: f64,
+        tint: Option<(String, Vec<f64>, [f64; 2])>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let size = [width, height];
+        let tint = tint.map(|(title, values, span)| Tint {
+            title,
+            values,
+            span,
+        });
         let bytes = run(py, None, None, |_| {
             let view = View {
                 size,
                 azimuth,
                 elevation,
             };
-            png(&render(&self.surface, &view), size)
+            png(&render(&self.surface, &view, tint.as_ref()), size)
         })?;
         Ok(PyBytes::new(py, &bytes))
     }

@@ -12,6 +12,7 @@ use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
 use trabecula::io;
+use trabecula::map::{Map, Misfit};
 use trabecula::region::Repaired;
 
 use crate::design::Folder;
@@ -158,6 +159,34 @@ impl Solid {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         values(py, &self.built.solid, self::points(&points)?)
+    }
+
+    /// How far the solved map of a lattice is from what was asked for, at points (n, 3): per point the worst angle
+    /// (degrees), the worst spacing ratio or its inverse, det J over the one asked for.
+    fn misfits<'py>(
+        &self,
+        py: Python<'py>,
+        lattice: &str,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let found = self.built.lattices.iter().find(|(name, _)| name == lattice);
+        let Some(Map::Phase(map)) = found.map(|(_, l)| &l.map) else {
+            let message = format!("lattice.{lattice} has no map that was solved for");
+            return Err(PyValueError::new_err(message));
+        };
+        let points = self::points(&points)?;
+        let found = run(py, None, None, |_| map.misfits(&points))?.map_err(error::fault)?;
+        let array = |of: &dyn Fn(&Misfit) -> f64| {
+            let values: Vec<f64> = found.iter().map(of).collect();
+            values.into_pyarray(py)
+        };
+        let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
+        let d = PyDict::new(py);
+        d.set_item("angle", array(&|m| worst(m.angle)))?;
+        let either = |m: &Misfit| worst(m.spacing.map(|s| s.max(1.0 / s)));
+        d.set_item("spacing", array(&either))?;
+        d.set_item("density", array(&|m| m.density))?;
+        Ok(d)
     }
 
     /// What a spacing will take: cells along each axis, triangles, bytes in memory, bytes of a binary STL.

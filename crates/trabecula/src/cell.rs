@@ -159,7 +159,9 @@ impl Cell {
 
     /// The intervals of solid fraction in which the periodic solid is one piece in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
-        let intervals = &self.connectivity(part).intervals;
+        // The table is asked for next: both at once.
+        let (found, _) = rayon::join(|| self.connectivity(part), || (self.range(), self.table()));
+        let intervals = &found.intervals;
         intervals
             .iter()
             .map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0)))

@@ -8,7 +8,7 @@ mod poisson;
 mod round;
 mod spline;
 
-pub use distortion::{Distortion, Spread};
+pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;

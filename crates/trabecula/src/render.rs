@@ -7,13 +7,17 @@ use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 mod chart;
 mod font;
+mod paper;
 mod png;
 mod raster;
 mod shade;
+mod tint;
 
 pub use chart::{Chart, charts};
+use paper::Paper;
 pub use png::png;
 use raster::Raster;
+pub use tint::Tint;
 
 /// How to draw.
 #[derive(Clone, Copy, Debug)]
@@ -116,9 +120,9 @@ impl Camera {
 /// Draws the surface; returns RGB rows from the top.
 ///
 /// Perspective with a narrow lens, fitted to the bounds, +Z up. The lattice is smooth and warm, cuts by the region's
-/// boundary are flat and cool. The picture is the same for any number of threads. A side of 0 pixels gives no
+/// boundary are flat and cool; with a tint, both have its colours. The picture is the same for any number of threads. A side of 0 pixels gives no
 /// rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
-pub fn render(surface: &Surface, view: &View) -> Vec<u8> {
+pub fn render(surface: &Surface, view: &View, tint: Option<&Tint>) -> Vec<u8> {
     let [w, h] = view.size;
     let pixels = w.saturating_mul(h);
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
@@ -135,11 +139,15 @@ pub fn render(surface: &Surface, view: &View) -> Vec<u8> {
     let picture = if drawn && angles {
         let camera = Camera::new(&bounds, &surface.mesh.vertices, view, size);
         let raster = Raster::draw(surface, &camera, size);
-        shade::shade(surface, &camera, &raster)
+        shade::shade(surface, &camera, &raster, tint)
     } else {
         vec![[0.0; 4]; size[0] * size[1]]
     };
-    resolve(&picture, [w, h], over)
+    let rgb = resolve(&picture, [w, h], over);
+    let Some(tint) = tint else { return rgb };
+    let mut paper = Paper { size: [w, h], rgb };
+    tint.legend(&mut paper);
+    paper.rgb
 }
 
 /// Averages the samples of each pixel over the background and encodes them as sRGB.

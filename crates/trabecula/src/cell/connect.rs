@@ -19,7 +19,7 @@ mod sublattice;
 
 pub(super) use critical::{Critical, Function, critical, eigen, sample};
 use forest::{Forest, Joined};
-use grid::{DIRECTIONS, Grid};
+use grid::{AROUND, DIRECTIONS, Grid, groups};
 use sublattice::{Int3, Sublattice};
 
 /// The steps along the axes.
@@ -163,18 +163,16 @@ impl Sweep<'_> {
         let mut nears = Vec::with_capacity(28);
         for &node in self.order {
             nears.clear();
-            for (k, d) in DIRECTIONS.iter().enumerate() {
-                let (ahead, wrap) = self.grid.step(node, *d);
-                let (behind, back) = self.grid.step(node, d.map(|c| -c));
-                nears.push((ahead, ahead, wrap));
-                nears.push((behind, behind, back));
-                if sheet {
-                    // An edge stands in the period of its first node.
-                    nears.push((self.grid.edge(node, k), ahead, [0; 3]));
-                    nears.push((self.grid.edge(behind, k), behind, back));
+            let near = AROUND.map(self.grid.steps(node));
+            if sheet {
+                // An edge stands in the period of its first node.
+                for (k, (behind, wrap)) in near[7..].iter().copied().enumerate() {
+                    nears.push((self.grid.edge(node, k), near[k].0, [0; 3]));
+                    nears.push((self.grid.edge(behind, k), behind, wrap));
                 }
+                nears.retain(|(element, _, _)| forest.has(*element));
             }
-            nears.retain(|(element, _, _)| forest.has(*element));
+            nears.extend(present(&forest, &near).map(|(i, wrap)| (i, i, wrap)));
             forest.insert(node);
             if nears.is_empty() {
                 let level = self.refine(node, &[], 0);
@@ -216,8 +214,9 @@ impl Sweep<'_> {
         let negative = |i: u32| self.grid.values[i as usize] < 0.0;
         let mut crossed = Vec::new();
         for node in 0..n {
+            let step = self.grid.steps(node);
             for (k, d) in DIRECTIONS.iter().enumerate() {
-                if negative(node) != negative(self.grid.step(node, *d).0) {
+                if negative(node) != negative(step(*d).0) {
                     forest.insert(self.grid.edge(node, k));
                     crossed.push(self.grid.edge(node, k));
                 }
@@ -225,9 +224,10 @@ impl Sweep<'_> {
         }
         for node in 0..n {
             // A triangle is node, node + d, node + d + e with d and e along different axes.
+            let step = self.grid.steps(node);
             for k in 0..7 {
                 for l in (0..7).filter(|l| (k + 1) & (l + 1) == 0) {
-                    let (mid, wrap) = self.grid.step(node, DIRECTIONS[k]);
+                    let (mid, wrap) = step(DIRECTIONS[k]);
                     let sides = [
                         (self.grid.edge(node, k), [0; 3]),
                         (self.grid.edge(mid, l), wrap),
@@ -262,7 +262,8 @@ impl Sweep<'_> {
         let steepest = 0.866 * self.grid.bend / self.grid.n as f64;
         let still = |i: &u32| {
             let here = self.grid.slopes[*i as usize];
-            let near = |d: Int3| self.grid.slopes[self.grid.step(*i, d).0 as usize];
+            let step = self.grid.steps(*i);
+            let near = |d: Int3| self.grid.slopes[step(d).0 as usize];
             here <= steepest
                 && STEPS
                     .iter()
@@ -306,11 +307,9 @@ impl Sweep<'_> {
             {
                 grown += 1;
                 forest.insert(node);
-                for d in DIRECTIONS.iter().flat_map(|d| [*d, d.map(|c| -c)]) {
-                    let (near, wrap) = self.grid.step(node, d);
-                    if forest.has(near) {
-                        forest.join(node, near, wrap);
-                    }
+                let near = AROUND.map(self.grid.steps(node));
+                for (near, wrap) in present(&forest, &near) {
+                    forest.join(node, near, wrap);
                 }
             }
             if !forest.together(a, b, [0, 1, 2].map(|c| w[c] - v[c])) {
@@ -350,6 +349,13 @@ impl Sweep<'_> {
             }
         }
     }
+}
+
+/// The neighbours that are in the forest, one of each group that is joined already.
+fn present(forest: &Forest, near: &[(u32, Int3); 14]) -> impl Iterator<Item = (u32, Int3)> + use<> {
+    let bits = (0..14).fold(0, |bits, k| bits | u16::from(forest.has(near[k].0)) << k);
+    let near = *near;
+    groups(bits).map(move |k| near[k])
 }
 
 /// Points of one period, those nearer than `apart` along every axis given once.

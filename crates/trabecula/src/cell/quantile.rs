@@ -4,6 +4,8 @@
 //! the cube (each plane wave times its sinc factors) and the variance that its slope gives, so the error of a cube is
 //! of fourth order in its edge; the ramps are summed exactly at every level of the table by two running sums.
 
+use core::ops::Range;
+
 use rayon::prelude::*;
 
 use super::Part;
@@ -14,6 +16,8 @@ use crate::math::Vec3;
 const CUBES: usize = 96;
 /// Levels of the table.
 const LEVELS: usize = 1 << 14;
+/// Layers of cubes that are added up as one.
+const SLAB: usize = 16;
 
 /// The distribution of a cell's values, tabulated.
 pub(super) struct Quantile {
@@ -42,39 +46,44 @@ impl Quantile {
         let h = 1.0 / n as f64;
         let most = most * (1.0 + 1e-9);
         let (start, step) = (-most, 2.0 * most / (LEVELS - 1) as f64);
-        // Second differences of V at the levels: ramps start and stop. Layers are added in order: same sums always.
-        let layers: Vec<Vec<(f64, f64)>> = (0..n)
-            .into_par_iter()
-            .map(|k| {
+        // Second differences of V at the levels: where ramps start and stop. Slabs of fixed thickness are added in their
+        // order: the same sums for any number of threads.
+        let weight = h * h * h;
+        let slab = |layers: Range<usize>| {
+            let (mut constant, mut slope) = (vec![0.0; LEVELS + 1], vec![0.0; LEVELS + 1]);
+            let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
+            for (k, j) in layers.flat_map(|k| (0..n).map(move |j| (k, j))) {
                 // Every row is shifted along itself by another amount (multiples of plastic-number fractions), so that
                 // cubes do not sample symmetric places alike and the errors of their ramps average out.
-                let shift = |j: usize| {
-                    (j as f64 * 0.7548776662466927 + k as f64 * 0.5698402909980532).fract()
-                };
-                let (mut v, mut g) = (vec![0.0; n * n], vec![[0.0; 3]; n * n]);
-                for (j, (v, g)) in v.chunks_mut(n).zip(g.chunks_mut(n)).enumerate() {
-                    let x: Vec<f64> = (0..n).map(|i| (i as f64 + shift(j)) * h).collect();
-                    let at = [(j as f64 + 0.397) * h, (k as f64 + 0.633) * h];
-                    mean(&x, at, v, g);
+                let shift = (j as f64 * 0.7548776662466927 + k as f64 * 0.5698402909980532).fract();
+                let x: Vec<f64> = (0..n).map(|i| (i as f64 + shift) * h).collect();
+                let at = [(j as f64 + 0.397) * h, (k as f64 + 0.633) * h];
+                mean(&x, at, &mut v, &mut g);
+                for (&v, g) in v.iter().zip(&g) {
+                    // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
+                    let w = ((g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h).max(0.5 * step);
+                    let (a, b) = (v - 0.5 * w, v + 0.5 * w);
+                    let index =
+                        |t: f64| (((t - start) / step).ceil().max(0.0) as usize).min(LEVELS);
+                    let (s, c) = (weight / w, -weight * a / w);
+                    slope[index(a)] += s;
+                    constant[index(a)] += c;
+                    slope[index(b)] -= s;
+                    constant[index(b)] += weight - c;
                 }
-                // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
-                let width = |g: &[f64; 3]| (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h;
-                v.iter()
-                    .zip(&g)
-                    .map(|(&v, g)| (v, width(g).max(0.5 * step)))
-                    .collect()
-            })
+            }
+            (constant, slope)
+        };
+        let slabs: Vec<_> = (0..n)
+            .step_by(SLAB)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|k| slab(k..(k + SLAB).min(n)))
             .collect();
         let (mut constant, mut slope) = (vec![0.0; LEVELS + 1], vec![0.0; LEVELS + 1]);
-        let weight = h * h * h;
-        for (v, w) in layers.into_iter().flatten() {
-            let (a, b) = (v - 0.5 * w, v + 0.5 * w);
-            let index = |t: f64| (((t - start) / step).ceil().max(0.0) as usize).min(LEVELS);
-            let (s, c) = (weight / w, -weight * a / w);
-            slope[index(a)] += s;
-            constant[index(a)] += c;
-            slope[index(b)] -= s;
-            constant[index(b)] += weight - c;
+        for (c, s) in slabs {
+            constant.iter_mut().zip(c).for_each(|(sum, c)| *sum += c);
+            slope.iter_mut().zip(s).for_each(|(sum, s)| *sum += s);
         }
         let (mut c, mut s, mut last) = (0.0, 0.0, 0.0f64);
         let lower: Vec<f64> = (0..LEVELS)

@@ -183,9 +183,11 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
     for v in spec.offset {
         finite(&below("offset"), v)?;
     }
+    let weight = spec.weight.as_ref().map(|g| any(g, below("weight")));
     let wanted = Wanted {
         wavelength,
         orientation,
+        weight: weight.transpose()?,
         offset: spec.offset,
     };
     let region: &dyn Field = &**place.region;

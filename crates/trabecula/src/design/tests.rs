@@ -84,7 +84,7 @@ fn every_kind_of_map_survives() {
     for map in [
         "phase = { wavelength = 4, rotate = [0, { formula = \"x\" }, 3] }",
         "phase = { wavelength = [4, { formula = \"5 + x/9\" }, 3], rotate_x = 2, rotate_z = { formula = \"x\" }, step = 0.5 }",
-        "phase = { wavelength = 4, direction = [0, { formula = \"x\" }, 3], domain = \"box\", folds = true }",
+        "phase = { wavelength = 4, direction = [0, { formula = \"x\" }, 3], weight = { formula = \"x*x\" }, domain = \"box\", folds = true }",
         "phase = { wavelength = 4, frame = { x = [1, 0, 0], z = { field = { path = \"a.vtu\", array = \"v\" } } } }",
         "phase = { wavelength = 4, stress = { field = { path = \"a.vtu\", array = \"S\" }, order = \"voigt\" }, offset = [1, 2, 3] }",
         "phase = { wavelength = 4, stress = [1, 2, 3, 0, 0, 0] }",

@@ -60,17 +60,23 @@ pub struct Distortion {
     pub turn_at: Vec3,
 }
 
-/// What is found at a node.
-pub(super) struct Found {
-    angle: Vec3,
-    spacing: Vec3,
-    shear: f64,
-    anisotropy: f64,
-    curl: f64,
+/// How far the gradients are from the wanted ones at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
+    pub angle: Vec3,
+    /// |∇Φᵢ| / |Kᵢ| for each axis.
+    pub spacing: Vec3,
+    /// The greatest deviation from a right angle between two gradients, degrees.
+    pub shear: f64,
+    /// Greatest over least stretch of a cell.
+    pub anisotropy: f64,
+    /// det J over the one asked for.
+    pub density: f64,
 }
 
 /// Compares J with K (rows of both: the three gratings) at a place.
-pub(super) fn compare(j: &Mat3, k: &Mat3, curl: f64) -> Found {
+pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
     let angle = |a: Vec3, b: Vec3| {
         let c = dot(a, b) / (norm(a) * norm(b));
         c.clamp(-1.0, 1.0).acos().to_degrees()
@@ -96,7 +102,7 @@ pub(super) fn compare(j: &Mat3, k: &Mat3, curl: f64) -> Found {
         .map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs())
         .into_iter()
         .fold(0.0, f64::max);
-    Found {
+    Misfit {
         angle: core::array::from_fn(|i| angle(j[i], k[i])),
         spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
         shear,
@@ -105,14 +111,14 @@ pub(super) fn compare(j: &Mat3, k: &Mat3, curl: f64) -> Found {
         } else {
             f64::INFINITY
         },
-        curl,
+        density,
     }
 }
 
 impl Distortion {
-    /// All but the density.
-    pub(super) fn of(found: &[Found], (turn, turn_at): (f64, Vec3)) -> Distortion {
-        let axis = |f: &dyn Fn(&Found) -> f64| Spread::of(found.iter().map(f).collect());
+    /// All but the density. |curl Kᵢ| λᵢ² comes beside.
+    pub(super) fn of(found: &[Misfit], curl: Vec<f64>, (turn, turn_at): (f64, Vec3)) -> Distortion {
+        let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(found.iter().map(f).collect());
         let outside = found
             .iter()
             .flat_map(|f| f.spacing)
@@ -127,7 +133,7 @@ impl Distortion {
             outside: outside as f64 / (3 * found.len()).max(1) as f64,
             shear: axis(&|f| f.shear),
             anisotropy: axis(&|f| f.anisotropy),
-            curl: axis(&|f| f.curl),
+            curl: Spread::of(curl),
             turn,
             turn_at,
             ..Distortion::default()

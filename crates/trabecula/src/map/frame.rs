@@ -56,23 +56,7 @@ impl Orientation {
                 );
                 Ok(along.into_iter().map(turned_from_z).collect())
             }
-            Orientation::Frame { x, z } => {
-                let (x, z) = (vectors(x, nodes, "frame.x")?, vectors(z, nodes, "frame.z")?);
-                let both = x.into_iter().zip(z).enumerate();
-                both.map(|(n, (x, z))| {
-                    let x = sub(x, scale(z, dot(x, z)));
-                    if norm(x) < 1e-6 {
-                        let message = format!(
-                            "the first and the third axis are parallel at {}; give two that differ",
-                            place(nodes[n])
-                        );
-                        return Err(Fault::new("frame.x", message));
-                    }
-                    let x = unit(x);
-                    Ok(transpose(&[x, cross(z, x), z]))
-                })
-                .collect()
-            }
+            Orientation::Frame { x, z } => squared(x, z, nodes),
             Orientation::Stress(of) => {
                 let values = columns(of, nodes, "stress")?;
                 let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) =
@@ -93,6 +77,54 @@ impl Orientation {
             }
         }
     }
+
+    /// The frames at points; where signs and axes are not given, those nearest to `like`.
+    pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3]) -> Result<Vec<Mat3>, Fault> {
+        match self {
+            Orientation::Angles(of) => {
+                let angles = columns(of, points, "rotate")?;
+                Ok(angles.into_iter().map(rotation).collect())
+            }
+            Orientation::Direction(of) => {
+                let along = vectors(of, points, "direction")?.into_iter().zip(like);
+                let signed = along.map(|(v, l)| {
+                    let sign = dot(v, [l[0][2], l[1][2], l[2][2]]).signum();
+                    scale(v, sign)
+                });
+                Ok(signed.map(turned_from_z).collect())
+            }
+            Orientation::Frame { x, z } => squared(x, z, points),
+            Orientation::Stress(of) => {
+                let (values, turns) = (columns(of, points, "stress")?, cube());
+                let frames = values.iter().map(principal).zip(like);
+                Ok(frames
+                    .map(|((f, gaps), l)| settled(&f, &gaps, l, &turns))
+                    .collect())
+            }
+        }
+    }
+}
+
+/// The frames of first and third axes.
+fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+    let (x, z) = (
+        vectors(x, points, "frame.x")?,
+        vectors(z, points, "frame.z")?,
+    );
+    let both = x.into_iter().zip(z).enumerate();
+    both.map(|(n, (x, z))| {
+        let x = sub(x, scale(z, dot(x, z)));
+        if norm(x) < 1e-6 {
+            let message = format!(
+                "the first and the third axis are parallel at {}; give two that differ",
+                place(points[n])
+            );
+            return Err(Fault::new("frame.x", message));
+        }
+        let x = unit(x);
+        Ok(transpose(&[x, cross(z, x), z]))
+    })
+    .collect()
 }
 
 /// Values of some grades at points, side by side.

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::distortion::{self, Distortion};
+use super::distortion::{self, Distortion, Misfit};
 use super::frame::{Orientation, place};
 use super::grid::Grid;
 use super::poisson::Poisson;
@@ -13,7 +13,9 @@ use super::spline::{self, Spline};
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub};
+use crate::math::{
+    Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
+};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -35,6 +37,8 @@ pub struct Wanted {
     pub wavelength: [Grade; 3],
     /// Which way the cells are turned.
     pub orientation: Orientation,
+    /// How much it matters that the map is what is asked for, compared with other places; the same everywhere if none.
+    pub weight: Option<Grade>,
     /// Moves the lattice (mm).
     pub offset: Vec3,
 }
@@ -53,6 +57,7 @@ pub struct Settings<'a> {
 /// A solved map.
 pub struct Phase {
     spline: Spline,
+    wanted: Wanted,
     shift: Vec3,
     wavelength: [f64; 2],
     mean: Vec3,
@@ -86,7 +91,8 @@ impl Phase {
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i]))
                 .collect()
         });
-        let (values, mean, steps) = integrate(&grid, &k, &depth);
+        let close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
+        let (values, mean, steps) = integrate(&grid, &k, close.as_deref());
         let spline = Spline::through(grid, values);
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // Cells for each cell wanted, everywhere; the rest, which costs more, at some tens of thousands of nodes.
@@ -108,9 +114,10 @@ impl Phase {
         let found: Vec<_> = (looked.par_iter().zip(&jacobians))
             .map(|(&n, j)| {
                 let wanted = [k[0][n], k[1][n], k[2][n]];
-                distortion::compare(j, &wanted, distortion::curl(&grid, &k, n))
+                distortion::compare(j, &wanted)
             })
             .collect();
+        let curl = (looked.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
         let range = wavelength
             .iter()
             .flatten()
@@ -124,7 +131,7 @@ impl Phase {
         let distortion = Distortion {
             density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
             least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
-            ..Distortion::of(&found, turn)
+            ..Distortion::of(&found, curl.collect(), turn)
         };
         if !settings.folds {
             refuse_folds(&grid, &spline, &distortion, &inside)?;
@@ -141,6 +148,7 @@ impl Phase {
         ];
         Ok(Phase {
             spline,
+            wanted: wanted.clone(),
             shift,
             wavelength: range,
             mean: if within.is_empty() {
@@ -168,6 +176,26 @@ impl Phase {
     /// How far the map is from what was asked for.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
+    }
+
+    /// How far the map is from what was asked for at points (mm) within the box. What was asked for is taken there itself,
+    /// with the signs and axes that are nearest to the map's.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, vectors without a direction.
+    pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
+        let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
+        let own = |j: &Mat3| transpose(&j.map(unit));
+        let like: Vec<Mat3> = jacobians.iter().map(own).collect();
+        let frames = self.wanted.orientation.frames_near(points, &like)?;
+        let wavelength = wavelengths(&self.wanted.wavelength, points)?;
+        let of = jacobians.iter().zip(frames.iter().zip(&wavelength));
+        Ok(of
+            .map(|(j, (f, w))| {
+                let k = transpose(f);
+                distortion::compare(j, &[0, 1, 2].map(|i| scale(k[i], 1.0 / w[i])))
+            })
+            .collect())
     }
 
     /// The Jacobians at the nodes in the region where cells are largest and smallest.
@@ -330,16 +358,48 @@ fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Res
     Ok(())
 }
 
-/// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
-/// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by the closeness to the region.
-fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], depth: &[f64]) -> ([Vec<f64>; 3], Mat3, usize) {
+/// The roots of the weights of nodes: how close they are to the region, and what is asked for. `None` if all are one.
+fn closeness(
+    grid: &Grid,
+    depth: &[f64],
+    weight: Option<&Grade>,
+    nodes: &[Vec3],
+) -> Result<Option<Vec<f64>>, Fault> {
     let fall = FALL * grid.step.into_iter().fold(0.0, f64::max);
-    let s: Option<Vec<f64>> = depth.iter().any(|d| *d > 1e-6 * fall).then(|| {
-        let weight = |d: &f64| (-d.max(0.0) / fall).exp().max(FAINT);
-        depth.iter().map(weight).collect()
-    });
+    let mut roots = vec![1.0; nodes.len()];
+    if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
+        weight.values(nodes, &mut roots);
+        let most = roots.iter().copied().fold(0.0, f64::max);
+        let wrong = (roots.iter().zip(nodes)).find(|(w, _)| !(**w >= 0.0 && w.is_finite()));
+        if let Some((w, p)) = wrong {
+            let message = format!(
+                "{} at {}; a weight is a finite number from 0 up, all over the region's bounds",
+                number(*w),
+                place(*p)
+            );
+            return Err(Fault::new("weight", message));
+        }
+        if most == 0.0 {
+            let message = "the weight is zero everywhere: nothing is asked for";
+            return Err(Fault::new("weight", message));
+        }
+        roots.iter_mut().for_each(|w| *w = (*w / most).sqrt());
+    } else if depth.iter().all(|d| *d <= 1e-6 * fall) {
+        return Ok(None);
+    }
+    let near = |d: &f64| (-d.max(0.0) / fall).exp();
+    let roots = roots
+        .iter()
+        .zip(depth)
+        .map(|(w, d)| (w * near(d)).max(FAINT));
+    Ok(Some(roots.collect()))
+}
+
+/// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
+/// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by s².
+fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>) -> ([Vec<f64>; 3], Mat3, usize) {
     let weights: Vec<f64> = (0..grid.len())
-        .map(|n| grid.trapezoid(n) * s.as_ref().map_or(1.0, |s| s[n] * s[n]))
+        .map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n]))
         .collect();
     let whole: f64 = weights.iter().sum();
     let poisson = Poisson::new(*grid);
@@ -354,7 +414,7 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], depth: &[f64]) -> ([Vec<f64>; 3], 
                 .fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
             let mean = add(first, scale(off, 1.0 / whole));
             let rest: Vec<Vec3> = k.iter().map(|k| sub(*k, mean)).collect();
-            let (mut f, steps) = match &s {
+            let (mut f, steps) = match s {
                 _ if rest.iter().all(|r| norm(*r) <= 1e-15 * norm(mean)) => (vec![0.0; k.len()], 0),
                 None => (poisson.integrate(&rest), 0),
                 Some(s) => {

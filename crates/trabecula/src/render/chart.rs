@@ -1,6 +1,6 @@
 //! Histograms as pictures.
 
-use super::font;
+use super::paper::{Colour, INK, LETTER, PITCH, Paper, short};
 
 /// One histogram.
 #[derive(Clone, Debug)]
@@ -15,14 +15,10 @@ pub struct Chart {
     pub marks: Vec<(String, f64)>,
 }
 
-type Colour = [u8; 3];
 const PAPER: Colour = [255, 255, 255];
-const INK: Colour = [40, 40, 44];
 const FAINT: Colour = [222, 224, 228];
 const BAR: Colour = [196, 129, 74];
 const MARK: Colour = [36, 84, 140];
-/// Pixels of a dot of a letter.
-const DOT: usize = 2;
 const MARGIN: [usize; 2] = [90, 70];
 /// Pixels of the room for the names of marks above a chart.
 const HEAD: usize = 70;
@@ -44,37 +40,7 @@ pub fn charts(charts: &[Chart], size: [usize; 2]) -> Vec<u8> {
     paper.rgb
 }
 
-struct Paper {
-    size: [usize; 2],
-    rgb: Vec<u8>,
-}
-
 impl Paper {
-    fn fill(&mut self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2], colour: Colour) {
-        let [w, h] = self.size;
-        for y in y0..y1.min(h) {
-            for x in x0..x1.min(w) {
-                self.rgb[3 * (y * w + x)..][..3].copy_from_slice(&colour);
-            }
-        }
-    }
-
-    /// Writes a line; `anchor` is the share of its width that lies left of x.
-    fn write(&mut self, text: &str, x: usize, y: usize, anchor: f64, colour: Colour) {
-        let step = (font::WIDE + 1) * DOT;
-        let back = (text.chars().count() * step) as f64 * anchor;
-        let mut x = x.saturating_sub(back as usize);
-        for letter in text.chars() {
-            for (j, row) in font::rows(letter).into_iter().enumerate() {
-                for i in (0..font::WIDE).filter(|i| row >> (font::WIDE - 1 - i) & 1 == 1) {
-                    let from = [x + i * DOT, y + j * DOT];
-                    self.fill(from, from.map(|c| c + DOT), colour);
-                }
-            }
-            x += step;
-        }
-    }
-
     fn chart(&mut self, chart: &Chart, top: usize, height: usize) {
         let [left, below] = MARGIN;
         let width = self.size[0].saturating_sub(left + 40);
@@ -95,13 +61,12 @@ impl Paper {
         let full = (100.0 * most / step).ceil() * step;
         let up =
             |percent: f64| base - (room as f64 * (percent / full).clamp(0.0, 1.0)).round() as usize;
-        let letter = font::HIGH * DOT;
         let mut percent = 0.0;
         while percent <= full * (1.0 + 1e-9) {
             let y = up(percent);
             self.fill([left, y], [left + width, y + 1], FAINT);
             let label = format!("{} %", short(percent));
-            self.write(&label, left - 8, y.saturating_sub(letter / 2), 1.0, INK);
+            self.write(&label, left - 8, y.saturating_sub(LETTER / 2), 1.0, INK);
             percent += step;
         }
         for (ends, share) in chart.edges.windows(2).zip(&chart.share) {
@@ -120,7 +85,7 @@ impl Paper {
         self.write(
             &chart.title,
             left + width / 2,
-            base + 12 + 2 * letter,
+            base + 12 + 2 * LETTER,
             0.5,
             INK,
         );
@@ -128,10 +93,10 @@ impl Paper {
         let mut names = Vec::new();
         let marks = chart.marks.iter().filter(|m| m.1.is_finite());
         for (k, (name, at)) in marks.enumerate() {
-            let (x, y) = (across(*at), top + 8 + k * (letter + 4));
-            self.fill([x, y + letter / 2], [x + 2, base], MARK);
+            let (x, y) = (across(*at), top + 8 + k * (LETTER + 4));
+            self.fill([x, y + LETTER / 2], [x + 2, base], MARK);
             let text = format!("{name} {}", short(*at));
-            let wide = text.chars().count() * (font::WIDE + 1) * DOT;
+            let wide = text.chars().count() * PITCH;
             let from = if x + 8 + wide < self.size[0] {
                 x + 8
             } else {
@@ -140,7 +105,7 @@ impl Paper {
             names.push((text, from, y, wide));
         }
         for (text, x, y, wide) in names {
-            self.fill([x, y], [x + wide, y + letter], PAPER);
+            self.fill([x, y], [x + wide, y + LETTER], PAPER);
             self.write(&text, x, y, 0.0, MARK);
         }
     }
@@ -153,20 +118,6 @@ fn nice(v: f64) -> f64 {
         .into_iter()
         .find(|k| k * unit >= v * (1.0 - 1e-9));
     of.unwrap_or(10.0) * unit
-}
-
-/// A number in few digits.
-fn short(v: f64) -> String {
-    if v == 0.0 {
-        return "0".into();
-    }
-    let digits = (2 - v.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{v:.digits$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').into()
-    } else {
-        text
-    }
 }
 
 #[cfg(test)]

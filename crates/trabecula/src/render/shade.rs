@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::raster::{NONE, Raster, weights};
-use super::{Camera, View};
+use super::{Camera, Tint, View};
 use crate::extract::Surface;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -21,7 +21,12 @@ pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
 }
 
 /// Premultiplied colour and cover of each sample.
-pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<[f32; 4]> {
+pub(super) fn shade(
+    surface: &Surface,
+    camera: &Camera,
+    raster: &Raster,
+    tint: Option<&Tint>,
+) -> Vec<[f32; 4]> {
     let normals = normals(surface);
     let [w, h] = raster.size;
     let open = occlusion(camera, raster);
@@ -41,11 +46,11 @@ pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<
             let [a, b, c] = surface.mesh.corners(id as usize);
             let flat = unit(cross(sub(b, a), sub(c, a)));
             let mut n = flat;
+            let t = surface.mesh.triangles[id as usize].map(|v| v as usize);
+            let k = weights(surface, id, p);
             if !cut {
-                let t = surface.mesh.triangles[id as usize];
-                let k = weights(surface, id, p);
                 n = (0..3).fold([0.0; 3], |n, i| {
-                    add(n, scale(normals[t[i] as usize].map(f64::from), k[i]))
+                    add(n, scale(normals[t[i]].map(f64::from), k[i]))
                 });
                 n = if norm(n) > 0.0 { unit(n) } else { flat };
             }
@@ -53,15 +58,16 @@ pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster) -> Vec<
             if dot(flat, eye) < 0.0 {
                 n = scale(n, -1.0);
             }
+            let colour = match tint {
+                Some(tint) => {
+                    let value = |i: usize| tint.values.get(t[i]).copied().unwrap_or(f64::NAN);
+                    tint.colour((0..3).map(|i| k[i] * value(i)).sum())
+                }
+                None if cut => CUT,
+                None => LATTICE,
+            };
             let sun = shadows.light(p, flat);
-            let light = lit(
-                [n, eye, key],
-                sun,
-                camera,
-                if cut { CUT } else { LATTICE },
-                open[at],
-                cut,
-            );
+            let light = lit([n, eye, key], sun, camera, colour, open[at], cut);
             *out = [light[0], light[1], light[2], 1.0];
         }
     });

@@ -89,7 +89,7 @@ const VIEW: View = View {
 
 #[test]
 fn nothing_gives_the_background() {
-    let rgb = render(&Surface::default(), &VIEW);
+    let rgb = render(&Surface::default(), &VIEW, None);
     assert_eq!(rgb.len(), 160 * 120 * 3);
     assert!(rgb.iter().all(|v| *v > 200));
     assert!(
@@ -98,7 +98,8 @@ fn nothing_gives_the_background() {
             &View {
                 size: [0, 9],
                 ..VIEW
-            }
+            },
+            None
         )
         .is_empty()
     );
@@ -108,7 +109,8 @@ fn nothing_gives_the_background() {
             &View {
                 size: [usize::MAX, 2],
                 ..VIEW
-            }
+            },
+            None
         )
         .is_empty()
     );
@@ -130,7 +132,10 @@ fn one_triangle_fills_what_it_should() {
         elevation: 0.0,
         size: [200, 200],
     };
-    let (with, without) = (render(&s, &view), render(&Surface::default(), &view));
+    let (with, without) = (
+        render(&s, &view, None),
+        render(&Surface::default(), &view, None),
+    );
     let pixels = with
         .chunks(3)
         .zip(without.chunks(3))
@@ -140,7 +145,10 @@ fn one_triangle_fills_what_it_should() {
     assert!((pixels / want - 1.0).abs() < 0.02, "{pixels} {want}");
     // Every side sees something, even the back of an open mesh, a point, and a number that is none.
     for azimuth in [90.0, 180.0, f64::NAN] {
-        assert_eq!(render(&s, &View { azimuth, ..view }).len(), 200 * 200 * 3);
+        assert_eq!(
+            render(&s, &View { azimuth, ..view }, None).len(),
+            200 * 200 * 3
+        );
     }
     let point = Surface {
         mesh: Mesh {
@@ -149,7 +157,7 @@ fn one_triangle_fills_what_it_should() {
         },
         cut: vec![],
     };
-    assert_eq!(render(&point, &view), without);
+    assert_eq!(render(&point, &view, None), without);
 }
 
 #[test]
@@ -176,13 +184,14 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
         size: [60, 60],
     };
     let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
-    let front = middle(render(&s, &view));
+    let front = middle(render(&s, &view, None));
     let back = middle(render(
         &s,
         &View {
             azimuth: 180.0,
             ..view
         },
+        None,
     ));
     assert!(front[2] > front[0], "the cut is bluish: {front:?}");
     assert!(back[0] > back[2], "the lattice is warm: {back:?}");
@@ -197,8 +206,8 @@ fn the_number_of_threads_does_not_show() {
         return;
     };
     assert_eq!(
-        one.install(|| render(&s, &VIEW)),
-        many.install(|| render(&s, &VIEW))
+        one.install(|| render(&s, &VIEW, None)),
+        many.install(|| render(&s, &VIEW, None))
     );
 }
 
@@ -216,7 +225,7 @@ fn gallery() {
             elevation: 28.0,
         };
         let t = std::time::Instant::now();
-        let rgb = render(&s, &view);
+        let rgb = render(&s, &view, None);
         let drawn = t.elapsed();
         let file = png(&rgb, view.size);
         println!(

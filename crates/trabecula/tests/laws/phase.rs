@@ -27,6 +27,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
     let wanted = Wanted {
         wavelength: wavelength.map(formula),
         orientation: Orientation::Angles(angles.map(formula)),
+        weight: None,
         offset: [0.1, 0.2, 0.3],
     };
     Map::Phase(Arc::new(

@@ -17,6 +17,51 @@ pub(super) const DIRECTIONS: [Int3; 7] = [
     [1, 1, 1],
 ];
 
+/// The neighbours of a node: ahead along each direction, then behind.
+pub(super) const AROUND: [Int3; 14] = {
+    let mut around = [[0; 3]; 14];
+    let mut k = 0;
+    while k < 7 {
+        let [x, y, z] = DIRECTIONS[k];
+        around[k] = [x, y, z];
+        around[k + 7] = [-x, -y, -z];
+        k += 1;
+    }
+    around
+};
+
+/// For each neighbour the ones that it has an edge to, as bits.
+const LINK: [u16; 14] = {
+    let mut link = [0; 14];
+    let mut k = 0;
+    while k < 14 * 14 * 14 {
+        let (a, b, d) = (AROUND[k % 14], AROUND[k / 14 % 14], AROUND[k / 196]);
+        if a[0] + d[0] == b[0] && a[1] + d[1] == b[1] && a[2] + d[2] == b[2] {
+            link[k % 14] |= 1 << (k / 14 % 14);
+        }
+        k += 1;
+    }
+    link
+};
+
+/// Of neighbours (bits), one of each group that hangs together without the node: joining the node to these joins it to
+/// all, for a triangle holds no loop.
+pub(super) fn groups(mut present: u16) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        if present == 0 {
+            return None;
+        }
+        let first = present.trailing_zeros() as usize;
+        let mut fresh = 1 << first;
+        while fresh != 0 {
+            present &= !fresh;
+            let of = |bits: u16| (0..14).filter(move |k| bits >> k & 1 == 1);
+            fresh = of(fresh).fold(0, |near, k| near | LINK[k]) & present;
+        }
+        Some(first)
+    })
+}
+
 /// Samples of a function on n³ nodes of the torus.
 pub(super) struct Grid {
     /// Nodes along each axis.
@@ -67,8 +112,8 @@ impl Grid {
             bend: 0.0,
         };
         let bend = (0..slopes.len() as u32).into_par_iter().map(|i| {
-            let change =
-                |d: Int3| norm(sub(slopes[grid.step(i, d).0 as usize], slopes[i as usize])) / h;
+            let step = grid.steps(i);
+            let change = |d: Int3| norm(sub(slopes[step(d).0 as usize], slopes[i as usize])) / h;
             change(DIRECTIONS[0])
                 .max(change(DIRECTIONS[1]))
                 .max(change(DIRECTIONS[3]))
@@ -95,14 +140,16 @@ impl Grid {
         [i % n, i / n % n, i / (n * n)].map(|c| c as f64 / n as f64)
     }
 
-    /// The node one step on, and the period it stands in.
-    pub(super) fn step(&self, node: u32, d: Int3) -> (u32, Int3) {
-        let n = self.n as i32;
-        let i = node as i32;
-        let at = [i % n + d[0], i / n % n + d[1], i / (n * n) + d[2]];
-        let wrap = at.map(|c| if c < 0 { -1 } else { i32::from(c >= n) });
-        let on = [0, 1, 2].map(|a| at[a] - n * wrap[a]);
-        (((on[2] * n + on[1]) * n + on[0]) as u32, wrap)
+    /// The steps from a node: the node one step on, and the period it stands in.
+    pub(super) fn steps(&self, node: u32) -> impl Fn(Int3) -> (u32, Int3) + use<> {
+        let (n, i) = (self.n as i32, node as i32);
+        let from = [i % n, i / n % n, i / (n * n)];
+        move |d| {
+            let at = [from[0] + d[0], from[1] + d[1], from[2] + d[2]];
+            let wrap = at.map(|c| i32::from(c >= n) - i32::from(c < 0));
+            let on = [0, 1, 2].map(|a| at[a] - n * wrap[a]);
+            (((on[2] * n + on[1]) * n + on[0]) as u32, wrap)
+        }
     }
 
     /// The nodes at the corners of the grid cell that holds a phase, with their periods.
@@ -122,5 +169,31 @@ impl Grid {
     /// The number of the edge from `node` along direction k, after all nodes.
     pub(super) fn edge(&self, node: u32, k: usize) -> u32 {
         self.values.len() as u32 + node * 7 + k as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_neighbour_of_each_group() {
+        for present in 0..1u16 << 14 {
+            // Labels spread over edges until nothing changes.
+            let mut label: [usize; 14] = core::array::from_fn(|k| k);
+            let inside = |k: &usize| present >> k & 1 == 1;
+            for _ in 0..14 {
+                for a in (0..14).filter(inside) {
+                    for b in (0..14).filter(inside) {
+                        let apart = [0, 1, 2].map(|c| AROUND[a][c] - AROUND[b][c]);
+                        if AROUND.contains(&apart) {
+                            label[a] = label[a].min(label[b]);
+                        }
+                    }
+                }
+            }
+            let first: Vec<usize> = (0..14).filter(inside).filter(|&k| label[k] == k).collect();
+            assert_eq!(groups(present).collect::<Vec<_>>(), first);
+        }
     }
 }

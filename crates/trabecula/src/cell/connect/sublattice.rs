@@ -10,6 +10,9 @@ pub(super) struct Sublattice([Int3; 3]);
 impl Sublattice {
     /// Adds a generator; whether the subgroup grew.
     pub(super) fn insert(&mut self, mut v: Int3) -> bool {
+        if v == [0; 3] {
+            return false;
+        }
         let mut grew = false;
         for k in 0..3 {
             if v[k] == 0 {

@@ -119,6 +119,10 @@ pub struct PhaseSpec {
     /// The cell's axes lie along the principal directions of a stress tensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<TensorSpec>,
+    /// How much it matters that cells are as they are asked for, compared with other places (0 or more): where no map can
+    /// follow everything, the error goes where this is small.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<GradeSpec>,
     /// Moves the lattice (mm).
     #[serde(default, skip_serializing_if = "is_default")]
     pub offset: [f64; 3],

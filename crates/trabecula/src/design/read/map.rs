@@ -124,7 +124,7 @@ fn skew(at: &At) -> Read<SkewSpec> {
 fn phase(at: &At) -> Read<PhaseSpec> {
     let mut keys = vec!["wavelength"];
     keys.extend(TURNS);
-    keys.extend(["offset", "step", "domain", "folds"]);
+    keys.extend(["weight", "offset", "step", "domain", "folds"]);
     let f = at.fields("a phase map", &keys, &[])?;
     let given: Vec<&str> = TURNS.into_iter().filter(|k| f.get(k).is_some()).collect();
     if let [first, rest @ ..] = given.as_slice() {
@@ -163,6 +163,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
             }))
         })?,
         stress: f.read("stress", None, |at| tensor(at).map(Some))?,
+        weight: maybe("weight")?,
         offset: f.read("offset", [0.0; 3], three)?,
         step: f.read("step", None, |at| at.number().map(Some))?,
         domain: f.read("domain", Domain::Region, |at| at.word("domain", &domains))?,

@@ -18,6 +18,7 @@ fn about_z(angle: &str, wavelength: Grade) -> Wanted {
     Wanted {
         wavelength: [wavelength.clone(), wavelength.clone(), wavelength],
         orientation: Orientation::Angles([zero(), zero(), formula(angle)]),
+        weight: None,
         offset: [0.0; 3],
     }
 }
@@ -38,6 +39,7 @@ fn what_does_not_vary_is_the_affine_map() {
     let wanted = Wanted {
         wavelength: wavelength.map(Grade::Constant),
         orientation: Orientation::Angles(angles.map(Grade::Constant)),
+        weight: Some(formula("1 + x*x")),
         offset,
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
@@ -209,12 +211,13 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
         .map(|p| norm(sub(*p, b.center())) - 1.5)
         .collect();
     for depth in [vec![-1.0; grid.len()], depth] {
-        let (three, ..) = integrate(&grid, &k, &depth);
+        let roots = closeness(&grid, &depth, None, &nodes).expect("weights");
+        let (three, ..) = integrate(&grid, &k, roots.as_deref());
         let hkl = [2.0, -1.0, 3.0];
         let sum: Vec<Vec3> = (0..grid.len())
             .map(|n| (0..3).fold([0.0; 3], |s, i| add(s, scale(k[i][n], hkl[i]))))
             .collect();
-        let (own, ..) = integrate(&grid, &[sum.clone(), sum.clone(), sum], &depth);
+        let (own, ..) = integrate(&grid, &[sum.clone(), sum.clone(), sum], roots.as_deref());
         let exact = depth[0] == -1.0;
         for n in (0..grid.len()).filter(|&n| depth[n] < 0.0) {
             let joined: f64 = (0..3).map(|i| hkl[i] * three[i][n]).sum();
@@ -341,9 +344,8 @@ fn solving_three_phases_at_128_cubed() {
             start.elapsed().as_secs_f64(),
             solved[0][77]
         );
-        let all = vec![f64::NEG_INFINITY; grid.len()];
         let start = std::time::Instant::now();
-        let (values, ..) = integrate(&grid, &k, &all);
+        let (values, ..) = integrate(&grid, &k, None);
         println!(
             "{n}: {:.3} s with means and gauge",
             start.elapsed().as_secs_f64()
@@ -364,5 +366,82 @@ fn solving_three_phases_at_128_cubed() {
             start.elapsed().as_secs_f64(),
             f[0][5]
         );
+    }
+}
+
+/// Where no map can follow, the weight says where the error goes: a map is the best by its own weight.
+#[test]
+fn errors_go_where_they_weigh_least() {
+    let b = bounds([0.0; 3], [24.0, 24.0, 3.0]);
+    let turned = about_z("40*sin(x/4)", Grade::Constant(3.0));
+    let one = |_: Vec3| 1.0;
+    let left = |p: Vec3| (-p[0] / 4.0).exp();
+    let solve = |weight| {
+        let wanted = Wanted {
+            weight,
+            ..turned.clone()
+        };
+        Phase::solve(&b, &wanted, &Settings::default()).expect("solved")
+    };
+    let miss = |map: &Phase, weight: &dyn Fn(Vec3) -> f64| -> f64 {
+        let places = (0..4000).map(|i| {
+            let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract());
+            [0, 1, 2].map(|a| s[a] * b.max[a])
+        });
+        let each = places.map(|p| {
+            let angle = (40.0 * (p[0] / 4.0).sin()).to_radians();
+            let (s, c) = angle.sin_cos();
+            let j = map.jacobian(p);
+            let off = [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]].map(|k| scale(k, 1.0 / 3.0));
+            let all = (0..3).map(|i| norm(sub(j[i], off[i])).powi(2));
+            weight(p) * all.sum::<f64>()
+        });
+        each.sum()
+    };
+    let (even, heavy) = (solve(None), solve(Some(formula("exp(-x/4)"))));
+    assert!(miss(&even, &one) < 0.97 * miss(&heavy, &one));
+    assert!(miss(&heavy, &left) < 0.97 * miss(&even, &left));
+    for bad in ["x - 1", "0*x"] {
+        let wanted = Wanted {
+            weight: Some(formula(bad)),
+            ..turned.clone()
+        };
+        let fault = Phase::solve(&b, &wanted, &Settings::default()).err();
+        assert_eq!(fault.expect("refused").at, "weight", "{bad}");
+    }
+}
+
+/// At the nodes, a misfit is what the solution was judged by; between them, stresses find their own signs and axes.
+#[test]
+fn misfits_at_nodes_are_those_of_the_report() {
+    let b = bounds([0.0; 3], [24.0, 24.0, 6.0]);
+    // A tensor whose first direction is turned as the angles are: s cos 2a etc., with a third value apart.
+    let stress = ["cos(0.1*x)", "-cos(0.1*x)", "3", "0", "0", "sin(0.1*x)"].map(formula);
+    let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
+    let laid = Wanted {
+        orientation: Orientation::Stress(stress),
+        ..turned.clone()
+    };
+    for wanted in [turned, laid] {
+        let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
+        let grid = *map.spline.grid();
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let found = map.misfits(&nodes).expect("misfits");
+        let most = |f: &dyn Fn(&Misfit) -> f64| found.iter().map(f).fold(0.0, f64::max);
+        let d = map.distortion();
+        // The report looks at every node of a grid as small as this; angles are good to √ε.
+        assert!(grid.len() < LOOKS);
+        let shear = most(&|m| m.shear);
+        assert!(
+            (shear - d.shear.max).abs() < 1e-5,
+            "{shear} {}",
+            d.shear.max
+        );
+        for i in 0..3 {
+            let angle = most(&|m| m.angle[i]);
+            let any = (0..3).any(|k| (angle - d.angle[k].max).abs() < 1e-5);
+            assert!(any, "{angle} {:?}", d.angle);
+        }
+        assert!((most(&|m| m.density) - d.density[1]).abs() < 1e-9);
     }
 }
