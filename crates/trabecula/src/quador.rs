@@ -17,6 +17,7 @@ pub mod integral;
 mod mesh;
 pub mod pencil;
 pub mod quadric;
+pub mod query;
 mod tiling;
 
 use hub::{Affine, Hub, Stub};

@@ -127,4 +127,48 @@ impl Index {
         out.dedup();
         (out.len() <= most).then_some(out)
     }
+
+    /// Calls `f` with the boxes of each cell along a ray and where the ray leaves the cell, until it answers no.
+    pub fn along(&self, origin: Vec3, way: Vec3, f: &mut impl FnMut(&[u32], f64) -> bool) {
+        if self.items.is_empty() || !way.iter().chain(&origin).all(|v| v.is_finite()) {
+            return;
+        }
+        let size = [0, 1, 2].map(|a| self.cells[a] as f64 / self.per[a]);
+        let all = Aabb {
+            min: self.origin,
+            max: [0, 1, 2].map(|a| self.origin[a] + size[a]),
+        };
+        let Some((from, _)) = super::query::crossed(&all, origin, way) else {
+            return;
+        };
+        let start = [0, 1, 2].map(|a| origin[a] + way[a] * from.max(0.0));
+        let mut at = [0, 1, 2].map(|a| self.step(a, start[a]));
+        loop {
+            // Where the ray leaves the cell along each axis.
+            let leave = [0, 1, 2].map(|a| {
+                let wall = at[a] + usize::from(way[a] > 0.0);
+                if way[a] == 0.0 {
+                    f64::INFINITY
+                } else {
+                    (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / way[a]
+                }
+            });
+            let a = (0..3)
+                .min_by(|&a, &b| leave[a].total_cmp(&leave[b]))
+                .unwrap_or(0);
+            let c = self.cell(at);
+            if !f(
+                &self.items[self.starts[c] as usize..self.starts[c + 1] as usize],
+                leave[a],
+            ) || leave[a].is_infinite()
+            {
+                return;
+            }
+            match way[a] > 0.0 {
+                true if at[a] + 1 < self.cells[a] => at[a] += 1,
+                false if at[a] > 0 => at[a] -= 1,
+                _ => return,
+            }
+        }
+    }
 }

@@ -7,6 +7,7 @@
 //! the whole comes out to 1e-10.
 
 use core::f64::consts::{FRAC_PI_4, PI};
+use std::cell::Cell;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
@@ -31,6 +32,8 @@ pub struct Mass {
     pub first: Vec3,
     /// ∫ x xᵀ dV, mm⁵.
     pub second: Mat3,
+    /// Solid angle at the hub's centre, of patches: what shows that they were filled.
+    angle: f64,
 }
 
 impl Mass {
@@ -72,6 +75,7 @@ impl Mass {
     pub fn plus(mut self, o: &Mass) -> Mass {
         self.volume += o.volume;
         self.area += o.area;
+        self.angle += o.angle;
         self.first = add(self.first, o.first);
         for i in 0..3 {
             self.second[i] = add(self.second[i], o.second[i]);
@@ -138,6 +142,9 @@ pub(super) const USUAL: Order = Order {
     differ: 2e-9,
 };
 
+/// How far the solid angle of a face may be from what its seams go round: what it is integrated to, times a few pieces.
+const FILLED: f64 = 1e-9;
+
 /// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be cut into
 /// triangles.
 pub(super) fn hub_mass<const ALL: bool>(
@@ -145,6 +152,15 @@ pub(super) fn hub_mass<const ALL: bool>(
     complex: &Complex,
     order: Order,
 ) -> Option<Mass> {
+    filled::<ALL>(hub, complex, order).map(|f| f.0)
+}
+
+/// As `hub_mass`, and how coarsely (radians of turn) seams may be drawn for every face to be filled.
+pub(super) fn filled<const ALL: bool>(
+    hub: &Hub,
+    complex: &Complex,
+    order: Order,
+) -> Option<(Mass, f64)> {
     let mut out = Mass::default();
     // A guess of the whole, for what is small beside it.
     let mut size = Mass {
@@ -163,6 +179,7 @@ pub(super) fn hub_mass<const ALL: bool>(
         complex,
         order,
         size,
+        turn: Cell::new(TURNS[0]),
     };
     for face in &complex.faces {
         match face.rim {
@@ -170,14 +187,19 @@ pub(super) fn hub_mass<const ALL: bool>(
             None => work.patch::<ALL>(face, &mut out)?,
         }
     }
-    Some(out)
+    Some((out, work.turn.get()))
 }
+
+/// How far seams turn between points of their drawings, radians, coarsest first.
+const TURNS: [f64; 5] = [0.8, 0.4, 0.2, 0.1, 0.05];
 
 struct Work<'a> {
     hub: &'a Hub<'a>,
     complex: &'a Complex,
     order: Order,
     size: Mass,
+    /// The finest turn that a face needed.
+    turn: Cell<f64>,
 }
 
 impl Work<'_> {
@@ -335,31 +357,45 @@ impl Work<'_> {
             .faces
             .iter()
             .position(|f| core::ptr::eq(f, face))? as u32;
-        let tiles = [0.8, 0.4, 0.2, 0.1, 0.05].iter().find_map(|&turn| {
-            let seams = Seams::new(self.complex, turn);
-            let mut tiles = Tiles::new(&seams);
-            tiles.triangles = seams
-                .triangles(face, apex)?
-                .into_iter()
-                .map(|t| (t, number))
-                .collect();
-            // An arc of a circle of 50 degrees is a ninth of its chord high.
-            // An arc of a circle of 50 degrees is a ninth of its chord high.
-            tiles.refine(self.complex, &|away, length| away > length / 9.0)?;
-            Some(tiles)
-        })?;
-        for &(t, _) in &tiles.triangles {
-            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                let side = tiles.curve(self.complex, face, a, b);
-                sector::<ALL>(
-                    &face.quadric,
-                    t.map(|i| tiles.points[i as usize]),
-                    &side,
-                    self.order.nodes,
-                    out,
-                );
+        // Seen from the centre the face is as large as its seams go round: ∮ det(o, x, dx)/(1 + cos β) on the sphere.
+        let o = unit(apex);
+        let mut round = 0.0;
+        for &(arc, forward) in face.loops.iter().flatten() {
+            let conic = &self.complex.arcs[arc as usize].conic;
+            let parts = 8;
+            for p in 0..parts {
+                for &(t, w) in gauss(16) {
+                    let step = conic.end / f64::from(parts);
+                    let (x, dx) = conic.with_slope((f64::from(p) + t) * step);
+                    let e = unit(x);
+                    let sign = if forward { 1.0 } else { -1.0 };
+                    round += sign * w * step * dot(o, cross(e, dx)) / (norm(x) * (1.0 + dot(o, e)));
+                }
             }
         }
+        let (made, turn) = TURNS.iter().find_map(|&turn| {
+            let seams = Seams::new(self.complex, turn);
+            let mut tiles = Tiles::new(&seams);
+            tiles.put(seams.triangles(face, apex)?, apex, number);
+            // An arc of a circle of 50 degrees is a ninth of its chord high.
+            tiles.refine(self.complex, &|away, length| away > length / 9.0)?;
+            let mut made = Mass::default();
+            for &(t, _) in &tiles.triangles {
+                for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                    let side = tiles.curve(self.complex, face, a, b);
+                    sector::<ALL>(
+                        &face.quadric,
+                        t.map(|i| tiles.points[i as usize]),
+                        &side,
+                        self.order.nodes,
+                        &mut made,
+                    );
+                }
+            }
+            ((made.angle - round).abs() < FILLED).then_some((made, turn))
+        })?;
+        self.turn.set(self.turn.get().min(turn));
+        *out = out.plus(&made);
         Some(())
     }
 }
@@ -406,6 +442,7 @@ fn sector<const ALL: bool>(
             // Half the slope along `up` is the root itself.
             let steep = turn * v * s / root.copysign(one);
             let flux = dot(place, slope) * steep;
+            out.angle += flux / dot(place, place).powf(1.5);
             if ALL {
                 out.surface(place, flux, norm(slope) * steep.abs() * turn.signum());
             } else {

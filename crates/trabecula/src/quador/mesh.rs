@@ -10,13 +10,13 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::fault::{Fault, number};
-use crate::math::{Vec3, add, cross, dot, scale, sub, unit};
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
 use super::Quadors;
 use super::complex::Complex;
 use super::hub::Hub;
-use super::integral::tangled;
+use super::integral::{USUAL, filled, tangled};
 use super::tiling::{Seams, Side, Tiles, middle};
 
 /// A hub in triangles.
@@ -102,7 +102,11 @@ impl Quadors {
                     .iter()
                     .map(|s| self.ring(s.beam as usize, chord))
                     .collect();
-                [0.6, 0.3, 0.15, 0.075]
+                // As finely as quadrature needed to fill every face, or finer.
+                let turn = filled::<false>(&hub, &complex, USUAL)
+                    .ok_or_else(|| tangled(i))?
+                    .1;
+                [turn, turn / 2.0, turn / 4.0]
                     .iter()
                     .find_map(|&turn| part(&hub, &complex, &rings, chord, turn))
                     .ok_or_else(|| tangled(i))
@@ -236,10 +240,8 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
                 }
             }
             None => {
-                let triangles = seams.triangles(face, middle(complex, face))?;
-                tiles
-                    .triangles
-                    .extend(triangles.into_iter().map(|t| (t, number)));
+                let middle = middle(complex, face);
+                tiles.put(seams.triangles(face, middle)?, middle, number);
             }
         }
     }
@@ -252,6 +254,11 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
                 .iter()
                 .fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))),
         );
+        // A triangle that lies on its back was cut across a fold: the seams are drawn finer and it is tried again.
+        let flat = cross(sub(b, a), sub(c, a));
+        if dot(flat, up) < -0.2 * norm(flat) && norm(flat) > chord * chord {
+            return None;
+        }
         for x in [
             scale(add(a, add(b, c)), 1.0 / 3.0),
             scale(add(a, b), 0.5),
@@ -260,6 +267,9 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
         ] {
             error = error.max(q.along(x, up).abs());
         }
+    }
+    if !(error < 3.0 * chord) {
+        return None;
     }
     let triangles = tiles.triangles.into_iter().map(|(t, _)| t).collect();
     Some(Part {

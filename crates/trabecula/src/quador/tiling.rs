@@ -70,8 +70,65 @@ impl Seams {
     }
 
     /// Triangles over the points of a face's seams, counter-clockwise from outside; `None` if the outline crosses itself, as it
-    /// may where seams are drawn too coarsely. Not for faces with a rim.
+    /// may where seams are drawn too coarsely. `MIDDLE` stands for the middle, where a fan from it stays nearer to the surface than
+    /// any cut from seam to seam. Not for faces with a rim.
     pub fn triangles(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
+        let place = |i: u32| {
+            if i == MIDDLE {
+                middle
+            } else {
+                self.points[i as usize]
+            }
+        };
+        let worst = |triangles: &[[u32; 3]]| {
+            let mut seam = std::collections::HashSet::new();
+            for l in &face.loops {
+                let w = self.walk(l);
+                (0..w.len()).for_each(|k| {
+                    seam.insert(key(w[k], w[(k + 1) % w.len()]));
+                });
+            }
+            let sides = triangles
+                .iter()
+                .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]);
+            let inner = sides.filter(|&(a, b)| !seam.contains(&key(a, b)));
+            inner
+                .map(|(a, b)| closeness(face, place(a), place(b)))
+                .fold(1.0, f64::min)
+        };
+        let cut = self.cut(face, middle);
+        if cut
+            .as_ref()
+            .is_some_and(|c| face.label != 0 && worst(c) > 0.4)
+        {
+            return cut;
+        }
+        let fan = self.fan(face, middle);
+        match (cut, fan) {
+            (Some(c), Some(f)) => Some(if face.label == 0 || worst(&f) > worst(&c) {
+                f
+            } else {
+                c
+            }),
+            (c, f) => f.or(c),
+        }
+    }
+
+    /// A fan from the middle, if the seams go round it without turning back.
+    fn fan(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
+        let [walked] = &face.loops[..] else {
+            return None;
+        };
+        let w = self.walk(walked);
+        let place = |i: u32| self.points[i as usize];
+        let all = (0..w.len()).map(|k| [MIDDLE, w[k], w[(k + 1) % w.len()]]);
+        let round = all
+            .clone()
+            .all(|[_, a, b]| dot(middle, cross(place(a), place(b))) > 0.0);
+        (round && w.len() > 2).then(|| all.collect())
+    }
+
+    fn cut(&self, face: &Face, middle: Vec3) -> Option<Vec<[u32; 3]>> {
         let m = unit(middle);
         let side = unit(cross(
             m,
@@ -114,6 +171,9 @@ impl Seams {
         })
     }
 }
+
+/// The number of a face's middle before it has one.
+pub const MIDDLE: u32 = u32::MAX;
 
 /// Cuts a polygon into triangles, the best shaped ear first.
 fn ears(
@@ -259,6 +319,17 @@ impl Tiles {
             triangles: Vec::new(),
             sides,
         }
+    }
+
+    /// Adds the triangles of a face, and its middle if they use it.
+    pub fn put(&mut self, triangles: Vec<[u32; 3]>, middle: Vec3, face: u32) {
+        let number = self.points.len() as u32;
+        if triangles.iter().flatten().any(|&i| i == MIDDLE) {
+            self.points.push(middle);
+        }
+        let named = |t: [u32; 3]| t.map(|i| if i == MIDDLE { number } else { i });
+        self.triangles
+            .extend(triangles.into_iter().map(|t| (named(t), face)));
     }
 
     /// What a side lies on.
