@@ -90,6 +90,10 @@ impl Root {
     /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess.
     #[inline]
     fn narrow(&mut self, value: f64, slope: f64) -> f64 {
+        // A surface may run along the edge: then there is no slope, and no step to either side.
+        if value == 0.0 {
+            return 0.0;
+        }
         *(if value <= 0.0 {
             &mut self.solid
         } else {
