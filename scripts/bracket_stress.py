@@ -15,6 +15,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+
 import trabecula as lt
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -91,10 +92,7 @@ class Model:
         """Displacements (mm) under the load, for E = 1 MPa."""
         matrix = stiffness() * self.step
         diagonal = np.stack(
-            [
-                np.bincount(self.corners.ravel(), np.tile(np.diag(matrix)[a::3], len(self.cells)), len(self.nodes))
-                for a in range(3)
-            ],
+            [np.bincount(self.corners.ravel(), np.tile(np.diag(matrix)[a::3], len(self.cells)), len(self.nodes)) for a in range(3)],
             axis=1,
         ).ravel()
         moves, rest = np.zeros_like(self.load), self.load * self.free
