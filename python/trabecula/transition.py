@@ -17,7 +17,8 @@ class Transitions(Sequence):
     ``between`` names the two lattices; ``volume`` (mm³) is where both count; ``loose`` and ``dangling`` have the number of
     ``bodies`` that touch neither side, or hang by necks under half the narrowest of the widest way across, and their
     ``volume``; ``neck`` is the ``diameter`` (mm, to within ``step``) and ``place`` of that narrowest neck, None where no way
-    leads across; ``fractions`` has for tenths of the second's ``share`` the fraction ``asked`` and ``found``.
+    leads across; ``fractions`` has for tenths of the second's ``share`` the fraction ``asked`` and ``found``, in
+    windows of two cells.
     """
 
     def __init__(self, found: list[dict]):

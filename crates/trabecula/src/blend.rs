@@ -114,6 +114,11 @@ impl Blend {
         &self.weights
     }
 
+    /// The greatest length of a cell, mm.
+    pub fn longest(&self) -> f64 {
+        self.strands.iter().map(Strand::longest).fold(0.0, f64::max)
+    }
+
     /// How the phases go together, where the fraction is kept.
     pub fn phases(&self) -> Option<Phases> {
         self.levels.as_ref().map(|l| l.joint.phases)

@@ -8,6 +8,7 @@
 use std::sync::OnceLock;
 
 use super::strand::Strand;
+use crate::map::Map;
 use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
 /// How the phases of the lattices of a blend go together.
@@ -38,7 +39,8 @@ pub(super) struct Joint {
     pub origin: Vec3,
     pub step: f64,
     pub shape: [usize; 3],
-    bounds: Aabb,
+    /// Where solved maps end; nothing else has an end.
+    bounds: Option<Aabb>,
 }
 
 /// The neighbourhoods about a point: each with its share and the gradient of that (per mm).
@@ -62,6 +64,9 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
+        let solved = strands
+            .iter()
+            .any(|s| s.lattice().is_some_and(|l| matches!(l.map, Map::Phase(_))));
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
@@ -83,7 +88,7 @@ impl Joint {
             origin,
             step,
             shape,
-            bounds: *bounds,
+            bounds: solved.then_some(*bounds),
         }
     }
 
@@ -119,8 +124,9 @@ impl Joint {
                     let j = (x as usize).min(table.len() - 2);
                     let s = table[j] + (table[j + 1] - table[j]) * (x - j as f64);
                     // Solved maps end where the region does: what would lie beyond is mirrored.
-                    let (lo, hi) = (self.bounds.min[a], self.bounds.max[a]);
                     let p = middle[a] + 2.0 * self.step * s;
+                    let Some(b) = &self.bounds else { return p };
+                    let (lo, hi) = (b.min[a], b.max[a]);
                     let p = if p > hi { 2.0 * hi - p } else { p };
                     let p = if p < lo { 2.0 * lo - p } else { p };
                     p.clamp(lo, hi)

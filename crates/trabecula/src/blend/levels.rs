@@ -293,14 +293,14 @@ impl Levels {
                 Table::Ends(ends) => at.nodes.iter().zip(&at.shares).fold([0.0; 2], |v, (n, s)| {
                     [v[0] + s * ends[*n][0], v[1] + s * ends[*n][1]]
                 }),
-                Table::Curves(curves) => self.from_curves(curves, &station.own, w, ends, at),
+                Table::Curves(curves) => self.curved(curves, &station.own, w, ends, at),
             };
             out = [out[0] + share * v[0], out[1] + share * v[1]];
         }
         out
     }
 
-    fn from_curves(
+    fn curved(
         &self,
         curves: &[Curve],
         own: &[[f64; 2]],
@@ -366,7 +366,7 @@ impl Levels {
                     ([lo.0, hi.0], [lo.1, hi.1])
                 }
                 Table::Curves(curves) => {
-                    self.from_curves_gradients(curves, &station.own, (w, dw), ends, at, &dy)
+                    self.curved_gradients(curves, &station.own, (w, dw), ends, at, &dy)
                 }
             };
             for e in 0..2 {
@@ -377,7 +377,7 @@ impl Levels {
         (out, slope)
     }
 
-    fn from_curves_gradients(
+    fn curved_gradients(
         &self,
         curves: &[Curve],
         own: &[[f64; 2]],

@@ -34,8 +34,9 @@ pub struct Transition {
     /// The narrowest neck of the widest way from one lattice to the other: its diameter (mm, to within a step) and place;
     /// `None` where no way leads across.
     pub neck: Option<(f64, Vec3)>,
-    /// For tenths of the second's share from 0 to 1: the share in the middle, the solid fraction asked for and found, and
-    /// the number of points.
+    /// For tenths of the second's share from 0 to 1: the share in the middle, the solid fraction asked for and found, both
+    /// in windows of two of the largest cells about the points (raised cosines, at half their height), and the number of
+    /// points.
     pub fractions: Vec<[f64; 4]>,
     /// Distance between points, mm.
     pub step: f64,
@@ -83,9 +84,10 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
         }
     }
     pairs.sort_unstable();
+    let found = windows(&points, 2.0 * blend.longest() / step);
     pairs
         .into_iter()
-        .map(|pair| transition(&points, &depth, pair, step, &at))
+        .map(|pair| transition(&points, &depth, &found, pair, step, &at))
         .collect()
 }
 
@@ -194,6 +196,36 @@ fn depths(points: &Points, step: f64) -> Vec<f32> {
         .collect()
 }
 
+/// The fractions asked for and found about each point: means over a window that is a raised cosine along each axis and ends
+/// `reach` points away, of what lies in the region.
+fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
+    let [nx, ny, nz] = points.shape;
+    let most = reach.floor() as usize;
+    let share = |d: usize| (1.0 + (std::f64::consts::PI * d as f64 / reach).cos()) as f32;
+    let window: Vec<f32> = (0..=most).map(share).collect();
+    let of =
+        |p: &Option<Point>| p.map_or([0.0; 3], |p| [1.0, p.asked, f32::from(u8::from(p.solid))]);
+    let mut sums: Vec<[f32; 3]> = points.of.iter().map(of).collect();
+    for (length, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
+        let old = sums;
+        sums = (0..old.len())
+            .into_par_iter()
+            .map(|n| {
+                let i = n / stride % length;
+                let mut sum = [0f32; 3];
+                for j in i.saturating_sub(most)..(i + most + 1).min(length) {
+                    let (w, v) = (window[i.abs_diff(j)], old[n + j * stride - i * stride]);
+                    (0..3).for_each(|c| sum[c] += w * v[c]);
+                }
+                sum
+            })
+            .collect();
+    }
+    sums.into_iter()
+        .map(|s| [s[1] / s[0].max(1e-30), s[2] / s[0].max(1e-30)])
+        .collect()
+}
+
 /// A body that grows: its points, whether it reaches either side.
 struct Bodies {
     parent: Vec<u32>,
@@ -244,6 +276,7 @@ impl Bodies {
 fn transition(
     points: &Points,
     depth: &[f32],
+    found: &[[f32; 2]],
     pair: [u8; 2],
     step: f64,
     at: &(dyn Fn(usize) -> Vec3 + Sync),
@@ -259,18 +292,15 @@ fn transition(
     let cell = step.powi(3);
     let mut sums = vec![[0.0; 3]; BINS];
     let mut count = 0usize;
-    for p in points.of.iter().flatten().filter(|p| of_pair(p)) {
+    let each = points.of.iter().zip(found);
+    for (p, f) in each.filter_map(|(p, f)| p.as_ref().filter(|p| of_pair(p)).map(|p| (p, f))) {
         let share = f64::from(if p.first == pair[0] {
             p.share
         } else {
             1.0 - p.share
         });
         let s = &mut sums[((share * BINS as f64) as usize).min(BINS - 1)];
-        *s = [
-            s[0] + 1.0,
-            s[1] + f64::from(p.asked),
-            s[2] + f64::from(u8::from(p.solid)),
-        ];
+        *s = [s[0] + 1.0, s[1] + f64::from(f[0]), s[2] + f64::from(f[1])];
         count += 1;
     }
     let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && (of_pair(&p) || side(&p) > 0));

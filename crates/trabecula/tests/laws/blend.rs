@@ -41,8 +41,8 @@ fn step(width: f64) -> Weights {
 }
 
 const BOUNDS: Aabb = Aabb {
-    min: [-20.0, -8.0, -8.0],
-    max: [20.0, 8.0, 8.0],
+    min: [-24.0, -14.0, -14.0],
+    max: [24.0, 14.0, 14.0],
 };
 
 fn blend(of: &[Arc<Lattice>], weights: Weights, by: By) -> Blend {
