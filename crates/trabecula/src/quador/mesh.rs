@@ -63,6 +63,13 @@ impl Quadors {
             ));
         }
         self.exact()?;
+        // Fillets fold over seams in ways that halving sides does not yet follow everywhere: never a wrong part.
+        if !self.sharp && self.balls.iter().any(|b| b.last - b.first > 1) {
+            return Err(Fault::new(
+                "fillet",
+                "hubs with fillets are meshed by way of the field: extract it on a grid, or ask for no fillets",
+            ));
+        }
         // Hubs that are equal to a billionth, one of each.
         let mut classes: HashMap<Vec<i64>, usize> = HashMap::new();
         let mut samples = Vec::new();
