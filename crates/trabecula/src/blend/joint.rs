@@ -135,29 +135,6 @@ impl Joint {
             .collect()
     }
 
-    /// The neighbourhoods that the window of neighbourhood `i` reaches, each with its share of it.
-    pub fn near(&self, i: usize) -> Vec<(usize, f64)> {
-        let [nx, ny, nz] = self.shape;
-        let at = [i % nx, i / nx % ny, i / nx / ny];
-        let along = |a: usize, n: usize| {
-            // One step away a raised cosine that ends after two is half as high.
-            [
-                (at[a].saturating_sub(1), 0.25),
-                (at[a], 0.5),
-                ((at[a] + 1).min(n - 1), 0.25),
-            ]
-        };
-        let mut out = Vec::with_capacity(27);
-        for (z, c) in along(2, nz) {
-            for (y, b) in along(1, ny) {
-                for (x, a) in along(0, nx) {
-                    out.push(((z * ny + y) * nx + x, a * b * c));
-                }
-            }
-        }
-        out
-    }
-
     /// The neighbourhoods about a point.
     pub fn corners(&self, p: Vec3) -> Corners {
         let mut out = [(0, 0.0, [0.0; 3]); 8];

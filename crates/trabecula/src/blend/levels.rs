@@ -75,24 +75,6 @@ enum Table {
     Curves(Vec<Curve>),
 }
 
-impl Table {
-    /// What is added to an end at a node, of a table of ends.
-    fn end(&self, node: usize, end: usize) -> f64 {
-        match self {
-            Table::Ends(ends) => ends[node][end],
-            Table::Curves(_) => 0.0,
-        }
-    }
-
-    /// A knot of the quantile function of a node, of a table of such.
-    fn knot(&self, node: usize, knot: usize) -> f64 {
-        match self {
-            Table::Ends(_) => 0.0,
-            Table::Curves(curves) => f64::from(curves[node].0[knot]),
-        }
-    }
-}
-
 /// A lattice of the blend at a point.
 #[derive(Clone, Copy, Default)]
 pub(super) struct End {
@@ -110,8 +92,6 @@ pub(super) struct Levels {
     two_sided: bool,
     /// The quantiles, where none varies.
     uniform: Option<Vec<End>>,
-    /// As looked at, and as used.
-    seen: Vec<OnceLock<Station>>,
     stations: Vec<OnceLock<Station>>,
     /// Numbers of the nodes at which one lattice is alone.
     alone: Vec<usize>,
@@ -137,7 +117,6 @@ impl Levels {
         Levels {
             two_sided: strands.iter().any(Strand::is_sheet),
             uniform: strands.iter().map(ends).collect(),
-            seen: (0..joint.len()).map(|_| OnceLock::new()).collect(),
             stations: (0..joint.len()).map(|_| OnceLock::new()).collect(),
             joint,
             grid,
@@ -150,47 +129,8 @@ impl Levels {
         self.uniform.is_some()
     }
 
-    /// What is used in neighbourhood `i`. A window dulls what drifts through it, beats most; so what the window takes
-    /// from the tables themselves is given back: twice the table less its mean over the window (Tukey's twicing).
     fn station(&self, i: usize, strands: &[Strand]) -> &Station {
-        if self.joint.len() == 1 {
-            return self.seen(i, strands);
-        }
         self.stations[i].get_or_init(|| {
-            let near = self.joint.near(i);
-            let each: Vec<(f64, &Station)> = near
-                .iter()
-                .map(|(j, share)| (*share, self.seen(*j, strands)))
-                .collect();
-            let mid = self.seen(i, strands);
-            let sharp = |of: &dyn Fn(&Station) -> f64| {
-                2.0 * of(mid) - each.iter().map(|(share, s)| share * of(s)).sum::<f64>()
-            };
-            let own = (0..mid.own.len())
-                .map(|k| [mid.own[k][0], sharp(&|s| s.own[k][1]).clamp(0.0, 1.0)])
-                .collect();
-            let table = match &mid.table {
-                Table::Ends(ends) => Table::Ends(
-                    (0..ends.len())
-                        .map(|n| [0, 1].map(|e| sharp(&|s| s.table.end(n, e))))
-                        .collect(),
-                ),
-                Table::Curves(curves) => Table::Curves(
-                    (0..curves.len())
-                        .map(|n| {
-                            Curve(core::array::from_fn(|k| {
-                                sharp(&|s| s.table.knot(n, k)) as f32
-                            }))
-                        })
-                        .collect(),
-                ),
-            };
-            Station { own, table }
-        })
-    }
-
-    fn seen(&self, i: usize, strands: &[Strand]) -> &Station {
-        self.seen[i].get_or_init(|| {
             let places = self.joint.places(i);
             let mut values = vec![0.0; places.len()];
             let samples: Vec<Vec<f32>> = strands
