@@ -1,6 +1,7 @@
 //! Laws of the whole: random designs, rates of convergence, bodies known exactly.
 
 mod common;
+mod crease;
 mod damage;
 mod fields;
 mod flush;
