@@ -158,7 +158,7 @@ impl Edges {
             for _ in 0..2 {
                 self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
                 self.face.insert(nodes.index(cell), seen.face);
-                cell[side.1] -= 1;
+                cell[side.1] = cell[side.1].wrapping_sub(1);
             }
             for c in &chords {
                 self.points.extend(c.via.iter().copied());
