@@ -26,7 +26,7 @@ use super::signs::{Signs, bits};
 use super::tile::Nodes;
 pub(super) use chord::Chord;
 
-/// Cells that are this many steps long or more show edges between them, however little the face turns there.
+/// Pieces of edges that are this many steps long or more are shown, however little the face turns there.
 const LONG: f64 = 3.0;
 /// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
 /// step.
@@ -35,7 +35,7 @@ const SHARP: f64 = 0.436;
 /// Edges of faces in the cells of a block.
 #[derive(Default)]
 pub(super) struct Edges {
-    /// For each row of cells: those that have a side with chords.
+    /// For each row of cells: those that are filled by their rims.
     pub cells: Vec<u64>,
     /// The face that makes the surface in these.
     pub face: HashMap<usize, usize>,
@@ -158,7 +158,7 @@ impl Edges {
             for _ in 0..2 {
                 self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
                 self.face.insert(nodes.index(cell), seen.face);
-                cell[side.1] -= 1;
+                cell[side.1] = cell[side.1].wrapping_sub(1);
             }
             for c in &chords {
                 self.points.extend(c.via.iter().copied());

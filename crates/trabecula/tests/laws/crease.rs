@@ -8,7 +8,9 @@ use trabecula::cell::Part;
 use trabecula::extract::{Silent, Surface, surface};
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
-use trabecula::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
+use trabecula::math::{
+    Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit,
+};
 use trabecula::mesh::Mesh;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::solid::Solid;
@@ -200,7 +202,9 @@ impl Shape for Rounded {
 fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     let found = region(mesh.clone());
     let points = creases(truth.mesh(), 30.0, edge / 4.0);
-    let far = points.iter().filter(|p| found.value(**p).abs() > edge / 100.0);
+    let far = points
+        .iter()
+        .filter(|p| found.value(**p).abs() > edge / 100.0);
     far.count() as f64 / points.len() as f64
 }
 
@@ -257,8 +261,14 @@ fn polyhedra_keep_their_edges() {
                 );
                 // Points keep 1/4096 of a step away from nodes, and a corner sees three of them.
                 let exact = turn == [0.0; 3] && ["block", "angle", "notched"].contains(&name);
-                assert!(!exact || off.iter().all(|x| *x < edge * 3.0 / 4096.0), "{name}: {off:?}");
-                assert!(off[0] <= before[0] && off[1] <= before[1] + 1e-9 * edge, "{name}");
+                assert!(
+                    !exact || off.iter().all(|x| *x < edge * 3.0 / 4096.0),
+                    "{name}: {off:?}"
+                );
+                assert!(
+                    off[0] <= before[0] && off[1] <= before[1] + 1e-9 * edge,
+                    "{name}"
+                );
                 assert!(share < 0.2 && rounded > 0.7, "{name}: {share}, {rounded}");
             }
         }
@@ -302,7 +312,11 @@ fn random_boxes_with_thin_walls_and_gaps_keep_every_guarantee() {
         let mesh = boxes(at.each_ref().map(|a| &a[..]), |[i, j, k]| {
             full[i + 3 * j + 9 * k]
         });
-        let turn = if done % 4 == 0 { [0.0; 3] } else { some.point(180.0) };
+        let turn = if done % 4 == 0 {
+            [0.0; 3]
+        } else {
+            some.point(180.0)
+        };
         let edge = some.between(0.03, 0.1);
         let Ok(truth) = MeshRegion::new(moved(mesh, turn, [0.1, 0.2, 0.3]), Repair::Refuse) else {
             continue;

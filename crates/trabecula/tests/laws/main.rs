@@ -2,6 +2,7 @@
 
 mod blend;
 mod common;
+mod crease;
 mod damage;
 mod fields;
 mod flush;

@@ -56,12 +56,9 @@ impl Edges {
                 taken.extend(&way.via);
                 found.push(way.clone());
             }
-            if crossing(
-                &points,
-                &found,
-                side.1,
-                seen.grid.margin * seen.grid.step / 4.0,
-            ) {
+            let apart = seen.grid.margin * seen.grid.step / 4.0;
+            let corners: usize = found.iter().map(|w| w.via.len()).sum();
+            if corners > Key::CORNERS || crossing(&points, &found, side.1, apart) {
                 // Without corners, chords of points that do not alternate keep apart.
                 for w in &mut found {
                     let plain = ways.iter().rfind(|v| v.ends == w.ends);
@@ -79,10 +76,6 @@ impl Edges {
             return None;
         }
         let (low, axis) = side;
-        let corners: usize = ways.iter().map(|w| w.via.len()).sum();
-        if corners > Key::CORNERS {
-            return None;
-        }
         let mut named = 0;
         let mut name = |p: &Vec3| {
             named += 1;
