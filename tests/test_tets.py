@@ -182,7 +182,7 @@ def test_ftetwild_takes_a_soup(tmp_path):
 
 
 def test_paths_of_tetrahedra_go_with_their_design():
-    from trabecula.design import _moved_all
+    from trabecula.design import _moved
 
     data = lt.Design(lt.region.sphere(radius=1), {"core": {"map": lt.map.tets(path="part.vtu")}}).to_dict()
-    assert _moved_all(data, lambda path: "../" + path)["lattice"]["core"]["map"]["tets"]["path"] == "../part.vtu"
+    assert _moved(data, lambda path: "../" + path)["lattice"]["core"]["map"]["tets"]["path"] == "../part.vtu"

@@ -477,6 +477,8 @@ def tell_tets(report: dict) -> None:
     if fit:
         print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {fit['deviation']:.2g} mm at most")
         print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
+
+
 def beam_cells(args) -> None:
     """``trabecula cells --beams``."""
     facts = beams.cells()

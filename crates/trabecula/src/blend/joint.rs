@@ -24,7 +24,7 @@ pub enum Phases {
 
 /// Places looked at where one distribution serves all, and in each neighbourhood.
 const EVERYWHERE: usize = 1 << 16;
-const NEARBY: usize = 1 << 10;
+const NEARBY: usize = 1 << 12;
 /// Most neighbourhoods.
 const MOST: f64 = 100_000.0;
 /// Most waves of a series whose beats are looked at.
