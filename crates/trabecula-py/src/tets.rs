@@ -16,6 +16,17 @@ use crate::file;
 use crate::mesh::Mesh;
 use crate::run::run;
 
+/// A number for each tetrahedron.
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+/// Points, connectivity, ends, kinds and zones of elements that Python read.
+type Read<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, u8>,
+    PyReadonlyArray1<'py, u32>,
+);
+
 /// A tetrahedral mesh, checked.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct TetMesh {
@@ -143,10 +154,7 @@ impl TetMesh {
     }
 
     /// The least dihedral angle (degrees) and the size (mm) of each tetrahedron.
-    fn shapes<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn shapes<'py>(&self, py: Python<'py>) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
         let (angles, sizes) = run(py, None, None, |_| self.tets.mesh.shapes())?;
         Ok((angles.into_pyarray(py), sizes.into_pyarray(py)))
     }
@@ -185,13 +193,7 @@ pub fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
                 .import("trabecula.elements")?
                 .getattr("read")?
                 .call1((path,))?;
-            let (points, connectivity, ends, kinds, zones): (
-                PyReadonlyArray2<'_, f64>,
-                PyReadonlyArray1<'_, u32>,
-                PyReadonlyArray1<'_, u64>,
-                PyReadonlyArray1<'_, u8>,
-                PyReadonlyArray1<'_, u32>,
-            ) = read.extract()?;
+            let (points, connectivity, ends, kinds, zones): Read<'_> = read.extract()?;
             let elements = Elements {
                 points: rows(&points),
                 connectivity: connectivity.as_array().to_vec(),

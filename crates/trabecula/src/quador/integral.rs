@@ -168,7 +168,7 @@ pub(super) fn filled<const ALL: bool>(
         area: hub.radius.powi(2),
         ..Mass::default()
     };
-    for s in &hub.stubs[..] {
+    for s in hub.stubs {
         size.volume += PI * s.squared(s.split) * s.split;
         size.area += PI * s.squared(s.split).sqrt() * s.split;
         size.second[0][0] += s.squared(s.split) * s.split.powi(3);
@@ -234,7 +234,7 @@ impl Work<'_> {
             part(self.order.check, [t, along[1]], across),
         ];
         let gained = (halves[0].volume + halves[1].volume - rough.volume).abs();
-        if gained > 0.5 * (fine.volume - rough.volume).abs() || depth % 4 == 0 {
+        if gained > 0.5 * (fine.volume - rough.volume).abs() || depth.is_multiple_of(4) {
             self.halve::<ALL>(part, [along[0], t], across, depth - 1, out);
             self.halve::<ALL>(part, [t, along[1]], across, depth - 1, out);
         } else {

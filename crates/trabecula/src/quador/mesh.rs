@@ -275,7 +275,7 @@ fn part(hub: &Hub, complex: &Complex, rings: &[usize], chord: f64, turn: f64) ->
             error = error.max(q.along(x, up).abs());
         }
     }
-    if !(error < 3.0 * chord) {
+    if error.is_nan() || error >= 3.0 * chord {
         return None;
     }
     let triangles = tiles.triangles.into_iter().map(|(t, _)| t).collect();

@@ -225,7 +225,7 @@ fn cylinder(n: u32, radius: f64, height: f64) -> Mesh {
 fn star(n: u32) -> Mesh {
     let corner = |i: u32| {
         let (s, c) = (PI * f64::from(i) / f64::from(n)).sin_cos();
-        let r = if i % 2 == 0 { 1.0 } else { 0.5 };
+        let r = if i.is_multiple_of(2) { 1.0 } else { 0.5 };
         [r * c, r * s]
     };
     let polygon: Vec<_> = (0..2 * n).map(corner).collect();
