@@ -345,7 +345,7 @@ def test_a_lattice_and_beams_need_a_blend():
     """And a lattice whose cell is one of beams is told where it belongs."""
     lattice = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
     with pytest.raises(lt.DesignError, match="blend"):
-        lt.Design(region=BOX, lattice=lattice, beams={"struts": lt.Beams(**GOOD)}).build()
+        lt.Design(region=BOX, lattice=lattice, beams={"frame": lt.Beams(**GOOD)}).build()
     with pytest.raises(lt.DesignError, match="another name"):
         lt.Design(region=BOX, lattice=lattice, beams=lt.Beams(**GOOD)).build()
     lattice = lt.Lattice(cell="octet", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
