@@ -2,6 +2,7 @@
 
 mod connect;
 mod curvature;
+mod cut;
 mod distance;
 mod named;
 mod nearest;
@@ -12,6 +13,7 @@ pub mod tet;
 mod thickness;
 
 pub use connect::{Connectivity, connectivity};
+pub(crate) use cut::Cut;
 pub use distance::Distance;
 pub use named::{Named, catalogue, named};
 pub use series::{Series, Term};

@@ -5,7 +5,7 @@ pub(crate) use rows::Rows;
 
 use std::sync::Arc;
 
-use crate::cell::{Cell, Distance, Part};
+use crate::cell::{Cell, Cut, Distance, Part};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::Map;
@@ -58,8 +58,8 @@ pub struct Lattice {
     steepness: f64,
     /// t, where it does not vary.
     uniform: Option<f64>,
-    /// Set for one of the two sides of a sheet: the part, lower or upper, whose inequality it is.
-    side: Option<Part>,
+    /// The part, or one side of it alone.
+    cut: Cut,
 }
 
 impl Lattice {
@@ -90,22 +90,8 @@ impl Lattice {
             distance,
             steepness,
             uniform,
-            side: None,
+            cut: Cut::new(part),
         }
-    }
-
-    /// The sign of f and that of t in the value; f by its magnitude for a whole sheet.
-    fn signs(&self) -> (f64, f64) {
-        match (self.part, self.side) {
-            (Part::Sheet, Some(Part::Upper)) => (-1.0, -1.0),
-            (Part::Upper, _) => (-1.0, 1.0),
-            _ => (1.0, -1.0),
-        }
-    }
-
-    /// Whether the value has the crease of |f|.
-    fn folded(&self) -> bool {
-        self.part == Part::Sheet && self.side.is_none()
     }
 
     /// The signed distance to the mid-surface, where the level is a thickness.
@@ -323,18 +309,15 @@ impl Field for Lattice {
         self.cores(points, out);
         let mut t = vec![0.0; points.len()];
         self.isos(points, &mut t);
-        let ((s, c), folded) = (self.signs(), self.folded());
         for (f, t) in out.iter_mut().zip(t) {
-            *f = s * if folded { f.abs() } else { *f } + c * t;
+            *f = self.cut.value(*f, t);
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         self.core_gradients(points, values, gradients);
-        let ((s, c), folded) = (self.signs(), self.folded());
         let cut = |f: &mut f64, g: &mut Vec3, t: f64, dt: Vec3| {
-            let s = if folded && *f < 0.0 { -s } else { s };
-            (*f, *g) = (s * *f + c * t, add(scale(*g, s), scale(dt, c)));
+            (*f, *g) = self.cut.gradient((*f, *g), (t, dt));
         };
         let both = values.iter_mut().zip(gradients);
         if let Some(t) = self.uniform {
@@ -349,27 +332,14 @@ impl Field for Lattice {
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        let (f, t) = (self.core_bound(b), self.iso_bound(b));
-        match (self.part, self.side) {
-            (Part::Sheet, Some(Part::Upper)) => -f - t,
-            (Part::Sheet, None) => f.abs() - t,
-            (Part::Upper, _) => t - f,
-            _ => f - t,
-        }
+        self.cut.bound(self.core_bound(b), self.iso_bound(b))
     }
 
     fn parts(&self) -> Vec<Arc<dyn Field>> {
-        if !self.folded() {
-            return Vec::new();
-        }
-        let side = |part| {
-            let side = Some(part);
-            Arc::new(Lattice {
-                side,
-                ..self.clone()
-            }) as Arc<dyn Field>
-        };
-        vec![side(Part::Lower), side(Part::Upper)]
+        self.cut.sides(|cut| Lattice {
+            cut,
+            ..self.clone()
+        })
     }
 
     fn slope(&self) -> f64 {
@@ -396,8 +366,8 @@ impl Lattice {
         let mut isos = vec![self.uniform.unwrap_or(0.0) as f32; xs.len()];
         let mut points: Vec<Vec3> = Vec::new();
         let mut found: Vec<f64> = Vec::new();
-        let (sign, of_level) = self.signs();
-        let (sign, of_level, folded) = (sign as f32, of_level as f32, self.folded());
+        let (sign, of_level, folded) = self.cut.signs();
+        let (sign, of_level) = (sign as f32, of_level as f32);
         for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
             let (j, k) = (n % ys.len(), n / ys.len());
             let word = wanted.map_or(u64::MAX, |w| w[n]);

@@ -12,8 +12,8 @@ mod level;
 
 use std::sync::Arc;
 
-use crate::cell::Part;
 use crate::cell::tet::{Bary, Stencil};
+use crate::cell::{Cut, Part};
 use crate::field::Field;
 use crate::map::Tets;
 use crate::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
@@ -54,8 +54,8 @@ pub struct Tiling {
     pub level: Level,
     /// For each tetrahedron, a bound of the steepness of f (per mm).
     steep: Arc<Vec<f64>>,
-    /// Set for one of the two sides of a sheet: the part, lower or upper, whose inequality it is.
-    side: Option<Part>,
+    /// The part, or one side of it alone.
+    cut: Cut,
 }
 
 /// How f is known at a point.
@@ -113,7 +113,7 @@ impl Tiling {
             part,
             level,
             steep: Arc::new(steep),
-            side: None,
+            cut: Cut::new(part),
         }
     }
 
@@ -259,19 +259,6 @@ impl Tiling {
         }
     }
 
-    fn folded(&self) -> bool {
-        self.part == Part::Sheet && self.side.is_none()
-    }
-
-    /// The sign of f and that of t in the value; f by its magnitude for a whole sheet.
-    fn signs(&self) -> (f64, f64) {
-        match (self.part, self.side) {
-            (Part::Sheet, Some(Part::Upper)) => (-1.0, -1.0),
-            (Part::Upper, _) => (-1.0, 1.0),
-            _ => (1.0, -1.0),
-        }
-    }
-
     /// Whether the level or the weights vary.
     pub fn varies(&self) -> bool {
         matches!(self.level, Level::Nodes(_)) || self.cells.iter().any(|c| c.weights.is_some())
@@ -334,19 +321,15 @@ impl Tiling {
 
 impl Field for Tiling {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let ((s, c), folded) = (self.signs(), self.folded());
         for (o, k) in out.iter_mut().zip(self.known(points)) {
-            *o = s * if folded { k.f.abs() } else { k.f } + c * k.t;
+            *o = self.cut.value(k.f, k.t);
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let ((s, c), folded) = (self.signs(), self.folded());
         let both = values.iter_mut().zip(gradients);
         for ((v, g), k) in both.zip(self.known(points)) {
-            let s = if folded && k.f < 0.0 { -s } else { s };
-            *v = s * k.f + c * k.t;
-            *g = add(scale(k.slope, s), scale(k.slope_t, c));
+            (*v, *g) = self.cut.gradient((k.f, k.slope), (k.t, k.slope_t));
         }
     }
 
@@ -405,26 +388,14 @@ impl Field for Tiling {
             Level::Nodes(_) if t.lo <= t.hi => t,
             Level::Nodes(_) => spread(self.levels()),
         };
-        match (self.part, self.side) {
-            (Part::Sheet, Some(Part::Upper)) => -f - t,
-            (Part::Sheet, None) => f.abs() - t,
-            (Part::Upper, _) => t - f,
-            _ => f - t,
-        }
+        self.cut.bound(f, t)
     }
 
     fn parts(&self) -> Vec<Arc<dyn Field>> {
-        if !self.folded() {
-            return Vec::new();
-        }
-        let side = |part| {
-            let side = Some(part);
-            Arc::new(Tiling {
-                side,
-                ..self.clone()
-            }) as Arc<dyn Field>
-        };
-        vec![side(Part::Lower), side(Part::Upper)]
+        self.cut.sides(|cut| Tiling {
+            cut,
+            ..self.clone()
+        })
     }
 
     fn slope(&self) -> f64 {
