@@ -10,6 +10,7 @@ use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
 pub mod complex;
+mod band;
 mod field;
 pub mod hub;
 mod index;

@@ -16,7 +16,7 @@ use crate::mesh::Mesh;
 use super::Quadors;
 use super::complex::Complex;
 use super::hub::Hub;
-use super::integral::{USUAL, filled, tangled};
+use super::integral::tangled;
 use super::tiling::{Seams, Side, Tiles, middle};
 
 /// A hub in triangles.
@@ -109,10 +109,7 @@ impl Quadors {
                     .iter()
                     .map(|s| self.ring(s.beam as usize, chord))
                     .collect();
-                // As finely as quadrature needed to fill every face, or finer.
-                let turn = filled::<false>(&hub, &complex, USUAL)
-                    .ok_or_else(|| tangled(i))?
-                    .1;
+                let turn = 0.2;
                 [turn, turn / 2.0, turn / 4.0]
                     .iter()
                     .find_map(|&turn| part(&hub, &complex, &rings, chord, turn))
