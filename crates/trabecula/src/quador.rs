@@ -11,6 +11,7 @@ use crate::math::{Aabb, Vec3, norm, scale, sub};
 
 pub mod complex;
 mod band;
+mod facets;
 mod field;
 pub mod hub;
 mod index;
@@ -19,7 +20,6 @@ mod mesh;
 pub mod pencil;
 pub mod quadric;
 pub mod query;
-mod tiling;
 
 use hub::{Affine, Hub, Stub};
 use index::Index;

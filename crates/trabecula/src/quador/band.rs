@@ -331,7 +331,7 @@ fn pair(hub: &Hub, complex: &Complex, face: &Face) -> Option<Frame> {
 fn corner(complex: &Complex, face: &Face) -> Vec<Frame> {
     let arcs = || face.loops.iter().flatten().map(|&(a, _)| &complex.arcs[a as usize].conic);
     let places = || arcs().flat_map(|c| [0.0, 0.25, 0.5, 0.75, 1.0].map(|s| unit(c.at(s * c.end))));
-    let m = super::tiling::middle(complex, face);
+    let m = middle(complex, face);
     let m = unit(m);
     let side = unit(cross(
         m,
@@ -513,3 +513,25 @@ impl Band {
     }
 }
 
+/// A place on a face, in the middle of its seams: on the ball the far side of a lone cap.
+pub(super) fn middle(complex: &Complex, face: &Face) -> Vec3 {
+    let (mut sum, mut arrow) = ([0.0; 3], [0.0; 3]);
+    for &(arc, forward) in face.loops.iter().flatten() {
+        let conic = &complex.arcs[arc as usize].conic;
+        for &(t, w) in super::integral::gauss(4) {
+            let (x, dx) = conic.with_slope(t * conic.end);
+            let turn = w * conic.end * if forward { 1.0 } else { -1.0 };
+            sum = add(sum, scale(unit(x), w * conic.end * norm(dx)));
+            arrow = add(arrow, scale(cross(x, dx), turn));
+        }
+    }
+    // Where seams go round more than half the sphere their middle is on the wrong side.
+    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 {
+        arrow
+    } else {
+        sum
+    };
+    let p = unit(p);
+    let at = face.quadric.exit(p);
+    scale(p, if at.is_finite() { at } else { 1.0 })
+}

@@ -15,11 +15,10 @@ use crate::fault::Fault;
 use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
-use super::band::{Band, Frame, Section, bands, girdle};
+use super::band::{Band, Frame, Section, bands, girdle, middle};
 use super::complex::{Complex, Face};
 use super::hub::Hub;
 use super::quadric::{Conic, Quadric};
-use super::tiling::middle;
 
 /// Integrals over a solid of density one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

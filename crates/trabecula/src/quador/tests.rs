@@ -815,3 +815,42 @@ fn zz_debug() {
         }
     }
 }
+
+#[test]
+#[ignore]
+fn zz_mesh() {
+    let mut random = Random(77);
+    let (mut ok, mut bad) = (0, 0);
+    for n in 1..=14 {
+        for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
+            for _ in 0..4 {
+                let g = random_star(&mut random, n);
+                let q = Quadors::new(&g, fillet).expect("a star");
+                if !q.overlaps().is_empty() {
+                    continue;
+                }
+                let exact = q.volume();
+                let mut e = Vec::new();
+                for chord in [0.02, 0.005] {
+                    match q.mesh(chord) {
+                        Ok((mesh, error)) => {
+                            let m = crate::measure::size(&mesh);
+                            let x = crate::mesh::self_intersections(&mesh, 100);
+                            let v = exact.as_ref().map_or(f64::NAN, |v| 1.0 - mesh.volume() / v);
+                            let mut low = mesh.clone();
+                            low.vertices.iter_mut().flatten().for_each(|c| *c = f64::from(*c as f32));
+                            let y = crate::mesh::self_intersections(&low, 100);
+                            let z = (0..low.triangles.len()).filter(|&i| crate::mesh::degenerate(&low, i)).count();
+                            let flat = mesh.triangles.iter().map(|t| { let [a, b, c] = t.map(|i| mesh.vertices[i as usize]); norm(crate::math::cross(sub(b, a), sub(c, a))) / (dot(sub(a, b), sub(a, b)) + dot(sub(b, c), sub(b, c)) + dot(sub(c, a), sub(c, a))) }).fold(1.0, f64::min);
+                            e.push((mesh.triangles.len(), error, v, m.closed && m.pieces == 1 && m.cavities == 0 && m.euler == 2, x + y + z, flat));
+                            ok += 1;
+                        }
+                        Err(f) => { bad += 1; println!("{n} {fillet:?} {chord} {f}"); }
+                    }
+                }
+                println!("{n} {fillet:?} {e:?}");
+            }
+        }
+    }
+    println!("{ok} {bad}");
+}
