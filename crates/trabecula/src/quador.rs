@@ -11,6 +11,7 @@ use crate::math::{Aabb, Vec3, norm, scale, sub};
 
 pub mod complex;
 mod band;
+mod classes;
 mod facets;
 mod field;
 pub mod hub;

@@ -122,7 +122,11 @@ impl<'a> Facets<'a> {
                 .map(|k| angle([s.axis, rim[k], rim[(k + 1) % rim.len()]]).abs())
                 .sum::<f64>();
         }
-        ((round - 4.0 * core::f64::consts::PI).abs() < 1e-6).then_some(out)
+        if (round - 4.0 * core::f64::consts::PI).abs() > 1e-6 {
+            return None;
+        }
+        out.settle();
+        Some(out)
     }
 
     fn corners(&self, t: [u32; 3]) -> [Vec3; 3] {
@@ -236,7 +240,7 @@ impl<'a> Facets<'a> {
                 .collect();
             outline.splice(i + 1..i + 1, bridge);
         }
-        self.ears(outline)
+        self.ears(outline, face)
     }
 
     /// An octahedron in a lone ball.
@@ -260,7 +264,7 @@ impl<'a> Facets<'a> {
     }
 
     /// Cuts an outline into triangles, the best ear first.
-    fn ears(&self, mut outline: Vec<u32>) -> Option<Vec<[u32; 3]>> {
+    fn ears(&self, mut outline: Vec<u32>, face: &Face) -> Option<Vec<[u32; 3]>> {
         let place = |i: u32| self.points[i as usize];
         let worth = |[a, b, c]: [u32; 3]| {
             let [p, q, r] = self.corners([a, b, c]);
@@ -269,9 +273,10 @@ impl<'a> Facets<'a> {
             }
             let edge = |p: Vec3, q: Vec3| dot(sub(p, q), sub(p, q));
             let shape = norm(cross(sub(q, p), sub(r, p))) / (edge(p, q) + edge(q, r) + edge(r, p));
-            // A chord that leaves the surface is the last resort.
+            // A chord that leaves the surface is the last resort, or a triangle that stands on it, as one along a seam does.
             let off = self.off(scale(add(p, r), 0.5)) / edge(p, r).sqrt();
-            shape / (1.0 + 8.0 * off).powi(2)
+            let lies = (lies(face, [p, q, r]) - 0.2).max(1e-4);
+            shape * lies / (1.0 + 8.0 * off).powi(2)
         };
         let ear = |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
         let mut out = Vec::with_capacity(outline.len());
@@ -444,27 +449,43 @@ impl<'a> Facets<'a> {
         }
     }
 
+    /// Turns sides until none is worth it: ears along a seam that curves little, seen from the centre, stand on the surface.
+    fn settle(&mut self) {
+        for _ in 0..100 {
+            let mut any = false;
+            for k in 0..self.triangles.len() {
+                for side in 0..3 {
+                    let t = self.triangles[k];
+                    any |= self.flip(t[side], t[(side + 1) % 3]);
+                }
+            }
+            if !any {
+                return;
+            }
+        }
+    }
+
     /// Turns a side inside a fillet, a corner or the ball if that makes its two triangles better.
-    fn flip(&mut self, a: u32, b: u32) {
+    fn flip(&mut self, a: u32, b: u32) -> bool {
         if self.sides.contains_key(&key(a, b)) {
-            return;
+            return false;
         }
         let (Some(&one), Some(&two)) = (self.left.get(&[a, b]), self.left.get(&[b, a])) else {
-            return;
+            return false;
         };
         let face = self.faces[one as usize];
         if face != self.faces[two as usize] || self.complex.faces[face as usize].rim.is_some() {
-            return;
+            return false;
         }
         let apex = |t: [u32; 3]| t.into_iter().find(|&v| v != a && v != b);
         let (Some(c), Some(d)) = (
             apex(self.triangles[one as usize]),
             apex(self.triangles[two as usize]),
         ) else {
-            return;
+            return false;
         };
         if c == d || self.left.contains_key(&[c, d]) || self.left.contains_key(&[d, c]) {
-            return;
+            return false;
         }
         let [p, q, r, s] = [a, b, c, d].map(|i| self.points[i as usize]);
         let open = |x: Vec3, u: Vec3, v: Vec3| {
@@ -474,17 +495,30 @@ impl<'a> Facets<'a> {
         let good = |u: Vec3, v: Vec3, w: Vec3| {
             turn(u, v, w) > 1e-3 * norm(u) * norm(cross(sub(v, u), sub(w, u)))
         };
-        if open(r, p, q) + open(s, p, q) <= core::f64::consts::PI + 0.05
-            || !good(r, s, q)
-            || !good(s, r, p)
-        {
-            return;
+        // Worth it where they stand on the surface, or where angles are wide.
+        let face = &self.complex.faces[face as usize];
+        let before = lies(face, [p, q, r]).min(lies(face, [q, p, s]));
+        let after = lies(face, [r, s, q]).min(lies(face, [s, r, p]));
+        let wide = open(r, p, q) + open(s, p, q) > core::f64::consts::PI + 0.05;
+        let better = before < 0.5 && after > before + 0.1 || wide && after > before.min(0.8);
+        if !better || !good(r, s, q) || !good(s, r, p) {
+            return false;
         }
         self.left.remove(&[a, b]);
         self.left.remove(&[b, a]);
         self.set(one, [c, d, b]);
         self.set(two, [d, c, a]);
+        true
     }
+}
+
+/// The cosine between a triangle and the face that it is to lie on.
+fn lies(face: &Face, [a, b, c]: [Vec3; 3]) -> f64 {
+    let up = face
+        .quadric
+        .half_slope(scale(add(a, add(b, c)), 1.0 / 3.0));
+    let flat = cross(sub(b, a), sub(c, a));
+    dot(flat, up) / (norm(flat) * norm(up)).max(f64::MIN_POSITIVE)
 }
 
 /// The points of a loop as it is walked, without the last, which is the first.

@@ -16,6 +16,7 @@ use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
 use super::band::{Band, Frame, Section, bands, girdle, middle};
+use super::classes::Classes;
 use super::complex::{Complex, Face};
 use super::hub::Hub;
 use super::quadric::{Conic, Quadric};
@@ -464,15 +465,16 @@ pub(super) fn tangled(hub: usize) -> Fault {
 }
 
 impl Quadors {
-    /// Volume, area, centroid and inertia of the whole, to 1e-10: of the parts of all hubs. Beams must not meet but in hubs.
+    /// Volume, area, centroid and inertia of the whole, to 1e-10: of the parts of all hubs, equal ones found once. Beams must not
+    /// meet but in hubs.
     ///
     /// # Errors
     /// Beams that overlap too far for closed forms.
     pub fn mass(&self) -> Result<Mass, Fault> {
-        self.sum(|i| {
-            let mass = hub_mass::<true>(&self.hub(i), &self.complex(i)?, USUAL);
-            Ok(mass.ok_or_else(|| tangled(i))?.moved(self.center(i)))
-        })
+        let (classes, each) = self.each::<true>()?;
+        let all = (classes.of.iter().enumerate())
+            .map(|(i, &c)| each[c as usize].moved(self.center(i)));
+        Ok(all.fold(Mass::default(), |sum, m| sum.plus(&m)))
     }
 
     /// The volume alone, mm³.
@@ -480,10 +482,20 @@ impl Quadors {
     /// # Errors
     /// As for `mass`.
     pub fn volume(&self) -> Result<f64, Fault> {
-        let all = self.sum(|i| {
-            hub_mass::<false>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
-        })?;
-        Ok(all.volume)
+        let (classes, each) = self.each::<false>()?;
+        let all = each.iter().zip(&classes.count);
+        Ok(all.map(|(m, &n)| m.volume * n as f64).sum())
+    }
+
+    /// Integrals over a hub of each class about its centre.
+    fn each<const ALL: bool>(&self) -> Result<(Classes, Vec<Mass>), Fault> {
+        self.exact()?;
+        let classes = self.classes();
+        let of = |&i: &usize| {
+            hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
+        };
+        let each = classes.sample.par_iter().map(of).collect::<Result<_, _>>()?;
+        Ok((classes, each))
     }
 
     /// The volume of the part of one hub, mm³.
@@ -501,18 +513,5 @@ impl Quadors {
     /// Hubs whose seams do not close.
     pub fn complex(&self, hub: usize) -> Result<Complex, Fault> {
         Complex::new(&self.hub(hub)).map_err(|f| f.under(&format!("hubs[{hub}]")))
-    }
-
-    fn sum(&self, of: impl Fn(usize) -> Result<Mass, Fault> + Sync) -> Result<Mass, Fault> {
-        self.exact()?;
-        const RUN: usize = 64;
-        let runs: Vec<Mass> = (0..self.len().div_ceil(RUN))
-            .into_par_iter()
-            .map(|r| {
-                (r * RUN..((r + 1) * RUN).min(self.len()))
-                    .try_fold(Mass::default(), |sum, i| Ok(sum.plus(&of(i)?)))
-            })
-            .collect::<Result<_, Fault>>()?;
-        Ok(runs.iter().fold(Mass::default(), |a, b| a.plus(b)))
     }
 }
