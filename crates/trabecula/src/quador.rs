@@ -9,9 +9,9 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
-pub mod complex;
 mod band;
 mod classes;
+pub mod complex;
 mod facets;
 mod field;
 pub mod hub;

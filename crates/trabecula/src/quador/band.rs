@@ -130,7 +130,11 @@ impl Frame {
             let length = (s * s + c * c).sqrt().copysign(s);
             let (s, c) = (s / length, c / length);
             // The start of an arc is at 0 and at half a turn.
-            let (s, c) = if s < 1e-14 && most == 1.0 { (0.0, 1.0) } else { (s, c) };
+            let (s, c) = if s < 1e-14 && most == 1.0 {
+                (0.0, 1.0)
+            } else {
+                (s, c)
+            };
             let mut off = (c - most).max(least - c).max(0.0);
             let f = -conic.q * s / (m[0] * c * c + 2.0 * m[1] * s * c + m[2] * s * s);
             let x = add(d, add(scale(conic.e[0], f * c), scale(conic.e[1], f * s)));
@@ -144,11 +148,18 @@ impl Frame {
         let (_, mut s, mut c) = best;
         // Half planes that just miss it, by rounding or at merged vertices, meet its end.
         if c > most || c < least || best.0 > 1.0 {
-            c = if (c - most).abs() < (c - least).abs() { most } else { least };
+            c = if (c - most).abs() < (c - least).abs() {
+                most
+            } else {
+                least
+            };
             s = (1.0 - c * c).max(0.0).sqrt();
         }
         let f = -conic.q * s / (m[0] * c * c + 2.0 * m[1] * s * c + m[2] * s * s);
-        let x = add(conic.v, add(scale(conic.e[0], f * c), scale(conic.e[1], f * s)));
+        let x = add(
+            conic.v,
+            add(scale(conic.e[0], f * c), scale(conic.e[1], f * s)),
+        );
         (x, c)
     }
 
@@ -247,7 +258,11 @@ impl Section {
 }
 
 /// The seams of a stub by longitude about its axis: where each begins and ends, the part, and −1 where it turns back.
-pub(super) fn girdle(complex: &Complex, face: &Face, axis: Vec3) -> (Frame, Vec<(Band, Part, f64)>) {
+pub(super) fn girdle(
+    complex: &Complex,
+    face: &Face,
+    axis: Vec3,
+) -> (Frame, Vec<(Band, Part, f64)>) {
     let east = if axis[0].abs() < 0.6 {
         [1.0, 0.0, 0.0]
     } else {
@@ -262,7 +277,11 @@ pub(super) fn girdle(complex: &Complex, face: &Face, axis: Vec3) -> (Frame, Vec<
         };
         (band, p.part, if p.lower { 1.0 } else { -1.0 })
     };
-    let all = pieces(complex, face, &frame).0.into_iter().map(band).collect();
+    let all = pieces(complex, face, &frame)
+        .0
+        .into_iter()
+        .map(band)
+        .collect();
     (frame, all)
 }
 
@@ -309,7 +328,9 @@ fn pair(hub: &Hub, complex: &Complex, face: &Face) -> Option<Frame> {
     let seam = |bit: u64| {
         face.loops.iter().flatten().find_map(|&(a, _)| {
             let a = &complex.arcs[a as usize];
-            a.sides.contains(&bit).then(|| a.conic.at(a.conic.end / 2.0))
+            a.sides
+                .contains(&bit)
+                .then(|| a.conic.at(a.conic.end / 2.0))
         })
     };
     let pole = cross(p.axis, across);
@@ -329,7 +350,12 @@ fn pair(hub: &Hub, complex: &Complex, face: &Face) -> Option<Frame> {
 
 /// Frames for a corner, about the hub's centre: an axis across it, and one through it.
 fn corner(complex: &Complex, face: &Face) -> Vec<Frame> {
-    let arcs = || face.loops.iter().flatten().map(|&(a, _)| &complex.arcs[a as usize].conic);
+    let arcs = || {
+        face.loops
+            .iter()
+            .flatten()
+            .map(|&(a, _)| &complex.arcs[a as usize].conic)
+    };
     let places = || arcs().flat_map(|c| [0.0, 0.25, 0.5, 0.75, 1.0].map(|s| unit(c.at(s * c.end))));
     let m = middle(complex, face);
     let m = unit(m);
@@ -403,7 +429,11 @@ fn pieces(complex: &Complex, face: &Face, frame: &Frame) -> (Vec<Piece>, Vec<f64
             let piece = Piece {
                 part: Part::new(number, if up { [a, b] } else { [b, a] }),
                 longitudes: [first.min(last), first.max(last)],
-                touch: if up { [soft_a, soft_b] } else { [soft_b, soft_a] },
+                touch: if up {
+                    [soft_a, soft_b]
+                } else {
+                    [soft_b, soft_a]
+                },
                 lower: up == forward,
             };
             stops.extend([first, last]);
@@ -420,9 +450,13 @@ fn cut(complex: &Complex, face: &Face, frame: &Frame) -> Option<Vec<Band>> {
     }
     // Around the whole axis if a seam goes there, else between the outermost.
     let around = !frame.fillet
-        && pieces.iter().any(|p| p.longitudes[0] < -PI || p.longitudes[1] > PI);
+        && pieces
+            .iter()
+            .any(|p| p.longitudes[0] < -PI || p.longitudes[1] > PI);
     if around {
-        stops.iter_mut().for_each(|s| *s -= TAU * (*s / TAU).floor());
+        stops
+            .iter_mut()
+            .for_each(|s| *s -= TAU * (*s / TAU).floor());
         stops.sort_by(f64::total_cmp);
         stops.push(stops[0] + TAU);
     } else {
@@ -470,9 +504,7 @@ fn cut(complex: &Complex, face: &Face, frame: &Frame) -> Option<Vec<Band>> {
                 crossed.swap(k, k + 1);
             }
         }
-        let border = |k: usize| {
-            (Border::Seam(crossed[k].1.part), crossed[k].2)
-        };
+        let border = |k: usize| (Border::Seam(crossed[k].1.part), crossed[k].2);
         let pole = |psi: f64| (Border::Pole(psi), [false; 2]);
         let mut ends = Vec::with_capacity(crossed.len() + 2);
         if crossed.first().is_some_and(|c| !c.1.lower) || crossed.is_empty() && frame.fillet {

@@ -162,7 +162,9 @@ impl<'a> Facets<'a> {
             let mut from = (0.0, direction(0.0));
             while let Some(&to) = todo.last() {
                 let (mid, there) = (direction((from.0 + to) / 2.0), direction(to));
-                let plain = dot(from.1, mid) > least && dot(mid, there) > least && dot(from.1, there) > least;
+                let plain = dot(from.1, mid) > least
+                    && dot(mid, there) > least
+                    && dot(from.1, there) > least;
                 if (!plain || a.ends[0] == a.ends[1] && to - from.0 > 1.0) && todo.len() < 12 {
                     todo.push((from.0 + to) / 2.0);
                     continue;
@@ -278,9 +280,12 @@ impl<'a> Facets<'a> {
             let lies = (lies(face, [p, q, r]) - 0.2).max(1e-4);
             shape * lies / (1.0 + 8.0 * off).powi(2)
         };
-        let ear = |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
+        let ear =
+            |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
         let mut out = Vec::with_capacity(outline.len());
-        let mut worths: Vec<f64> = (0..outline.len()).map(|i| worth(ear(&outline, i))).collect();
+        let mut worths: Vec<f64> = (0..outline.len())
+            .map(|i| worth(ear(&outline, i)))
+            .collect();
         while outline.len() > 3 {
             let n = outline.len();
             let mut order: Vec<usize> = (0..n).filter(|&i| worths[i] > 0.0).collect();
@@ -514,9 +519,7 @@ impl<'a> Facets<'a> {
 
 /// The cosine between a triangle and the face that it is to lie on.
 fn lies(face: &Face, [a, b, c]: [Vec3; 3]) -> f64 {
-    let up = face
-        .quadric
-        .half_slope(scale(add(a, add(b, c)), 1.0 / 3.0));
+    let up = face.quadric.half_slope(scale(add(a, add(b, c)), 1.0 / 3.0));
     let flat = cross(sub(b, a), sub(c, a));
     dot(flat, up) / (norm(flat) * norm(up)).max(f64::MIN_POSITIVE)
 }

@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use crate::fault::Fault;
-use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, unit};
 
 use super::Quadors;
 use super::band::{Band, Frame, Section, bands, girdle, middle};
@@ -472,8 +472,8 @@ impl Quadors {
     /// Beams that overlap too far for closed forms.
     pub fn mass(&self) -> Result<Mass, Fault> {
         let (classes, each) = self.each::<true>()?;
-        let all = (classes.of.iter().enumerate())
-            .map(|(i, &c)| each[c as usize].moved(self.center(i)));
+        let all =
+            (classes.of.iter().enumerate()).map(|(i, &c)| each[c as usize].moved(self.center(i)));
         Ok(all.fold(Mass::default(), |sum, m| sum.plus(&m)))
     }
 
@@ -494,7 +494,11 @@ impl Quadors {
         let of = |&i: &usize| {
             hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
         };
-        let each = classes.sample.par_iter().map(of).collect::<Result<_, _>>()?;
+        let each = classes
+            .sample
+            .par_iter()
+            .map(of)
+            .collect::<Result<_, _>>()?;
         Ok((classes, each))
     }
 

@@ -20,7 +20,6 @@ use super::facets::Facets;
 use super::hub::{Hub, Stub};
 use super::integral::tangled;
 
-
 /// A hub in triangles.
 struct Part {
     /// Places about the centre: those of its rims first, stub by stub.
@@ -100,7 +99,9 @@ impl Quadors {
         let mut kinds: HashMap<Vec<u32>, usize> = HashMap::new();
         for i in 0..self.len() {
             let key = core::iter::once(i).chain(beside(i));
-            kinds.entry(key.map(|j| classes.of[j]).collect()).or_insert(i);
+            kinds
+                .entry(key.map(|j| classes.of[j]).collect())
+                .or_insert(i);
         }
         let crosses = |hubs: &[usize]| {
             let mesh = self.laid(hubs.iter().copied(), classes, parts, chord);

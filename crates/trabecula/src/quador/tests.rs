@@ -675,30 +675,50 @@ fn meshes_are_closed_and_converge_at_second_order() {
             let (mesh, error) = q.mesh(*chord).expect("meshed");
             let m = crate::measure::size(&mesh);
             let name = format!("{} beams {fillet:?} at {chord}", graph.beams.len());
-            assert!(m.closed && m.pieces == 1 && m.cavities == 0, "{name}: {m:?}");
+            assert!(
+                m.closed && m.pieces == 1 && m.cavities == 0,
+                "{name}: {m:?}"
+            );
             // As read back from single precision, too.
             let mut low = mesh.clone();
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             low.vertices.iter_mut().flatten().for_each(round);
             for (k, mesh) in [&mesh, &low].into_iter().enumerate() {
                 if crate::mesh::self_intersections(mesh, 1) > 0 {
-                    println!("XX {name} {k} {}", crate::mesh::self_intersections(mesh, 100));
+                    println!(
+                        "XX {name} {k} {}",
+                        crate::mesh::self_intersections(mesh, 100)
+                    );
                     let mut list: Vec<[u32; 3]> = mesh.triangles.clone();
                     loop {
                         let n = list.len();
                         let mut found = None;
                         'o: for axis in 0..3 {
                             let mut l = list.clone();
-                            l.sort_by(|a, b| mesh.vertices[a[0] as usize][axis].total_cmp(&mesh.vertices[b[0] as usize][axis]));
+                            l.sort_by(|a, b| {
+                                mesh.vertices[a[0] as usize][axis]
+                                    .total_cmp(&mesh.vertices[b[0] as usize][axis])
+                            });
                             for s in 0..5 {
                                 let cut = l[s * n / 8..(s + 4) * n / 8].to_vec();
-                                let m = crate::mesh::Mesh { vertices: mesh.vertices.clone(), triangles: cut.clone() };
-                                if crate::mesh::self_intersections(&m, 1) > 0 { found = Some(cut); break 'o; }
+                                let m = crate::mesh::Mesh {
+                                    vertices: mesh.vertices.clone(),
+                                    triangles: cut.clone(),
+                                };
+                                if crate::mesh::self_intersections(&m, 1) > 0 {
+                                    found = Some(cut);
+                                    break 'o;
+                                }
                             }
                         }
-                        match found { Some(f) if f.len() < n => list = f, _ => break }
+                        match found {
+                            Some(f) if f.len() < n => list = f,
+                            _ => break,
+                        }
                     }
-                    for t in list.iter().take(12) { println!("{t:?} {:?}", t.map(|i| mesh.vertices[i as usize])); }
+                    for t in list.iter().take(12) {
+                        println!("{t:?} {:?}", t.map(|i| mesh.vertices[i as usize]));
+                    }
                 }
                 assert_eq!(crate::mesh::self_intersections(mesh, 1), 0, "{name}");
                 let flat = (0..mesh.triangles.len()).any(|i| crate::mesh::degenerate(mesh, i));
@@ -789,18 +809,40 @@ fn zz_speed() {
             }
         }
         let t2 = t.elapsed().as_secs_f64() / all.len() as f64;
-        let fine = integral::Order { nodes: &[16, 24], differ: 1e-12 };
-        for (nodes, differ) in [(&[5, 8, 12][..], 1e-10), (&[4, 6, 9, 13], 1e-10), (&[4, 6, 9, 13], 1e-11), (&[5, 8, 12], 1e-11)] {
+        let fine = integral::Order {
+            nodes: &[16, 24],
+            differ: 1e-12,
+        };
+        for (nodes, differ) in [
+            (&[5, 8, 12][..], 1e-10),
+            (&[4, 6, 9, 13], 1e-10),
+            (&[4, 6, 9, 13], 1e-11),
+            (&[5, 8, 12], 1e-11),
+        ] {
             let o = integral::Order { nodes, differ };
             let t = Instant::now();
-            let v: Vec<f64> = all.iter().zip(&c).map(|(q, c)| integral::hub_mass::<false>(&q.hub(0), c, o).map_or(f64::NAN, |m| m.volume)).collect();
+            let v: Vec<f64> = all
+                .iter()
+                .zip(&c)
+                .map(|(q, c)| {
+                    integral::hub_mass::<false>(&q.hub(0), c, o).map_or(f64::NAN, |m| m.volume)
+                })
+                .collect();
             let t3 = t.elapsed().as_secs_f64() / all.len() as f64;
             let mut worst = 0.0f64;
             for ((q, c), v) in all.iter().zip(&c).zip(&v).take(60) {
-                let w = integral::hub_mass::<false>(&q.hub(0), c, fine).map_or(f64::NAN, |m| m.volume);
+                let w =
+                    integral::hub_mass::<false>(&q.hub(0), c, fine).map_or(f64::NAN, |m| m.volume);
                 worst = worst.max((v / w - 1.0).abs());
             }
-            println!("{n} hubs {} complex {:.1} us bands {:.1} us ({:.1}) mass({nodes:?},{differ:e}) {:.1} us worst {worst:e}", all.len(), t1 * 1e6, t2 * 1e6, bands as f64 / all.len() as f64, t3 * 1e6);
+            println!(
+                "{n} hubs {} complex {:.1} us bands {:.1} us ({:.1}) mass({nodes:?},{differ:e}) {:.1} us worst {worst:e}",
+                all.len(),
+                t1 * 1e6,
+                t2 * 1e6,
+                bands as f64 / all.len() as f64,
+                t3 * 1e6
+            );
         }
     }
 }
@@ -810,29 +852,51 @@ fn zz_speed() {
 fn zz_debug() {
     for n in [6usize, 12, 4] {
         let mut random = Random(99);
-        let fine = integral::Order { nodes: &[16, 24], differ: 1e-12 };
+        let fine = integral::Order {
+            nodes: &[16, 24],
+            differ: 1e-12,
+        };
         for k in 0..60 {
             let q = Quadors::new(&random_star(&mut random, n), Fillet::Auto).expect("a star");
-            if q.overlaps().iter().any(|o| o.hub == 0) { continue; }
+            if q.overlaps().iter().any(|o| o.hub == 0) {
+                continue;
+            }
             let c = q.complex(0).expect("c");
             let usual = integral::USUAL;
             let a = integral::hub_mass::<false>(&q.hub(0), &c, usual);
             let b = integral::hub_mass::<false>(&q.hub(0), &c, fine);
-            let (Some(a), Some(b)) = (a, b) else { println!("none {n} {k} {} {}", a.is_some(), b.is_some()); continue; };
+            let (Some(a), Some(b)) = (a, b) else {
+                println!("none {n} {k} {} {}", a.is_some(), b.is_some());
+                continue;
+            };
             if (a.volume / b.volume - 1.0).abs() > 3e-10 {
                 println!("{n} {k} {} {}", a.volume, b.volume);
                 for f in &c.faces {
                     let mut one = c.clone();
                     one.faces = vec![f.clone()];
-                    let a = integral::hub_mass::<false>(&q.hub(0), &one, usual).map_or(f64::NAN, |m| m.volume);
-                    let b = integral::hub_mass::<false>(&q.hub(0), &one, fine).map_or(f64::NAN, |m| m.volume);
+                    let a = integral::hub_mass::<false>(&q.hub(0), &one, usual)
+                        .map_or(f64::NAN, |m| m.volume);
+                    let b = integral::hub_mass::<false>(&q.hub(0), &one, fine)
+                        .map_or(f64::NAN, |m| m.volume);
                     if !((a - b).abs() < 1e-10) {
                         println!("  face {:b} {a} {b} loops {:?}", f.label, f.loops);
                         if f.label.count_ones() > 1 {
                             let (frame, bands) = band::bands(&q.hub(0), &c, f).expect("b");
                             println!("    origin {:?}", frame.origin);
-                            for b in bands { println!("    {b:?}"); }
-                            for (a, _) in f.loops.iter().flatten() { let a = &c.arcs[*a as usize]; println!("    arc {:b} {:b} end {} {:?} {:?}", a.sides[0], a.sides[1], a.conic.end, a.conic.at(0.0), a.conic.at(a.conic.end)); }
+                            for b in bands {
+                                println!("    {b:?}");
+                            }
+                            for (a, _) in f.loops.iter().flatten() {
+                                let a = &c.arcs[*a as usize];
+                                println!(
+                                    "    arc {:b} {:b} end {} {:?} {:?}",
+                                    a.sides[0],
+                                    a.sides[1],
+                                    a.conic.end,
+                                    a.conic.at(0.0),
+                                    a.conic.at(a.conic.end)
+                                );
+                            }
                         }
                     }
                 }
@@ -863,14 +927,39 @@ fn zz_mesh() {
                             let x = crate::mesh::self_intersections(&mesh, 100);
                             let v = exact.as_ref().map_or(f64::NAN, |v| 1.0 - mesh.volume() / v);
                             let mut low = mesh.clone();
-                            low.vertices.iter_mut().flatten().for_each(|c| *c = f64::from(*c as f32));
+                            low.vertices
+                                .iter_mut()
+                                .flatten()
+                                .for_each(|c| *c = f64::from(*c as f32));
                             let y = crate::mesh::self_intersections(&low, 100);
-                            let z = (0..low.triangles.len()).filter(|&i| crate::mesh::degenerate(&low, i)).count();
-                            let flat = mesh.triangles.iter().map(|t| { let [a, b, c] = t.map(|i| mesh.vertices[i as usize]); norm(crate::math::cross(sub(b, a), sub(c, a))) / (dot(sub(a, b), sub(a, b)) + dot(sub(b, c), sub(b, c)) + dot(sub(c, a), sub(c, a))) }).fold(1.0, f64::min);
-                            e.push((mesh.triangles.len(), error, v, m.closed && m.pieces == 1 && m.cavities == 0 && m.euler == 2, x + y + z, flat));
+                            let z = (0..low.triangles.len())
+                                .filter(|&i| crate::mesh::degenerate(&low, i))
+                                .count();
+                            let flat = mesh
+                                .triangles
+                                .iter()
+                                .map(|t| {
+                                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+                                    norm(crate::math::cross(sub(b, a), sub(c, a)))
+                                        / (dot(sub(a, b), sub(a, b))
+                                            + dot(sub(b, c), sub(b, c))
+                                            + dot(sub(c, a), sub(c, a)))
+                                })
+                                .fold(1.0, f64::min);
+                            e.push((
+                                mesh.triangles.len(),
+                                error,
+                                v,
+                                m.closed && m.pieces == 1 && m.cavities == 0 && m.euler == 2,
+                                x + y + z,
+                                flat,
+                            ));
                             ok += 1;
                         }
-                        Err(f) => { bad += 1; println!("{n} {fillet:?} {chord} {f}"); }
+                        Err(f) => {
+                            bad += 1;
+                            println!("{n} {fillet:?} {chord} {f}");
+                        }
                     }
                 }
                 println!("{n} {fillet:?} {e:?}");
