@@ -185,8 +185,8 @@ def parser() -> argparse.ArgumentParser:
         "mesh",
         "Mesh a design: closed, oriented, free of self-intersection.",
         "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n"
-        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. --open leaves out what\n"
-        "lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
+        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. --open leaves out\n"
+        "what lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
         "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",

@@ -117,8 +117,8 @@ def tets(
     Made: ``size`` is the edge (mm, a number or a grade) of a regular tetrahedron of the volume they are to have, ``mesher``
     is "background" (ours, takes any region) or "ftetwild" (in the extra ``tets``, takes soups), ``limit`` the seconds that
     the latter may take, ``zones`` regions by number: a tetrahedron is of the first that has its middle, else of zone 0, and
-    ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …), ``unit`` of its coordinates,
-    ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
+    ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …),
+    ``unit`` of its coordinates, ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
 
     ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
     tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
