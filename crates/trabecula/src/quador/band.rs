@@ -44,9 +44,7 @@ pub(super) enum Border {
 pub(super) struct Part {
     /// The arc.
     pub arc: u32,
-    /// Its angles at the least longitude and the greatest.
-    pub angles: [f64; 2],
-    /// Cosines of the greater angle and the lesser.
+    /// Cosines of its greatest angle and its least.
     cosines: [f64; 2],
 }
 
@@ -55,7 +53,6 @@ impl Part {
         let [lo, hi] = [angles[0].min(angles[1]), angles[0].max(angles[1])];
         Part {
             arc,
-            angles,
             cosines: [hi.cos(), lo.cos()],
         }
     }
