@@ -601,14 +601,13 @@ fn golden_volumes_of_filleted_hubs() {
 }
 
 #[test]
-fn integrals_are_converged_and_move_with_the_solid() {
+fn integrals_are_converged_for_every_hub() {
     let mut random = Random(31);
     let fine = integral::Order {
         nodes: &[16, 24],
         differ: 1e-12,
     };
-    let mut worst: [f64; 3] = [0.0; 3];
-    let (mut done, mut refused) = (0, 0);
+    let (mut worst, mut done): ([f64; 3], usize) = ([0.0; 3], 0);
     for n in 1..=14 {
         for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
             for _ in 0..3 {
@@ -617,37 +616,90 @@ fn integrals_are_converged_and_move_with_the_solid() {
                     continue;
                 }
                 let (hub, c) = (q.hub(0), q.complex(0).expect("a hub"));
-                // A face that cannot be filled is refused, never summed wrongly.
-                let Some(usual) = integral::hub_mass::<true>(&hub, &c, integral::USUAL) else {
-                    refused += 1;
-                    println!("refused {n} {fillet:?}");
-                    continue;
-                };
+                let of = |order| integral::hub_mass::<true>(&hub, &c, order).expect("integrals");
+                let (usual, want) = (of(integral::USUAL), of(fine));
+                let volume = q.hub_volume(0).expect("a volume");
                 done += 1;
-                let volume = integral::hub_mass::<false>(&hub, &c, integral::USUAL)
-                    .expect("whole")
-                    .volume;
-                let Some(want) = integral::hub_mass::<true>(&hub, &c, fine) else {
-                    continue;
-                };
                 let e = [
                     (volume / want.volume - 1.0).abs(),
                     (usual.area / want.area - 1.0).abs(),
                     (usual.second[0][0] / want.second[0][0] - 1.0).abs(),
                 ];
                 for k in 0..3 {
-                    assert!(e[k].is_finite(), "{n} {fillet:?}");
+                    assert!(e[k] < 1e-10, "{n} {fillet:?} {e:?}");
                     worst[k] = worst[k].max(e[k]);
-                }
-                if e[0] > 1e-10 {
-                    println!("{n} {fillet:?} {e:?}");
                 }
             }
         }
     }
-    println!("{worst:?} {done} {refused}");
-    assert!(done >= 42, "{done} {refused}");
-    assert!(worst.iter().all(|e| *e < 1e-10), "{worst:?}");
+    println!("{worst:?} {done}");
+    assert!(done > 120, "{done}");
+}
+
+/// Points thrown at random into a box: of n of them a share p falls into the solid, within four standard deviations.
+#[test]
+fn integrals_are_those_of_points_thrown_at_random() {
+    let mut random = Random(41);
+    for (n, fillet) in [
+        (2, Fillet::Auto),
+        (3, Fillet::Auto),
+        (5, Fillet::Tau(0.5)),
+        (8, Fillet::Auto),
+        (13, Fillet::Auto),
+    ] {
+        let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
+        let mass = q.mass().expect("exact");
+        let (b, thrown) = (q.bounds(), 400_000);
+        let (mut inside, mut sum, mut squares) = (0usize, [0.0; 3], [0.0; 3]);
+        for _ in 0..thrown {
+            let p = [0, 1, 2].map(|a| b.min[a] + random.next() * (b.max[a] - b.min[a]));
+            if q.contains(p) {
+                inside += 1;
+                for a in 0..3 {
+                    sum[a] += p[a];
+                    squares[a] += p[a] * p[a];
+                }
+            }
+        }
+        let boxed: f64 = b.size().iter().product();
+        let share = mass.volume / boxed;
+        let deviation = (share * (1.0 - share) / f64::from(thrown)).sqrt();
+        let found = inside as f64 / f64::from(thrown);
+        assert!(
+            (found - share).abs() < 4.0 * deviation,
+            "{n} {fillet:?}: {found} {share}"
+        );
+        for a in 0..3 {
+            let (mean, square) = (sum[a] / inside as f64, squares[a] / inside as f64);
+            let spread = (square - mean * mean).sqrt();
+            let off = (mean - mass.centroid()[a]).abs();
+            assert!(
+                off < 4.0 * spread / (inside as f64).sqrt(),
+                "{n} {fillet:?} {a}: {off}"
+            );
+            // The inertia's diagonal is the spread of the two other axes.
+            let inertia = mass.inertia();
+            let others = (0..3).map(|k| inertia[k][k]).sum::<f64>() / 2.0 - inertia[a][a];
+            let want = (others / mass.volume).sqrt();
+            // A sample's spread is within its own share of 1/√n, times what heavy ends add.
+            assert!(
+                (spread / want - 1.0).abs() < 8.0 / (inside as f64).sqrt(),
+                "{n} {a}: {spread} {want}"
+            );
+        }
+    }
+}
+
+#[test]
+fn equal_hubs_are_found_wherever_they_are() {
+    let one = Quadors::new(&cubic(3, 0.0), Fillet::Auto).expect("a lattice");
+    let classes = one.classes();
+    // Corners, edges, faces and the inside of a cube, by what is missing.
+    assert_eq!((classes.sample.len(), one.len()), (27, 64));
+    let each: f64 = (0..one.len())
+        .map(|i| one.hub_volume(i).expect("exact"))
+        .sum();
+    assert!((one.volume().expect("exact") / each - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -658,13 +710,19 @@ fn meshes_are_closed_and_converge_at_second_order() {
         (cubic(1, 1.0), Fillet::None),
         (star(1.0, &[], |_| Profile::Cone), Fillet::Auto),
     ];
-    for n in [1, 2, 3, 6, 9, 12, 14] {
-        for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
-            graphs.push((random_star(&mut random, n), fillet));
-        }
+    for (n, fillet) in [
+        (1, Fillet::Auto),
+        (2, Fillet::Auto),
+        (3, Fillet::Tau(0.7)),
+        (6, Fillet::Auto),
+        (6, Fillet::None),
+        (9, Fillet::Tau(0.7)),
+        (14, Fillet::Auto),
+    ] {
+        graphs.push((random_star(&mut random, n), fillet));
     }
-    let chords = [0.03, 0.0075, 0.001_875];
-    let mut errors = [0.0f64; 3];
+    let chords = [0.03, 0.0075];
+    let mut errors = [0.0f64; 2];
     for (graph, fillet) in graphs {
         let q = Quadors::new(&graph, fillet).expect("a lattice");
         if !q.overlaps().is_empty() {
@@ -683,43 +741,7 @@ fn meshes_are_closed_and_converge_at_second_order() {
             let mut low = mesh.clone();
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             low.vertices.iter_mut().flatten().for_each(round);
-            for (k, mesh) in [&mesh, &low].into_iter().enumerate() {
-                if crate::mesh::self_intersections(mesh, 1) > 0 {
-                    println!(
-                        "XX {name} {k} {}",
-                        crate::mesh::self_intersections(mesh, 100)
-                    );
-                    let mut list: Vec<[u32; 3]> = mesh.triangles.clone();
-                    loop {
-                        let n = list.len();
-                        let mut found = None;
-                        'o: for axis in 0..3 {
-                            let mut l = list.clone();
-                            l.sort_by(|a, b| {
-                                mesh.vertices[a[0] as usize][axis]
-                                    .total_cmp(&mesh.vertices[b[0] as usize][axis])
-                            });
-                            for s in 0..5 {
-                                let cut = l[s * n / 8..(s + 4) * n / 8].to_vec();
-                                let m = crate::mesh::Mesh {
-                                    vertices: mesh.vertices.clone(),
-                                    triangles: cut.clone(),
-                                };
-                                if crate::mesh::self_intersections(&m, 1) > 0 {
-                                    found = Some(cut);
-                                    break 'o;
-                                }
-                            }
-                        }
-                        match found {
-                            Some(f) if f.len() < n => list = f,
-                            _ => break,
-                        }
-                    }
-                    for t in list.iter().take(12) {
-                        println!("{t:?} {:?}", t.map(|i| mesh.vertices[i as usize]));
-                    }
-                }
+            for mesh in [&mesh, &low] {
                 assert_eq!(crate::mesh::self_intersections(mesh, 1), 0, "{name}");
                 let flat = (0..mesh.triangles.len()).any(|i| crate::mesh::degenerate(mesh, i));
                 assert!(!flat, "{name}");
@@ -733,9 +755,8 @@ fn meshes_are_closed_and_converge_at_second_order() {
         }
     }
     // Halving edges is a quarter of the chord error, and second order a quarter of what is lost.
-    let [a, b, c] = errors.map(f64::sqrt);
-    println!("{a} {b} {c}");
-    assert!(b < a / 3.0 && c < b / 3.0, "{a} {b} {c}");
+    let [a, b] = errors.map(f64::sqrt);
+    assert!(b < a / 3.0, "{a} {b}");
 }
 
 #[test]
@@ -774,197 +795,4 @@ fn rays_hit_the_surface_first_where_it_is() {
         }
         assert!(hits > 800, "{hits}");
     }
-}
-
-#[test]
-#[ignore]
-fn zz_speed() {
-    #[derive(Clone, Copy)]
-    struct Instant(u64);
-    impl Instant {
-        fn now() -> Instant {
-            let s = std::fs::read_to_string("/proc/thread-self/schedstat").expect("s");
-            Instant(s.split(' ').next().expect("n").parse().expect("u"))
-        }
-        fn elapsed(self) -> std::time::Duration {
-            std::time::Duration::from_nanos(Instant::now().0 - self.0)
-        }
-    }
-    for n in [6usize, 12] {
-        let mut random = Random(99);
-        let all: Vec<Quadors> = (0..300)
-            .map(|_| Quadors::new(&random_star(&mut random, n), Fillet::Auto).expect("a star"))
-            .filter(|q| !q.overlaps().iter().any(|o| o.hub == 0))
-            .collect();
-        let t = Instant::now();
-        let c: Vec<_> = all.iter().map(|q| q.complex(0).expect("c")).collect();
-        let t1 = t.elapsed().as_secs_f64() / all.len() as f64;
-        let t = Instant::now();
-        let mut bands = 0;
-        for (q, c) in all.iter().zip(&c) {
-            for f in &c.faces {
-                if f.label.count_ones() > 1 {
-                    bands += band::bands(&q.hub(0), c, f).expect("b").1.len();
-                }
-            }
-        }
-        let t2 = t.elapsed().as_secs_f64() / all.len() as f64;
-        let fine = integral::Order {
-            nodes: &[16, 24],
-            differ: 1e-12,
-        };
-        for (nodes, differ) in [
-            (&[5, 8, 12][..], 1e-10),
-            (&[4, 6, 9, 13], 1e-10),
-            (&[4, 6, 9, 13], 1e-11),
-            (&[5, 8, 12], 1e-11),
-        ] {
-            let o = integral::Order { nodes, differ };
-            let t = Instant::now();
-            let v: Vec<f64> = all
-                .iter()
-                .zip(&c)
-                .map(|(q, c)| {
-                    integral::hub_mass::<false>(&q.hub(0), c, o).map_or(f64::NAN, |m| m.volume)
-                })
-                .collect();
-            let t3 = t.elapsed().as_secs_f64() / all.len() as f64;
-            let mut worst = 0.0f64;
-            for ((q, c), v) in all.iter().zip(&c).zip(&v).take(60) {
-                let w =
-                    integral::hub_mass::<false>(&q.hub(0), c, fine).map_or(f64::NAN, |m| m.volume);
-                worst = worst.max((v / w - 1.0).abs());
-            }
-            println!(
-                "{n} hubs {} complex {:.1} us bands {:.1} us ({:.1}) mass({nodes:?},{differ:e}) {:.1} us worst {worst:e}",
-                all.len(),
-                t1 * 1e6,
-                t2 * 1e6,
-                bands as f64 / all.len() as f64,
-                t3 * 1e6
-            );
-        }
-    }
-}
-
-#[test]
-#[ignore]
-fn zz_debug() {
-    for n in [6usize, 12, 4] {
-        let mut random = Random(99);
-        let fine = integral::Order {
-            nodes: &[16, 24],
-            differ: 1e-12,
-        };
-        for k in 0..60 {
-            let q = Quadors::new(&random_star(&mut random, n), Fillet::Auto).expect("a star");
-            if q.overlaps().iter().any(|o| o.hub == 0) {
-                continue;
-            }
-            let c = q.complex(0).expect("c");
-            let usual = integral::USUAL;
-            let a = integral::hub_mass::<false>(&q.hub(0), &c, usual);
-            let b = integral::hub_mass::<false>(&q.hub(0), &c, fine);
-            let (Some(a), Some(b)) = (a, b) else {
-                println!("none {n} {k} {} {}", a.is_some(), b.is_some());
-                continue;
-            };
-            if (a.volume / b.volume - 1.0).abs() > 3e-10 {
-                println!("{n} {k} {} {}", a.volume, b.volume);
-                for f in &c.faces {
-                    let mut one = c.clone();
-                    one.faces = vec![f.clone()];
-                    let a = integral::hub_mass::<false>(&q.hub(0), &one, usual)
-                        .map_or(f64::NAN, |m| m.volume);
-                    let b = integral::hub_mass::<false>(&q.hub(0), &one, fine)
-                        .map_or(f64::NAN, |m| m.volume);
-                    if !((a - b).abs() < 1e-10) {
-                        println!("  face {:b} {a} {b} loops {:?}", f.label, f.loops);
-                        if f.label.count_ones() > 1 {
-                            let (frame, bands) = band::bands(&q.hub(0), &c, f).expect("b");
-                            println!("    origin {:?}", frame.origin);
-                            for b in bands {
-                                println!("    {b:?}");
-                            }
-                            for (a, _) in f.loops.iter().flatten() {
-                                let a = &c.arcs[*a as usize];
-                                println!(
-                                    "    arc {:b} {:b} end {} {:?} {:?}",
-                                    a.sides[0],
-                                    a.sides[1],
-                                    a.conic.end,
-                                    a.conic.at(0.0),
-                                    a.conic.at(a.conic.end)
-                                );
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[test]
-#[ignore]
-fn zz_mesh() {
-    let mut random = Random(77);
-    let (mut ok, mut bad) = (0, 0);
-    for n in 1..=14 {
-        for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
-            for _ in 0..4 {
-                let g = random_star(&mut random, n);
-                let q = Quadors::new(&g, fillet).expect("a star");
-                if !q.overlaps().is_empty() {
-                    continue;
-                }
-                let exact = q.volume();
-                let mut e = Vec::new();
-                for chord in [0.02, 0.005] {
-                    match q.mesh(chord) {
-                        Ok((mesh, error)) => {
-                            let m = crate::measure::size(&mesh);
-                            let x = crate::mesh::self_intersections(&mesh, 100);
-                            let v = exact.as_ref().map_or(f64::NAN, |v| 1.0 - mesh.volume() / v);
-                            let mut low = mesh.clone();
-                            low.vertices
-                                .iter_mut()
-                                .flatten()
-                                .for_each(|c| *c = f64::from(*c as f32));
-                            let y = crate::mesh::self_intersections(&low, 100);
-                            let z = (0..low.triangles.len())
-                                .filter(|&i| crate::mesh::degenerate(&low, i))
-                                .count();
-                            let flat = mesh
-                                .triangles
-                                .iter()
-                                .map(|t| {
-                                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
-                                    norm(crate::math::cross(sub(b, a), sub(c, a)))
-                                        / (dot(sub(a, b), sub(a, b))
-                                            + dot(sub(b, c), sub(b, c))
-                                            + dot(sub(c, a), sub(c, a)))
-                                })
-                                .fold(1.0, f64::min);
-                            e.push((
-                                mesh.triangles.len(),
-                                error,
-                                v,
-                                m.closed && m.pieces == 1 && m.cavities == 0 && m.euler == 2,
-                                x + y + z,
-                                flat,
-                            ));
-                            ok += 1;
-                        }
-                        Err(f) => {
-                            bad += 1;
-                            println!("{n} {fillet:?} {chord} {f}");
-                        }
-                    }
-                }
-                println!("{n} {fillet:?} {e:?}");
-            }
-        }
-    }
-    println!("{ok} {bad}");
 }
