@@ -10,6 +10,7 @@
 //! whole of the fillet is seen from there and nothing is hidden, however wide it is. Corners are seen from the hub's centre.
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::OnceLock;
 
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -186,6 +187,21 @@ pub(super) struct Section {
     tip: f64,
 }
 
+/// The terms of `Section::powers`.
+fn series() -> &'static [[f64; 2]; 12] {
+    static TERMS: OnceLock<[[f64; 2]; 12]> = OnceLock::new();
+    TERMS.get_or_init(|| {
+        core::array::from_fn(|m| {
+            let factorial = |n: usize| (2..=n).map(|k| k as f64).product::<f64>();
+            let power = 2f64.powi(2 * m as i32 + 3);
+            [
+                1.0 / factorial(2 * m + 3),
+                (power - 2.0) / (factorial(2 * m + 4) * (2 * m + 5) as f64),
+            ]
+        })
+    })
+}
+
 impl Section {
     /// The section by the half plane of a longitude.
     #[inline]
@@ -239,6 +255,43 @@ impl Section {
             (2.0 * s * s / z, 2.0 * s * c / r)
         };
         (self.crotch - self.d * even * p * p, self.d * odd * p)
+    }
+
+    /// ∫ (α + βg) g dp between two p, in closed form.
+    pub fn swept(&self, from: f64, to: f64, alpha: f64, beta: f64) -> f64 {
+        let [one, two] = self.powers(to);
+        let [before, squared] = self.powers(from);
+        alpha * (one - before) + beta * (two - squared)
+    }
+
+    /// ∫ g dp and ∫ g² dp from the crotch, by those of (cosh √A p − 1)/A and its square.
+    fn powers(&self, p: f64) -> [f64; 2] {
+        let z = self.a * p * p;
+        let (one, two) = if z.abs() < 1.0 {
+            // Σ zᵐ/(2m + 3)! and Σ (2²ᵐ⁺³ − 2) zᵐ/((2m + 4)! (2m + 5)), twelve terms for sixteen digits.
+            let (mut one, mut two) = (0.0, 0.0);
+            for [a, b] in series().iter().rev() {
+                (one, two) = (a + z * one, b + z * two);
+            }
+            (one, two)
+        } else {
+            let r = z.abs().sqrt();
+            let (odd, even) = if z < 0.0 {
+                (r.sin() / r, r.cos())
+            } else {
+                (r.sinh() / r, r.cosh())
+            };
+            (
+                (odd - 1.0) / z,
+                (odd * (even - 4.0) / 2.0 + 1.5) / (z * z),
+            )
+        };
+        let (p3, d, g) = (p * p * p, self.d, self.crotch);
+        let first = d * one * p3;
+        [
+            g * p - first,
+            g * g * p - 2.0 * g * first + d * d * two * p3 * p * p,
+        ]
     }
 
     /// p at which a border is met.

@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use crate::fault::Fault;
-use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, unit};
+use crate::math::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
 use super::band::{Band, Frame, Section, bands, girdle, middle};
@@ -357,6 +357,9 @@ fn stripe<const ALL: bool>(
 ) -> Mass {
     let mut out = Mass::default();
     let q = &frame.quadric;
+    // x·½∇Q is linear where Q vanishes: α + β g along the meridian.
+    let alpha = dot(q.b, frame.origin) - q.c;
+    let linear = sub(apply(&q.m, frame.origin), q.b);
     for &(u, w) in gauss(n) {
         let (phi, slope) = band.longitude(along[0] + u * (along[1] - along[0]));
         let meridian = frame.meridian(phi);
@@ -373,6 +376,11 @@ fn stripe<const ALL: bool>(
             low + across[0] * (high - low),
             (across[1] - across[0]) * (high - low),
         );
+        if !ALL && frame.fillet {
+            let beta = dot(linear, meridian);
+            out.volume += weight * section.swept(from, from + height, alpha, beta) / 3.0;
+            continue;
+        }
         for &(v, w) in gauss(n) {
             let at = from + v * height;
             // The place from the origin, and dA = steep |½∇Q| along and across.
