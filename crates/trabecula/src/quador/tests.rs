@@ -819,7 +819,15 @@ fn zz_speed() {
             }
         }
         let t2 = cpu() - t;
-        for nodes in [&[5, 8, 12][..], &[4, 6, 9, 13], &[6, 9, 13], &[7, 10, 14, 20]] {
+        for kind in 0..4u32 {
+            let parts: Vec<_> = c.iter().map(|c| { let mut d = c.clone(); d.faces.retain(|f| f.label.count_ones().min(3) == kind); d }).collect();
+            let t = cpu();
+            for (q, c) in all.iter().zip(&parts) {
+                std::hint::black_box(integral::hub_mass::<false>(&q.hub(0), c, integral::Order { nodes: &[7, 10, 14, 20], differ: 1e-10 }));
+            }
+            println!("  kind {kind} {:.1} us", (cpu() - t) / 300.0);
+        }
+        for nodes in [&[5, 8, 12][..], &[7, 10, 14, 20], &[8, 12, 17, 24]] {
             let t = cpu();
             let o = integral::Order { nodes, differ: 1e-10 };
             for (q, c) in all.iter().zip(&c) {
