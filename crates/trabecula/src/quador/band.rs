@@ -281,10 +281,7 @@ impl Section {
             } else {
                 (r.sinh() / r, r.cosh())
             };
-            (
-                (odd - 1.0) / z,
-                (odd * (even - 4.0) / 2.0 + 1.5) / (z * z),
-            )
+            ((odd - 1.0) / z, (odd * (even - 4.0) / 2.0 + 1.5) / (z * z))
         };
         let (p3, d, g) = (p * p * p, self.d, self.crotch);
         let first = d * one * p3;

@@ -135,7 +135,7 @@ pub(super) struct Order {
 
 /// Enough for 1e-10: the better of two rules that agree is right to half as many digits again.
 pub(super) const USUAL: Order = Order {
-    nodes: &[5, 8, 12],
+    nodes: &[7, 10, 14, 20],
     differ: 1e-10,
 };
 
@@ -176,7 +176,14 @@ pub(super) fn hub_mass<const ALL: bool>(
                 let (frame, bands) = bands(hub, complex, face)?;
                 for band in &bands {
                     let part = |n, a, b| stripe::<ALL>(complex, &frame, band, n, a, b);
-                    work.settle::<ALL>(&part, [0.0, 1.0], [0.0, 1.0], 16, &mut out);
+                    work.settle::<ALL>(
+                        &part,
+                        [0.0, 1.0],
+                        [0.0, 1.0],
+                        16,
+                        !ALL && frame.fillet,
+                        &mut out,
+                    );
                 }
             }
         }
@@ -193,13 +200,14 @@ struct Work<'a> {
 
 impl Work<'_> {
     /// Adds what `part` gives, for a number of nodes and ranges along a seam and across the face, with more nodes and then
-    /// halving ranges until two rules agree.
+    /// halving ranges until two rules agree. `line` tells that it is in closed form across.
     fn settle<const ALL: bool>(
         &self,
         part: &impl Fn(usize, [f64; 2], [f64; 2]) -> Mass,
         along: [f64; 2],
         across: [f64; 2],
         depth: u32,
+        line: bool,
         out: &mut Mass,
     ) {
         let trace = |m: &Mass| m.second[0][0] + m.second[1][1] + m.second[2][2];
@@ -230,13 +238,16 @@ impl Work<'_> {
         // The side that says more about the difference.
         let (t, u) = ((along[0] + along[1]) / 2.0, (across[0] + across[1]) / 2.0);
         let n = nodes[nodes.len() - 2];
-        let halves = part(n, [along[0], t], across).plus(&part(n, [t, along[1]], across));
-        if apart(&halves, &rough) > 0.5 * apart(&rough, &fine) || depth.is_multiple_of(4) {
-            self.settle::<ALL>(part, [along[0], t], across, depth - 1, out);
-            self.settle::<ALL>(part, [t, along[1]], across, depth - 1, out);
+        let gained = || {
+            let halves = part(n, [along[0], t], across).plus(&part(n, [t, along[1]], across));
+            apart(&halves, &rough) > 0.5 * apart(&rough, &fine)
+        };
+        if line || depth.is_multiple_of(4) || gained() {
+            self.settle::<ALL>(part, [along[0], t], across, depth - 1, line, out);
+            self.settle::<ALL>(part, [t, along[1]], across, depth - 1, line, out);
         } else {
-            self.settle::<ALL>(part, along, [across[0], u], depth - 1, out);
-            self.settle::<ALL>(part, along, [u, across[1]], depth - 1, out);
+            self.settle::<ALL>(part, along, [across[0], u], depth - 1, line, out);
+            self.settle::<ALL>(part, along, [u, across[1]], depth - 1, line, out);
         }
     }
 
@@ -262,6 +273,7 @@ impl Work<'_> {
                     along,
                     [0.0, 1.0],
                     16,
+                    false,
                     out,
                 );
             }
@@ -305,7 +317,7 @@ impl Work<'_> {
                 }
                 out
             };
-            self.settle::<ALL>(&part, [0.0, 1.0], [0.0, 1.0], 16, out);
+            self.settle::<ALL>(&part, [0.0, 1.0], [0.0, 1.0], 16, !ALL, out);
         }
         // The disc in the split plane: no surface of the lattice, but of the hub's part.
         let (z, disc) = (s.split, PI * s.squared(s.split));
