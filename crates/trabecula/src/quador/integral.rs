@@ -1,10 +1,9 @@
 //! Volume, area, centroid and inertia, from the faces.
 //!
 //! By the divergence theorem ∫ dV = ⅓∮ x·n dA, ∫ x dV = ¼∮ x (x·n) dA and ∫ xxᵀ dV = ⅕∮ xxᵀ (x·n) dA over a closed surface.
-//! On a stub, x·n dA = (Bz/2 + C) dz dψ. On any other face the surface is its quadric seen from the hub's centre: a fan of
-//! segments from a point of the face to its seams, each taken out to the quadric by the root of a quadratic. What is
-//! integrated is analytic in each piece, so Gauss's rule gains digits in proportion to its nodes; it is given enough that
-//! the whole comes out to 1e-10.
+//! On a stub, x·n dA = (Bz/2 + C) dz dψ. Fillets and corners are swept band by band by half planes; on the ball a fan of arcs
+//! runs from the middle of a face to its seams. What is integrated is analytic in each piece, so Gauss's rule gains digits in
+//! proportion to its nodes; it is given enough that the whole comes out to 1e-10, and what does not settle is refused.
 
 use core::f64::consts::{FRAC_PI_4, PI};
 use std::sync::OnceLock;
@@ -19,7 +18,7 @@ use super::band::{Band, Frame, Section, bands, girdle, middle};
 use super::classes::Classes;
 use super::complex::{Complex, Face};
 use super::hub::Hub;
-use super::quadric::{Conic, Quadric};
+use super::quadric::Conic;
 
 /// Integrals over a solid of density one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -338,7 +337,7 @@ impl Work<'_> {
     /// A face on the ball: a fan from its middle.
     fn ball<const ALL: bool>(&self, face: &Face, out: &mut Mass) {
         if face.loops.is_empty() {
-            let r = (-face.quadric.c).sqrt();
+            let r = self.hub.radius;
             out.volume += 4.0 / 3.0 * PI * r.powi(3);
             out.area += 4.0 * PI * r * r;
             for i in 0..3 {
@@ -352,7 +351,7 @@ impl Work<'_> {
                 let (x, dx) = conic.with_slope(a + t * (b - a));
                 (x, scale(dx, sign * (b - a)))
             };
-            fan::<ALL>(&face.quadric, apex, &curve, n, across)
+            fan::<ALL>(self.hub.radius, apex, &curve, n, across)
         };
         self.seams::<ALL>(face, &part, out);
     }
@@ -419,57 +418,44 @@ fn stripe<const ALL: bool>(
     out
 }
 
-/// The share of the part of a quadric that a fan of segments from `apex` to a curve (place and derivative over [0, 1]) fills, as
-/// far across as told.
+/// The share of the part of a ball that a fan from `apex` to a curve (place and derivative over [0, 1]) fills, as far across as
+/// told. What runs round the far side is counted with its sign, so the fan need not stay in the face.
 fn fan<const ALL: bool>(
-    q: &Quadric,
+    r: f64,
     apex: Vec3,
     curve: &dyn Fn(f64) -> (Vec3, Vec3),
     n: usize,
     across: [f64; 2],
 ) -> Mass {
     let mut out = Mass::default();
-    let (o, far) = (unit(apex), norm(apex));
-    let (bo, oo) = (dot(q.b, apex), q.form(apex, apex));
+    let o = unit(apex);
     for &(t, w) in gauss(n) {
         let (x, dx) = curve(t);
-        let turn = w * (across[1] - across[0]) * dot(apex, cross(x, dx));
-        let length = norm(x);
-        let cos = dot(o, x) / length;
-        if cos > 0.3 {
-            // Straight segments p = (1 − t) o + t x: the solid angle is t det(o, x, dx) dt/|p|³.
-            let (bx, ox, xx) = (dot(q.b, x), q.form(apex, x), q.form(x, x));
-            for &(t, w) in gauss(n) {
-                let t = across[0] + t * (across[1] - across[0]);
-                let u = 1.0 - t;
-                let (one, two) = (u * bo + t * bx, u * u * oo + 2.0 * u * t * ox + t * t * xx);
-                let exit = -q.c / (one + (one * one - q.c * two).max(0.0).sqrt());
-                let flux = turn * w * t * exit * exit * exit;
-                if ALL {
-                    let place = scale(add(scale(apex, u), scale(x, t)), exit);
-                    let h = q.half_slope(place);
-                    out.surface(place, flux, flux * norm(h) / dot(place, h));
-                } else {
-                    out.volume += flux / 3.0;
-                }
-            }
-        } else {
-            // Great circles, as a segment would pass near the centre: β sin(tβ) det/sin²β of unit vectors.
-            let e = scale(x, 1.0 / length);
-            let beta = cos.clamp(-1.0, 1.0).acos();
-            let sin = beta.sin();
-            let turn = turn / (far * length * length * sin * sin);
-            for &(t, w) in gauss(n) {
-                let t = across[0] + t * (across[1] - across[0]);
+        let (length, e) = (norm(x), unit(x));
+        let turn = w * (across[1] - across[0]) * dot(o, cross(e, dx)) / length;
+        let cos = dot(o, e);
+        for &(t, w) in gauss(n) {
+            let t = across[0] + t * (across[1] - across[0]);
+            let (p, angle) = if cos > 0.3 {
+                // Straight segments p = (1 − t) o + t e: the solid angle is t det(o, e, de) dt/|p|³.
+                let p = add(scale(o, 1.0 - t), scale(e, t));
+                let size = norm(p);
+                (scale(p, 1.0 / size), t / (size * size * size))
+            } else {
+                // Great circles, as a segment would pass near the centre: β sin(tβ) det/sin²β.
+                let beta = cos.clamp(-1.0, 1.0).acos();
+                let sin = beta.sin();
                 let p = add(
                     scale(o, ((1.0 - t) * beta).sin() / sin),
                     scale(e, (t * beta).sin() / sin),
                 );
-                let exit = q.exit(p);
-                let place = scale(p, exit);
-                let h = q.half_slope(place);
-                let flux = turn * w * beta * (t * beta).sin() * exit * exit * exit;
-                out.surface(place, flux, flux * norm(h) / dot(place, h));
+                (p, beta * (t * beta).sin() / (sin * sin))
+            };
+            let area = turn * w * angle * r * r;
+            if ALL {
+                out.surface(scale(p, r), r * area, area);
+            } else {
+                out.volume += r * area / 3.0;
             }
         }
     }
