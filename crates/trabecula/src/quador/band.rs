@@ -604,8 +604,8 @@ pub(super) fn middle(complex: &Complex, face: &Face) -> Vec3 {
             arrow = add(arrow, scale(cross(x, dx), turn));
         }
     }
-    // Where seams go round more than half the sphere their middle is on the wrong side.
-    let p = if face.label == 0 && dot(sum, arrow) < 0.0 || norm(sum) < 1e-9 {
+    // On the ball seams may go round half the sphere or more: their area as a vector points to the face all the same.
+    let p = if face.label == 0 && norm(arrow) > 1e-3 * norm(sum) || norm(sum) < 1e-9 {
         arrow
     } else {
         sum

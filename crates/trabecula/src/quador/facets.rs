@@ -54,6 +54,8 @@ fn angle([a, b, c]: [Vec3; 3]) -> f64 {
     2.0 * turn(a, b, c).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
 }
 
+/// Turns of directions below this are none: planes of seams may pass through the centre, and vertices are good to a ten-millionth.
+const STRAIGHT: f64 = 1e-9;
 /// How far seams turn between the first points on them, radians: finer where outlines that coarse would cross.
 const TURNS: [f64; 5] = [0.5, 0.25, 0.12, 0.06, 0.03];
 
@@ -98,7 +100,17 @@ impl<'a> Facets<'a> {
                     let (stub, first) = (stub as usize, firsts[stub as usize]);
                     let ring: Vec<u32> = (0..rims[stub].len() as u32).map(|k| first + k).collect();
                     let inner = walk(&chains, face.loops.first()?);
-                    strip(hub.stubs[stub].axis, &out.points, &inner, &ring)
+                    let strip = strip(hub.stubs[stub].axis, &out.points, &inner, &ring);
+                    let turned = |t: &[u32; 3]| {
+                        let [a, b, c] = out.corners(*t);
+                        turn(a, b, c) <= 0.0
+                    };
+                    if strip.iter().any(turned) {
+                        // Where a fillet reaches far along the stub its azimuths say too little.
+                        out.joined(vec![inner, ring.into_iter().rev().collect()], face)?
+                    } else {
+                        strip
+                    }
                 }
                 None => out.outlined(&chains, face)?,
             };
@@ -213,6 +225,11 @@ impl<'a> Facets<'a> {
                 return Some(fan);
             }
         }
+        self.joined(loops, face)
+    }
+
+    /// Triangles between loops.
+    fn joined(&self, mut loops: Vec<Vec<u32>>, face: &Face) -> Option<Vec<[u32; 3]>> {
         let mut outline = loops.pop().unwrap_or_default();
         while !loops.is_empty() {
             // Rings are opened along the shortest bridge.
@@ -270,7 +287,7 @@ impl<'a> Facets<'a> {
         let place = |i: u32| self.points[i as usize];
         let worth = |[a, b, c]: [u32; 3]| {
             let [p, q, r] = self.corners([a, b, c]);
-            if a == b || b == c || c == a || turn(p, q, r) <= 0.0 {
+            if a == b || b == c || c == a || turn(unit(p), unit(q), unit(r)) <= STRAIGHT {
                 return f64::NEG_INFINITY;
             }
             let edge = |p: Vec3, q: Vec3| dot(sub(p, q), sub(p, q));
@@ -293,14 +310,16 @@ impl<'a> Facets<'a> {
             let i = order.into_iter().find(|&i| {
                 let [a, b, c] = ear(&outline, i);
                 let [p, q, r] = self.corners([a, b, c]);
+                // What lies on a side is in the way too: seams may run straight, seen from the centre.
+                let [p, q, r] = [p, q, r].map(unit);
                 outline.iter().all(|&o| {
-                    let x = place(o);
+                    let x = unit(place(o));
                     o == a
                         || o == b
                         || o == c
-                        || turn(p, q, x) < 0.0
-                        || turn(q, r, x) < 0.0
-                        || turn(r, p, x) < 0.0
+                        || turn(p, q, x) < -STRAIGHT
+                        || turn(q, r, x) < -STRAIGHT
+                        || turn(r, p, x) < -STRAIGHT
                 })
             })?;
             out.push(ear(&outline, i));
@@ -312,7 +331,7 @@ impl<'a> Facets<'a> {
             }
         }
         if outline.len() == 3 {
-            out.push([outline[0], outline[1], outline[2]]);
+            out.push(ear(&outline, 1));
         }
         Some(out)
     }
@@ -479,7 +498,7 @@ impl<'a> Facets<'a> {
             return false;
         };
         let face = self.faces[one as usize];
-        if face != self.faces[two as usize] || self.complex.faces[face as usize].rim.is_some() {
+        if face != self.faces[two as usize] {
             return false;
         }
         let apex = |t: [u32; 3]| t.into_iter().find(|&v| v != a && v != b);
@@ -504,7 +523,9 @@ impl<'a> Facets<'a> {
         let face = &self.complex.faces[face as usize];
         let before = lies(face, [p, q, r]).min(lies(face, [q, p, s]));
         let after = lies(face, [r, s, q]).min(lies(face, [s, r, p]));
-        let wide = open(r, p, q) + open(s, p, q) > core::f64::consts::PI + 0.05;
+        // Along a stub angles are to be wide: it is straight, or nearly.
+        let wide =
+            face.rim.is_none() && open(r, p, q) + open(s, p, q) > core::f64::consts::PI + 0.05;
         let better = before < 0.5 && after > before + 0.1 || wide && after > before.min(0.8);
         if !better || !good(r, s, q) || !good(s, r, p) {
             return false;

@@ -797,3 +797,39 @@ fn rays_hit_the_surface_first_where_it_is() {
         assert!(hits > 800, "{hits}");
     }
 }
+
+/// Symmetric hubs, whole and in part as at the border of a block: corners of four, seams in planes through the centre.
+#[test]
+fn symmetric_hubs_are_meshed() {
+    let octet = orbit([1.0, 1.0, 0.0]);
+    let part = |axes: &[usize]| {
+        let kept = |v: &&Vec3| axes.iter().all(|&a| v[a] >= -1e-9);
+        octet.iter().filter(kept).copied().collect::<Vec<Vec3>>()
+    };
+    for axes in [
+        six(),
+        orbit([1.0, 1.0, 1.0]),
+        part(&[]),
+        part(&[2]),
+        part(&[0, 2]),
+        part(&[0, 1, 2]),
+    ] {
+        for fillet in [Fillet::Auto, Fillet::None] {
+            let q = equal(&axes, 14.0, fillet);
+            let (mut mesh, _) = q.mesh(0.03).expect("meshed");
+            let m = crate::measure::size(&mesh);
+            assert!(
+                m.closed && m.euler == 2 && m.pieces == 1,
+                "{fillet:?} {m:?}"
+            );
+            let round = |c: &mut f64| *c = f64::from(*c as f32);
+            mesh.vertices.iter_mut().flatten().for_each(round);
+            assert_eq!(
+                crate::mesh::self_intersections(&mesh, 1),
+                0,
+                "{fillet:?} {}",
+                axes.len()
+            );
+        }
+    }
+}
