@@ -84,19 +84,10 @@ impl Blend {
             );
             return Err(Fault::new("", message));
         }
-        let raw: Vec<Strand> = of
-            .into_iter()
-            .map(|c| Strand::new(c, 1.0, bounds))
-            .collect();
-        let (strands, levels): (Arc<[Strand]>, _) = match by {
-            By::Value => (raw.into(), None),
-            By::Fraction => {
-                let joint = Joint::new(&raw, bounds);
-                let strands: Arc<[Strand]> = scaled(&raw, &joint, bounds).into();
-                let levels = Levels::new(&strands, joint);
-                (strands, Some(Arc::new(levels)))
-            }
-        };
+        let joint = Joint::new(&of, bounds);
+        let unit = by == By::Fraction;
+        let strands: Arc<[Strand]> = looked(of, unit, &joint, bounds).into();
+        let levels = unit.then(|| Arc::new(Levels::new(&strands, joint)));
         // Shares move no faster than a cell is long, or the blend is no blend: half as much again for them.
         let slope = strands.iter().map(Strand::slope).fold(0.0, f64::max) * 1.5;
         Ok(Blend {
@@ -161,7 +152,8 @@ impl Blend {
             for (k, (g, high)) in here.into_iter().zip(g.into_iter().zip(high)) {
                 let w = w[k * n + i];
                 let o = &mut out[k];
-                *o = [o[0] + w * g, o[1] + w * s.low(high), o[2] + w * high];
+                let low = if w < 1.0 { s.low(high) } else { s.low_alone(high) };
+                *o = [o[0] + w * g, o[1] + w * low, o[2] + w * high];
                 if graded && w < 1.0 {
                     ends[k * n + i].quantiles = s.quantiles(high);
                 }
@@ -192,8 +184,8 @@ impl Blend {
     }
 }
 
-/// The lattices with their cores in units of their root mean square deviation from the mean.
-fn scaled(raw: &[Strand], joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
+/// The lattices after a look at each; if `unit`, with their cores in units of their root mean square deviation from the mean.
+fn looked(of: Vec<Constituent>, unit: bool, joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
     let mut points = match joint.phases {
         Phases::Drifting => Vec::new(),
         Phases::Locked | Phases::Independent => joint.places(0),
@@ -213,13 +205,13 @@ fn scaled(raw: &[Strand], joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
         points.truncate(LOOKS);
     }
     let mut values = vec![0.0; points.len()];
-    let each = raw.iter().map(|s| {
-        s.values(&points, &mut values);
+    let each = of.into_iter().map(|c| {
+        c.cores(&points, &mut values);
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
-        Strand::new(s.constituent().clone(), unit, bounds)
+        let size = if unit && square > 0.0 { square.sqrt() } else { 1.0 };
+        Strand::new(c, size, &values, bounds)
     });
     each.collect()
 }
@@ -255,9 +247,10 @@ impl Field for Blend {
             let down = if s.is_sheet() { -1.0 } else { 0.0 };
             for (j, k) in here.into_iter().enumerate() {
                 let (w, dw) = (w[k * n + i], dw[k * n + i]);
+                let low = if w < 1.0 { s.low(high[j]) } else { s.low_alone(high[j]) };
                 let of = [
                     (g[j], dg[j]),
-                    (s.low(high[j]), scale(dhigh[j], down)),
+                    (low, scale(dhigh[j], down)),
                     (high[j], dhigh[j]),
                 ];
                 let (v, d) = &mut out[k];
@@ -307,9 +300,10 @@ impl Field for Blend {
             None if self.two_sided => (f - hi).max(lo - f),
             None => f - hi,
         };
-        let ends = |s: &Strand| {
+        let ends = |s: &Strand, alone: bool| {
             let hi = s.high_bound(b);
-            let ends = [s.low(hi.lo), s.low(hi.hi)];
+            let low = |high: f64| if alone { s.low_alone(high) } else { s.low(high) };
+            let ends = [low(hi.lo), low(hi.hi)];
             (
                 s.bound(b),
                 Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1])),
@@ -322,7 +316,7 @@ impl Field for Blend {
                 // Its lower end is below all its values.
                 return Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE);
             }
-            let (f, lo, hi) = ends(&self.strands[i]);
+            let (f, lo, hi) = ends(&self.strands[i], true);
             return join(f, lo, hi);
         }
         if self.levels.is_some() {
@@ -344,7 +338,7 @@ impl Field for Blend {
             .zip(&w)
             .filter(|(_, w)| w.hi > 0.0)
             .fold((zero, zero, zero), |sum, (s, w)| {
-                let (f, lo, hi) = ends(s);
+                let (f, lo, hi) = ends(s, false);
                 (
                     plus(sum.0, times(*w, f)),
                     plus(sum.1, times(*w, lo)),

@@ -103,7 +103,7 @@ impl Blend {
                     let Some(rows) = &rows[s] else { continue };
                     match self.strands[s].uniform() {
                         Some(high) => {
-                            let low = self.strands[s].low(high);
+                            let low = self.strands[s].low_alone(high);
                             for i in nodes {
                                 row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
                             }
@@ -115,7 +115,7 @@ impl Blend {
                             let mut high = vec![0.0; points.len()];
                             self.strands[s].highs(&points, &mut high);
                             for (i, high) in nodes.into_iter().zip(high) {
-                                let low = self.strands[s].low(high);
+                                let low = self.strands[s].low_alone(high);
                                 row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
                             }
                         }
@@ -170,7 +170,8 @@ impl Blend {
             let high = |s: usize| high[s * points.len() + p];
             let mut sum = [0.0; 3];
             if let Some(s) = w.iter().position(|w| *w == 1.0) {
-                sum = [core(s, *node), self.strands[s].low(high(s)), high(s)];
+                let high = high(s);
+                sum = [core(s, *node), self.strands[s].low_alone(high), high];
             } else {
                 for (s, strand) in self.strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
                     let high = high(s);

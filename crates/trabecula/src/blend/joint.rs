@@ -7,7 +7,7 @@
 
 use std::sync::OnceLock;
 
-use super::strand::Strand;
+use super::strand::Constituent;
 use crate::map::Map;
 use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
@@ -47,16 +47,16 @@ pub(super) struct Joint {
 pub(super) type Corners = [(usize, f64, Vec3); 8];
 
 impl Joint {
-    pub fn new(strands: &[Strand], bounds: &Aabb) -> Joint {
-        let longest = strands.iter().map(Strand::longest).fold(0.0, f64::max);
-        let maps: Option<Vec<Mat3>> = strands
+    pub fn new(of: &[Constituent], bounds: &Aabb) -> Joint {
+        let longest = of.iter().map(Constituent::longest).fold(0.0, f64::max);
+        let maps: Option<Vec<Mat3>> = of
             .iter()
             .map(|s| Some(s.lattice()?.map.affine()?.matrix))
             .collect();
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
         let (phases, common) = match (found, &maps) {
             (Some(back), _) => (Phases::Locked, Some(back)),
-            (None, Some(maps)) if independent(strands, maps, longest) => {
+            (None, Some(maps)) if independent(of, maps, longest) => {
                 let mut wide = [[0.0; 3]; 3];
                 // So far that what is met there has no memory.
                 (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
@@ -64,7 +64,7 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
-        let solved = strands
+        let solved = of
             .iter()
             .any(|s| s.lattice().is_some_and(|l| matches!(l.map, Map::Phase(_))));
         let size = bounds.size();
@@ -222,9 +222,9 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
 
 /// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
 /// make count too, since what is solid is no linear matter.
-fn independent(strands: &[Strand], maps: &[Mat3], longest: f64) -> bool {
+fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
-    for (s, m) in strands.iter().zip(maps) {
+    for (s, m) in of.iter().zip(maps) {
         let Some(l) = s.lattice() else { return false };
         let terms = l.cell.series().terms();
         if terms.len() > WAVES {

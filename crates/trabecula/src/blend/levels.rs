@@ -203,8 +203,12 @@ impl Levels {
                 table: Table::Curves(curves),
             };
         }
-        // Less what it is where each lattice is alone.
-        let base: Vec<[f64; 2]> = (0..strands.len()).map(|i| ends[self.alone[i]]).collect();
+        // Less what it is where each lattice is alone; less all that is added of a network's lower end, which no quantile is.
+        let alone = |i: usize| match ends[self.alone[i]] {
+            sheet if strands[i].is_sheet() => sheet,
+            [_, hi] => [strands[i].low(0.0), hi],
+        };
+        let base: Vec<[f64; 2]> = (0..strands.len()).map(alone).collect();
         self.grid.each(|node, w| {
             for (i, w) in w.iter().enumerate() {
                 (0..2).for_each(|e| ends[node][e] -= w * base[i][e]);
@@ -233,15 +237,26 @@ impl Levels {
                 Table::Ends(ends) => at.nodes.iter().zip(&at.shares).fold([0.0; 2], |v, (n, s)| {
                     [v[0] + s * ends[*n][0], v[1] + s * ends[*n][1]]
                 }),
-                Table::Curves(curves) => self.curved(curves, &station.own, w, ends, at),
+                Table::Curves(curves) => self.curved(strands, curves, &station.own, w, ends, at),
             };
             out = [out[0] + share * v[0], out[1] + share * v[1]];
         }
         out
     }
 
+    /// Where each lattice is alone: the value at its end's quantile, and how it changes with that.
+    fn base(&self, strands: &[Strand], curves: &[Curve], i: usize, q: [f64; 2]) -> [(f64, f64); 2] {
+        let curve = &curves[self.alone[i]];
+        let low = match strands[i].is_sheet() {
+            true => curve.at(q[0]),
+            false => (strands[i].low(0.0), 0.0),
+        };
+        [low, curve.at(q[1])]
+    }
+
     fn curved(
         &self,
+        strands: &[Strand],
         curves: &[Curve],
         own: &[[f64; 2]],
         w: &[f64],
@@ -256,8 +271,8 @@ impl Levels {
         };
         let mut v = [sum(a), sum(b)];
         for (i, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            let alone = &curves[self.alone[i]];
-            (0..2).for_each(|e| v[e] -= w * alone.at(q(i)[e]).0);
+            let base = self.base(strands, curves, i, q(i));
+            (0..2).for_each(|e| v[e] -= w * base[e].0);
         }
         v
     }
@@ -306,7 +321,7 @@ impl Levels {
                     ([lo.0, hi.0], [lo.1, hi.1])
                 }
                 Table::Curves(curves) => {
-                    self.curved_gradients(curves, &station.own, (w, dw), ends, at, &dy)
+                    self.curved_gradients(strands, curves, &station.own, (w, dw), ends, at, &dy)
                 }
             };
             for e in 0..2 {
@@ -319,6 +334,7 @@ impl Levels {
 
     fn curved_gradients(
         &self,
+        strands: &[Strand],
         curves: &[Curve],
         own: &[[f64; 2]],
         (w, dw): (&[f64], &[Vec3]),
@@ -367,9 +383,9 @@ impl Levels {
         let (lo, hi) = (side(a, da), side(b, db));
         let (mut v, mut g) = ([lo.0, hi.0], [lo.1, hi.1]);
         for i in 0..w.len() {
-            let alone = &curves[self.alone[i]];
+            let base = self.base(strands, curves, i, q(i));
             for e in 0..2 {
-                let (c, steep) = alone.at(q(i)[e]);
+                let (c, steep) = base[e];
                 v[e] -= w[i] * c;
                 g[e] = sub(g[e], add(scale(dw[i], c), scale(dq(i)[e], w[i] * steep)));
             }
