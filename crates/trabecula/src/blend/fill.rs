@@ -5,8 +5,7 @@
 //! lattice that is alone by its bounds is alone by its shares too.
 
 use super::Blend;
-use super::levels::End;
-use super::simplex::Place;
+use super::levels::{End, Row};
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
 
@@ -145,7 +144,7 @@ impl Blend {
             w,
             high,
             ends,
-            place,
+            row: known,
         } = mixed;
         points.clear();
         points.extend(nodes.iter().map(|i| point(*i)));
@@ -183,7 +182,7 @@ impl Blend {
                     }
                 }
                 if let Some(levels) = &self.levels {
-                    let more = levels.added(&self.strands, points[p], w, ends, place);
+                    let more = levels.added_in_row(&self.strands, points[p], w, ends, known);
                     sum = [sum[0], sum[1] + more[0], sum[2] + more[1]];
                 }
             }
@@ -202,5 +201,5 @@ struct Mixed {
     /// Upper ends, those of a lattice side by side.
     high: Vec<f64>,
     ends: Vec<End>,
-    place: Place,
+    row: Row,
 }

@@ -88,9 +88,10 @@ impl Strand {
             }
             Constituent::Field { field, .. } => {
                 // A bound of the whole part is far below all values: a sheet's second side would be gone at once.
-                let (lo, hi) = (seen.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
+                let (lo, hi) = (seen.iter())
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                        (l.min(*v), h.max(*v))
+                    });
                 let proven = made.factor * field.bound(bounds).lo;
                 made.least = below(made.turned(Interval::new(lo.min(hi), hi)));
                 made.floor = made.least.min(proven.max(BOTTOM) - made.factor);
@@ -126,6 +127,27 @@ impl Strand {
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         self.of.cores(points, out);
         out.iter_mut().for_each(|v| *v *= self.factor);
+    }
+
+    /// g at points (mm), in single precision.
+    pub fn samples(&self, points: &[Vec3]) -> Vec<f32> {
+        let mut out = vec![0f32; points.len()];
+        match &self.of {
+            Constituent::Lattice(l) if l.distance().is_none() => {
+                let mut u = vec![[0.0; 3]; points.len()];
+                l.map.phases(points, &mut u);
+                let each = [0, 1, 2].map(|a| u.iter().map(|u| u[a]).collect());
+                l.cell.series().fill(&each, &mut out);
+            }
+            of => {
+                let mut values = vec![0.0; points.len()];
+                of.cores(points, &mut values);
+                out.iter_mut().zip(values).for_each(|(o, v)| *o = v as f32);
+            }
+        }
+        let factor = self.factor as f32;
+        out.iter_mut().for_each(|v| *v *= factor);
+        out
     }
 
     /// Fills g and ∇g (per mm).

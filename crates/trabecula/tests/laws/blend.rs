@@ -265,7 +265,10 @@ fn lattices_pass_into_beams_with_their_fractions() {
         }
     }
     let text = "schema = 1\n[region.box]\nsize = [64, 36, 36]\n[beams.a]\ncell = \"octet\"\nradius = 0.45\nmap.affine.wavelength = 5";
-    let built = Design::from_toml(text).expect("text").build(&Nothing).expect("built");
+    let built = Design::from_toml(text)
+        .expect("text")
+        .build(&Nothing)
+        .expect("built");
     let beams = built.beams[0].1.field();
     let mut cell = window([0.0; 3], 0.0, 40_000);
     for (i, p) in cell.iter_mut().enumerate() {
@@ -387,6 +390,34 @@ fn gradients_blocks_and_bounds_agree_with_values() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Inside transitions, too, small boxes are told to be empty or full, and those that are told so are.
+#[test]
+fn bounds_tell_empty_places_within_transitions() {
+    for (what, of, _) in pairs() {
+        for by in [By::Fraction, By::Value] {
+            let field = blend(&of, step(30.0), by);
+            let (mut told, mut clear) = (0, 0);
+            for p in window([0.0; 3], 9.0, 400) {
+                let b = Aabb {
+                    min: p,
+                    max: p.map(|x| x + 0.1),
+                };
+                let v = field.value(p.map(|x| x + 0.03));
+                let r = field.bound(&b);
+                assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
+                told += usize::from(r.lo > 0.0 || r.hi < 0.0);
+                // No face of any kind within some steps of the box.
+                let slope = Field::slope(&field);
+                clear += usize::from(v.abs() > 0.35 * slope);
+            }
+            assert!(
+                told > 20 && 4 * told > clear,
+                "{what} {by:?}: {told} of {clear}"
+            );
         }
     }
 }
