@@ -133,6 +133,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         tilings.push(Tiled {
             name: domain.name.to_string(),
             tiling: tiling.clone(),
+            zones: domain.zones(),
             mesh: domain.report,
         });
         if d.blend.is_none() {
