@@ -105,10 +105,10 @@ def test_the_command_lists_them():
 def test_zones_pass_into_each_other_and_keep_the_fraction():
     """Zones by region on the background mesh: told apart, one piece, and as full as asked, also between them."""
     half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
-    solid = design(lt.cell.tet(zones={0: "primitive", 1: "diamond"}), level=lt.level.fraction(0.3), zones={1: half}).build()
+    solid = design(lt.cell.tet(zones={0: "p43m", 1: "f43m"}), level=lt.level.fraction(0.3), zones={1: half}).build()
     report = solid.report()["lattices"]["a"]
     zones = report["tets"]["zones"]
-    assert [z["cell"] for z in zones.values()] == ["primitive", "diamond"]
+    assert [z["cell"] for z in zones.values()] == ["p43m", "f43m"]
     assert sum(z["count"] for z in zones.values()) == report["tets"]["count"]
     # Levels settle until the tetrahedra about each node are within 0.001.
     assert report["fraction"] == pytest.approx(0.3, abs=2e-3)
