@@ -273,7 +273,7 @@ impl<'a> Facets<'a> {
         let corner = |k: u32| {
             let [x, y, z] = [k & 1, k >> 1 & 1, k >> 2].map(|s| 3 * s);
             let t = [n + x, n + 1 + y, n + 2 + z];
-            if k.count_ones() % 2 == 0 {
+            if k.count_ones().is_multiple_of(2) {
                 t
             } else {
                 [t[0], t[2], t[1]]

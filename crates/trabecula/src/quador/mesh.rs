@@ -30,9 +30,10 @@ struct Part {
     error: f64,
 }
 
-/// A direction across an axis, the same for an axis and its opposite.
+/// A direction across an axis, the same for an axis and its opposite. Where it changes no usual direction lies, so that beams that
+/// are equal but for rounding have it in common.
 pub(super) fn across(axis: Vec3) -> Vec3 {
-    let pole = if axis[0].abs() < 0.6 {
+    let pole = if axis[0].abs() < 0.618_034 {
         [1.0, 0.0, 0.0]
     } else {
         [0.0, 1.0, 0.0]
