@@ -63,6 +63,7 @@ class Solid:
     def mesh(
         self, edge: float, threads: int | None = None, progress: Progress | None = None, islands: str = "keep"
     ) -> tuple[Mesh, dict[str, Any], str]: ...
+    def mesh_beams(self, chord: float, threads: int | None = None, progress: Progress | None = None) -> tuple[Mesh, float]: ...
     def stream_stl(
         self,
         path: str | PathLike[str],

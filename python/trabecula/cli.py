@@ -137,12 +137,16 @@ def parser() -> argparse.ArgumentParser:
         )
         return made
 
-    def resolution(p: argparse.ArgumentParser, word: str = "--edge") -> None:
+    def resolution(p: argparse.ArgumentParser, word: str = "--edge", chord: bool = False) -> None:
         either = p.add_mutually_exclusive_group()
         either.add_argument(word, type=length, metavar="MM", dest="edge", help="grid spacing in mm")
         either.add_argument(
             "--per-cell", type=samples, metavar="N", help="grid spacing as the smallest wavelength / N (default: 32)"
         )
+        if chord:
+            either.add_argument(
+                "--chord", type=length, metavar="MM", help="no grid: how far triangles may be from uncut beams alone, in mm"
+            )
         p.add_argument("--threads", type=count, metavar="N", help="threads (default: all); the result is the same")
         progress(p)
 
@@ -189,11 +193,12 @@ def parser() -> argparse.ArgumentParser:
         "what lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
-        "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",
+        "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01\n"
+        "  trabecula mesh beams.toml -o beams.stl --chord 0.01",
     )
     p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json)")
     p.add_argument("-o", "--output", required=True, type=ending(MESH_OUT), metavar="OUT", help="the mesh to write")
-    resolution(p)
+    resolution(p, chord=True)
     p.add_argument(
         "--islands",
         choices=("keep", "drop", "error"),

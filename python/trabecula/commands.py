@@ -180,7 +180,16 @@ def mesh(args) -> None:
     with Progress("meshing", args.progress) as progress:
         lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
         streams = not (any(lighter.values()) or args.open)
-        if kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
+        if args.chord is not None:
+            surface = solid.mesh(threads=args.threads, progress=progress, **options)
+            told = {"chord": args.chord, "chord_error": surface.chord_error}
+            if any(lighter.values()):
+                progress.clear()
+                surface = simplified(surface, args)
+            made = surface._summary() | told
+            progress.clear()
+            surface.write(args.output)
+        elif kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
             if not any(lighter.values()):
@@ -199,13 +208,13 @@ def mesh(args) -> None:
                 say("open at the region's boundary: volume and fraction are the closed part's")
             surface.write(args.output)
             tell_voids(made["voids"])
-    edge = solid.spacing(**resolved(args))
+    edge = solid.spacing(args.edge, args.per_cell)
     made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
-    made["edge"] = edge
+    made["edge"] = None if args.chord is not None else edge
     made["bytes"] = os.path.getsize(args.output)
     made["seconds"] = round(time.perf_counter() - start, 3)
     left_out = made["islands"]
-    if left_out["dropped"]:
+    if left_out and left_out["dropped"]:
         place = ", ".join(figure(v) for v in left_out["largest"]["place"])
         say(
             f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the "
@@ -213,9 +222,10 @@ def mesh(args) -> None:
         )
     if args.json:
         return print(json.dumps(made, indent=2))
+    size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
-        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
         f"{made['seconds']:.2f} s"
     )
 
@@ -609,6 +619,8 @@ def build(path: str, tell: bool = True) -> Solid:
 
 def resolved(args) -> dict:
     """The resolution that was asked for."""
+    if getattr(args, "chord", None) is not None:
+        return {"chord": args.chord}
     if args.edge is not None:
         return {"edge": args.edge}
     return {"per_cell": 32 if args.per_cell is None else args.per_cell}

@@ -205,6 +205,7 @@ class Solid(Picture):
         threads: int | None = None,
         progress: Progress | None = None,
         islands: Islands = "keep",
+        chord: float | None = None,
     ) -> Mesh:
         """The surface as a closed mesh.
 
@@ -213,8 +214,19 @@ class Solid(Picture):
 
         ``islands``: what becomes of all pieces but the largest. ``"keep"`` leaves them, with a warning; ``"drop"`` leaves
         them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
+
+        ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
+        the beams' and fillets' own patches and stay within so many mm of them; ``Mesh.chord_error`` is how near they came.
+        All pieces are kept.
         """
         check_islands(islands)
+        if chord is not None:
+            if edge is not None or per_cell is not None:
+                raise ValueError("give a chord error or the spacing of a grid, not both")
+            if islands != "keep":
+                raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
+            core, error = self._core.mesh_beams(positive("chord", chord), _threads(threads), progress)
+            return Mesh(core, self._core.region, chord_error=error)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.

@@ -259,6 +259,24 @@ impl Solid {
         Ok((mesh, told, words))
     }
 
+    /// The surface of beams alone, from their patches, within `chord` (mm) of them; and how far it is from them, mm.
+    #[pyo3(signature = (chord, threads=None, progress=None))]
+    fn mesh_beams(
+        &self,
+        py: Python<'_>,
+        chord: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Mesh, f64)> {
+        let made = run(py, threads, progress, |_| {
+            self.built.lone_beams()?.mesh(chord)
+        })?;
+        let (mesh, error) = made.map_err(error::fault)?;
+        let cut = vec![false; mesh.triangles.len()];
+        let surface = extract::Surface { mesh, cut };
+        Ok((Mesh::new(surface, self.design.clone()), error))
+    }
+
     /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume, areas and
     /// pieces, these also in words.
     #[pyo3(signature = (path, edge, threads=None, progress=None, islands="keep"))]

@@ -9,7 +9,10 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
+mod band;
+mod classes;
 pub mod complex;
+mod facets;
 mod field;
 pub mod hub;
 mod index;
@@ -18,7 +21,6 @@ mod mesh;
 pub mod pencil;
 pub mod quadric;
 pub mod query;
-mod tiling;
 
 use hub::{Affine, Hub, Stub};
 use index::Index;
