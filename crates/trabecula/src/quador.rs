@@ -9,6 +9,7 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
+mod bezier;
 pub mod complex;
 mod field;
 pub mod hub;
@@ -18,6 +19,7 @@ mod mesh;
 pub mod pencil;
 pub mod quadric;
 pub mod query;
+pub mod slice;
 mod tiling;
 
 use hub::{Affine, Hub, Stub};

@@ -69,6 +69,16 @@ const SHIFT: f64 = 2e-12;
 /// What is shorter is one place, in radii of the hub: far above the shift, far below what anything is made of.
 const MERGE: f64 = 1e-7;
 
+/// A number of the order of one (greater by the seed) for a stub, well mixed: in a symmetric hub no few of them may add up to
+/// nothing.
+pub(super) fn shift(stub: usize, seed: u64) -> f64 {
+    let hash = (stub as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let hash = (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let hash = (hash ^ hash >> 32).wrapping_mul(0x94D0_49BB_1331_11EB);
+    let unit = (hash >> 11) as f64 / (1u64 << 53) as f64;
+    8f64.powi(seed as i32) * (0.5 + unit)
+}
+
 struct Walk<'a> {
     hub: &'a Hub<'a>,
     /// G of the stubs, shifted.
@@ -125,16 +135,9 @@ impl Complex {
 
 impl<'a> Walk<'a> {
     fn new(hub: &'a Hub<'a>, seed: u64) -> Walk<'a> {
-        let shifted = |(i, s): (usize, &Stub)| {
-            // Well mixed: in a symmetric hub no few shifts may add up to nothing.
-            let hash = (i as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            let hash = (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            let hash = (hash ^ hash >> 32).wrapping_mul(0x94D0_49BB_1331_11EB);
-            let unit = (hash >> 11) as f64 / (1u64 << 53) as f64;
-            Affine {
-                a: s.g.a,
-                b: s.g.b + SHIFT * 8f64.powi(seed as i32) * hub.radius * (0.5 + unit),
-            }
+        let shifted = |(i, s): (usize, &Stub)| Affine {
+            a: s.g.a,
+            b: s.g.b + SHIFT * shift(i, seed) * hub.radius,
         };
         Walk {
             hub,
