@@ -10,8 +10,10 @@ use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
 mod bezier;
+pub mod closest;
 pub mod complex;
 mod field;
+mod foot;
 pub mod hub;
 mod index;
 pub mod integral;
