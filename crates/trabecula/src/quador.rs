@@ -9,7 +9,7 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
-mod bezier;
+pub mod bezier;
 pub mod closest;
 pub mod complex;
 mod field;
@@ -18,6 +18,7 @@ pub mod hub;
 mod index;
 pub mod integral;
 mod mesh;
+pub mod patch;
 pub mod pencil;
 pub mod quadric;
 pub mod query;

@@ -9,6 +9,7 @@
 use crate::fault::Fault;
 use crate::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
+use super::bezier::{Bezier, curves};
 use super::hub::{Affine, Hub, Stub};
 use super::quadric::{Conic, Quadric, piece};
 
@@ -38,6 +39,13 @@ pub struct Arc {
     pub conic: Conic,
     /// The plane that it lies in.
     pub plane: Affine,
+}
+
+impl Arc {
+    /// The conic as rational quadratic curves, from the first end to the second.
+    pub fn curves(&self) -> Vec<Bezier<3>> {
+        curves(&self.conic, 0.0, self.conic.end)
+    }
 }
 
 /// A piece of one quadric.
