@@ -87,6 +87,14 @@ impl Axes {
                 continue;
             }
             let r = square.sqrt();
+            // What little p is off decides, if it is.
+            let mut off = [0.0; 3];
+            free.iter().for_each(|&j| off[j] = p[j] - mu * self.b[j]);
+            if norm(off) > 0.0 {
+                let off = scale(off, r / norm(off));
+                put(add(middle, off), mu);
+                put(sub(middle, off), mu);
+            }
             let steps = if free.len() == 1 { 2 } else { ROUND };
             for k in 0..steps {
                 let turn = (0.5 + k as f64) / steps as f64;
