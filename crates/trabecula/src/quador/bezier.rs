@@ -38,8 +38,7 @@ impl<const D: usize> Bezier<D> {
         let [p, q, r] = self.points;
         let w = self.weight;
         let middle = self.at(0.5);
-        let beside =
-            |p: [f64; D]| core::array::from_fn(|i| (p[i] + w * q[i]) / (1.0 + w));
+        let beside = |p: [f64; D]| core::array::from_fn(|i| (p[i] + w * q[i]) / (1.0 + w));
         let weight = ((1.0 + w) / 2.0).sqrt();
         [
             Bezier {

@@ -78,15 +78,14 @@ impl Quadors {
             clear(q, norm(g), 1.0)
         } else if of.sharp {
             let s = dot(x, x) - of.radius * of.radius;
-            of.stubs.iter().fold(
-                clear(s.max(0.0), 2.0 * norm(x), 0.0),
-                |least, stub| {
+            of.stubs
+                .iter()
+                .fold(clear(s.max(0.0), 2.0 * norm(x), 0.0), |least, stub| {
                     let v = stub.g.at(x);
                     let slope = sub(scale(x, 2.0), scale(stub.g.a, 2.0 * v));
                     let bend = dot(stub.g.a, stub.g.a) - 1.0;
                     least.min(clear((s - v * v).max(0.0), norm(slope), bend))
-                },
-            )
+                })
         } else {
             clear(q, norm(g), ball.bend - 1.0)
         };
@@ -296,10 +295,7 @@ mod tests {
                 let p = if k % 3 == 0 {
                     [0, 1, 2].map(|a| b.min[a] + random.next() * (b.max[a] - b.min[a]))
                 } else {
-                    add(
-                        cloud[k],
-                        scale(random.direction(), 0.4 * random.next()),
-                    )
+                    add(cloud[k], scale(random.direction(), 0.4 * random.next()))
                 };
                 let c = near.closest(p).expect("a foot");
                 let d = c.distance.abs();

@@ -160,7 +160,8 @@ impl Axes {
             let q = self.value(x);
             let near = norm(off) <= 1e-13 * size && q.abs() <= 1e-13 * size * norm(g);
             if near || round == 5 {
-                return (norm(off) <= 1e-8 * size && q.abs() <= 1e-10 * size * norm(g)).then_some(x);
+                return (norm(off) <= 1e-8 * size && q.abs() <= 1e-10 * size * norm(g))
+                    .then_some(x);
             }
             let mut rows = [[0.0; 5]; 4];
             for i in 0..3 {
@@ -269,11 +270,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
         return vec![-c[0] / c[1]];
     }
     let value = |x: f64| c.iter().rev().fold(0.0, |v, a| v * x + a);
-    let slope = |x: f64| {
-        (1..n)
-            .rev()
-            .fold(0.0, |v, k| v * x + k as f64 * c[k])
-    };
+    let slope = |x: f64| (1..n).rev().fold(0.0, |v, k| v * x + k as f64 * c[k]);
     let noise = |x: f64| c.iter().rev().fold(0.0, |v: f64, a| v * x.abs() + a.abs()) * 1e-14;
     let derived: Vec<f64> = (1..n).map(|k| k as f64 * c[k]).collect();
     // Fujiwara's bound of all roots.

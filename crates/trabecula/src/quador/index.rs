@@ -143,7 +143,8 @@ impl Index {
         let reach = 0.5 * (normal[b].abs() * edge(b) + normal[c].abs() * edge(c));
         for i in 0..self.cells[b] {
             for j in 0..self.cells[c] {
-                let middle = |axis: usize, k: usize| self.origin[axis] + (k as f64 + 0.5) * edge(axis);
+                let middle =
+                    |axis: usize, k: usize| self.origin[axis] + (k as f64 + 0.5) * edge(axis);
                 let rest = level - normal[b] * middle(b, i) - normal[c] * middle(c, j);
                 let (at, half) = (rest / normal[a], reach / normal[a].abs() + 1e-9 * edge(a));
                 let end = self.origin[a] + self.cells[a] as f64 * edge(a);

@@ -4,12 +4,12 @@
 //! the quadric once more, in X = Q(B, B) A − 2 Q(A, B) B with Q the quadric's bilinear form on homogeneous places. With B linear in
 //! (s, t) that is of degree two, so a biquadratic Bézier patch holds it exactly; for a sphere it is stereographic projection.
 //! The way back is a central projection, which takes a conic on the quadric to a conic: a rational quadratic curve in
-//! space stays one in (s, t). The pole lies off the face. The faces of stubs, which go all round, are cut in three by meridians,
-//! which are conics too, and end at the rim.
+//! space stays one in (s, t). The pole lies off the face. The faces of stubs, which go all round, are cut in three or more by
+//! meridians, which are conics too, and end at the rim.
 
 use core::f64::consts::TAU;
 
-use crate::math::{Vec3, add, apply, cross, dot, norm, scale, sub, unit};
+use crate::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
 use super::bezier::{Bezier, Path, curves, onward};
 use super::complex::{Complex, Face};
@@ -55,10 +55,7 @@ impl Patch {
             add(scale(self.axes[0], s), scale(self.axes[1], t)),
         );
         let (bb, ab) = (self.quadric.at(b), 2.0 * self.polar());
-        scale(
-            sub(scale(self.pole, bb), scale(b, ab)),
-            1.0 / (bb - ab),
-        )
+        scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab))
     }
 
     /// Q(A, B), the same for all B of the plane.
@@ -99,7 +96,13 @@ impl Patch {
         let ab = 2.0 * self.polar();
         let [s, t] = self.range();
         // Polar forms of 1, s, s² at the pairs of ends that the control points stand for.
-        let blossom = |[a, b]: [f64; 2]| [[1.0, a, a * a], [1.0, (a + b) / 2.0, a * b], [1.0, b, b * b]];
+        let blossom = |[a, b]: [f64; 2]| {
+            [
+                [1.0, a, a * a],
+                [1.0, (a + b) / 2.0, a * b],
+                [1.0, b, b * b],
+            ]
+        };
         let (ss, tt) = (blossom(s), blossom(t));
         let mut net = ([[[0.0; 3]; 3]; 3], [[0.0; 3]; 3]);
         for i in 0..3 {
@@ -112,17 +115,20 @@ impl Patch {
                     + t[2] * q.form(v, v);
                 let b = add(self.origin, add(scale(u, s[1]), scale(v, t[1])));
                 net.1[i][j] = bb - ab;
-                net.0[i][j] = scale(
-                    sub(scale(self.pole, bb), scale(b, ab)),
-                    1.0 / (bb - ab),
-                );
+                net.0[i][j] = scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab));
             }
         }
         net
     }
 
     /// A patch seen from a pole; `None` if a side runs through the pole's tangent plane, where (s, t) are infinite.
-    fn seen_from(face: u32, quadric: Quadric, pole: Vec3, origin: Vec3, sides: &[Vec<Side>]) -> Option<Patch> {
+    fn seen_from(
+        face: u32,
+        quadric: Quadric,
+        pole: Vec3,
+        origin: Vec3,
+        sides: &[Vec<Side>],
+    ) -> Option<Patch> {
         let n = quadric.half_slope(pole);
         let u = unit(cross(
             n,
@@ -179,10 +185,13 @@ impl Patch {
             },
         ));
         let v = cross(normal, u);
-        let inward = [unit(scale(origin, -1.0)), scale(normal, -1.0)];
+        // Through the quadric's own middle, the hub's, and along the normal.
+        let middle = scale(apply(&inverse(&quadric.m), quadric.b), -1.0);
+        let normal = scale(normal, -1.0);
+        let inward = [sub(middle, origin), unit(scale(origin, -1.0)), normal];
         let tilts = (0..8).flat_map(|k| {
             let (sin, cos) = (TAU * f64::from(k) / 8.0).sin_cos();
-            [0.3, 0.8, 2.0].map(|by| add(inward[1], scale(add(scale(u, cos), scale(v, sin)), by)))
+            [0.3, 0.8, 2.0].map(|by| add(normal, scale(add(scale(u, cos), scale(v, sin)), by)))
         });
         inward.into_iter().chain(tilts).find_map(|way| {
             // The origin is on the quadric: the other root.
@@ -201,7 +210,21 @@ impl Complex {
         for (i, face) in self.faces.iter().enumerate() {
             match self.of_face(hub, i as u32, face) {
                 Some(made) => out.extend(made),
-                None => left += 1,
+                None => {
+                    left += 1;
+                    if cfg!(test) {
+                        let stub = face.rim.map(|s| &hub.stubs[s as usize]);
+                        let cut = stub.map(|s| sectors(self, face, s, 3, 0.737).is_some());
+                        println!(
+                            "LEFT label {:b} rim {:?} cut {cut:?} loops {:?} sharp {} n {}",
+                            face.label,
+                            face.rim,
+                            face.loops.iter().map(|l| l.len()).collect::<Vec<_>>(),
+                            hub.sharp,
+                            hub.stubs.len()
+                        );
+                    }
+                }
             }
         }
         (out, left)
@@ -210,10 +233,19 @@ impl Complex {
     fn of_face(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<Patch>> {
         let q = face.quadric;
         if let Some(stub) = face.rim {
-            return thirds(self, face, &hub.stubs[stub as usize])?
+            let stub = &hub.stubs[stub as usize];
+            // Where a seam turns back at one azimuth it does not at another.
+            let ways = [3, 4, 6]
                 .into_iter()
-                .map(|(origin, sides)| Patch::across(number, q, origin, &[sides]))
-                .collect();
+                .flat_map(|n| (0..5).map(move |k| (n, k)));
+            return ways
+                .map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k)))
+                .find_map(|(n, first)| {
+                    sectors(self, face, stub, n, first)?
+                        .into_iter()
+                        .map(|(origin, sides)| Patch::across(number, q, origin, &[sides]))
+                        .collect()
+                });
         }
         let sides: Vec<Vec<Side>> = face
             .loops
@@ -258,9 +290,15 @@ impl Complex {
     }
 }
 
-/// A stub's face, cut by three half-planes about its axis: a place in the middle of each third, and its sides. `None` if the seam
+/// A stub's face, cut by half-planes about its axis: a place in the middle of each sector, and its sides. `None` if the seam
 /// turns back across one of them.
-fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<Side>)>> {
+fn sectors(
+    complex: &Complex,
+    face: &Face,
+    stub: &Stub,
+    count: usize,
+    first: f64,
+) -> Option<Vec<(Vec3, Vec<Side>)>> {
     let (q, axis) = (&face.quadric, stub.axis);
     let pole = if axis[0].abs() < 0.6 {
         [1.0, 0.0, 0.0]
@@ -269,8 +307,7 @@ fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<
     };
     let side = unit(cross(axis, pole));
     let other = cross(axis, side);
-    // An odd azimuth, away from the vertices of symmetric hubs.
-    let azimuth = |k: usize| 0.737 + TAU * k as f64 / 3.0;
+    let azimuth = |k: usize| first + TAU * k as f64 / count as f64;
     let along = |a: f64| add(scale(side, a.cos()), scale(other, a.sin()));
     let across = |a: f64| cross(axis, along(a));
     // The seam in pieces between the cuts, and the cut that each begins at.
@@ -278,7 +315,7 @@ fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<
     for &(arc, forward) in face.loops.iter().flatten() {
         let conic = &complex.arcs[arc as usize].conic;
         let mut stops: Vec<(f64, usize)> = Vec::new();
-        for k in 0..3 {
+        for k in 0..count {
             let m = across(azimuth(k));
             for t in conic.roots(
                 [dot(m, conic.v), dot(m, conic.e[0]), dot(m, conic.e[1])],
@@ -319,12 +356,12 @@ fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<
         }
         out.last_mut()?.1.extend(sides);
     }
-    if out.len() != 3 {
+    if out.len() != count {
         return None;
     }
     let corners: Vec<Vec3> = out.iter().map(|o| o.1[0].0.points[0]).collect();
     let meridian = |k: usize| {
-        let (from, m) = (corners[k % 3], across(azimuth(k)));
+        let (from, m) = (corners[k % count], across(azimuth(k)));
         let way = onward(q, m, from);
         let up = if dot(way, axis) > 0.0 {
             way
@@ -335,7 +372,7 @@ fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<
         let end = path.first(dot(axis, from) - stub.split, axis, false)?;
         path.until(Some(end))
     };
-    for k in 0..3 {
+    for k in 0..count {
         let (up, down) = (meridian(k + 1)?, meridian(k)?);
         let (from, n) = (up.at(1.0), scale(axis, -1.0));
         let back = Path::new(q, n, from, onward(q, n, from))?;
@@ -348,7 +385,8 @@ fn thirds(complex: &Complex, face: &Face, stub: &Stub) -> Option<Vec<(Vec3, Vec<
         let cuts = up.curves().into_iter().chain(rim.curves()).chain(down);
         out[k].1.extend(cuts.map(|c| (c, None)));
         let way = along((azimuth(k) + azimuth(k + 1)) / 2.0);
-        let height = (dot(corners[k], axis) + dot(corners[(k + 1) % 3], axis)) / 4.0 + stub.split / 2.0;
+        let height =
+            (dot(corners[k], axis) + dot(corners[(k + 1) % count], axis)) / 4.0 + stub.split / 2.0;
         let rho = stub.squared(height).max(0.0).sqrt();
         out[k].0 = add(scale(axis, height), scale(way, rho));
     }
@@ -391,12 +429,20 @@ mod tests {
                     for share in [0.0, 0.21, 0.5, 0.84, 1.0] {
                         // The side lies on the face, in space and by its parameters.
                         let x = t.space.at(share);
-                        assert!(p.quadric.at(x).abs() < 1e-9 * size * size, "{}", p.quadric.at(x));
+                        assert!(
+                            p.quadric.at(x).abs() < 1e-9 * size * size,
+                            "{}",
+                            p.quadric.at(x)
+                        );
                         let y = p.at(t.flat.at(share));
                         assert!(p.quadric.at(y).abs() < 1e-9 * size * size);
                         assert!(hub.value(y).abs() < 1e-8 * size * size, "{}", hub.value(y));
                         let there = p.parameters(x);
-                        assert!(norm(sub(p.at(there), x)) < 1e-8 * size, "{x:?} {:?}", p.at(there));
+                        assert!(
+                            norm(sub(p.at(there), x)) < 1e-8 * size,
+                            "{x:?} {:?}",
+                            p.at(there)
+                        );
                         // The net gives the same place.
                         let at = p.parameters(y);
                         let bernstein = |a: usize| {
@@ -432,7 +478,10 @@ mod tests {
             }
         }
         if left == 0 {
-            assert!(walked.iter().all(|w| *w >= 2), "each arc is walked from both sides: {walked:?}");
+            assert!(
+                walked.iter().all(|w| *w >= 2),
+                "each arc is walked from both sides: {walked:?}"
+            );
         }
         (patches.len(), left)
     }
@@ -488,7 +537,9 @@ mod tests {
         let m = matrix(&q, center);
         let y = add(center, x);
         let h = [y[0], y[1], y[2], 1.0];
-        let value: f64 = (0..4).map(|i| (0..4).map(|j| h[i] * m[i][j] * h[j]).sum::<f64>()).sum();
+        let value: f64 = (0..4)
+            .map(|i| (0..4).map(|j| h[i] * m[i][j] * h[j]).sum::<f64>())
+            .sum();
         assert!((value - q.at(x)).abs() < 1e-12);
     }
 }

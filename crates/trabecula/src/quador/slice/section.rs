@@ -225,7 +225,11 @@ impl<'a> Section<'a> {
                 let stays = label >> m & 1 == 1;
                 guards.push((
                     label ^ 1 << m,
-                    if stays { none.plus(-1.0, &joins) } else { joins },
+                    if stays {
+                        none.plus(-1.0, &joins)
+                    } else {
+                        joins
+                    },
                 ));
             }
         }
@@ -268,8 +272,9 @@ impl<'a> Section<'a> {
         let (o, q, r) = (self.middle(), &cell.quadric, self.reach);
         let place = |p: [f64; 2]| add(o, add(scale(u, p[0]), scale(v, p[1])));
         // The square within reach, cut by the sides; with each corner the side that begins there.
-        let mut polygon: Vec<Corner> =
-            [[-r, -r], [r, -r], [r, r], [-r, r]].map(|p| (p, None)).into();
+        let mut polygon: Vec<Corner> = [[-r, -r], [r, -r], [r, r], [-r, r]]
+            .map(|p| (p, None))
+            .into();
         for (k, (_, f)) in cell.guards.iter().enumerate() {
             clip(&mut polygon, [f.at(o), dot(f.a, u), dot(f.a, v)], k);
         }

@@ -46,10 +46,20 @@ fn areas_add_up_to_the_volume() {
             let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
             // About a hundred parts are halved, each for 1e-11 or better.
             let [got, other] = [0; 2].map(|_| volume(&q, random.direction(), 1e-10));
-            assert!((got - other).abs() < 4e-9 * got, "{n} {fillet:?}: {got} {other}");
+            assert!(
+                (got - other).abs() < 4e-9 * got,
+                "{n} {fillet:?}: {got} {other}"
+            );
             let Ok(want) = q.volume() else { continue };
-            println!("{n} {fillet:?} {:e} {:e}", got / want - 1.0, other / want - 1.0);
-            assert!((got - want).abs() < 4e-9 * want, "{n} {fillet:?}: {got} {want}");
+            println!(
+                "{n} {fillet:?} {:e} {:e}",
+                got / want - 1.0,
+                other / want - 1.0
+            );
+            assert!(
+                (got - want).abs() < 4e-9 * want,
+                "{n} {fillet:?}: {got} {want}"
+            );
             compared += 1;
         }
     }
@@ -79,7 +89,10 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
             for arcs in &s.loops {
                 let curves: Vec<_> = arcs.iter().flat_map(|a| &a.curves).collect();
                 for k in 0..curves.len() {
-                    assert_eq!(curves[k].points[2], curves[(k + 1) % curves.len()].points[0]);
+                    assert_eq!(
+                        curves[k].points[2],
+                        curves[(k + 1) % curves.len()].points[0]
+                    );
                 }
                 for a in arcs {
                     for c in &a.curves {
@@ -176,13 +189,21 @@ fn planes_of_symmetry_are_sliced() {
         assert_eq!(s.loops.len(), 5);
         // Along the tops: what is a line there counts for nothing, up to the width √(2 r δ) of a strip at a depth of δ = 1e-8.
         let s = at(normal, turn);
-        assert!((s.area - 9.0 * PI).abs() < 240.0 * 3e-4, "{} {}", s.area, s.moved);
+        assert!(
+            (s.area - 9.0 * PI).abs() < 240.0 * 3e-4,
+            "{} {}",
+            s.area,
+            s.moved
+        );
         assert_eq!(at(normal, -5.0 * turn).loops.len(), 0);
     }
     // Octet and filleted hubs in their planes of symmetry, through the centre and in the planes of seams.
     for (axes, fillet) in [
         (six(), Fillet::Tau(0.7)),
-        (super::super::tests::orbit([1.0, 1.0, 0.0]), Fillet::Tau(0.8)),
+        (
+            super::super::tests::orbit([1.0, 1.0, 0.0]),
+            Fillet::Tau(0.8),
+        ),
         (super::super::tests::orbit([1.0, 1.0, 0.0]), Fillet::None),
         (super::super::tests::orbit([1.0, 1.0, 1.0]), Fillet::Auto),
     ] {
@@ -223,10 +244,19 @@ fn a_slice_far_from_the_origin_keeps_its_digits() {
         ([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]),
         ([5.0, 5.0, 0.3], [0.6, 0.0, 0.8]),
     ] {
-        let a = near.slice(&Plane::new(p, n).expect("a plane")).expect("a slice");
-        let b = far.slice(&Plane::new(add(p, by), n).expect("a plane")).expect("a slice");
+        let a = near
+            .slice(&Plane::new(p, n).expect("a plane"))
+            .expect("a slice");
+        let b = far
+            .slice(&Plane::new(add(p, by), n).expect("a plane"))
+            .expect("a slice");
         // Places are known to 1e-12 there.
-        assert!((a.area - b.area).abs() < 1e-9 * a.area, "{} {}", a.area, b.area);
+        assert!(
+            (a.area - b.area).abs() < 1e-9 * a.area,
+            "{} {}",
+            a.area,
+            b.area
+        );
     }
 }
 
@@ -235,7 +265,10 @@ fn faults_of_planes_say_what_is_wrong() {
     let says = |r: Result<Plane, Fault>, at: &str| assert_eq!(r.expect_err("refused").at, at);
     says(Plane::new([0.0; 3], [0.0; 3]), "normal");
     says(Plane::new([0.0; 3], [f64::NAN, 0.0, 1.0]), "normal");
-    says(Plane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]), "point");
+    says(
+        Plane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]),
+        "point",
+    );
     let close = star(
         1.0,
         &[
