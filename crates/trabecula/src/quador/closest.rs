@@ -48,6 +48,7 @@ struct Faces {
 /// Nearest places on a lattice; what is found out about a hub is kept.
 pub struct Nearest<'a> {
     quadors: &'a Quadors,
+    bounds: Aabb,
     hubs: Vec<OnceLock<Result<Faces, Fault>>>,
 }
 
@@ -63,6 +64,7 @@ impl Quadors {
     pub fn nearest(&self) -> Nearest<'_> {
         Nearest {
             quadors: self,
+            bounds: self.bounds(),
             hubs: (0..self.len()).map(|_| OnceLock::new()).collect(),
         }
     }
@@ -131,8 +133,7 @@ impl Nearest<'_> {
             ));
         }
         let q = self.quadors;
-        let all = q.bounds();
-        let mut reach = q.cap.max(all.distance(p) * (1.0 + 1e-12));
+        let mut reach = q.cap.max(self.bounds.distance(p) * (1.0 + 1e-12));
         let mut best: Option<Closest> = None;
         let mut seen: Vec<u32> = Vec::new();
         loop {
