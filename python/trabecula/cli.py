@@ -196,7 +196,8 @@ def parser() -> argparse.ArgumentParser:
         "mesh",
         "Mesh a design: closed, oriented, free of self-intersection.",
         "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n"
-        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format.\n\n"
+        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. --open leaves out\n"
+        "what lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
         "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",
@@ -211,6 +212,7 @@ def parser() -> argparse.ArgumentParser:
         help="pieces beside the largest: keep them with a warning (default), drop them, or refuse",
     )
     lighter(p)
+    p.add_argument("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary")
     p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
 
     p = command(

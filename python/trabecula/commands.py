@@ -66,8 +66,9 @@ def check(args) -> None:
         print(f"  fraction   {span(it['fraction'])}")
         print(f"  porosity   {span(it['porosity'])}")
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
-        whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
-        print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+        if not (it.get("tets") and it["tets"]["zones"]):
+            whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
+            print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
         if it.get("tets"):
             tell_tiling(it["tets"])
         if it.get("distortion"):
@@ -112,6 +113,8 @@ def tell_beams(name: str, it: dict) -> None:
 def tell_tiling(t: dict) -> None:
     """The mesh under a tetrahedral lattice, its walls and its creases."""
     print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
+    for zone, it in (t["zones"] or {}).items():
+        print(f"  zone {zone}     {it['cell']} in {it['count']} tetrahedra; solid fraction {it['solid_fraction']:.4f}")
     if t["ports"] is not None:
         ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
         print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
@@ -168,7 +171,8 @@ def mesh(args) -> None:
     options = resolved(args) | {"islands": args.islands}
     with Progress("meshing", args.progress) as progress:
         lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
-        if kind_of(args.output) == "stl" and not any(lighter.values()) and not closes(solid, resolved(args)):
+        streams = not (any(lighter.values()) or args.open)
+        if kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
             if not any(lighter.values()):
@@ -181,6 +185,10 @@ def mesh(args) -> None:
             if surface.simplification:
                 made["simplification"] = surface.simplification
             progress.clear()
+            if args.open:
+                surface = surface.uncapped()
+                made |= {"triangles": surface.counts[1], "open": True}
+                say("open at the region's boundary: volume and fraction are the closed part's")
             surface.write(args.output)
             tell_voids(made["voids"])
     edge = solid.spacing(**resolved(args))

@@ -105,6 +105,7 @@ def tets(
     mesher: str | None = None,
     limit: float | None = None,
     *,
+    zones: dict[int, dict] | None = None,
     path: str | None = None,
     unit: str | None = None,
     split: bool | None = None,
@@ -115,11 +116,14 @@ def tets(
 
     Made: ``size`` is the edge (mm, a number or a grade) of a regular tetrahedron of the volume they are to have, ``mesher``
     is "background" (ours, takes any region) or "ftetwild" (in the extra ``tets``, takes soups), ``limit`` the seconds that
-    the latter may take. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …), ``unit`` of its coordinates,
-    ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
+    the latter may take, ``zones`` regions by number: a tetrahedron is of the first that has its middle, else of zone 0, and
+    ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …),
+    ``unit`` of its coordinates, ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
 
     ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
     tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
     """
     given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road)
+    if zones is not None:
+        given["zones"] = {str(zone): region for zone, region in zones.items()}
     return {"tets": given}

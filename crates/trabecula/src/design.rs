@@ -27,6 +27,7 @@ mod tests;
 mod tets;
 mod tiling;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -134,6 +135,8 @@ pub struct Tiled {
     pub name: String,
     /// The lattice.
     pub tiling: Arc<Tiling>,
+    /// The cell of each zone, where zones have cells of their own.
+    pub zones: BTreeMap<String, String>,
     /// What is known of the mesh.
     pub mesh: TetReport,
 }

@@ -135,6 +135,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let tiled = Tiled {
             name: domain.name.to_string(),
             tiling,
+            zones: domain.zones(),
             mesh: domain.report,
         };
         return Ok(Built {

@@ -1,6 +1,6 @@
 //! Lattices over tetrahedral meshes: data to [`Tiling`], and what is to be said of one.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
@@ -33,6 +33,13 @@ pub(super) struct Domain<'a> {
     pub report: TetReport,
     /// The mesh's own boundary.
     pub region: Region,
+}
+
+impl Domain<'_> {
+    /// The cell of each zone, where zones have cells of their own.
+    pub fn zones(&self) -> BTreeMap<String, String> {
+        self.cell.zones.clone()
+    }
 }
 
 /// The mesh of a design that has one.
@@ -253,7 +260,9 @@ fn zoned(
     let asked = grade(value, &path, place, allowed, complement)?;
     let values = at_nodes(&asked, allowed, complement, &path, map)?;
     let names: BTreeSet<&String> = zones.values().collect();
-    let mut levels = vec![0.0; map.nodes().len()];
+    let (lo, hi) = values
+        .iter()
+        .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let mut cells = Vec::new();
     for name in names {
         let spec = TetCellSpec {
@@ -262,25 +271,16 @@ fn zoned(
         };
         let stencil = stencil(&spec, &at)?;
         let range = stencil.range();
-        let scale = 0.5 * (range.hi - range.lo);
-        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
-        for (i, (level, weight)) in levels.iter_mut().zip(&weights).enumerate() {
-            if *weight > 0.0 {
-                let share = values[i.min(values.len() - 1)];
-                *level += weight * stencil.iso(part, share) / scale;
-            }
-        }
-        let (lo, hi) = values
-            .iter()
-            .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
         apart(&stencil, part, [lo, hi], &path, warnings);
+        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
         cells.push(Share {
             stencil: Arc::new(stencil),
-            scale,
+            scale: 0.5 * (range.hi - range.lo),
             weights: Some(Arc::new(weights)),
         });
     }
-    let tiling = Tiling::of(map.clone(), cells, part, Level::Nodes(Arc::new(levels)));
+    let level = Level::mixed(map, &cells, part, &values);
+    let tiling = Tiling::of(map.clone(), cells, part, level);
     Ok((Arc::new(tiling), explicit(domain, place)))
 }
 

@@ -1,9 +1,11 @@
 //! Maps, as data.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FieldSpec, GradeSpec, OneOrThree, Unit, is_default};
+use super::{FieldSpec, GradeSpec, OneOrThree, RegionSpec, Unit, is_default};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -45,6 +47,10 @@ pub struct MadeTetsSpec {
     /// How long another mesher than the background one may take (s).
     #[serde(default = "limit", skip_serializing_if = "is_limit")]
     pub limit: f64,
+    /// Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius = 5 } } }`;
+    /// the first of several counts, and all others are of zone 0.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub zones: BTreeMap<String, RegionSpec>,
     /// How cells are joined.
     #[serde(flatten)]
     pub joined: Joined,

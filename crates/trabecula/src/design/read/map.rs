@@ -1,6 +1,8 @@
 //! Maps: tree to data.
 
-use super::{Read, grade, three};
+use std::collections::BTreeMap;
+
+use super::{Read, grade, region, three};
 use crate::design::data::*;
 use crate::design::node::{At, Fields};
 use crate::fault::counted;
@@ -100,7 +102,7 @@ const MESHERS: [(&str, &str); 3] = [
 
 pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     let keys = [
-        "size", "mesher", "limit", "path", "unit", "split", "overlap", "road",
+        "size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road",
     ];
     let f = at.fields("a map over tetrahedra", &keys, &[])?;
     let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
@@ -109,7 +111,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
         road: f.read("road", Road::Explicit, |at| at.word("road", &roads))?,
     };
     let found = |keys: &[&str]| keys.iter().find_map(|k| f.get(k));
-    let made = found(&["size", "mesher", "limit"]);
+    let made = found(&["size", "mesher", "limit", "zones"]);
     if let (Some(_), Some(path)) = (made, f.get("path")) {
         return Err(path.error(
             "a tetrahedral mesh is either made, with size, or read, from path; found both",
@@ -139,8 +141,20 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
             at.word_or("mesher", &meshers, &MESHERS)
         })?,
         limit: f.read("limit", 600.0, At::number)?,
+        zones: f.read("zones", BTreeMap::new(), zones)?,
         joined,
     }))
+}
+
+fn zones(at: &At) -> Read<BTreeMap<String, RegionSpec>> {
+    let of =
+        at.entries("regions by the zone's number, such as { 1 = { sphere = { radius = 5 } } }")?;
+    of.into_iter()
+        .map(|(zone, at)| match zone.parse::<u32>() {
+            Ok(n) if n.to_string() == zone => Ok((zone.to_string(), region(&at)?)),
+            _ => Err(at.error(format!("a zone is a whole number from 0; found \"{zone}\""))),
+        })
+        .collect()
 }
 
 fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
