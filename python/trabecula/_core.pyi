@@ -10,7 +10,9 @@ __version__: str
 Progress = Callable[[int, int], Any]
 
 def charts(
-    charts: Sequence[tuple[str, Sequence[float], Sequence[float], Sequence[tuple[str, float]]]], width: int, height: int
+    charts: Sequence[tuple[str, Sequence[float], Sequence[float], Sequence[float], Sequence[tuple[str, float]]]],
+    width: int,
+    height: int,
 ) -> bytes: ...
 def schema() -> str: ...
 def read_file(path: str | PathLike[str]) -> bytes: ...

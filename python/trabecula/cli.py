@@ -275,6 +275,7 @@ def parser() -> argparse.ArgumentParser:
         "measure",
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
         "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
+        "Of a design with a blend the transitions are told too: pieces, what is loose or dangles, the narrowest neck.\n"
         "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
         "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
@@ -293,6 +294,12 @@ def parser() -> argparse.ArgumentParser:
         "--step", type=length, metavar="MM", help="voxels for the thickness, mm (default: an eighth of the mean wall)"
     )
     p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
+    p.add_argument(
+        "--transitions",
+        metavar="OUT.png",
+        type=ending(("png",)),
+        help="draw the fraction along the transitions of a blend",
+    )
     p.add_argument("--json", action="store_true", help="print the measures as JSON")
 
     p = command(

@@ -100,6 +100,12 @@ pub trait Loader {
     /// The bytes of the file at `path`, or one sentence why not.
     fn load(&self, path: &str) -> Result<Vec<u8>, String>;
 
+    /// The names of the files that `pattern` stands for, in which one * of the last part stands for anything; or one sentence
+    /// why there are none.
+    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
+        Err(format!("{pattern}: folders are not looked into here"))
+    }
+
     /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
     /// each or for none; or one sentence why not.
     fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {

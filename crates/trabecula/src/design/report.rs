@@ -265,6 +265,7 @@ pub(super) fn transitions(built: &Built) -> Json {
         json!({
             "between": t.between.map(|i| &b.names[i]),
             "volume": t.volume,
+            "pieces": t.pieces,
             "loose": { "bodies": t.loose.0, "volume": t.loose.1 },
             "dangling": { "bodies": t.dangling.0, "volume": t.dangling.1 },
             "neck": t.neck.map(|(diameter, place)| json!({ "diameter": diameter, "place": place })),

@@ -62,9 +62,16 @@ pub(super) fn domain<'a>(
                        cell.tet.name = \"primitive\"";
         return Err(DesignError::new(format!("{path}.cell"), message));
     };
-    if let Some(other) = d.lattice.keys().find(|n| *n != name) {
-        let message = "a lattice over tetrahedra stands alone; keep one";
+    let others = d.lattice.iter().filter(|(n, _)| *n != name);
+    if let Some((other, _)) = others.clone().find(|o| matches!(o.1.map, MapSpec::Tets(_))) {
+        let message = "two lattices over tetrahedra; keep one, with zones where cells differ";
         return Err(DesignError::new(format!("lattice.{other}"), message));
+    }
+    let tables = others.map(|(n, _)| format!("lattice.{n}"));
+    let tables = tables.chain(d.beams.keys().map(|n| format!("beams.{n}")));
+    if let (None, Some(other)) = (&d.blend, tables.into_iter().next()) {
+        let message = "a lattice over tetrahedra stands alone without a blend; keep one, or say where each is";
+        return Err(DesignError::new(other, message));
     }
     let path = format!("{path}.map.tets");
     let joined = match spec_of_mesh {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::grade::control;
 use super::{Read, grade, region, three};
 use crate::design::data::*;
 use crate::design::node::{At, Fields};
@@ -21,7 +22,9 @@ const TURNS: [&str; 7] = [
 pub(super) fn map(at: &At) -> Read<MapSpec> {
     let (kind, at) = at.kind(
         "map",
-        &["affine", "spartan", "phase", "cylinder", "sphere", "tets"],
+        &[
+            "affine", "spartan", "phase", "cylinder", "sphere", "sweep", "tets",
+        ],
         &[],
     )?;
     if kind == "tets" {
@@ -51,6 +54,24 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
                 .number()?,
             center: f.read("center", [0.0; 3], three)?,
             axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
+        }));
+    }
+    if kind == "sweep" {
+        let keys = ["wavelength", "points", "path", "closed", "normal"];
+        let f = at.fields("a map along a line", &keys, &[])?;
+        let wavelength = f.need(
+            "wavelength",
+            "the cell's edge in mm, one number or three: two across the line and one along it",
+        )?;
+        return Ok(MapSpec::Sweep(SweepSpec {
+            wavelength: if wavelength.is_list() {
+                OneOrThree::Three(wavelength.numbers("one number or three, mm")?)
+            } else {
+                OneOrThree::One(wavelength.number()?)
+            },
+            points: control(&f)?,
+            closed: f.read("closed", false, At::truth)?,
+            normal: f.read("normal", None, |at| three(at).map(Some))?,
         }));
     }
     if kind == "sphere" {
@@ -191,7 +212,14 @@ fn skew(at: &At) -> Read<SkewSpec> {
 fn phase(at: &At) -> Read<PhaseSpec> {
     let mut keys = vec!["wavelength"];
     keys.extend(TURNS);
-    keys.extend(["weight", "offset", "step", "domain", "folds"]);
+    keys.extend([
+        "weight",
+        "angle_weight",
+        "offset",
+        "step",
+        "domain",
+        "folds",
+    ]);
     let f = at.fields("a phase map", &keys, &[])?;
     let given: Vec<&str> = TURNS.into_iter().filter(|k| f.get(k).is_some()).collect();
     if let [first, rest @ ..] = given.as_slice() {
@@ -231,6 +259,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         })?,
         stress: f.read("stress", None, |at| tensor(at).map(Some))?,
         weight: maybe("weight")?,
+        angle_weight: f.read("angle_weight", 1.0, At::number)?,
         offset: f.read("offset", [0.0; 3], three)?,
         step: f.read("step", None, |at| at.number().map(Some))?,
         domain: f.read("domain", Domain::Region, |at| at.word("domain", &domains))?,
