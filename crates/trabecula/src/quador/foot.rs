@@ -284,7 +284,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
     stops.push(bound);
     let mut out = Vec::new();
     for (k, &x) in stops.iter().enumerate() {
-        if k > 0 && k + 1 < stops.len() && value(x).abs() <= noise(x).max(1e-9 * largest * 1e-3) {
+        if k > 0 && k + 1 < stops.len() && value(x).abs() <= noise(x).max(1e-12 * largest) {
             out.push(x);
         }
         let Some(&y) = stops.get(k + 1) else { break };
