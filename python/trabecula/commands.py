@@ -20,7 +20,7 @@ from .starter import STARTER
 from .transition import off
 from .words import Progress, figure, say, span
 
-__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "tets", "voxels"]
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "slice", "tets", "voxels"]
 
 DESIGNS = ("toml", "json")
 #: How far a solved map is from what was asked for: names on the scale of a picture.
@@ -470,6 +470,32 @@ def tet_cells(args) -> None:
         for part, whole in it["connected_fraction"].items():
             text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
             print(f"  {part:7} in one piece that reaches all faces at fractions {text}")
+
+
+def slice(args) -> None:
+    """``trabecula slice``."""
+    import numpy  # noqa: F401  wanted by drawings; see `interrupt` for why no import waits until then
+
+    if args.output:
+        check_place(args.output)
+        keep_file(args.design, args.output)
+    quadors = build(args.design, tell=not args.json).quadors(args.beams)
+    start = time.perf_counter()
+    cut = quadors.slice(args.z)
+    seconds = round(time.perf_counter() - start, 3)
+    if args.output:
+        cut.write(args.output, args.chord)
+    curves = sum(len(it["weights"]) for it in cut.loops)
+    figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
+    figures |= {"moved": cut.moved, "seconds": seconds}
+    if args.json:
+        return print(json.dumps(figures, indent=2))
+    print(f"area   {figure(cut.area)} mm², exact")
+    print(f"loops  {len(cut.loops)}, of {curves} arcs of conics; {cut.hubs} of {len(quadors)} hubs looked at")
+    if cut.moved:
+        print(f"moved  by {cut.moved:g} mm: the plane would touch the surface without cutting it")
+    if args.output:
+        say(f"{args.output}: written, {args.chord:g} mm off at most")
 
 
 def tets(args) -> None:
