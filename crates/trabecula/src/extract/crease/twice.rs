@@ -26,7 +26,7 @@ impl Edges {
         edges.sort_unstable();
         edges.dedup();
         for (node, axis) in edges {
-            if let Some(points) = seen.twice(node, axis) {
+            if let Some(points) = seen.twice(self, node, axis) {
                 self.twice.insert((node, axis), points);
             }
         }
@@ -41,7 +41,7 @@ impl Edges {
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     /// The two points at which the face crosses a grid edge whose ends are on the same side of it.
-    fn twice(&self, node: usize, axis: usize) -> Option<[Vec3; 2]> {
+    fn twice(&self, edges: &Edges, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
         if at[axis] + 2 > nodes.shape[axis]
@@ -57,15 +57,15 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
             .any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
         let mut beside = around;
         let (u, v) = (beside.next()?, beside.next()?);
-        let all_alone = || {
+        let all_join = || {
             [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().all(|(x, y)| {
                 let mut cell = at;
                 cell[u] -= x;
                 cell[v] -= y;
-                self.alone(cell)
+                edges.joins(self, cell)
             })
         };
-        if on_plane || !all_alone() {
+        if on_plane || !all_join() {
             return None;
         }
         let height = |t: f64| self.height(node, axis, t);
