@@ -46,6 +46,11 @@ impl Key {
         Key(Key::center(node, span).0 | Key::new(0, &[], faces).0 | points << Key::POINTS)
     }
 
+    /// Whether it is one of these.
+    pub fn is_between(self) -> bool {
+        self.0 >> Key::POINTS != 0
+    }
+
     /// Of a point of a grid edge that a face crosses twice: one for the lower, two for the upper one; zero for others.
     pub fn index(self) -> usize {
         let mut faces = self.faces();

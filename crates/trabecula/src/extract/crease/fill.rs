@@ -6,12 +6,13 @@ use super::fit::Part;
 use super::rim::Step;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
+use crate::field::Field;
 use crate::math::{Vec3, add, scale, sub};
 
-/// What is between patches that are kept apart is this much smaller than the cell.
-const INNER: f64 = 0.5;
+/// What is between patches that are kept apart is smaller than the cell by one of these.
+const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
 /// How often a cell is filled anew from another point inside, if single precision muddles it.
-const TRIES: usize = 6;
+const TRIES: usize = INNER.len();
 
 /// A tetrahedron of a fitted cell.
 struct Tet {
@@ -60,11 +61,16 @@ impl Knots<'_> {
         let center = scale(add(ends[0], ends[1]), 0.5);
         let field = self.grid.faces[self.local.live[face]].field.clone();
         let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
+        let solid = field.value(center) <= 0.0;
+        let shares = if rims.len() > 1 {
+            self.shares_by_fit(&bases, center, solid, &*field)
+        } else {
+            INNER
+        };
         let first = self.extra.triangles.len();
         for attempt in 0..TRIES {
             let tets = if rims.len() > 1 {
-                let share = INNER * (1.0 - 0.07 * attempt as f64);
-                self.apart(cell, &bases, center, share)
+                self.apart(cell, &bases, center, solid, shares[attempt])
             } else {
                 let apex = match attempt {
                     0 if rim.is_empty() => center,
@@ -145,25 +151,57 @@ impl Knots<'_> {
         bases.iter().map(tet).collect()
     }
 
+    /// How much smaller than the cell the one between its patches may be, those first with which these are nearest to the
+    /// face.
+    fn shares_by_fit(
+        &self,
+        bases: &[Base],
+        center: Vec3,
+        solid: bool,
+        field: &dyn Field,
+    ) -> [f64; TRIES] {
+        let other = bases.iter().filter(|b| b.inside != solid);
+        let rays: Vec<Vec3> = other
+            .flat_map(|b| b.ids.map(|id| sub(self.place_of(id), center)))
+            .collect();
+        let mut off = vec![0.0; rays.len()];
+        let mut all = INNER.map(|share| {
+            let places: Vec<Vec3> = rays.iter().map(|r| add(center, scale(*r, share))).collect();
+            field.values(&places, &mut off);
+            (share, off.iter().fold(0.0f64, |m, d| m.max(d.abs())))
+        });
+        all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        all.map(|a| a.0)
+    }
+
     /// The tetrahedra of a cell in which several patches keep apart: between its sides and those of a smaller cell in it,
-    /// in which the face is positive.
-    fn apart(&mut self, cell: [usize; 3], bases: &[Base], center: Vec3, share: f64) -> Vec<Tet> {
+    /// all of which is `solid` or not.
+    fn apart(
+        &mut self,
+        cell: [usize; 3],
+        bases: &[Base],
+        center: Vec3,
+        solid: bool,
+        share: f64,
+    ) -> Vec<Tet> {
         let mut inner: HashMap<usize, usize> = HashMap::new();
         let middle = self.inner_point(cell, center);
         let mut tets = Vec::with_capacity(4 * bases.len());
         for b in bases {
             let mut order = [0, 1, 2];
-            order.sort_by_key(|i| b.ids[*i]);
+            let ids = b.ids.map(|id| self.first_of(id));
+            order.sort_by_key(|i| ids[*i]);
             let even = (0..3).any(|k| order == [k, (k + 1) % 3, (k + 2) % 3]);
             let left = b.left == even;
             let out = order.map(|i| b.ids[i]);
             let within = out.map(|id| {
-                if let Some(at) = inner.get(&id) {
+                let first = self.first_of(id);
+                if let Some(at) = inner.get(&first) {
                     return *at;
                 }
                 let place = add(center, scale(sub(self.place_of(id), center), share));
                 let at = self.inner_point(cell, place);
-                inner.insert(id, at);
+                inner.insert(first, at);
                 at
             });
             // Corners of the three tetrahedra: how many are outer ones, and from where on the others run.
@@ -177,7 +215,7 @@ impl Knots<'_> {
                         .map(|c| corners[c])
                         .collect();
                     if rest.iter().all(|c| !c.1) {
-                        return true;
+                        return !solid;
                     }
                     let mut of: Vec<usize> = rest.iter().map(|c| c.0).collect();
                     of.sort_unstable();
@@ -207,8 +245,8 @@ impl Knots<'_> {
                     count: 4,
                 },
                 right: !left,
-                inside: false,
-                walls: [false; 4],
+                inside: solid,
+                walls: [false, false, false, solid && !b.inside],
                 outer: 0,
                 side: b.side,
                 corners: None,
@@ -259,23 +297,20 @@ impl Knots<'_> {
     ) -> u32 {
         if spot.corners & !tet.outer == 0 {
             let key = match (tet.corners, self.fits.sides.get(&tet.side).cloned()) {
-                (Some(corners), Some(side)) => {
-                    let key = self.side_key(tet.side, &side, &corners, &tet.simplex, spot);
-                    self.told(key)
-                }
+                (Some(corners), Some(side)) => self.side_key(tet.side, &side, &corners, spot),
                 _ => self.key(&tet.simplex, spot),
             };
             return self.vertex(key);
         }
         let mut ids = [usize::MAX; 4];
         for c in (0..4).filter(|c| spot.corners >> c & 1 == 1) {
-            ids[c] = tet.simplex.nodes[c];
+            ids[c] = self.first_of(tet.simplex.nodes[c]);
         }
         ids.sort_unstable();
         if let Some(v) = inner.get(&(ids, spot.faces)) {
             return *v;
         }
-        let place = self.spot_place(&tet.simplex, spot);
+        let place = self.spot_place(&tet.simplex, spot, 1.0);
         let v = self.push(Key::center(node, 7), place);
         inner.insert((ids, spot.faces), v);
         v

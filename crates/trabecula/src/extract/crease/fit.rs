@@ -20,15 +20,17 @@ use crate::extract::knot::{Knots, Simplex, Spot};
 use crate::extract::signs::{Signs, bits};
 use crate::extract::tile::Nodes;
 use crate::math::Vec3;
-use crate::mesh::exact::drop_axis;
+use crate::mesh::exact::{drop_axis, orient2d};
 
 /// Points that are no nodes, and the sides of cells that they divide.
 #[derive(Default)]
 pub(in crate::extract) struct Fits {
     /// Places of the points.
-    pub(super) places: Vec<Vec3>,
+    places: Vec<Vec3>,
     /// Values of all live faces at them.
-    pub(super) values: Vec<Vec<f64>>,
+    values: Vec<Vec<f64>>,
+    /// The first of those that are the same point, with other values.
+    first: Vec<usize>,
     numbers: HashMap<Key, usize>,
     /// By the lowest node and the axis normal to the side.
     pub sides: HashMap<(usize, usize), Rc<Side>>,
@@ -53,6 +55,8 @@ pub(in crate::extract) struct Side {
     pub pieces: Vec<(u64, Vec<Key>)>,
     /// The chords with the points where other faces cross them.
     pub chords: Vec<Vec<Key>>,
+    /// How often it was divided anew.
+    pub(super) tries: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -75,6 +79,14 @@ pub(super) struct Part {
     /// Whether the line across from each corner is part of a chord.
     pub walls: [bool; 3],
 }
+
+const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The faces that are negative in a polygon, and the names and places of its corners.
+type Polygon = (u64, Vec<(Key, Vec3)>);
+
+/// How often a side is divided anew with other values at its points, if single precision muddles it.
+const TRIES: usize = 8;
 
 /// The grid edges of a side that a corner lies on, as bits.
 fn lines(code: usize) -> u8 {
@@ -282,7 +294,35 @@ impl Knots<'_> {
     pub(super) fn add_point(&mut self, place: Vec3, values: Vec<f64>) -> usize {
         self.fits.places.push(place);
         self.fits.values.push(values);
-        self.nodes.count() + self.fits.places.len() - 1
+        let id = self.nodes.count() + self.fits.places.len() - 1;
+        self.fits.first.push(id);
+        id
+    }
+
+    /// The number that stands for a node or a point and those that are the same.
+    pub(super) fn first_of(&self, id: usize) -> usize {
+        id.checked_sub(self.nodes.count())
+            .map_or(id, |p| self.fits.first[p])
+    }
+
+    /// The same point with other values of the same signs, by chance.
+    fn shaken(&mut self, low: usize, corner: &Corner, attempt: usize) -> usize {
+        let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
+            return corner.id;
+        };
+        let faces = 0..self.local.live.len();
+        let shaken = faces.map(|f| {
+            let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
+            self.kept(
+                f,
+                self.fits.values[point][f] * (1.0 + 0.7 * self.chance(seed, low)),
+            )
+        });
+        let values = shaken.collect();
+        let id = self.add_point(self.fits.places[point], values);
+        let first = self.fits.first[point];
+        self.fits.first[id - self.nodes.count()] = first;
+        id
     }
 
     /// The values of all live faces at a place, between those at some nodes.
@@ -359,11 +399,27 @@ impl Knots<'_> {
             parts,
             pieces: Vec::new(),
             chords: Vec::new(),
+            tries: 0,
         };
-        self.cut_parts((low, axis), face, &mut side);
-        let chords = chords
-            .iter()
-            .map(|c| self.crossed((low, axis), face, &side, c));
+        let at = (low, axis);
+        let mut pieces = self.cut_parts(at, face, &side);
+        while !is_sound(&pieces, axis) && side.tries < TRIES {
+            side.tries += 1;
+            for i in 0..side.corners.len() {
+                side.corners[i].id = self.shaken(low, &side.corners[i], side.tries);
+            }
+            pieces = self.cut_parts(at, face, &side);
+        }
+        for (negative, ring) in pieces {
+            let keys = ring.into_iter().map(|(key, place)| {
+                if key.is_between() {
+                    self.named(key, place);
+                }
+                key
+            });
+            side.pieces.push((negative, keys.collect()));
+        }
+        let chords = chords.iter().map(|c| self.crossed(at, face, &side, c));
         side.chords = chords.collect();
         Some(side)
     }
@@ -495,37 +551,40 @@ impl Knots<'_> {
         parts
     }
 
-    /// Cuts the triangles of a side by all faces but one.
-    fn cut_parts(&mut self, at: (usize, usize), face: usize, side: &mut Side) {
+    /// The triangles of a side cut by all faces but one: the faces that are negative, and names and places, counter-clockwise
+    /// about the side's axis.
+    fn cut_parts(&mut self, at: (usize, usize), face: usize, side: &Side) -> Vec<Polygon> {
+        let mut pieces = Vec::with_capacity(side.parts.len());
         for part in &side.parts {
+            let [a, b, c] = part.corners.map(|c| side.corners[c].id);
             let simplex = Simplex {
-                nodes: [part.corners[0], part.corners[1], part.corners[2], 0]
-                    .map(|c| side.corners[c].id),
+                nodes: [a, b, c, a],
                 count: 3,
             };
             let (negative, mixed) = self.others_of(&simplex, face, part.inside);
-            let mut ring = [0, 1, 2].map(|c| Spot {
-                corners: 1 << c,
-                faces: 0,
-            });
+            let mut ring = [1, 2, 4].map(|corners| Spot { corners, faces: 0 });
             if !part.left {
                 ring.reverse();
             }
             for (negative, ring) in self.split_by(&simplex, negative, mixed, ring.to_vec()) {
-                let key = |s: &Spot| self.side_key(at, side, &part.corners, &simplex, *s);
-                let keys: Vec<(Key, Option<Vec3>)> = ring.iter().map(key).collect();
-                let keys = keys.into_iter().map(|k| self.told(k)).collect();
-                side.pieces.push((negative, keys));
+                let ring = ring.iter().map(|s| {
+                    let key = self.side_key(at, side, &part.corners, *s);
+                    (key, self.side_place(key, side, &simplex, *s))
+                });
+                pieces.push((negative, ring.collect()));
             }
         }
+        pieces
     }
 
-    /// Makes the vertex of a name that has a place, and gives the name.
-    pub(super) fn told(&mut self, (key, place): (Key, Option<Vec3>)) -> Key {
-        if let Some(place) = place {
-            self.named(key, place);
+    /// The place of a spot of a triangle in a side.
+    fn side_place(&mut self, key: Key, side: &Side, simplex: &Simplex, spot: Spot) -> Vec3 {
+        if key.is_between() || spot.faces == 0 {
+            // The more often a side is divided, the farther spots keep from its points.
+            return self.spot_place(simplex, spot, (1 + 2 * side.tries) as f64);
         }
-        key
+        let v = self.vertex(key);
+        self.places[v as usize]
     }
 
     /// The faces but one that are negative at all corners of a simplex, with that one if it is; and those that vary.
@@ -535,34 +594,31 @@ impl Knots<'_> {
         (negative & !own | if inside { own } else { 0 }, mixed & !own)
     }
 
-    /// The name of a spot of a triangle in a side; and its place, if nothing else has it.
+    /// The name of a spot of a triangle in a side, or of a line in it.
     pub(super) fn side_key(
         &self,
         (low, axis): (usize, usize),
         side: &Side,
         corners: &[usize],
-        simplex: &Simplex,
         spot: Spot,
-    ) -> (Key, Option<Vec3>) {
-        let between: Vec<Corner> = bits(u64::from(spot.corners))
-            .map(|c| side.corners[corners[c]])
-            .collect();
+    ) -> Key {
+        let between = bits(u64::from(spot.corners)).map(|c| side.corners[corners[c]]);
+        let mut between: Vec<Corner> = between.collect();
         if let [only] = between[..] {
-            return (only.key, None);
+            return only.key;
         }
+        between.sort_by_key(|c| c.code);
         let line = between.iter().fold(15, |l, c| l & lines(c.code));
         let faces: Vec<usize> = bits(spot.faces).collect();
         if line != 0 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
-            let (node, along) =
-                [(low, u), (low + du, v), (low + dv, u), (low, v)][line.trailing_zeros() as usize];
-            return (Key::new(node, &[1 << along], &faces), None);
+            let lines = [(low, u), (low + du, v), (low + dv, u), (low, v)];
+            let (node, along) = lines[line.trailing_zeros() as usize];
+            return Key::new(node, &[1 << along], &faces);
         }
-        let mut codes: Vec<usize> = between.iter().map(|c| c.code).collect();
-        codes.sort_unstable();
-        let key = Key::between(low, 7 & !(1 << axis), &codes, &faces);
-        (key, Some(self.spot_place(simplex, spot)))
+        let codes: Vec<usize> = between.iter().map(|c| c.code).collect();
+        Key::between(low, 7 & !(1 << axis), &codes, &faces)
     }
 
     /// A chord with the points where faces cross it.
@@ -586,16 +642,29 @@ impl Knots<'_> {
             if ends[0] != w[0] {
                 found.reverse();
             }
-            for (_, f) in found {
+            path.extend(found.into_iter().map(|(_, f)| {
                 let spot = Spot {
                     corners: 3,
                     faces: 1 << f,
                 };
-                let key = self.side_key(at, side, &ends, &simplex, spot);
-                path.push(self.told(key));
-            }
+                self.side_key(at, side, &ends, spot)
+            }));
             path.push(side.corners[w[1]].key);
         }
         path
     }
+}
+
+/// Whether all polygons of a side are what they are meant to be in single precision: then they do not overlap either, for
+/// together they fill the side.
+fn is_sound(pieces: &[Polygon], axis: usize) -> bool {
+    pieces.iter().all(|(_, ring)| {
+        let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
+        let way = orient2d(
+            [0.0, 0.0],
+            drop_axis(AXES[(axis + 1) % 3], axis),
+            drop_axis(AXES[(axis + 2) % 3], axis),
+        );
+        (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
+    })
 }

@@ -197,8 +197,9 @@ impl Knots<'_> {
         }
     }
 
-    /// The place of a spot of a simplex. Points may be near to each other: a spot between two keeps away from both.
-    pub fn spot_place(&self, simplex: &Simplex, spot: Spot) -> Vec3 {
+    /// The place of a spot of a simplex. Points may be near to each other: a spot between two keeps away from both,
+    /// by `apart` times what crossings keep from nodes.
+    pub fn spot_place(&self, simplex: &Simplex, spot: Spot, apart: f64) -> Vec3 {
         let (part, faces, met) = self.part(simplex, spot);
         let mut shares = self.shares(&part, &faces[..met]);
         let places = part.nodes.map(|n| self.place_of(n));
@@ -207,7 +208,7 @@ impl Knots<'_> {
                 .map(f64::abs)
                 .into_iter()
                 .fold(0.0, f64::max);
-            let least = (self.grid.margin * self.grid.step / length).min(1.0 / 3.0);
+            let least = (apart * self.grid.margin * self.grid.step / length).min(1.0 / 3.0);
             shares[1] = shares[1].clamp(least, 1.0 - least);
         }
         (1..part.count).fold(places[0], |p, c| {
