@@ -1,4 +1,5 @@
-//! Edges that a face has of its own, such as those of a mesh, where it alone makes the surface.
+//! Edges that a face has of its own, such as those of a mesh: where it alone makes the surface, and (`fit`) where it meets
+//! others.
 //!
 //! The line in which a face meets the side of a cell runs straight from one grid edge to another. Where an edge of the
 //! face pierces the side it gets a corner there, if it lies nearer to the face with it. A grid edge that the face
