@@ -305,7 +305,11 @@ fn in_lattice(truth: &MeshRegion, field: &dyn Field, mesh: &Mesh, edge: f64) -> 
 
 #[test]
 fn edges_are_kept_where_a_lattice_meets_them() {
-    for (name, mesh) in [("angle", angle()), ("notched", notched()), ("star", star(5))] {
+    for (name, mesh) in [
+        ("angle", angle()),
+        ("notched", notched()),
+        ("star", star(5)),
+    ] {
         for (cell, part) in [("gyroid", Part::Sheet), ("diamond", Part::Lower)] {
             let truth = region(moved(mesh.clone(), [17.0, 31.0, 47.0], [0.11, -0.07, 0.05]));
             let field = lattice(cell, part, 0.4, [0.6; 3], [0.0; 3]);
@@ -322,7 +326,10 @@ fn edges_are_kept_where_a_lattice_meets_them() {
             };
             let [kept, rounded] = [&s, &round].map(share);
             println!("{name}, {cell}: {kept:.3} of the edges are off, {rounded:.3} rounded");
-            assert!(kept < 0.06 && rounded > 0.7, "{name}, {cell}: {kept}, {rounded}");
+            assert!(
+                kept < 0.06 && rounded > 0.7,
+                "{name}, {cell}: {kept}, {rounded}"
+            );
         }
     }
 }
@@ -340,7 +347,9 @@ fn rims_with_a_lattice_come_to_second_order() {
         off.sort_by(f64::total_cmp);
         off[off.len() * 19 / 20]
     });
-    println!("19 of 20 points of the rims of a cylinder with a gyroid, at 15, 30, 60 steps: {errors:?}");
+    println!(
+        "19 of 20 points of the rims of a cylinder with a gyroid, at 15, 30, 60 steps: {errors:?}"
+    );
     assert!(errors[2] < errors[0] / 9.0, "{errors:?}");
 }
 

@@ -51,7 +51,6 @@ impl Edges {
                 let of = ways.iter().filter(|w| w.ends == *pair);
                 let free = of.filter(|w| !w.via.iter().any(|v| taken.contains(v)));
                 let Some(way) = free.min_by(|a, b| a.off.total_cmp(&b.off)) else {
-                    if std::env::var("DBGAT").is_ok() { eprintln!("NO WAY"); }
                     return;
                 };
                 taken.extend(&way.via);
@@ -71,20 +70,7 @@ impl Edges {
                 best = Some((off, found));
             }
         });
-        let (offbest, ways) = best?;
-        if let Ok(at) = std::env::var("DBGAT") {
-            let at: Vec<f64> = at.split(',').map(|x| x.parse().unwrap()).collect();
-            let low = seen.nodes.place(side.0);
-            let h = seen.grid.step;
-            if (0..3).all(|a| (low[a] + h / 2.0 - at[a]).abs() < 1.5 * h) {
-                let fr = |p: Vec3| [0, 1, 2].map(|a| (p[a] - low[a]) / h);
-                eprintln!("SIDE {:?} axis {} low-at {:?}", seen.nodes.at(side.0), side.1, fr([at[0], at[1], at[2]]).map(|x| (x*100.0).round()/100.0));
-                for p in &points { eprintln!("   edge {} enters {} at {:.3?} d {:.5}", p.edge, p.enters, fr(p.place), seen.field.value(p.place)/h); }
-                eprintln!("   pierced {:.3?}", pierced.iter().map(|p| fr(*p)).collect::<Vec<_>>());
-                for w in &ways { eprintln!("   chosen {:?} via {:.3?} off {:.4}", w.ends, w.via.iter().map(|p| fr(*p)).collect::<Vec<_>>(), w.off / h); }
-                eprintln!("   best {:.4}", offbest / h);
-            }
-        }
+        let (_, ways) = best?;
         let single = points.iter().all(|p| p.key.index() == 0);
         if single && points.len() < 4 && ways.iter().all(|w| w.via.is_empty()) {
             return None;
