@@ -14,6 +14,7 @@ mod chord;
 mod fill;
 mod fit;
 mod rim;
+mod side;
 mod twice;
 
 use std::collections::HashMap;

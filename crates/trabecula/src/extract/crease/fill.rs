@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::fit::Part;
 use super::rim::Step;
+use super::side::Part;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
 use crate::field::Field;
