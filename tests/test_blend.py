@@ -90,7 +90,7 @@ def test_lattices_that_do_not_meet_have_no_neck(tmp_path):
     solid = lt.load(file)
     with pytest.warns(lt.DesignWarning):
         (it,) = solid.build().transitions()
-    assert it["neck"] is None and it["loose"]["bodies"] > 0
+    assert it["neck"] is None and it["loose"]["bodies"] > 0 and it["pieces"] > it["loose"]["bodies"]
 
 
 def test_grades_of_boundaries(tmp_path):
@@ -219,9 +219,51 @@ def test_check_tells_and_draws_the_transitions(tmp_path):
     report = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     assert report["blend"]["transitions"][0]["between"] == ["a", "b"]
     assert picture.read_bytes().startswith(b"\x89PNG")
+    run = [sys.executable, "-m", "trabecula", "measure", str(file), "--per-cell", "10"]
+    told = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    assert "transition a to b" in told and "pieces" in told and "dangling" in told
+    drawn = tmp_path / "measured.png"
+    run += ["--json", "--transitions", str(drawn)]
+    figures = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
+    # The same grid is looked at, whatever the mesh.
+    assert figures["transitions"] == report["blend"]["transitions"] and figures["transitions"][0]["pieces"] == 1
+    assert drawn.read_bytes() == picture.read_bytes()
     alone = subprocess.run(
         [sys.executable, "-m", "trabecula", "check", str(EXAMPLES / "gyroid_cube.toml"), "--transitions", str(picture)],
         capture_output=True,
         text=True,
     )
     assert alone.returncode == 1 and "blend" in alone.stderr
+
+
+def test_a_lattice_over_tetrahedra_takes_part():
+    """Walls in tetrahedra pass into a network; without a blend they stand alone."""
+    lattices = {
+        "a": lt.Lattice(
+            lt.cell.tet("primitive"), "upper", lt.map.tets(size=5), lt.level.fraction(0.3)
+        ),
+        "b": lt.Lattice("gyroid", "upper", lt.map.affine(wavelength=4.0), lt.level.fraction(0.3)),
+    }
+    box = lt.region.box(size=[32, 12, 12])
+    blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-8: 0, 8: 1}))
+    solid = lt.Design(region=box, lattice=lattices, blend=blend).build()
+    (it,) = solid.transitions()
+    assert it["neck"] is not None
+    for row in it["fractions"]:
+        assert abs(row["found"] - row["asked"]) < 0.03 and abs(row["asked"] - 0.3) < 0.05
+    mesh = solid.mesh(edge=0.4)
+    assert mesh.closed and mesh.self_intersections == 0
+    with pytest.raises(lt.DesignError, match="blend") as e:
+        lt.Design(region=box, lattice=lattices).build()
+    assert e.value.path == "lattice.b"
+
+
+def test_beams_take_part_with_the_fraction_they_have():
+    """The fraction asked for of beams is what they have there; the sheet's second side stays until it sinks in."""
+    beams = lt.Beams("octet", lt.map.affine(wavelength=5.0), radius=0.45)
+    sheet = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4.0), lt.level.fraction(0.3))
+    blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-10: 0, 10: 1}))
+    design = lt.Design(region=lt.region.box(size=[40, 16, 16]), lattice={"a": sheet}, beams={"b": beams}, blend=blend)
+    (it,) = design.build().transitions()
+    assert all(row["asked"] is not None for row in it["fractions"])
+    assert max(abs(row["found"] - row["asked"]) for row in it["fractions"]) < 0.02

@@ -1,5 +1,8 @@
 """Cells that turn, from Python: builders, files made by NumPy, the report, and what is refused."""
 
+import struct
+import zlib
+
 import numpy as np
 import pytest
 import trabecula as lt
@@ -100,3 +103,78 @@ def test_the_distortion_is_seen_and_had_by_the_point():
     still = design(lt.map.affine(wavelength=3)).build()
     with pytest.raises(ValueError, match="solved for"):
         still.misfits(mesh.vertices)
+
+
+def test_cells_follow_a_line_and_folds_are_refused(tmp_path):
+    line = [[x, 3 * np.sin(x / 5), 0] for x in np.linspace(0, 24, 9)]
+    box = lt.region.box(min=[0, -4, -2], max=[24, 4, 2])
+
+    def swept(points, **keys):
+        core = lt.Lattice("primitive", "sheet", lt.map.sweep(3, points, **keys), lt.level.fraction(0.3))
+        return lt.Design(region=box, lattice={"a": core}, folder=str(tmp_path))
+
+    solid = swept(line, normal=[0, 0, 1]).build()
+    mesh = solid.mesh(edge=0.2)
+    assert mesh.closed and mesh.self_intersections == 0
+    # What is asked for holds, since cells that shrink inside a bend grow outside it.
+    assert abs(mesh.measure()["solid_fraction"] - 0.3) < 0.03
+    np.savetxt(tmp_path / "line.csv", line, delimiter=",", header="x,y,z", comments="")
+    same = swept("line.csv", normal=[0, 0, 1]).build()
+    points = np.random.default_rng(3).uniform([1, -3, -1], [23, 3, 1], (200, 3))
+    assert np.allclose(solid.field(points), same.field(points))
+    with pytest.raises(lt.DesignError, match="folds at|tears at") as e:
+        swept([[8, -3, 0], [12, 3, 0], [16, -3, 0]]).build()
+    assert e.value.path == "lattice.a.map.sweep.points"
+    with pytest.raises(lt.DesignError, match="coincide"):
+        swept([[8, -3, 0], [8, -3, 0]]).build()
+
+
+def test_angles_are_bought_with_spacings():
+    turn = lt.grade.linear(along=[1, 0, 0], stops={0: 0, 12: 40})
+
+    def off(weight):
+        map = lt.map.phase(wavelength=3, rotate_z=turn, angle_weight=weight)
+        return design(map).build().report()["lattices"]["core"]["distortion"]["angle"][0]["mean"]
+
+    assert off(20) < off(1) < off(0.05)
+    with pytest.raises(lt.DesignError, match="0.001"):
+        off(0)
+
+
+def grey_png(rows):
+    """A grey picture of 8 bits."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 0, 0, 0, 0)
+    packed = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
+
+
+def test_a_stack_of_pictures_is_a_grid(tmp_path):
+    """The same numbers as an array and as pictures, whose names sort as people count."""
+    i, j, k = np.indices((13, 9, 12))
+    numbers = (5 * i + 7 * j + 3 * k).astype(np.uint8)
+    np.save(tmp_path / "all.npy", numbers.astype(np.float64))
+    for z in range(12):
+        (tmp_path / f"slice{z}.png").write_bytes(grey_png(numbers[:, :, z].T.tolist()))
+    box = lt.region.box(min=[0, 0, 0], max=[12, 8, 11])
+
+    def solid(path, **keys):
+        grid = lt.grade.grid(path, **{"origin": [0, 0, 0], "step": 1, "remap": {0: 0.2, 160: 0.5}} | keys)
+        core = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=3), lt.level.fraction(grid))
+        return lt.Design(region=box, lattice={"a": core}, folder=str(tmp_path)).build()
+
+    points = np.random.default_rng(4).uniform([0, 0, 0], [12, 8, 11], (300, 3))
+    assert np.allclose(solid("slice*.png").field(points), solid("all.npy").field(points))
+    for path, keys, words in [
+        ("none*.png", {}, "no file is named"),
+        ("slice*.png", {"origin": None}, "pictures do not say"),
+        ("all.png", {}, "all.png"),
+    ]:
+        with pytest.raises(lt.DesignError, match=words):
+            solid(path, **keys)
+    (tmp_path / "slice3.png").write_bytes(grey_png([[1, 2], [3, 4]]))
+    with pytest.raises(lt.DesignError, match="2 × 2 pixels among those of 13 × 9"):
+        solid("slice*.png")

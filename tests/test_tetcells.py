@@ -100,3 +100,43 @@ def test_the_command_lists_them():
     assert "one piece that reaches all faces" in run("diamond")[1]
     code, _, words = run("dimond")
     assert code == 1 and "diamond" in words
+
+
+def test_zones_pass_into_each_other_and_keep_the_fraction():
+    """Zones by region on the background mesh: told apart, one piece, and as full as asked, also between them."""
+    half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
+    solid = design(lt.cell.tet(zones={0: "p43m", 1: "f43m"}), level=lt.level.fraction(0.3), zones={1: half}).build()
+    report = solid.report()["lattices"]["a"]
+    zones = report["tets"]["zones"]
+    assert [z["cell"] for z in zones.values()] == ["p43m", "f43m"]
+    assert sum(z["count"] for z in zones.values()) == report["tets"]["count"]
+    # Levels settle until the tetrahedra about each node are within 0.001.
+    assert report["fraction"] == pytest.approx(0.3, abs=2e-3)
+    for zone in zones.values():
+        assert zone["solid_fraction"] == pytest.approx(0.3, abs=0.01)
+    mesh = solid.mesh(edge=0.2)
+    assert mesh.closed and mesh.pieces == 1
+    # Second order in the steps of the surface, of which there are twenty to an edge.
+    assert mesh.volume == pytest.approx(0.3 * report["tets"]["volume"], rel=0.02)
+    far = lt.region.box(size=1, center=[50, 0, 0])
+    with pytest.raises(lt.DesignError, match="no tetrahedron's middle"):
+        design(lt.cell.tet(zones={0: "iwp", 1: "diamond"}), zones={1: far}).build()
+    with pytest.raises(lt.DesignError, match="which has no cell"):
+        design(lt.cell.tet(zones={0: "iwp"}), zones={1: half}).build()
+
+
+def test_the_boundary_may_be_left_open(tmp_path):
+    mesh = design().build().mesh(edge=0.4)
+    opened = mesh.uncapped()
+    assert mesh.closed and not opened.closed
+    assert opened.area == pytest.approx(mesh.measure()["area_lattice"], rel=1e-12)
+    # Every open edge is one of a cap.
+    caps = mesh.triangles[mesh.cut]
+    corners = {tuple(p) for p in mesh.vertices[caps.ravel()].tolist()}
+    edges = np.sort(opened.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    found, times = np.unique(edges, axis=0, return_counts=True)
+    assert (times == 1).any() and times.max() == 2
+    assert all(tuple(p) in corners for p in opened.vertices[found[times == 1].ravel()].tolist())
+    mesh.write(tmp_path / "a.stl")
+    with pytest.raises(ValueError, match="within"):
+        lt.Mesh.read(tmp_path / "a.stl").uncapped()

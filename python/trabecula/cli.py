@@ -185,7 +185,8 @@ def parser() -> argparse.ArgumentParser:
         "mesh",
         "Mesh a design: closed, oriented, free of self-intersection.",
         "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n"
-        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format.\n\n"
+        "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. --open leaves out\n"
+        "what lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
         "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",
@@ -200,6 +201,7 @@ def parser() -> argparse.ArgumentParser:
         help="pieces beside the largest: keep them with a warning (default), drop them, or refuse",
     )
     lighter(p)
+    p.add_argument("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary")
     p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
 
     p = command(
@@ -249,6 +251,7 @@ def parser() -> argparse.ArgumentParser:
         "measure",
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
         "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
+        "Of a design with a blend the transitions are told too: pieces, what is loose or dangles, the narrowest neck.\n"
         "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
         "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
@@ -267,6 +270,12 @@ def parser() -> argparse.ArgumentParser:
         "--step", type=length, metavar="MM", help="voxels for the thickness, mm (default: an eighth of the mean wall)"
     )
     p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
+    p.add_argument(
+        "--transitions",
+        metavar="OUT.png",
+        type=ending(("png",)),
+        help="draw the fraction along the transitions of a blend",
+    )
     p.add_argument("--json", action="store_true", help="print the measures as JSON")
 
     p = command(

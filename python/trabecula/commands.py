@@ -17,6 +17,7 @@ from .mesh import READS, Mesh
 from .output import check_place, whole_file
 from .solid import Solid
 from .starter import STARTER
+from .transition import off
 from .words import Progress, figure, say, span
 
 __all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "tets", "voxels"]
@@ -66,8 +67,9 @@ def check(args) -> None:
         print(f"  fraction   {span(it['fraction'])}")
         print(f"  porosity   {span(it['porosity'])}")
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
-        whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
-        print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
+        if not (it.get("tets") and it["tets"]["zones"]):
+            whole = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in it["connected_fraction"])
+            print(f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}")
         if it.get("tets"):
             tell_tiling(it["tets"])
         if it.get("distortion"):
@@ -112,6 +114,8 @@ def tell_beams(name: str, it: dict) -> None:
 def tell_tiling(t: dict) -> None:
     """The mesh under a tetrahedral lattice, its walls and its creases."""
     print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
+    for zone, it in (t["zones"] or {}).items():
+        print(f"  zone {zone}     {it['cell']} in {it['count']} tetrahedra; solid fraction {it['solid_fraction']:.4f}")
     if t["ports"] is not None:
         ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
         print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
@@ -130,11 +134,18 @@ def tell_blend(blend: dict) -> None:
     print(f"blend of {', '.join(blend['lattices'])} by {blend['by']}{phases}")
     for it in blend["rbf"]:
         print(f"  {it['path']}: {it['points']} points, delta {figure(it['delta'])} mm, condition {it['condition']:.2g}")
-    for it in blend["transitions"]:
+    tell_transitions(blend["transitions"])
+
+
+def tell_transitions(found) -> None:
+    """How lattices pass into each other."""
+    for it in found:
         print(f"transition {it['between'][0]} to {it['between'][1]}: {figure(it['volume'])} mm³")
         rows = it["fractions"]
-        off = max((r["found"] - r["asked"] for r in rows), key=abs, default=0.0)
-        print(f"  fraction   {span([min(r['found'] for r in rows), max(r['found'] for r in rows)])}, off by {off:+.4f} at most")
+        worst = off(it)
+        told = "" if worst is None else f", off by {worst:+.4f} at most"
+        print(f"  fraction   {span([min(r['found'] for r in rows), max(r['found'] for r in rows)])}{told}")
+        print(f"  pieces     {it['pieces']}")
         neck = it["neck"]
         text = "none: no way leads across"
         if neck:
@@ -168,7 +179,8 @@ def mesh(args) -> None:
     options = resolved(args) | {"islands": args.islands}
     with Progress("meshing", args.progress) as progress:
         lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
-        if kind_of(args.output) == "stl" and not any(lighter.values()) and not closes(solid, resolved(args)):
+        streams = not (any(lighter.values()) or args.open)
+        if kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
             if not any(lighter.values()):
@@ -181,6 +193,10 @@ def mesh(args) -> None:
             if surface.simplification:
                 made["simplification"] = surface.simplification
             progress.clear()
+            if args.open:
+                surface = surface.uncapped()
+                made |= {"triangles": surface.counts[1], "open": True}
+                say("open at the region's boundary: volume and fraction are the closed part's")
             surface.write(args.output)
             tell_voids(made["voids"])
     edge = solid.spacing(**resolved(args))
@@ -267,7 +283,15 @@ def measure(args) -> None:
     if args.histogram is not None:
         check_place(args.histogram)
         keep_measured(args)
-    made = surface(args)
+    solid = build(args.file) if kind_of(args.file) in DESIGNS else None
+    found = solid.transitions() if solid is not None else ()
+    if args.transitions is not None:
+        if not found:
+            raise Refused("--transitions is for designs with a blend, in which lattices pass into each other; this has none")
+        check_place(args.transitions)
+        keep_inputs(args.file, args.transitions)
+        found.render(args.transitions)
+    made = surface(args) if solid is None else meshed(solid, args)
     if args.region:
         made = made.within(region(args.region))
     figures = made.measure()
@@ -289,6 +313,8 @@ def measure(args) -> None:
         if args.histogram is not None:
             balls.render(args.histogram)
     if args.json:
+        if found:
+            figures["transitions"] = list(found)
         return print(json.dumps(figures, indent=2))
     units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
     lines = listed(figures)
@@ -305,6 +331,7 @@ def measure(args) -> None:
         else:
             text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
         print(f"{key:{width}} {text}")
+    tell_transitions(found)
     if figures["closed"] and not inverted:
         tell_voids(figures["voids"])
 

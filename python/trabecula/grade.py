@@ -39,7 +39,8 @@ def grid(
     array: str | None = None,
     remap: Stops | None = None,
 ) -> dict:
-    """Numbers on a grid from a file: npy (with the ``origin`` of the first number and the ``step``, mm), vti, vtk.
+    """Numbers on a grid from a file: npy (with the ``origin`` of the first number and the ``step``, mm), vti, vtk; or from
+    grey pictures one above the other, png or tif ("scan/*.png", with ``origin`` and ``step``).
 
     ``remap`` says what they stand for: {number: value} or pairs, linear between. A ``path`` is relative to the design's
     folder.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .given import settings
 
-__all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "tets"]
+__all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
 
 def affine(
@@ -46,6 +46,7 @@ def phase(
     frame: dict | None = None,
     stress: Sequence[float | dict] | dict | None = None,
     weight: dict | None = None,
+    angle_weight: float | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
     domain: str | None = None,
@@ -56,8 +57,9 @@ def phase(
     Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
     ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
     components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``weight`` says how much it
-    matters where: what no map can follow is left to where it is small. ``step`` is the spacing in mm
-    of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
+    matters where: what no map can follow is left to where it is small. ``angle_weight`` is what an error of angle counts for the same
+    error of spacing: above 1 cells are nearer to their directions, below 1 to their sizes. ``step`` is the spacing in mm of
+    the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
     """
     given = settings(
         wavelength=wavelength,
@@ -69,6 +71,7 @@ def phase(
         frame=frame,
         stress=stress,
         weight=weight,
+        angle_weight=angle_weight,
         offset=offset,
         step=step,
         domain=domain,
@@ -100,11 +103,28 @@ def sphere(
     return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
 
 
+def sweep(
+    wavelength: float | Sequence[float],
+    points: Sequence[Sequence[float]] | str,
+    closed: bool | None = None,
+    normal: Sequence[float] | None = None,
+) -> dict:
+    """Cells along a line, in a frame that does not rotate about it: u = (a/λ₁, b/λ₂, s/λ₃), a and b across it, s along it.
+
+    ``points`` are control points (mm) of a cubic spline, or the path of a table of them (csv); ``closed=True`` joins the last
+    with the first, with a whole number of cells around. ``normal`` is where the first edge points at the start. A region in
+    which the lattice would fold or tear is refused.
+    """
+    line = {"path": points} if isinstance(points, str) else {"points": [list(p) for p in points]}
+    return {"sweep": settings(wavelength=wavelength, **line, closed=closed, normal=normal)}
+
+
 def tets(
     size: float | dict | None = None,
     mesher: str | None = None,
     limit: float | None = None,
     *,
+    zones: dict[int, dict] | None = None,
     path: str | None = None,
     unit: str | None = None,
     split: bool | None = None,
@@ -115,11 +135,14 @@ def tets(
 
     Made: ``size`` is the edge (mm, a number or a grade) of a regular tetrahedron of the volume they are to have, ``mesher``
     is "background" (ours, takes any region) or "ftetwild" (in the extra ``tets``, takes soups), ``limit`` the seconds that
-    the latter may take. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …), ``unit`` of its coordinates,
-    ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
+    the latter may take, ``zones`` regions by number: a tetrahedron is of the first that has its middle, else of zone 0, and
+    ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …),
+    ``unit`` of its coordinates, ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
 
     ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
     tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
     """
     given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road)
+    if zones is not None:
+        given["zones"] = {str(zone): region for zone, region in zones.items()}
     return {"tets": given}

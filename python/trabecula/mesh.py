@@ -327,6 +327,20 @@ class Mesh(Picture):
             raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
         return Mesh(self._core.split_by(region), region, self._edge, self._islands)
 
+    def uncapped(self) -> Mesh:
+        """The lattice's own surface alone, open where the region cuts it: without the triangles that ``cut`` marks.
+
+        For shells, and for surfaces that are to be joined to others; what is to be printed stays closed. Volume and
+        porosity of an open surface mean nothing. A ValueError where it is not known which triangles are cuts, as in a mesh
+        from a file: ``within`` finds them.
+        """
+        if self._figures["area_cut"] is None:
+            raise ValueError("which triangles are cuts is not known: use within(solid) first")
+        made = Mesh(self._core.uncapped(), None, self._edge, self._islands)
+        if not made.counts[1]:
+            raise ValueError("all triangles lie on the region's boundary: there is no lattice in this mesh")
+        return made
+
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""
         kind = extension(path, WRITES)

@@ -44,7 +44,7 @@ class Thickness:
         """The histograms as the bytes of a PNG file."""
         named = [("wall thickness, mm", self.wall), ("pore size, mm", self.pore)]
         drawn = [
-            (title, it["histogram"]["edges"], it["histogram"]["share"], [(k, it[k]) for k in ("min", "p05", "mean")])
+            (title, it["histogram"]["edges"], it["histogram"]["share"], [], [(k, it[k]) for k in ("min", "p05", "mean")])
             for title, it in named
             if it
         ]

@@ -14,11 +14,12 @@ __all__ = ["Transitions"]
 class Transitions(Sequence):
     """The transitions of a blend, each a dictionary. Made by ``Solid.transitions``.
 
-    ``between`` names the two lattices; ``volume`` (mm³) is where both count; ``loose`` and ``dangling`` have the number of
+    ``between`` names the two lattices; ``volume`` (mm³) is where both count; ``pieces`` the bodies that come into it, with what
+    is theirs on either side; ``loose`` and ``dangling`` have the number of
     ``bodies`` that touch neither side, or hang by necks under half the narrowest of the widest way across, and their
     ``volume``; ``neck`` is the ``diameter`` (mm, to within ``step``) and ``place`` of that narrowest neck, None where no way
-    leads across; ``fractions`` has for tenths of the second's ``share`` the fraction ``asked`` and ``found``, in
-    windows of two cells.
+    leads across; ``fractions`` has for tenths of the second's ``share`` the fraction ``asked`` (None where
+    it is not known) and ``found``, in windows of two cells.
     """
 
     def __init__(self, found: list[dict]):
@@ -37,27 +38,33 @@ class Transitions(Sequence):
         return f"<trabecula.Transitions {', '.join(' to '.join(t['between']) for t in self) or 'none'}>"
 
     def png(self) -> bytes:
-        """The fraction found along each transition as the bytes of a PNG file; what was asked for is marked in words."""
+        """The fraction found along each transition as bars, what was asked for as a line across each: a PNG file's bytes."""
         drawn = []
         for it in self:
             rows = it["fractions"]
             first, second = it["between"]
-            tenth = 1 / 10
-            edges, share, at = [0.0], [], 0.0
+            half = 0.5 / 10  # rows are tenths
+            edges, found, asked, at = [0.0], [], [], 0.0
             for row in rows:
-                low = row["share"] - tenth / 2
-                if low > at + tenth / 2:  # tenths at which nothing was looked at
+                low = row["share"] - half
+                if low > at + half:  # tenths at which nothing was looked at
                     edges.append(low)
-                    share.append(0.0)
-                at = row["share"] + tenth / 2
+                    found.append(0.0)
+                    asked.append(0.0)
+                at = row["share"] + half
                 edges.append(at)
-                share.append(row["found"])
-            asked = [r["asked"] for r in rows]
-            found = max((abs(r["found"] - r["asked"]) for r in rows), default=0.0)
-            title = f"share of {second} against {first}: solid fraction found, asked {min(asked):.3f} to {max(asked):.3f}"
-            marks = [(f"off by {found:.3f} at most ", 0.5)]
-            drawn.append((title, edges, share, marks))
+                found.append(row["found"])
+                asked.append(row["asked"] or 0.0)
+            worst = off(it)
+            words = "found" if worst is None else f"found, line: asked for, off by {worst:+.3f} at most"
+            neck = f"neck {it['neck']['diameter']:.3g} mm" if it["neck"] else "no way across"
+            loose, dangling = it["loose"]["bodies"], it["dangling"]["bodies"]
+            title = f"share of {second} against {first}. solid fraction {words}"
+            drawn.append((title, edges, found, asked, [(f"{neck}, {loose} loose, {dangling} dangling; half at", 0.5)]))
         return _core.charts(drawn, 960, 480 * len(drawn))
+
+    def _repr_png_(self) -> bytes | None:
+        return self.png() if self._found else None
 
     def render(self, path: str | os.PathLike[str]) -> None:
         """Writes the fractions along the transitions to a .png file."""
@@ -66,3 +73,9 @@ class Transitions(Sequence):
             raise ValueError("there is no transition: the design has no blend, or one lattice alone counts everywhere")
         with whole_file(path) as temporary, open(temporary, "wb") as out:
             out.write(self.png())
+
+
+def off(transition: dict) -> float | None:
+    """The most by which the fraction found is off the one asked for; None where nobody knows what was."""
+    each = [r["found"] - r["asked"] for r in transition["fractions"] if r["asked"] is not None]
+    return max(each, key=abs, default=None)

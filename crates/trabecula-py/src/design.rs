@@ -28,6 +28,23 @@ impl Loader for Folder {
         crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
     }
 
+    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
+        let (folder, name) = pattern.rsplit_once('/').unwrap_or(("", pattern));
+        let (before, after) = name.split_once('*').unwrap_or((name, ""));
+        let found = std::fs::read_dir(self.0.join(folder)).map_err(|e| format!("{folder}: {e}"))?;
+        let names = found.filter_map(|f| f.ok()?.file_name().into_string().ok());
+        let long = before.len() + after.len();
+        let fits = |n: &String| n.len() >= long && n.starts_with(before) && n.ends_with(after);
+        let found: Vec<String> = names
+            .filter(fits)
+            .map(|n| format!("{folder}{}{n}", if folder.is_empty() { "" } else { "/" }))
+            .collect();
+        if found.is_empty() {
+            return Err(format!("no file is named {pattern}"));
+        }
+        Ok(found)
+    }
+
     fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
         crate::tets::elements(&self.0.join(Path::new(path)).to_string_lossy())
     }

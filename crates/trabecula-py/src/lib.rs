@@ -15,7 +15,7 @@ mod tets;
 /// Rotations and translations.
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
 /// Title, edges, shares, marks.
-type Histogram = (String, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
+type Histogram = (String, Vec<f64>, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
 /// For each part, intervals of the fraction.
 type Connected = Vec<(&'static str, Vec<[f64; 2]>)>;
 /// Name, title, group, aspect; nodes and beams of a cell; its valences; Maxwell's count; length of the beams.
@@ -75,7 +75,7 @@ mod _core {
         crate::machine::free_memory(&root)
     }
 
-    /// Histograms one above the other as PNG bytes: (title, edges, shares, marks).
+    /// Histograms one above the other as PNG bytes: (title, edges, shares, what these are held against or nothing, marks).
     #[pyfunction]
     fn charts<'py>(
         py: Python<'py>,
@@ -87,10 +87,11 @@ mod _core {
         let bytes = crate::run::run(py, None, None, |_| {
             let charts: Vec<Chart> = charts
                 .into_iter()
-                .map(|(title, edges, share, marks)| Chart {
+                .map(|(title, edges, share, wanted, marks)| Chart {
                     title,
                     edges,
                     share,
+                    wanted,
                     marks,
                 })
                 .collect();

@@ -71,6 +71,15 @@ impl Mesh {
         })
     }
 
+    /// The triangles that are no cuts.
+    fn uncapped(&self, py: Python<'_>) -> PyResult<Mesh> {
+        Ok(Mesh {
+            surface: run(py, None, None, |_| self.surface.uncapped())?,
+            split: self.split,
+            design: self.design.clone(),
+        })
+    }
+
     /// Vertex positions (n, 3), mm.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

@@ -9,6 +9,7 @@
 mod fill;
 mod joint;
 mod levels;
+mod quantile;
 mod simplex;
 mod strand;
 mod weights;
@@ -84,19 +85,10 @@ impl Blend {
             );
             return Err(Fault::new("", message));
         }
-        let raw: Vec<Strand> = of
-            .into_iter()
-            .map(|c| Strand::new(c, 1.0, bounds))
-            .collect();
-        let (strands, levels): (Arc<[Strand]>, _) = match by {
-            By::Value => (raw.into(), None),
-            By::Fraction => {
-                let joint = Joint::new(&raw, bounds);
-                let strands: Arc<[Strand]> = scaled(&raw, &joint, bounds).into();
-                let levels = Levels::new(&strands, joint);
-                (strands, Some(Arc::new(levels)))
-            }
-        };
+        let joint = Joint::new(&of, bounds);
+        let unit = by == By::Fraction;
+        let strands: Arc<[Strand]> = looked(of, unit, &joint, bounds).into();
+        let levels = unit.then(|| Arc::new(Levels::new(&strands, joint, &weights)));
         // Shares move no faster than a cell is long, or the blend is no blend: half as much again for them.
         let slope = strands.iter().map(Strand::slope).fold(0.0, f64::max) * 1.5;
         Ok(Blend {
@@ -124,7 +116,8 @@ impl Blend {
         self.levels.as_ref().map(|l| l.joint.phases)
     }
 
-    /// Fills the fraction that is asked for at points (mm): Σ wᵢ pᵢ. NaN where a field is blended whose fraction is not known.
+    /// Fills the fraction that is asked for at points (mm): Σ wᵢ pᵢ. That of a field of another kind is what it has in the
+    /// neighbourhood; by value nobody has looked, and where such a field counts the fraction is NaN.
     pub fn fractions(&self, points: &[Vec3], out: &mut [f64]) {
         let n = self.strands.len();
         let mut w = vec![0.0; n * points.len()];
@@ -132,9 +125,18 @@ impl Blend {
         let mut own = vec![0.0; points.len()];
         out.fill(0.0);
         for (i, s) in self.strands.iter().enumerate() {
-            match s.lattice() {
-                Some(l) => l.fractions(points, &mut own),
-                None => own.fill(f64::NAN),
+            match (s.lattice(), &self.levels) {
+                (Some(l), _) => l.fractions(points, &mut own),
+                (None, Some(levels)) => {
+                    for (k, o) in own
+                        .iter_mut()
+                        .enumerate()
+                        .filter(|(k, _)| w[k * n + i] > 0.0)
+                    {
+                        *o = levels.share_found(&self.strands, points[k], i);
+                    }
+                }
+                (None, None) => own.fill(f64::NAN),
             }
             for (k, (o, p)) in out.iter_mut().zip(&own).enumerate() {
                 if w[k * n + i] > 0.0 {
@@ -161,7 +163,12 @@ impl Blend {
             for (k, (g, high)) in here.into_iter().zip(g.into_iter().zip(high)) {
                 let w = w[k * n + i];
                 let o = &mut out[k];
-                *o = [o[0] + w * g, o[1] + w * s.low(high), o[2] + w * high];
+                let low = if w < 1.0 {
+                    s.low(high)
+                } else {
+                    s.low_alone(high)
+                };
+                *o = [o[0] + w * g, o[1] + w * low, o[2] + w * high];
                 if graded && w < 1.0 {
                     ends[k * n + i].quantiles = s.quantiles(high);
                 }
@@ -192,8 +199,8 @@ impl Blend {
     }
 }
 
-/// The lattices with their cores in units of their root mean square deviation from the mean.
-fn scaled(raw: &[Strand], joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
+/// The lattices after a look at each; if `unit`, with their cores in units of their root mean square deviation from the mean.
+fn looked(of: Vec<Constituent>, unit: bool, joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
     let mut points = match joint.phases {
         Phases::Drifting => Vec::new(),
         Phases::Locked | Phases::Independent => joint.places(0),
@@ -213,13 +220,17 @@ fn scaled(raw: &[Strand], joint: &Joint, bounds: &Aabb) -> Vec<Strand> {
         points.truncate(LOOKS);
     }
     let mut values = vec![0.0; points.len()];
-    let each = raw.iter().map(|s| {
-        s.values(&points, &mut values);
+    let each = of.into_iter().map(|c| {
+        c.cores(&points, &mut values);
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
-        Strand::new(s.constituent().clone(), unit, bounds)
+        let size = if unit && square > 0.0 {
+            square.sqrt()
+        } else {
+            1.0
+        };
+        Strand::new(c, size, &values, bounds)
     });
     each.collect()
 }
@@ -255,9 +266,14 @@ impl Field for Blend {
             let down = if s.is_sheet() { -1.0 } else { 0.0 };
             for (j, k) in here.into_iter().enumerate() {
                 let (w, dw) = (w[k * n + i], dw[k * n + i]);
+                let low = if w < 1.0 {
+                    s.low(high[j])
+                } else {
+                    s.low_alone(high[j])
+                };
                 let of = [
                     (g[j], dg[j]),
-                    (s.low(high[j]), scale(dhigh[j], down)),
+                    (low, scale(dhigh[j], down)),
                     (high[j], dhigh[j]),
                 ];
                 let (v, d) = &mut out[k];
@@ -307,9 +323,16 @@ impl Field for Blend {
             None if self.two_sided => (f - hi).max(lo - f),
             None => f - hi,
         };
-        let ends = |s: &Strand| {
+        let ends = |s: &Strand, alone: bool| {
             let hi = s.high_bound(b);
-            let ends = [s.low(hi.lo), s.low(hi.hi)];
+            let low = |high: f64| {
+                if alone {
+                    s.low_alone(high)
+                } else {
+                    s.low(high)
+                }
+            };
+            let ends = [low(hi.lo), low(hi.hi)];
             (
                 s.bound(b),
                 Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1])),
@@ -322,35 +345,34 @@ impl Field for Blend {
                 // Its lower end is below all its values.
                 return Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE);
             }
-            let (f, lo, hi) = ends(&self.strands[i]);
+            let (f, lo, hi) = ends(&self.strands[i], true);
             return join(f, lo, hi);
         }
-        if self.levels.is_some() {
-            // What is added is found by looking: no bound of it is proven.
-            return Interval::new(f64::NEG_INFINITY, f64::INFINITY);
-        }
         let zero = Interval::new(0.0, 0.0);
-        let times = |w: Interval, v: Interval| {
-            let ends = [w.lo * v.lo, w.lo * v.hi, w.hi * v.lo, w.hi * v.hi];
-            Interval::new(
-                ends.into_iter().fold(f64::INFINITY, f64::min),
-                ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
-            )
-        };
-        let plus = |a: Interval, b: Interval| Interval::new(a.lo + b.lo, a.hi + b.hi);
-        let (f, lo, hi) = self
+        let mut highs = vec![zero; w.len()];
+        let (mut f, mut lo, mut hi) = (zero, zero, zero);
+        for (i, s) in self
             .strands
             .iter()
-            .zip(&w)
-            .filter(|(_, w)| w.hi > 0.0)
-            .fold((zero, zero, zero), |sum, (s, w)| {
-                let (f, lo, hi) = ends(s);
-                (
-                    plus(sum.0, times(*w, f)),
-                    plus(sum.1, times(*w, lo)),
-                    plus(sum.2, times(*w, hi)),
-                )
-            });
+            .enumerate()
+            .filter(|(i, _)| w[*i].hi > 0.0)
+        {
+            let of = ends(s, false);
+            highs[i] = of.2;
+            f = f + w[i].times(of.0);
+            lo = lo + w[i].times(of.1);
+            hi = hi + w[i].times(of.2);
+        }
+        if let Some(levels) = &self.levels {
+            let more = levels.bound(&self.strands, b, &w, &highs);
+            (lo, hi) = (lo + more[0], hi + more[1]);
+        }
+        // Where one of them may be alone its lower end is another one.
+        for (i, s) in self.strands.iter().enumerate() {
+            if w[i].hi >= 1.0 - 1e-9 && w[i].hi > w[i].lo && !s.is_sheet() {
+                lo = lo.union(Interval::new(s.low_alone(0.0), s.low_alone(0.0)));
+            }
+        }
         join(f, lo, hi)
     }
 

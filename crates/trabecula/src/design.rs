@@ -27,6 +27,7 @@ mod tests;
 mod tets;
 mod tiling;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -99,6 +100,12 @@ pub trait Loader {
     /// The bytes of the file at `path`, or one sentence why not.
     fn load(&self, path: &str) -> Result<Vec<u8>, String>;
 
+    /// The names of the files that `pattern` stands for, in which one * of the last part stands for anything; or one sentence
+    /// why there are none.
+    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
+        Err(format!("{pattern}: folders are not looked into here"))
+    }
+
     /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
     /// each or for none; or one sentence why not.
     fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
@@ -134,6 +141,8 @@ pub struct Tiled {
     pub name: String,
     /// The lattice.
     pub tiling: Arc<Tiling>,
+    /// The cell of each zone, where zones have cells of their own.
+    pub zones: BTreeMap<String, String>,
     /// What is known of the mesh.
     pub mesh: TetReport,
 }

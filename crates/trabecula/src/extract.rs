@@ -73,6 +73,24 @@ pub struct Surface {
     pub cut: Vec<bool>,
 }
 
+impl Surface {
+    /// The lattice alone, without its cuts: open where the region ends.
+    pub fn uncapped(&self) -> Surface {
+        let mut runs: Vec<std::ops::Range<u64>> = Vec::new();
+        for i in (0u64..)
+            .zip(&self.cut)
+            .filter(|(_, cut)| !**cut)
+            .map(|(i, _)| i)
+        {
+            match runs.last_mut() {
+                Some(r) if r.end == i => r.end += 1,
+                _ => runs.push(i..i + 1),
+            }
+        }
+        only(self, &runs)
+    }
+}
+
 /// What a streamed extraction wrote.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {

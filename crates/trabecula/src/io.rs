@@ -13,6 +13,7 @@ mod npy;
 mod number;
 mod obj;
 mod off;
+mod picture;
 mod ply;
 pub(crate) mod stl;
 mod text;
@@ -23,6 +24,7 @@ mod vtu;
 
 pub use elements::Elements;
 pub use npy::{read_npy, write_npy};
+pub use picture::{Picture, read_pictures};
 pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;

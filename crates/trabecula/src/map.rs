@@ -8,12 +8,15 @@ mod phase;
 mod poisson;
 mod round;
 mod spline;
+mod sweep;
 pub(crate) mod tets;
+mod tilt;
 
 pub use distortion::{Distortion, Misfit, Spread};
 pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;
+pub use sweep::{Path, Sweep};
 pub use tets::Tets;
 
 use std::sync::Arc;
@@ -151,6 +154,8 @@ pub enum Map {
     Phase(Arc<Phase>),
     /// Wrapped round an axis or a centre.
     Round(Round),
+    /// Along a line.
+    Sweep(Arc<Sweep>),
 }
 
 impl Map {
@@ -160,6 +165,7 @@ impl Map {
             Map::Affine(a) => a.wavelength.iter().copied().fold(f64::INFINITY, f64::min),
             Map::Phase(p) => p.wavelength()[0],
             Map::Round(r) => r.wavelengths()[0],
+            Map::Sweep(s) => s.wavelengths()[0],
         }
     }
 
@@ -169,6 +175,7 @@ impl Map {
             Map::Affine(a) => a.wavelength.iter().copied().fold(0.0, f64::max),
             Map::Phase(p) => p.wavelength()[1],
             Map::Round(r) => r.wavelengths()[1],
+            Map::Sweep(s) => s.wavelengths()[1],
         }
     }
 
@@ -186,6 +193,11 @@ impl Map {
                     *o = map.phase(p);
                 }
             }
+            Map::Sweep(map) => {
+                for (o, &p) in out.iter_mut().zip(points) {
+                    *o = map.phase(p);
+                }
+            }
         }
     }
 
@@ -195,6 +207,7 @@ impl Map {
             Map::Affine(a) => a.matrix,
             Map::Phase(map) => map.jacobian(at),
             Map::Round(map) => map.jacobian(at),
+            Map::Sweep(map) => map.jacobian(at),
         }
     }
 
@@ -202,7 +215,7 @@ impl Map {
     pub fn affine(&self) -> Option<&Affine> {
         match self {
             Map::Affine(a) => Some(a),
-            Map::Phase(_) | Map::Round(_) => None,
+            Map::Phase(_) | Map::Round(_) | Map::Sweep(_) => None,
         }
     }
 
@@ -215,6 +228,7 @@ impl Map {
                 core::array::from_fn(|a| scale(IDENTITY[a], 1.0 / w[a]))
             }
             Map::Round(map) => map.typical(),
+            Map::Sweep(map) => map.typical(),
         }
     }
 
@@ -224,6 +238,7 @@ impl Map {
             Map::Affine(a) => vec![a.matrix],
             Map::Phase(map) => map.extremes().to_vec(),
             Map::Round(map) => map.extremes().to_vec(),
+            Map::Sweep(map) => map.extremes().to_vec(),
         }
     }
 
@@ -233,6 +248,7 @@ impl Map {
             Map::Affine(a) => spectral_norm(&a.matrix),
             Map::Phase(map) => map.stretch(b),
             Map::Round(map) => map.stretch(b),
+            Map::Sweep(map) => map.stretch(b),
         }
     }
 
@@ -242,6 +258,7 @@ impl Map {
             Map::Affine(a) => spectral_norm(&a.matrix),
             Map::Phase(map) => map.steepest(),
             Map::Round(map) => map.steepest(),
+            Map::Sweep(map) => map.steepest(),
         }
     }
 
@@ -251,7 +268,7 @@ impl Map {
             map: self,
             block: *block,
             spline: match self {
-                Map::Affine(_) | Map::Round(_) => None,
+                Map::Affine(_) | Map::Round(_) | Map::Sweep(_) => None,
                 Map::Phase(map) => Some(map.rows(block)),
             },
             layer: 0,

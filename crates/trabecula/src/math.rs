@@ -301,6 +301,29 @@ impl Interval {
     }
 }
 
+impl Interval {
+    /// The range of a product.
+    pub fn times(self, o: Self) -> Self {
+        let ends = [
+            self.lo * o.lo,
+            self.lo * o.hi,
+            self.hi * o.lo,
+            self.hi * o.hi,
+        ];
+        Interval::new(
+            ends.into_iter().fold(f64::INFINITY, f64::min),
+            ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        )
+    }
+}
+
+impl core::ops::Add for Interval {
+    type Output = Interval;
+    fn add(self, o: Interval) -> Interval {
+        Interval::new(self.lo + o.lo, self.hi + o.hi)
+    }
+}
+
 impl core::ops::Sub for Interval {
     type Output = Interval;
     fn sub(self, o: Interval) -> Interval {

@@ -9,6 +9,7 @@
 
 mod crease;
 mod level;
+mod mixture;
 
 use std::sync::Arc;
 
@@ -104,7 +105,13 @@ impl Tiling {
             let j = core::array::from_fn(|a| {
                 core::array::from_fn(|b| (0..3).map(|i| along[i][a] * slopes[i][b]).sum())
             });
-            steep * more * spectral_norm(&j)
+            // ∇(Σ w f) = Σ w ∇f + f ∇w.
+            let turn = |c: &Share| {
+                let w = c.weights.as_ref()?;
+                let most = c.stencil.series().amplitude() / c.scale;
+                Some(most * norm(linear_slope(&map, w, t)))
+            };
+            steep * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let steep: Vec<f64> = (0..map.len()).map(of).collect();
         Tiling {
@@ -130,14 +137,6 @@ impl Tiling {
         (0..4).map(|i| l[i] * of[n[i] as usize]).sum()
     }
 
-    /// The gradient (per mm) of what is linear in a tetrahedron.
-    fn linear_slope(&self, of: &[f64], t: usize) -> Vec3 {
-        let n = self.map.tet(t);
-        let v = n.map(|n| of[n as usize]);
-        let m = self.map.slopes(t);
-        (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], v[i] - v[3])))
-    }
-
     /// f and t, and their gradients, at points in tetrahedra.
     fn pieces(&self, at: &[(usize, Bary)]) -> Vec<Known> {
         let mut out = vec![Known::default(); at.len()];
@@ -155,7 +154,7 @@ impl Tiling {
                     Some(w) => {
                         let l = self.tamed(*l);
                         let weight = self.linear(w, *t, l);
-                        let turn = scale(self.linear_slope(w, *t), f);
+                        let turn = scale(linear_slope(&self.map, w, *t), f);
                         k.f += weight * f;
                         k.slope = add(k.slope, add(scale(slope, weight), turn));
                     }
@@ -165,7 +164,7 @@ impl Tiling {
         for (k, (t, l)) in out.iter_mut().zip(at) {
             k.t = self.level_at(*t, self.tamed(*l));
             if let Level::Nodes(of) = &self.level {
-                k.slope_t = self.linear_slope(of, *t);
+                k.slope_t = linear_slope(&self.map, of, *t);
             }
         }
         out
@@ -282,33 +281,13 @@ impl Tiling {
         Interval::new(lo, hi)
     }
 
-    /// The volume of the mesh (mm³), and the solid's: Σ fraction · |T|, exact where the level is the same everywhere.
+    /// The volume of the mesh (mm³), and the solid's, by [`Tiling::shares`].
     pub fn volumes(&self) -> (f64, f64) {
-        let fraction = |t: f64| {
-            let c = &self.cells[0];
-            c.stencil.fraction(self.part, t * c.scale)
-        };
-        let same = match &self.level {
-            Level::Same(t) => Some(fraction(*t)),
-            Level::Nodes(_) => None,
-        };
-        let (mut all, mut solid) = (0.0, 0.0);
-        for t in 0..self.map.len() {
+        let shares = self.shares().into_iter().enumerate();
+        shares.fold((0.0, 0.0), |(all, solid), (t, share)| {
             let v = self.map.volume(t);
-            all += v;
-            let share = same.unwrap_or_else(|| {
-                let corner = |i: usize| {
-                    let mut l = [0.0; 4];
-                    l[i] = 1.0;
-                    fraction(self.level_at(t, l))
-                };
-                // Corners and the middle: exact for what is quadratic in the level.
-                let ends: f64 = (0..4).map(corner).sum();
-                (ends + 16.0 * fraction(self.level_at(t, [0.25; 4]))) / 20.0
-            });
-            solid += share * v;
-        }
-        (all, solid)
+            (all + v, solid + share * v)
+        })
     }
 
     /// The length of a cell's period in tetrahedra of mean edge, mm.
@@ -317,6 +296,13 @@ impl Tiling {
         let edge = norm(crate::math::sub(s.corners()[0], s.corners()[1]));
         self.map.mean_edge() / edge
     }
+}
+
+/// The gradient (per mm) of what is linear in a tetrahedron.
+fn linear_slope(map: &Tets, of: &[f64], t: usize) -> Vec3 {
+    let v = map.tet(t).map(|n| of[n as usize]);
+    let m = map.slopes(t);
+    (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i], v[i] - v[3])))
 }
 
 impl Field for Tiling {

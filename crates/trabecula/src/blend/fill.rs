@@ -5,8 +5,7 @@
 //! lattice that is alone by its bounds is alone by its shares too.
 
 use super::Blend;
-use super::levels::End;
-use super::simplex::Place;
+use super::levels::{End, Row};
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
 
@@ -103,7 +102,7 @@ impl Blend {
                     let Some(rows) = &rows[s] else { continue };
                     match self.strands[s].uniform() {
                         Some(high) => {
-                            let low = self.strands[s].low(high);
+                            let low = self.strands[s].low_alone(high);
                             for i in nodes {
                                 row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
                             }
@@ -115,7 +114,7 @@ impl Blend {
                             let mut high = vec![0.0; points.len()];
                             self.strands[s].highs(&points, &mut high);
                             for (i, high) in nodes.into_iter().zip(high) {
-                                let low = self.strands[s].low(high);
+                                let low = self.strands[s].low_alone(high);
                                 row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
                             }
                         }
@@ -145,7 +144,7 @@ impl Blend {
             w,
             high,
             ends,
-            place,
+            row: known,
         } = mixed;
         points.clear();
         points.extend(nodes.iter().map(|i| point(*i)));
@@ -170,7 +169,8 @@ impl Blend {
             let high = |s: usize| high[s * points.len() + p];
             let mut sum = [0.0; 3];
             if let Some(s) = w.iter().position(|w| *w == 1.0) {
-                sum = [core(s, *node), self.strands[s].low(high(s)), high(s)];
+                let high = high(s);
+                sum = [core(s, *node), self.strands[s].low_alone(high), high];
             } else {
                 for (s, strand) in self.strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
                     let high = high(s);
@@ -182,7 +182,7 @@ impl Blend {
                     }
                 }
                 if let Some(levels) = &self.levels {
-                    let more = levels.added(&self.strands, points[p], w, ends, place);
+                    let more = levels.added_in_row(&self.strands, points[p], w, ends, known);
                     sum = [sum[0], sum[1] + more[0], sum[2] + more[1]];
                 }
             }
@@ -201,5 +201,5 @@ struct Mixed {
     /// Upper ends, those of a lattice side by side.
     high: Vec<f64>,
     ends: Vec<End>,
-    place: Place,
+    row: Row,
 }

@@ -7,7 +7,7 @@
 
 use std::sync::OnceLock;
 
-use super::strand::Strand;
+use super::strand::Constituent;
 use crate::map::Map;
 use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
@@ -47,16 +47,16 @@ pub(super) struct Joint {
 pub(super) type Corners = [(usize, f64, Vec3); 8];
 
 impl Joint {
-    pub fn new(strands: &[Strand], bounds: &Aabb) -> Joint {
-        let longest = strands.iter().map(Strand::longest).fold(0.0, f64::max);
-        let maps: Option<Vec<Mat3>> = strands
+    pub fn new(of: &[Constituent], bounds: &Aabb) -> Joint {
+        let longest = of.iter().map(Constituent::longest).fold(0.0, f64::max);
+        let maps: Option<Vec<Mat3>> = of
             .iter()
             .map(|s| Some(s.lattice()?.map.affine()?.matrix))
             .collect();
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
         let (phases, common) = match (found, &maps) {
             (Some(back), _) => (Phases::Locked, Some(back)),
-            (None, Some(maps)) if independent(strands, maps, longest) => {
+            (None, Some(maps)) if independent(of, maps, longest) => {
                 let mut wide = [[0.0; 3]; 3];
                 // So far that what is met there has no memory.
                 (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
@@ -64,7 +64,7 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
-        let solved = strands
+        let solved = of
             .iter()
             .any(|s| s.lattice().is_some_and(|l| matches!(l.map, Map::Phase(_))));
         let size = bounds.size();
@@ -135,6 +135,64 @@ impl Joint {
             .collect()
     }
 
+    /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
+    /// that (per mm).
+    pub fn along(&self, a: usize, v: f64) -> (usize, f64, f64) {
+        let last = (self.shape[a] - 1) as f64;
+        let s = (v - self.origin[a]) / self.step;
+        let inside = s.clamp(0.0, last);
+        let i = (inside as usize).min(self.shape[a].saturating_sub(2));
+        let within = s == inside && last > 0.0;
+        (
+            i,
+            inside - i as f64,
+            if within { 1.0 / self.step } else { 0.0 },
+        )
+    }
+
+    /// The box in which points have a neighbourhood among theirs, if there are several.
+    pub fn support(&self, i: usize) -> Aabb {
+        let [nx, ny, _] = self.shape;
+        let at = [i % nx, i / nx % ny, i / nx / ny];
+        let middle = |a: usize| self.origin[a] + self.step * at[a] as f64;
+        Aabb {
+            min: core::array::from_fn(|a| middle(a) - self.step),
+            max: core::array::from_fn(|a| middle(a) + self.step),
+        }
+    }
+
+    /// How many neighbourhoods points of a box have; `None` if it reaches beyond them.
+    pub fn count_in(&self, b: &Aabb) -> Option<usize> {
+        if self.common.is_some() {
+            return Some(1);
+        }
+        let ends = |a: usize| {
+            (
+                self.origin[a],
+                self.origin[a] + self.step * (self.shape[a] - 1) as f64,
+            )
+        };
+        let within = (0..3).all(|a| b.min[a] >= ends(a).0 && b.max[a] <= ends(a).1);
+        let along = |a: usize| self.along(a, b.max[a]).0 - self.along(a, b.min[a]).0 + 2;
+        within.then(|| (0..3).map(along).product())
+    }
+
+    /// Calls `each` with the neighbourhoods about the points of a box.
+    pub fn each_in(&self, b: &Aabb, mut each: impl FnMut(usize)) {
+        let [x, y, z] = core::array::from_fn(|a| {
+            let last = self.shape[a] - 1;
+            let (lo, hi) = (self.along(a, b.min[a]).0, self.along(a, b.max[a]).0);
+            lo..=(hi + 1).min(last)
+        });
+        for k in z {
+            for j in y.clone() {
+                for i in x.clone() {
+                    each((k * self.shape[1] + j) * self.shape[0] + i);
+                }
+            }
+        }
+    }
+
     /// The neighbourhoods about a point.
     pub fn corners(&self, p: Vec3) -> Corners {
         let mut out = [(0, 0.0, [0.0; 3]); 8];
@@ -142,18 +200,7 @@ impl Joint {
             out[0].1 = 1.0;
             return out;
         }
-        let along: [(usize, f64, f64); 3] = core::array::from_fn(|a| {
-            let last = (self.shape[a] - 1) as f64;
-            let s = (p[a] - self.origin[a]) / self.step;
-            let inside = s.clamp(0.0, last);
-            let i = (inside as usize).min(self.shape[a].saturating_sub(2));
-            let slope = if s == inside && last > 0.0 {
-                1.0 / self.step
-            } else {
-                0.0
-            };
-            (i, inside - i as f64, slope)
-        });
+        let along: [(usize, f64, f64); 3] = core::array::from_fn(|a| self.along(a, p[a]));
         for (c, o) in out.iter_mut().enumerate() {
             let up = |a: usize| c >> a & 1;
             let share = |a: usize| {
@@ -222,9 +269,9 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
 
 /// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
 /// make count too, since what is solid is no linear matter.
-fn independent(strands: &[Strand], maps: &[Mat3], longest: f64) -> bool {
+fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
-    for (s, m) in strands.iter().zip(maps) {
+    for (s, m) in of.iter().zip(maps) {
         let Some(l) = s.lattice() else { return false };
         let terms = l.cell.series().terms();
         if terms.len() > WAVES {

@@ -22,6 +22,22 @@ pub enum Constituent {
 }
 
 impl Constituent {
+    /// The lattice, if it is one.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        match self {
+            Constituent::Lattice(l) => Some(l),
+            Constituent::Field { .. } => None,
+        }
+    }
+
+    /// Fills the core at points (mm).
+    pub fn cores(&self, points: &[Vec3], out: &mut [f64]) {
+        match self {
+            Constituent::Lattice(l) => l.cores(points, out),
+            Constituent::Field { field, .. } => field.values(points, out),
+        }
+    }
+
     /// The greatest length of its cells, mm.
     pub fn longest(&self) -> f64 {
         match self {
@@ -43,36 +59,49 @@ pub(super) struct Strand {
     of: Constituent,
     /// The sign of the core in g over its scale.
     factor: f64,
-    /// The lower end of a network.
+    /// The lower end of a network where it is blended.
     least: f64,
+    /// Its lower end where it is alone: below all values, proven.
+    floor: f64,
 }
 
+/// Below all values of a field of which no bound is known; its square is a number in single precision too.
+const BOTTOM: f64 = -1e18;
+
 impl Strand {
-    /// g is the core over `unit`; `bounds` is where it is looked at.
-    pub fn new(of: Constituent, unit: f64, bounds: &Aabb) -> Strand {
+    /// g is the core over `unit`. Of a field whose fraction is found by looking the range is, too: `seen` are its values, and
+    /// `bounds` is where it is.
+    pub fn new(of: Constituent, unit: f64, seen: &[f64], bounds: &Aabb) -> Strand {
         let turned = matches!(&of, Constituent::Lattice(l) if l.part == Part::Upper);
         let mut made = Strand {
             factor: if turned { -1.0 } else { 1.0 } / unit,
             of,
             least: 0.0,
+            floor: 0.0,
         };
-        let range = made.turned(match &made.of {
-            Constituent::Lattice(l) => l.distance().map_or_else(|| l.cell.range(), |d| d.range()),
-            Constituent::Field { field, .. } => field.bound(bounds),
-        });
-        made.least = range.lo - BELOW * (range.hi - range.lo);
+        let below = |range: Interval| range.lo - BELOW * (range.hi - range.lo);
+        match &made.of {
+            Constituent::Lattice(l) => {
+                let range = l.distance().map_or_else(|| l.cell.range(), |d| d.range());
+                made.least = below(made.turned(range));
+                made.floor = made.least;
+            }
+            Constituent::Field { field, .. } => {
+                // A bound of the whole part is far below all values: a sheet's second side would be gone at once.
+                let (lo, hi) = (seen.iter())
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                        (l.min(*v), h.max(*v))
+                    });
+                let proven = made.factor * field.bound(bounds).lo;
+                made.least = below(made.turned(Interval::new(lo.min(hi), hi)));
+                made.floor = made.least.min(proven.max(BOTTOM) - made.factor);
+            }
+        }
         made
     }
 
-    pub fn constituent(&self) -> &Constituent {
-        &self.of
-    }
-
     pub fn lattice(&self) -> Option<&Lattice> {
-        match &self.of {
-            Constituent::Lattice(l) => Some(l),
-            Constituent::Field { .. } => None,
-        }
+        self.of.lattice()
     }
 
     /// Whether it has two ends.
@@ -96,11 +125,29 @@ impl Strand {
 
     /// Fills g at points (mm).
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        match &self.of {
-            Constituent::Lattice(l) => l.cores(points, out),
-            Constituent::Field { field, .. } => field.values(points, out),
-        }
+        self.of.cores(points, out);
         out.iter_mut().for_each(|v| *v *= self.factor);
+    }
+
+    /// g at points (mm), in single precision.
+    pub fn samples(&self, points: &[Vec3]) -> Vec<f32> {
+        let mut out = vec![0f32; points.len()];
+        match &self.of {
+            Constituent::Lattice(l) if l.distance().is_none() => {
+                let mut u = vec![[0.0; 3]; points.len()];
+                l.map.phases(points, &mut u);
+                let each = [0, 1, 2].map(|a| u.iter().map(|u| u[a]).collect());
+                l.cell.series().fill(&each, &mut out);
+            }
+            of => {
+                let mut values = vec![0.0; points.len()];
+                of.cores(points, &mut values);
+                out.iter_mut().zip(values).for_each(|(o, v)| *o = v as f32);
+            }
+        }
+        let factor = self.factor as f32;
+        out.iter_mut().for_each(|v| *v *= factor);
+        out
     }
 
     /// Fills g and ∇g (per mm).
@@ -171,6 +218,11 @@ impl Strand {
     /// The lower end where the upper one is `high`.
     pub fn low(&self, high: f64) -> f64 {
         if self.is_sheet() { -high } else { self.least }
+    }
+
+    /// The lower end where it is alone.
+    pub fn low_alone(&self, high: f64) -> f64 {
+        if self.is_sheet() { -high } else { self.floor }
     }
 
     /// The shares of the cell in which g is below the lower and the upper end, the latter being `high`, and how they

@@ -10,6 +10,7 @@ mod fraction;
 mod nodes;
 mod ready;
 
+pub(crate) use fraction::share_below;
 pub use nodes::{Grid, Nodes};
 pub use ready::{Ready, ready, ready_cells};
 

@@ -120,7 +120,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         mut warnings,
         repairs,
     } = notes;
-    let mut lattices = Vec::new();
+    let (mut lattices, mut tilings) = (Vec::new(), Vec::new());
     if let Some(domain) = domain {
         let place = Place {
             path: format!("lattice.{}", domain.name),
@@ -130,25 +130,29 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             loader,
         };
         let (tiling, explicit) = tiling::lattice(&domain, &place, &mut warnings)?;
-        let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
-        solid.tiling = explicit.then(|| tiling.clone());
-        let tiled = Tiled {
+        tilings.push(Tiled {
             name: domain.name.to_string(),
-            tiling,
+            tiling: tiling.clone(),
+            zones: domain.zones(),
             mesh: domain.report,
-        };
-        return Ok(Built {
-            solid: filled.into_iter().fold(solid, Solid::with),
-            lattices,
-            tilings: vec![tiled],
-            beams: Vec::new(),
-            blend: None,
-            skin: thinnest,
-            warnings,
-            repairs,
         });
+        if d.blend.is_none() {
+            let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
+            solid.tiling = explicit.then_some(tiling);
+            return Ok(Built {
+                solid: filled.into_iter().fold(solid, Solid::with),
+                lattices,
+                tilings,
+                beams: Vec::new(),
+                blend: None,
+                skin: thinnest,
+                warnings,
+                repairs,
+            });
+        }
     }
-    for (name, spec) in &d.lattice {
+    let others = d.lattice.iter();
+    for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapSpec::Tets(_))) {
         let path = format!("lattice.{name}");
         let place = Place {
             path: path.clone(),
@@ -181,6 +185,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     }
     let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
     let wavelengths = wavelengths.chain(graphs.iter().map(|g| g.1.wavelength()));
+    let wavelengths = wavelengths.chain(tilings.iter().map(|t| t.tiling.wavelength()));
     let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
     let mut blended = None;
     let field: Arc<dyn Field> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
@@ -192,7 +197,12 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
                 filled: &filled,
                 loader,
             };
-            let made = blend::blend(spec, &members(&lattices, &graphs), &place, &mut warnings)?;
+            let made = blend::blend(
+                spec,
+                &members(&lattices, &tilings, &graphs),
+                &place,
+                &mut warnings,
+            )?;
             let field = made.blend.clone();
             blended = Some(made);
             field
@@ -215,7 +225,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     Ok(Built {
         solid,
         lattices,
-        tilings: Vec::new(),
+        tilings,
         beams: graphs,
         blend: blended,
         skin: thinnest,
@@ -225,11 +235,23 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
 }
 
 /// What may be named in a blend.
-fn members(lattices: &[(String, Arc<Lattice>)], graphs: &[(String, Beams)]) -> Vec<blend::Member> {
+fn members(
+    lattices: &[(String, Arc<Lattice>)],
+    tilings: &[Tiled],
+    graphs: &[(String, Beams)],
+) -> Vec<blend::Member> {
     let lattices = lattices.iter().map(|(name, l)| blend::Member {
         table: "lattice",
         name: name.clone(),
         of: Constituent::Lattice(l.clone()),
+    });
+    let tilings = tilings.iter().map(|t| blend::Member {
+        table: "lattice",
+        name: t.name.clone(),
+        of: Constituent::Field {
+            field: t.tiling.clone(),
+            wavelength: t.tiling.wavelength(),
+        },
     });
     let graphs = graphs.iter().map(|(name, b)| blend::Member {
         table: "beams",
@@ -239,7 +261,7 @@ fn members(lattices: &[(String, Arc<Lattice>)], graphs: &[(String, Beams)]) -> V
             wavelength: b.wavelength(),
         },
     });
-    lattices.chain(graphs).collect()
+    lattices.chain(tilings).chain(graphs).collect()
 }
 
 fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {

@@ -92,7 +92,7 @@ pub(super) fn within(spec: &WithinSpec, path: &str, place: &Place) -> Result<Sig
 }
 
 /// The control points, and the values beside them if a file has such.
-fn control(
+pub(super) fn control(
     spec: &ControlSpec,
     path: &str,
     place: &Place,
@@ -128,7 +128,7 @@ fn direction(axis: Option<[f64; 3]>, path: &str) -> Result<Option<Vec3>, DesignE
 }
 
 /// A fault of control points stands where they do.
-fn wrong(spec: &ControlSpec, path: &str, f: Fault) -> DesignError {
+pub(super) fn wrong(spec: &ControlSpec, path: &str, f: Fault) -> DesignError {
     let f = match spec {
         ControlSpec::Path(_) if f.at == "points" => Fault {
             at: "path".into(),

@@ -7,11 +7,11 @@ use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
-use super::samples;
+use super::{control, samples};
 use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::map::{Affine, Map, Orientation, Phase, Round, Settings, Wanted};
+use crate::map::{Affine, Map, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
 use crate::math::{dot, norm, scale, sub, unit};
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
@@ -27,6 +27,7 @@ pub(super) fn kind(spec: &MapSpec) -> &'static str {
         MapSpec::Phase(_) => "phase",
         MapSpec::Cylinder(_) => "cylinder",
         MapSpec::Sphere(_) => "sphere",
+        MapSpec::Sweep(_) => "sweep",
         MapSpec::Tets(_) => "tets",
     }
 }
@@ -53,6 +54,7 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
                 .map(Map::Round)
                 .map_err(|f| DesignError::fault(&path, f));
         }
+        MapSpec::Sweep(s) => return sweep(s, &path, place),
         MapSpec::Sphere(s) => {
             let radii = radii(s.center, s.axis, place);
             let map = Round::sphere(s.center, s.axis, s.wavelength, s.around, radii);
@@ -106,6 +108,19 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
     affine
         .map(Map::Affine)
         .map_err(|f| DesignError::fault(&path, f))
+}
+
+fn sweep(spec: &SweepSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
+    let (points, _) = control::control(&spec.points, path, place)?;
+    let line = Path {
+        points,
+        closed: spec.closed,
+        wavelength: spec.wavelength.three(),
+        normal: spec.normal,
+    };
+    Sweep::new(&line, &**place.region, place.points)
+        .map(|s| Map::Sweep(Arc::new(s)))
+        .map_err(|f| control::wrong(&spec.points, path, f))
 }
 
 /// Least, mean and greatest distance from an axis in the region.
@@ -194,6 +209,7 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
         wavelength,
         orientation,
         weight: weight.transpose()?,
+        angle_weight: finite(&below("angle_weight"), spec.angle_weight)?,
         offset: spec.offset,
     };
     let region: &dyn Field = &**place.region;

@@ -184,20 +184,35 @@ fn tiled(it: &Tiled) -> Json {
         max: levels.hi,
     };
     let share = iso.map(|t| stencil.fraction(part, t));
-    let (volume, solid) = tiling.volumes();
-    if tiling.cells.len() > 1 {
-        // Cells of zones have neither level nor fraction in common.
+    let shares = tiling.shares();
+    let sums = |zone: Option<u32>| {
+        let of = (0..tiling.map.len()).filter(|t| zone.is_none_or(|z| tiling.map.zone(*t) == z));
+        of.fold((0, 0.0, 0.0), |(n, all, solid), t| {
+            let v = tiling.map.volume(t);
+            (n + 1, all + v, solid + shares[t] * v)
+        })
+    };
+    let (_, volume, solid) = sums(None);
+    if !it.zones.is_empty() {
+        // Cells of zones have no level in common, and between them no fraction that they were asked for.
+        let zones = it.zones.iter().map(|(zone, cell)| {
+            let (count, volume, solid) = sums(zone.parse().ok());
+            let told = json!({ "cell": cell, "count": count, "volume": volume, "solid_fraction": solid / volume });
+            (zone.clone(), told)
+        });
         return json!({
             "part": word(part),
             "wavelength": tiling.wavelength(),
-            "iso": Json::Null, "fraction": Json::Null, "porosity": Json::Null, "thickness": Json::Null, "folding": Json::Null,
+            "iso": Json::Null, "fraction": solid / volume, "porosity": 1.0 - solid / volume, "thickness": Json::Null,
+            "folding": Json::Null,
             "connected_fraction": [],
             "tets": {
                 "count": tiling.map.len(),
                 "mesh": it.mesh,
                 "edge": tiling.map.mean_edge(),
                 "volume": volume,
-                "solid_fraction": Json::Null,
+                "solid_fraction": solid / volume,
+                "zones": zones.collect::<serde_json::Map<String, Json>>(),
                 "overlap": tiling.map.overlap(),
                 "thickness": Json::Null,
                 "ports": Json::Null,
@@ -222,6 +237,7 @@ fn tiled(it: &Tiled) -> Json {
             "edge": tiling.map.mean_edge(),
             "volume": volume,
             "solid_fraction": solid / volume,
+            "zones": Json::Null,
             "overlap": tiling.map.overlap(),
             "thickness": spread.map(|s| json!({ "min": s.min, "low": s.low, "mean": s.mean, "high": s.high, "max": s.max })),
             "ports": stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports,
@@ -249,6 +265,7 @@ pub(super) fn transitions(built: &Built) -> Json {
         json!({
             "between": t.between.map(|i| &b.names[i]),
             "volume": t.volume,
+            "pieces": t.pieces,
             "loose": { "bodies": t.loose.0, "volume": t.loose.1 },
             "dangling": { "bodies": t.dangling.0, "volume": t.dangling.1 },
             "neck": t.neck.map(|(diameter, place)| json!({ "diameter": diameter, "place": place })),

@@ -123,7 +123,13 @@ pub(super) fn grade(
 
 pub(super) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
-    let file = bytes(&spec.path, &at, place)?;
+    let kind = extension(&spec.path);
+    let pictures = ["png", "tif", "tiff"].contains(&kind.as_str());
+    let file = if pictures {
+        Vec::new()
+    } else {
+        bytes(&spec.path, &at, place)?
+    };
     let wrong =
         |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let (origin, step, shape, values) = match extension(&spec.path).as_str() {
@@ -186,9 +192,28 @@ pub(super) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples
                 array.values.clone(),
             )
         }
+        "png" | "tif" | "tiff" => {
+            let need = |key: &str, what: &str| {
+                DesignError::new(
+                    format!("{path}.{key}"),
+                    format!("pictures do not say where they lie; give {key}, {what}"),
+                )
+            };
+            let origin = spec
+                .origin
+                .ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
+            let step = spec.step.ok_or_else(|| {
+                need(
+                    "step",
+                    "the distance between pixels and pictures in mm, one or three",
+                )
+            })?;
+            let (shape, values) = stack(spec, &at, place)?;
+            (origin, step.three(), shape, values)
+        }
         _ => {
             let message = format!(
-                "the name must end in npy, vti or vtk; found \"{}\"",
+                "the name must end in npy, vti or vtk, or in png or tif for pictures; found \"{}\"",
                 spec.path
             );
             return Err(DesignError::new(at, message).found(&spec.path));
@@ -218,6 +243,62 @@ pub(super) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     Ok(samples)
+}
+
+/// Grey pictures one above the other: the files that the path stands for in the order of their names, in which 10 comes after 9,
+/// each with one picture or more.
+fn stack(spec: &GridSpec, at: &str, place: &Place) -> Result<([usize; 3], Vec<f64>), DesignError> {
+    let mut names = match spec.path.contains('*') {
+        true => place
+            .loader
+            .list(&spec.path)
+            .map_err(|m| DesignError::new(at, m).found(&spec.path))?,
+        false => vec![spec.path.clone()],
+    };
+    names.sort_by_cached_key(|n| counted_name(n));
+    let (mut size, mut values, mut count) = (None, Vec::new(), 0);
+    for name in &names {
+        let wrong =
+            |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
+        let file = bytes(name, at, place)?;
+        for picture in io::read_pictures(&file).map_err(|f| wrong(f.message))? {
+            let [w, h] = picture.size;
+            let first = *size.get_or_insert(picture.size);
+            if first != picture.size {
+                let message = format!(
+                    "a picture of {w} × {h} pixels among those of {} × {}",
+                    first[0], first[1]
+                );
+                return Err(wrong(message));
+            }
+            values.extend(picture.values);
+            count += 1;
+        }
+    }
+    let [w, h] = size.ok_or_else(|| {
+        DesignError::new(at, format!("{}: no pictures", spec.path)).found(&spec.path)
+    })?;
+    Ok(([w, h, count], values))
+}
+
+/// A name as its words and numbers, so that they sort as people count.
+fn counted_name(name: &str) -> Vec<(String, u64)> {
+    let mut parts: Vec<(String, u64)> = vec![(String::new(), 0)];
+    let mut digits = false;
+    for c in name.chars() {
+        match (c.to_digit(10), parts.last_mut()) {
+            (Some(d), Some(last)) => {
+                last.1 = last.1.saturating_mul(10).saturating_add(u64::from(d));
+                digits = true;
+            }
+            (None, Some(last)) if !digits => last.0.push(c),
+            _ => {
+                parts.push((c.to_string(), 0));
+                digits = false;
+            }
+        }
+    }
+    parts
 }
 
 fn percent(share: f64) -> String {

@@ -90,6 +90,9 @@ fn every_kind_of_map_survives() {
         "phase = { wavelength = 4, stress = [1, 2, 3, 0, 0, 0] }",
         "cylinder = { wavelength = [3, 4], around = 12, center = [1, 2, 3] }",
         "sphere = { wavelength = 3, around = 12, axis = [0, 1, 0] }",
+        "phase = { wavelength = 4, angle_weight = 10 }",
+        "sweep = { wavelength = [2, 2, 3], points = [[0, 0, 0], [1, 2, 3]], normal = [1, 0, 0] }",
+        "sweep = { wavelength = 2, path = \"line.csv\", closed = true }",
     ] {
         let text = format!(
             "schema = 1\n[region.box]\nsize = [8, 8, 8]\n[lattice.a]\ncell = \"gyroid\"\npart = \"sheet\"\nmap = {{ {map} }}\n\

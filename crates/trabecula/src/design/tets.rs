@@ -11,7 +11,7 @@ use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::{Loader, Node, Warning, read, region, sample};
 use crate::fault::{Fault, counted, number};
-use crate::math::Vec3;
+use crate::math::{Vec3, add, scale};
 use crate::tets::{Checked, Fit, Quality, SLIVER, TetMesh, background};
 use source::{from_file, surface, triangles, wild};
 
@@ -118,7 +118,7 @@ pub(super) fn tets(
         deep.map(|(p, _)| *p).collect()
     };
     let bounds = place.region.bounds();
-    let (mesh, fit, checked, mesher) = match spec {
+    let (mut mesh, fit, checked, mesher) = match spec {
         TetsSpec::Made(made) => {
             let below = |key: &str| format!("{}.{key}", place.path);
             let size = grade(
@@ -152,6 +152,10 @@ pub(super) fn tets(
             (mesh, None, checked, file.path.clone())
         }
     };
+    let mut notes = region::Notes::default();
+    if let TetsSpec::Made(made) = spec {
+        mesh.zones = zones(&mesh, made, place, &mut notes)?;
+    }
     let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
     let todo = match spec {
         TetsSpec::Made(_) => {
@@ -159,7 +163,54 @@ pub(super) fn tets(
         }
         TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
     };
-    told(mesh, &checked, mesher, Some(fit), &place.path, todo)
+    let mut told = told(mesh, &checked, mesher, Some(fit), &place.path, todo)?;
+    told.warnings.extend(notes.warnings);
+    Ok(told)
+}
+
+/// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
+fn zones(
+    mesh: &TetMesh,
+    made: &MadeTetsSpec,
+    place: &Place,
+    notes: &mut region::Notes,
+) -> Result<Vec<u32>, DesignError> {
+    if made.zones.is_empty() {
+        return Ok(Vec::new());
+    }
+    let middle = |t: &[u32; 4]| {
+        let sum = t
+            .iter()
+            .fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize]));
+        scale(sum, 0.25)
+    };
+    let middles: Vec<Vec3> = mesh.tets.iter().map(middle).collect();
+    let mut of: Vec<Option<u32>> = vec![None; middles.len()];
+    let numbered = made.zones.iter();
+    let mut numbered: Vec<(u32, &RegionSpec)> = numbered
+        .filter_map(|(n, r)| Some((n.parse().ok()?, r)))
+        .collect();
+    numbered.sort_by_key(|z| z.0);
+    for (zone, spec) in numbered {
+        let path = format!("{}.zones.{zone}", place.path);
+        let region = region::region(spec, &path, place.loader, notes)?;
+        let mut values = vec![0.0; middles.len()];
+        region.values(&middles, &mut values);
+        let mut count = 0;
+        for (of, _) in of
+            .iter_mut()
+            .zip(&values)
+            .filter(|(of, v)| of.is_none() && **v < 0.0)
+        {
+            *of = Some(zone);
+            count += 1;
+        }
+        if count == 0 {
+            let message = "no tetrahedron's middle is in this region, or all are in zones before it; move it or leave it out";
+            return Err(DesignError::new(path, message));
+        }
+    }
+    Ok(of.into_iter().map(|z| z.unwrap_or(0)).collect())
 }
 
 /// The mesh with its figures, and warnings at `path`; `todo` against what is lost.

@@ -1,6 +1,6 @@
 //! Lattices over tetrahedral meshes: data to [`Tiling`], and what is to be said of one.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
@@ -35,6 +35,13 @@ pub(super) struct Domain<'a> {
     pub region: Region,
 }
 
+impl Domain<'_> {
+    /// The cell of each zone, where zones have cells of their own.
+    pub fn zones(&self) -> BTreeMap<String, String> {
+        self.cell.zones.clone()
+    }
+}
+
 /// The mesh of a design that has one.
 pub(super) fn domain<'a>(
     d: &'a Design,
@@ -55,9 +62,16 @@ pub(super) fn domain<'a>(
                        cell.tet.name = \"primitive\"";
         return Err(DesignError::new(format!("{path}.cell"), message));
     };
-    if let Some(other) = d.lattice.keys().find(|n| *n != name) {
-        let message = "a lattice over tetrahedra stands alone; keep one";
+    let others = d.lattice.iter().filter(|(n, _)| *n != name);
+    if let Some((other, _)) = others.clone().find(|o| matches!(o.1.map, MapSpec::Tets(_))) {
+        let message = "two lattices over tetrahedra; keep one, with zones where cells differ";
         return Err(DesignError::new(format!("lattice.{other}"), message));
+    }
+    let tables = others.map(|(n, _)| format!("lattice.{n}"));
+    let tables = tables.chain(d.beams.keys().map(|n| format!("beams.{n}")));
+    if let (None, Some(other)) = (&d.blend, tables.into_iter().next()) {
+        let message = "a lattice over tetrahedra stands alone without a blend; keep one, or say where each is";
+        return Err(DesignError::new(other, message));
     }
     let path = format!("{path}.map.tets");
     let joined = match spec_of_mesh {
@@ -253,7 +267,9 @@ fn zoned(
     let asked = grade(value, &path, place, allowed, complement)?;
     let values = at_nodes(&asked, allowed, complement, &path, map)?;
     let names: BTreeSet<&String> = zones.values().collect();
-    let mut levels = vec![0.0; map.nodes().len()];
+    let (lo, hi) = values
+        .iter()
+        .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let mut cells = Vec::new();
     for name in names {
         let spec = TetCellSpec {
@@ -262,25 +278,16 @@ fn zoned(
         };
         let stencil = stencil(&spec, &at)?;
         let range = stencil.range();
-        let scale = 0.5 * (range.hi - range.lo);
-        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
-        for (i, (level, weight)) in levels.iter_mut().zip(&weights).enumerate() {
-            if *weight > 0.0 {
-                let share = values[i.min(values.len() - 1)];
-                *level += weight * stencil.iso(part, share) / scale;
-            }
-        }
-        let (lo, hi) = values
-            .iter()
-            .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
         apart(&stencil, part, [lo, hi], &path, warnings);
+        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
         cells.push(Share {
             stencil: Arc::new(stencil),
-            scale,
+            scale: 0.5 * (range.hi - range.lo),
             weights: Some(Arc::new(weights)),
         });
     }
-    let tiling = Tiling::of(map.clone(), cells, part, Level::Nodes(Arc::new(levels)));
+    let level = Level::mixed(map, &cells, part, &values);
+    let tiling = Tiling::of(map.clone(), cells, part, level);
     Ok((Arc::new(tiling), explicit(domain, place)))
 }
 

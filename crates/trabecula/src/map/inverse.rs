@@ -22,6 +22,7 @@ impl Map {
                 x.iter().all(|v| v.is_finite()).then_some(x)
             }
             Map::Round(r) => r.position(u),
+            Map::Sweep(s) => s.position(u),
             Map::Phase(p) => found(p, u, near),
         }
     }
@@ -36,6 +37,7 @@ impl Map {
                 core::array::from_fn(|a| [whole(box_.min[a]) - 1, whole(box_.max[a]) + 1])
             }
             Map::Round(r) => r.cells(b),
+            Map::Sweep(s) => s.cells(b),
             Map::Phase(p) => return seeds(p, b),
         };
         let count = |a: usize| ranges[a][0]..=ranges[a][1];
@@ -64,6 +66,10 @@ impl Map {
     pub fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
         match self {
             Map::Round(r) => [cell[0], cell[1].rem_euclid(r.around()), cell[2]],
+            Map::Sweep(s) => match s.around() {
+                Some(n) => [cell[0], cell[1], cell[2].rem_euclid(n)],
+                None => cell,
+            },
             Map::Affine(_) | Map::Phase(_) => cell,
         }
     }
@@ -156,6 +162,7 @@ mod tests {
             orientation: Orientation::Angles([still.clone(), still, turn]),
             offset: [0.2, 0.3, -0.1],
             weight: None,
+            angle_weight: 1.0,
         };
         let phase = Phase::solve(&bounds, &wanted, &Settings::default()).expect("map");
         let round = |sphere: bool| {

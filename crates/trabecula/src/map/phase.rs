@@ -10,6 +10,7 @@ use super::frame::{Orientation, place};
 use super::grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
+use super::tilt::Tilt;
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
@@ -27,6 +28,8 @@ const ABRUPT: f64 = 1.5;
 const FALL: f64 = 3.0;
 /// Nodes at which a solution is held against what was asked for.
 const LOOKS: usize = 60_000;
+/// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
+const LEAST_RATIO: f64 = 0.001;
 /// Least weight, as its root.
 const FAINT: f64 = 1e-3;
 
@@ -39,6 +42,9 @@ pub struct Wanted {
     pub orientation: Orientation,
     /// How much it matters that the map is what is asked for, compared with other places; the same everywhere if none.
     pub weight: Option<Grade>,
+    /// What an error of angle counts, for the same error of spacing (squares of the parts of ∇Φ − K across and along K); 1 if
+    /// both count alike.
+    pub angle_weight: f64,
     /// Moves the lattice (mm).
     pub offset: Vec3,
 }
@@ -92,7 +98,16 @@ impl Phase {
                 .collect()
         });
         let close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
-        let (values, mean, steps) = integrate(&grid, &k, close.as_deref());
+        let ratio = wanted.angle_weight;
+        if !(LEAST_RATIO..=1.0 / LEAST_RATIO).contains(&ratio) {
+            let message = format!(
+                "{}; an angle counts from {LEAST_RATIO} to {} times as much as a spacing",
+                number(ratio),
+                number(1.0 / LEAST_RATIO)
+            );
+            return Err(Fault::new("angle_weight", message));
+        }
+        let (values, mean, steps) = integrate(&grid, &k, close.as_deref(), ratio);
         let spline = Spline::through(grid, values);
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // Cells for each cell wanted, everywhere; the rest, which costs more, at some tens of thousands of nodes.
@@ -397,7 +412,14 @@ fn closeness(
 
 /// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
 /// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by s².
-fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>) -> ([Vec<f64>; 3], Mat3, usize) {
+fn integrate(
+    grid: &Grid,
+    k: &[Vec<Vec3>; 3],
+    s: Option<&[f64]>,
+    ratio: f64,
+) -> ([Vec<f64>; 3], Mat3, usize) {
+    let even = (ratio != 1.0 && s.is_none()).then(|| vec![1.0; grid.len()]);
+    let s = s.or(even.as_deref());
     let weights: Vec<f64> = (0..grid.len())
         .map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n]))
         .collect();
@@ -418,7 +440,8 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>) -> ([Vec<f64>; 
                 _ if rest.iter().all(|r| norm(*r) <= 1e-15 * norm(mean)) => (vec![0.0; k.len()], 0),
                 None => (poisson.integrate(&rest), 0),
                 Some(s) => {
-                    let (f, steps, _) = poisson.integrate_weighted(&rest, s);
+                    let tilt = Tilt::new(*grid, k, ratio, s);
+                    let (f, steps, _) = poisson.integrate_weighted(&rest, s, tilt.as_ref());
                     (f, steps)
                 }
             };

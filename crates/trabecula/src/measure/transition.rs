@@ -27,6 +27,8 @@ pub struct Transition {
     pub between: [usize; 2],
     /// Volume in which both count, mm³.
     pub volume: f64,
+    /// Bodies of solid, with what is theirs on either side, that come into it: one where it holds together.
+    pub pieces: usize,
     /// Bodies of solid that touch neither side, and their volume, mm³.
     pub loose: (usize, f64),
     /// Bodies that hang by necks thinner than half the narrowest of the widest way, and their volume, mm³.
@@ -226,6 +228,11 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
         .collect()
 }
 
+/// A body that has points in the transition itself, beside the two bits of the sides.
+const WITHIN: u8 = 4;
+/// The bits of the sides.
+const SIDES: u8 = 3;
+
 /// A body that grows: its points, whether it reaches either side.
 struct Bodies {
     parent: Vec<u32>,
@@ -264,12 +271,21 @@ impl Bodies {
     fn apart(&mut self, inside: &[bool]) -> (usize, u64) {
         let (mut count, mut all) = (0, 0);
         for i in 0..self.parent.len() as u32 {
-            if inside[i as usize] && self.parent[i as usize] == i && self.sides[i as usize] == 0 {
+            let own = inside[i as usize] && self.parent[i as usize] == i;
+            if own && self.sides[i as usize] & SIDES == 0 {
                 count += 1;
                 all += u64::from(self.size[i as usize]);
             }
         }
         (count, all)
+    }
+
+    /// Bodies that come into the transition, of the points that are in.
+    fn pieces(&self, inside: &[bool]) -> usize {
+        let own = |i: &usize| inside[*i] && self.parent[*i] as usize == *i;
+        (0..inside.len())
+            .filter(|i| own(i) && self.sides[*i] & WITHIN > 0)
+            .count()
     }
 }
 
@@ -287,6 +303,7 @@ fn transition(
     let side = |p: &Point| match p.share {
         0.0 if p.first == pair[0] => 1u8,
         0.0 if p.first == pair[1] => 2,
+        _ if of_pair(p) => WITHIN,
         _ => 0,
     };
     let cell = step.powi(3);
@@ -317,7 +334,7 @@ fn transition(
         sides: points
             .of
             .iter()
-            .map(|p| p.as_ref().map_or(0, side))
+            .map(|p| p.as_ref().map_or(0, &side))
             .collect(),
         size: vec![1; points.of.len()],
     };
@@ -344,12 +361,13 @@ fn transition(
     let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
     let mut neck = None;
     for i in &order {
-        if grow(&mut bodies, &mut inside, *i) == 3 && neck.is_none() {
+        if grow(&mut bodies, &mut inside, *i) & SIDES == SIDES && neck.is_none() {
             // Its own half step stands for the point's extent.
             neck = Some((2.0 * f64::from(depth[*i as usize]), at(*i as usize)));
         }
     }
     let (loose, lost) = bodies.apart(&inside);
+    let pieces = bodies.pieces(&inside);
     let mut dangling = (0, 0.0);
     if let Some((wide, _)) = neck {
         let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
@@ -369,6 +387,7 @@ fn transition(
     Transition {
         between: pair.map(usize::from),
         volume: count as f64 * cell,
+        pieces,
         loose: (loose, lost as f64 * cell),
         dangling,
         neck,

@@ -1,5 +1,8 @@
 //! A pattern as a field, without its beams being written out.
 
+mod classes;
+mod row;
+
 use rayon::prelude::*;
 
 use super::{MOST, Pattern, Similarity, Strut};
@@ -8,55 +11,8 @@ use crate::field::Field;
 use crate::graph::Graph;
 use crate::math::{Aabb, Interval, Vec3, add, apply, norm, scale, sub};
 use crate::quador::{Fillet, Quadors};
-
-/// Which hubs along a step differ: the first and the last few, and one for all between; or every one.
-#[derive(Clone, Copy, Debug)]
-struct Classes {
-    count: usize,
-    /// How many at either end have less neighbours; none if every one differs.
-    ends: Option<usize>,
-}
-
-impl Classes {
-    fn len(&self) -> usize {
-        match self.ends {
-            Some(m) if self.count > 2 * m + 1 => 2 * m + 1,
-            _ => self.count,
-        }
-    }
-
-    /// The class of an index.
-    fn of(&self, i: usize) -> usize {
-        match self.ends {
-            Some(m) if self.count > 2 * m + 1 => {
-                if i < m {
-                    i
-                } else if i >= self.count - m {
-                    i + 2 * m + 1 - self.count
-                } else {
-                    m
-                }
-            }
-            _ => i,
-        }
-    }
-
-    /// The first index of a class, and how many there are of it.
-    fn members(&self, class: usize) -> (usize, usize) {
-        match self.ends {
-            Some(m) if self.count > 2 * m + 1 => {
-                if class < m {
-                    (class, 1)
-                } else if class == m {
-                    (m, self.count - 2 * m)
-                } else {
-                    (class + self.count - (2 * m + 1), 1)
-                }
-            }
-            _ => (class, 1),
-        }
-    }
-}
+use classes::Classes;
+use row::Row;
 
 /// A hub that stands for all of its class.
 struct Kind {
@@ -409,55 +365,6 @@ impl Laid {
     }
 }
 
-/// Boxes in a row, by a tree over their order: what is next in order is near in space.
-struct Row {
-    count: usize,
-    /// The root is 1, below n are 2n and 2n + 1, the boxes are the last.
-    tree: Vec<Aabb>,
-}
-
-impl Row {
-    fn of(boxes: Vec<Aabb>) -> Row {
-        let leaves = boxes.len().next_power_of_two();
-        let mut tree = vec![Aabb::EMPTY; 2 * leaves];
-        tree[leaves..leaves + boxes.len()].copy_from_slice(&boxes);
-        for n in (1..leaves).rev() {
-            tree[n] = tree[2 * n].union(tree[2 * n + 1]);
-        }
-        Row {
-            count: boxes.len(),
-            tree,
-        }
-    }
-
-    fn all(&self) -> Aabb {
-        self.tree[1]
-    }
-
-    /// Calls `found` with the number of each box that meets p, until it says that it has enough; whether it never did.
-    fn near(&self, p: &Aabb, found: &mut impl FnMut(usize) -> bool) -> bool {
-        let leaves = self.tree.len() / 2;
-        let mut open = [0usize; 64];
-        let mut count = 1;
-        open[0] = 1;
-        while count > 0 {
-            count -= 1;
-            let n = open[count];
-            if p.intersection(self.tree[n]).is_empty() {
-                continue;
-            }
-            if n < leaves {
-                open[count] = 2 * n + 1;
-                open[count + 1] = 2 * n;
-                count += 2;
-            } else if n - leaves < self.count && !found(n - leaves) {
-                return false;
-            }
-        }
-        true
-    }
-}
-
 /// The box that holds a box carried by a similarity.
 fn carried(by: &Similarity, b: &Aabb) -> Aabb {
     if b.is_empty() {
@@ -553,143 +460,4 @@ impl Field for Laid {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::graph::{Hub, Profile};
-
-    fn places() -> impl Iterator<Item = Vec3> {
-        (1..4000).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract()))
-    }
-
-    fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
-        let strut = |by| Strut {
-            ends: [0, 0],
-            by,
-            profile: Profile::Mid(0.2),
-        };
-        Pattern {
-            nodes: vec![Hub {
-                center,
-                radius: 0.25,
-            }],
-            struts: vec![
-                strut([1, 0, 0]),
-                strut([0, 1, 0]),
-                strut([0, 0, 1]),
-                strut([1, -1, 0]),
-            ],
-            steps,
-        }
-    }
-
-    /// Translations, a swirl about an axis with rings along it, a shrinking spiral, and one in which no two commute.
-    fn samples() -> [Pattern; 4] {
-        let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
-        let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
-        let shrink = Similarity::new(0.9, [0.0, 0.0, 20.0], [0.0; 3], [0.0; 3]);
-        [
-            pattern(
-                [
-                    (by([1.5, 0.0, 0.0]), 6),
-                    (by([0.3, 1.4, 0.0]), 5),
-                    (by([0.0, 0.2, 1.6]), 4),
-                ],
-                [0.0; 3],
-            ),
-            pattern(
-                [
-                    (by([1.5, 0.0, 0.0]), 4),
-                    (turn(24.0), 12),
-                    (by([0.0, 0.0, 1.6]), 5),
-                ],
-                [4.0, 0.0, 0.0],
-            ),
-            pattern(
-                [(turn(20.0), 9), (shrink, 6), (by([0.0, 0.0, 1.6]), 3)],
-                [6.0, 0.0, 0.0],
-            ),
-            pattern(
-                [
-                    (by([1.5, 0.0, 0.0]), 4),
-                    (
-                        Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]),
-                        5,
-                    ),
-                    (
-                        Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]),
-                        4,
-                    ),
-                ],
-                [3.0, 0.0, 0.0],
-            ),
-        ]
-    }
-
-    #[test]
-    fn a_pattern_is_what_it_is_written_out() {
-        for (n, pattern) in samples().into_iter().enumerate() {
-            for fillet in [Fillet::None, Fillet::Tau(0.8)] {
-                let graph = pattern.expanded().expect("small");
-                let (hubs, beams) = pattern.counts();
-                assert_eq!(
-                    (graph.hubs.len() as f64, graph.beams.len() as f64),
-                    (hubs, beams)
-                );
-                let whole = Quadors::new(&graph, fillet).expect("quadors");
-                let laid = Laid::new(pattern.clone(), fillet).expect("laid");
-                let b = whole.bounds();
-                let (mut inside, mut out) = (0, 0);
-                for t in places() {
-                    let p = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
-                    let is = whole.contains(p);
-                    assert_eq!(laid.contains(p), is, "{n} {p:?}");
-                    let (v, own) = (laid.value(p), whole.value(p));
-                    // Both fields have the sign of the solid, but for what rounding leaves on its surface.
-                    if own.abs() > 1e-9 {
-                        assert_eq!(v < 0.0, own < 0.0, "{n} {p:?} {v} {own}");
-                    }
-                    inside += usize::from(is);
-                    out += usize::from(!is);
-                }
-                assert!(inside > 20 && out > 200, "{n}: {inside} {out}");
-            }
-        }
-    }
-
-    #[test]
-    fn bounds_hold_the_values() {
-        for pattern in samples() {
-            let laid = Laid::new(pattern, Fillet::Tau(0.8)).expect("laid");
-            let all = laid.bounds();
-            for (i, t) in places().take(300).enumerate() {
-                let p: Vec3 = core::array::from_fn(|a| all.min[a] + t[a] * all.size()[a]);
-                let b = Aabb { min: p, max: p }.grown(0.05 * (1 + i % 7) as f64);
-                let range = laid.bound(&b);
-                for t in places().take(30) {
-                    let q: Vec3 = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
-                    let v = laid.value(q);
-                    assert!(
-                        range.lo - 1e-12 <= v && v <= range.hi + 1e-12,
-                        "{v} {range:?}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn different_hubs_are_few_where_steps_commute() {
-        let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
-        let steps = [
-            (by([1.5, 0.0, 0.0]), 1000),
-            (by([0.0, 1.5, 0.0]), 1000),
-            (by([0.0, 0.0, 1.5]), 1000),
-        ];
-        let laid = Laid::new(pattern(steps, [0.0; 3]), Fillet::None).expect("laid");
-        let (_, kinds) = laid.kinds();
-        assert_eq!(kinds.len(), 27);
-        assert_eq!(kinds.iter().map(|k| k.1).sum::<f64>(), 1e9);
-        assert!(laid.contains([750.0, 751.5, 750.7]) && !laid.contains([750.7, 750.7, 750.7]));
-        assert_eq!(laid.pattern().counts().0, 1e9);
-    }
-}
+mod tests;

@@ -11,6 +11,8 @@ pub struct Chart {
     pub edges: Vec<f64>,
     /// The share of the whole in each bar.
     pub share: Vec<f64>,
+    /// What each share is held against, drawn as a line across its bar; nothing if there is none.
+    pub wanted: Vec<f64>,
     /// Places on the axis that are marked, with their names.
     pub marks: Vec<(String, f64)>,
 }
@@ -49,6 +51,7 @@ impl Paper {
         let most = chart
             .share
             .iter()
+            .chain(&chart.wanted)
             .copied()
             .filter(|s| s.is_finite())
             .fold(0.0, f64::max);
@@ -72,6 +75,11 @@ impl Paper {
         for (ends, share) in chart.edges.windows(2).zip(&chart.share) {
             let (x0, x1) = (across(ends[0]) + 1, across(ends[1]));
             self.fill([x0, up(100.0 * share)], [x1.max(x0 + 1), base], BAR);
+        }
+        let wanted = chart.edges.windows(2).zip(&chart.wanted);
+        for (ends, share) in wanted.filter(|(_, s)| s.is_finite() && **s > 0.0) {
+            let (x0, x1, y) = (across(ends[0]) + 1, across(ends[1]), up(100.0 * share));
+            self.fill([x0, y.saturating_sub(2)], [x1.max(x0 + 1), y + 2], MARK);
         }
         self.fill([left, base], [left + width, base + 2], INK);
         let step = nice(end / 8.0);
@@ -129,6 +137,7 @@ mod tests {
             title: "wall thickness, mm".into(),
             edges: (0..=share.len()).map(|i| i as f64 * 0.1).collect(),
             share,
+            wanted: Vec::new(),
             marks: vec![("mean".into(), 0.15)],
         }
     }
@@ -147,6 +156,10 @@ mod tests {
         let (a, b) = (count(&one, BAR) as f64, count(&two, BAR) as f64);
         assert!(a > 10_000.0 && (a / b - 1.0).abs() < 0.01, "{a} {b}");
         assert!(count(&one, INK) > 200 && count(&one, MARK) > 200);
+        let mut held = chart(vec![0.0, 0.5, 0.5, 0.0]);
+        held.wanted = vec![0.0, 0.25, 0.25, f64::NAN];
+        // Two lines of four pixels across bars that are hundreds wide.
+        assert!(count(&charts(&[held], size), MARK) > count(&one, MARK) + 800);
     }
 
     #[test]

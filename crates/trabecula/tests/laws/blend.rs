@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use trabecula::blend::{Blend, By, Constituent, Phases, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
+use trabecula::design::{Design, Loader};
 use trabecula::extract::{Silent, surface};
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Sigmoid};
@@ -253,6 +254,57 @@ fn any_number_of_fields_takes_part() {
     }
 }
 
+/// A sheet or a network that passes into beams, whose fraction nobody told: the share of an octet's cell that is solid is
+/// counted on one cell.
+#[test]
+fn lattices_pass_into_beams_with_their_fractions() {
+    struct Nothing;
+    impl Loader for Nothing {
+        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+            Err(path.to_string())
+        }
+    }
+    let text = "schema = 1\n[region.box]\nsize = [64, 36, 36]\n[beams.a]\ncell = \"octet\"\nradius = 0.45\nmap.affine.wavelength = 5";
+    let built = Design::from_toml(text)
+        .expect("text")
+        .build(&Nothing)
+        .expect("built");
+    let beams = built.beams[0].1.field();
+    let mut cell = window([0.0; 3], 0.0, 40_000);
+    for (i, p) in cell.iter_mut().enumerate() {
+        *p = [0.8191725134, 0.6710436067, 0.5497004779].map(|a| 5.0 * (a * i as f64).fract());
+    }
+    let mut v = vec![0.0; cell.len()];
+    beams.values(&cell, &mut v);
+    let own = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
+    for (part, fraction) in [(Part::Sheet, 0.3), (Part::Sheet, 0.15), (Part::Upper, 0.3)] {
+        let lattice = share("gyroid", part, fraction, 4.0);
+        let of = vec![
+            Constituent::Lattice(lattice),
+            Constituent::Field {
+                field: beams.clone(),
+                wavelength: 5.0,
+            },
+        ];
+        let blend = Blend::new(of, step(15.0), By::Fraction, &BOUNDS).expect("blend");
+        for i in -4..=4 {
+            let points = window([1.7 * f64::from(i), 0.37, -0.21], 10.0, 20_000);
+            let mut w = vec![0.0; 2 * points.len()];
+            blend.weights().values(&points, &mut w);
+            let asked = w.chunks_exact(2).map(|w| fraction * w[0] + own * w[1]);
+            let asked = asked.sum::<f64>() / points.len() as f64;
+            let mut v = vec![0.0; points.len()];
+            blend.values(&points, &mut v);
+            let found = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
+            println!("{part:?} {fraction} {i}: {found:.4} for {asked:.4}");
+            assert!(
+                (found - asked).abs() < 0.01,
+                "{part:?} {fraction}, {i}: {found:.4} for {asked:.4}"
+            );
+        }
+    }
+}
+
 /// Where one lattice counts alone its surface is there, to the last bit; and a lattice blended with itself is itself.
 #[test]
 fn alone_and_with_itself_a_lattice_is_itself() {
@@ -338,6 +390,34 @@ fn gradients_blocks_and_bounds_agree_with_values() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Inside transitions, too, small boxes are told to be empty or full, and those that are told so are.
+#[test]
+fn bounds_tell_empty_places_within_transitions() {
+    for (what, of, _) in pairs() {
+        for by in [By::Fraction, By::Value] {
+            let field = blend(&of, step(30.0), by);
+            let (mut told, mut clear) = (0, 0);
+            for p in window([0.0; 3], 9.0, 400) {
+                let b = Aabb {
+                    min: p,
+                    max: p.map(|x| x + 0.1),
+                };
+                let v = field.value(p.map(|x| x + 0.03));
+                let r = field.bound(&b);
+                assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
+                told += usize::from(r.lo > 0.0 || r.hi < 0.0);
+                // No face of any kind within some steps of the box.
+                let slope = Field::slope(&field);
+                clear += usize::from(v.abs() > 0.35 * slope);
+            }
+            assert!(
+                told > 20 && 4 * told > clear,
+                "{what} {by:?}: {told} of {clear}"
+            );
         }
     }
 }

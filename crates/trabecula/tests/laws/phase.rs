@@ -28,6 +28,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         wavelength: wavelength.map(formula),
         orientation: Orientation::Angles(angles.map(formula)),
         weight: None,
+        angle_weight: 1.0,
         offset: [0.1, 0.2, 0.3],
     };
     Map::Phase(Arc::new(

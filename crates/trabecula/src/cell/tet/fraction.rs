@@ -53,6 +53,11 @@ fn below_in_triangle([a, b, c]: [f64; 3], t: f64) -> f64 {
     }
 }
 
+/// Share of a tetrahedron with these values at its corners where the linear function is below t.
+pub(crate) fn share_below(v: [f64; 4], t: f64) -> f64 {
+    below_in_tet(ascending(v), t)
+}
+
 fn ascending<const N: usize>(mut v: [f64; N]) -> [f64; N] {
     v.sort_unstable_by(f64::total_cmp);
     v

@@ -150,12 +150,13 @@ pub struct RadialSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridSpec {
-    /// Path of the file (npy, vti, vtk), relative to the design file.
+    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif), where
+    /// a * in the last part stands for anything: "scan/*.png". Columns run along x, rows along y, pictures along z.
     pub path: String,
     /// Name of the array, where a file has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
-    /// Place of the first number (mm); VTI and VTK files say it themselves.
+    /// Place of the first number (mm), of pictures the middle of the first pixel; VTI and VTK files say it themselves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<[f64; 3]>,
     /// Distance between numbers (mm), one or three; VTI and VTK files say it themselves.

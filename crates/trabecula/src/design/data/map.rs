@@ -1,9 +1,11 @@
 //! Maps, as data.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FieldSpec, GradeSpec, OneOrThree, Unit, is_default};
+use super::{ControlSpec, FieldSpec, GradeSpec, OneOrThree, RegionSpec, Unit, is_default};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -19,6 +21,8 @@ pub enum MapSpec {
     Cylinder(CylinderMapSpec),
     /// Wrapped about a centre: cells along the radius, round the axis, from pole to pole.
     Sphere(SphereMapSpec),
+    /// Along a line through control points: cells across it and along it, in a frame that does not rotate about it.
+    Sweep(SweepSpec),
     /// Piecewise affine over a tetrahedral mesh of the region: a cell in each tetrahedron.
     Tets(TetsSpec),
 }
@@ -45,6 +49,10 @@ pub struct MadeTetsSpec {
     /// How long another mesher than the background one may take (s).
     #[serde(default = "limit", skip_serializing_if = "is_limit")]
     pub limit: f64,
+    /// Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius = 5 } } }`;
+    /// the first of several counts, and all others are of zone 0.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub zones: BTreeMap<String, RegionSpec>,
     /// How cells are joined.
     #[serde(flatten)]
     pub joined: Joined,
@@ -100,6 +108,14 @@ pub enum Road {
     Explicit,
     /// On a grid over the part, like other lattices.
     Implicit,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(v: &f64) -> bool {
+    *v == 1.0
 }
 
 fn limit() -> f64 {
@@ -212,6 +228,10 @@ pub struct PhaseSpec {
     /// follow everything, the error goes where this is small.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<GradeSpec>,
+    /// What an error of angle counts, for the same error of spacing: where no map can follow both, above 1 cells are nearer to
+    /// their directions, below 1 to their sizes. From 0.001 to 1000.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub angle_weight: f64,
     /// Moves the lattice (mm).
     #[serde(default, skip_serializing_if = "is_default")]
     pub offset: [f64; 3],
@@ -262,6 +282,23 @@ pub struct SphereMapSpec {
         skip_serializing_if = "super::is_build_axis"
     )]
     pub axis: [f64; 3],
+}
+
+/// Cells along a line: a cubic spline through control points, straight on beyond the ends of an open one.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepSpec {
+    /// Cell edge (mm), one or three: two across the line and one along it. Along a closed line it is made to fit.
+    pub wavelength: OneOrThree,
+    /// The control points (mm).
+    #[serde(flatten)]
+    pub points: ControlSpec,
+    /// Whether the last point is followed by the first.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub closed: bool,
+    /// Which way the first edge points at the start, but for what it has along the line; chosen if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
 }
 
 /// A number, or two.

@@ -112,7 +112,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
 }
 
 /// Control points: here, or in a file.
-fn control(f: &Fields) -> Read<ControlSpec> {
+pub(super) fn control(f: &Fields) -> Read<ControlSpec> {
     match (f.get("points"), f.get("path")) {
         (Some(_), Some(path)) => {
             Err(path.error("points and path at once; give the points here or in a file"))

@@ -1,6 +1,9 @@
 //! Maps: tree to data.
 
-use super::{Read, grade, three};
+use std::collections::BTreeMap;
+
+use super::grade::control;
+use super::{Read, grade, region, three};
 use crate::design::data::*;
 use crate::design::node::{At, Fields};
 use crate::fault::counted;
@@ -19,7 +22,9 @@ const TURNS: [&str; 7] = [
 pub(super) fn map(at: &At) -> Read<MapSpec> {
     let (kind, at) = at.kind(
         "map",
-        &["affine", "spartan", "phase", "cylinder", "sphere", "tets"],
+        &[
+            "affine", "spartan", "phase", "cylinder", "sphere", "sweep", "tets",
+        ],
         &[],
     )?;
     if kind == "tets" {
@@ -49,6 +54,24 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
                 .number()?,
             center: f.read("center", [0.0; 3], three)?,
             axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
+        }));
+    }
+    if kind == "sweep" {
+        let keys = ["wavelength", "points", "path", "closed", "normal"];
+        let f = at.fields("a map along a line", &keys, &[])?;
+        let wavelength = f.need(
+            "wavelength",
+            "the cell's edge in mm, one number or three: two across the line and one along it",
+        )?;
+        return Ok(MapSpec::Sweep(SweepSpec {
+            wavelength: if wavelength.is_list() {
+                OneOrThree::Three(wavelength.numbers("one number or three, mm")?)
+            } else {
+                OneOrThree::One(wavelength.number()?)
+            },
+            points: control(&f)?,
+            closed: f.read("closed", false, At::truth)?,
+            normal: f.read("normal", None, |at| three(at).map(Some))?,
         }));
     }
     if kind == "sphere" {
@@ -100,7 +123,7 @@ const MESHERS: [(&str, &str); 3] = [
 
 pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     let keys = [
-        "size", "mesher", "limit", "path", "unit", "split", "overlap", "road",
+        "size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road",
     ];
     let f = at.fields("a map over tetrahedra", &keys, &[])?;
     let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
@@ -109,7 +132,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
         road: f.read("road", Road::Explicit, |at| at.word("road", &roads))?,
     };
     let found = |keys: &[&str]| keys.iter().find_map(|k| f.get(k));
-    let made = found(&["size", "mesher", "limit"]);
+    let made = found(&["size", "mesher", "limit", "zones"]);
     if let (Some(_), Some(path)) = (made, f.get("path")) {
         return Err(path.error(
             "a tetrahedral mesh is either made, with size, or read, from path; found both",
@@ -139,8 +162,20 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
             at.word_or("mesher", &meshers, &MESHERS)
         })?,
         limit: f.read("limit", 600.0, At::number)?,
+        zones: f.read("zones", BTreeMap::new(), zones)?,
         joined,
     }))
+}
+
+fn zones(at: &At) -> Read<BTreeMap<String, RegionSpec>> {
+    let of =
+        at.entries("regions by the zone's number, such as { 1 = { sphere = { radius = 5 } } }")?;
+    of.into_iter()
+        .map(|(zone, at)| match zone.parse::<u32>() {
+            Ok(n) if n.to_string() == zone => Ok((zone.to_string(), region(&at)?)),
+            _ => Err(at.error(format!("a zone is a whole number from 0; found \"{zone}\""))),
+        })
+        .collect()
 }
 
 fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
@@ -177,7 +212,14 @@ fn skew(at: &At) -> Read<SkewSpec> {
 fn phase(at: &At) -> Read<PhaseSpec> {
     let mut keys = vec!["wavelength"];
     keys.extend(TURNS);
-    keys.extend(["weight", "offset", "step", "domain", "folds"]);
+    keys.extend([
+        "weight",
+        "angle_weight",
+        "offset",
+        "step",
+        "domain",
+        "folds",
+    ]);
     let f = at.fields("a phase map", &keys, &[])?;
     let given: Vec<&str> = TURNS.into_iter().filter(|k| f.get(k).is_some()).collect();
     if let [first, rest @ ..] = given.as_slice() {
@@ -217,6 +259,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         })?,
         stress: f.read("stress", None, |at| tensor(at).map(Some))?,
         weight: maybe("weight")?,
+        angle_weight: f.read("angle_weight", 1.0, At::number)?,
         offset: f.read("offset", [0.0; 3], three)?,
         step: f.read("step", None, |at| at.number().map(Some))?,
         domain: f.read("domain", Domain::Region, |at| at.word("domain", &domains))?,

@@ -19,6 +19,7 @@ fn about_z(angle: &str, wavelength: Grade) -> Wanted {
         wavelength: [wavelength.clone(), wavelength.clone(), wavelength],
         orientation: Orientation::Angles([zero(), zero(), formula(angle)]),
         weight: None,
+        angle_weight: 1.0,
         offset: [0.0; 3],
     }
 }
@@ -40,6 +41,7 @@ fn what_does_not_vary_is_the_affine_map() {
         wavelength: wavelength.map(Grade::Constant),
         orientation: Orientation::Angles(angles.map(Grade::Constant)),
         weight: Some(formula("1 + x*x")),
+        angle_weight: 1.0,
         offset,
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
@@ -212,12 +214,17 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
         .collect();
     for depth in [vec![-1.0; grid.len()], depth] {
         let roots = closeness(&grid, &depth, None, &nodes).expect("weights");
-        let (three, ..) = integrate(&grid, &k, roots.as_deref());
+        let (three, ..) = integrate(&grid, &k, roots.as_deref(), 1.0);
         let hkl = [2.0, -1.0, 3.0];
         let sum: Vec<Vec3> = (0..grid.len())
             .map(|n| (0..3).fold([0.0; 3], |s, i| add(s, scale(k[i][n], hkl[i]))))
             .collect();
-        let (own, ..) = integrate(&grid, &[sum.clone(), sum.clone(), sum], roots.as_deref());
+        let (own, ..) = integrate(
+            &grid,
+            &[sum.clone(), sum.clone(), sum],
+            roots.as_deref(),
+            1.0,
+        );
         let exact = depth[0] == -1.0;
         for n in (0..grid.len()).filter(|&n| depth[n] < 0.0) {
             let joined: f64 = (0..3).map(|i| hkl[i] * three[i][n]).sum();
@@ -345,7 +352,7 @@ fn solving_three_phases_at_128_cubed() {
             solved[0][77]
         );
         let start = std::time::Instant::now();
-        let (values, ..) = integrate(&grid, &k, None);
+        let (values, ..) = integrate(&grid, &k, None, 1.0);
         println!(
             "{n}: {:.3} s with means and gauge",
             start.elapsed().as_secs_f64()
@@ -408,6 +415,58 @@ fn errors_go_where_they_weigh_least() {
         };
         let fault = Phase::solve(&b, &wanted, &Settings::default()).err();
         assert_eq!(fault.expect("refused").at, "weight", "{bad}");
+    }
+}
+
+/// What counts more is nearer to what was asked for: the steeper an angle weighs the smaller its error and the greater that of
+/// spacing, and the other way round. What does not vary is met exactly, whatever counts.
+#[test]
+fn angles_are_bought_with_spacings() {
+    let b = bounds([0.0; 3], [16.0, 16.0, 4.0]);
+    let ball = crate::region::Sphere::new([8.0, 8.0, 2.0], 7.0).expect("ball");
+    for region in [None, Some(&ball as &dyn Field)] {
+        let solve = |angle_weight, angle: &str| {
+            let wanted = Wanted {
+                angle_weight,
+                ..about_z(angle, Grade::Constant(2.0))
+            };
+            let settings = Settings {
+                region,
+                ..Settings::default()
+            };
+            Phase::solve(&b, &wanted, &settings)
+        };
+        let off = |angle_weight| {
+            let d = solve(angle_weight, "70*x/16")
+                .expect("solved")
+                .distortion()
+                .clone();
+            let spacing = d
+                .spacing
+                .iter()
+                .take(2)
+                .map(|s| (s.max - 1.0).abs())
+                .fold(0.0, f64::max);
+            (d.angle[0].mean + d.angle[1].mean, spacing)
+        };
+        let [little, even, much] = [0.1, 1.0, 10.0].map(off);
+        assert!(
+            much.0 < 0.8 * even.0 && even.0 < 0.95 * little.0,
+            "{little:?} {even:?} {much:?}"
+        );
+        assert!(
+            much.1 > even.1 && even.1 > little.1,
+            "{little:?} {even:?} {much:?}"
+        );
+        let still = solve(30.0, "25").expect("solved");
+        let (p, q) = ([3.1, 9.2, 1.3], [11.0, 4.4, 2.0]);
+        let (c, s) = (25f64.to_radians().cos(), 25f64.to_radians().sin());
+        let wanted = ((q[0] - p[0]) * c + (q[1] - p[1]) * s) / 2.0;
+        assert!((at(&still, q)[0] - at(&still, p)[0] - wanted).abs() < 1e-10);
+        for bad in [0.0, -1.0, 1e9, f64::NAN] {
+            let fault = solve(bad, "25").err().expect("refused");
+            assert_eq!(fault.at, "angle_weight");
+        }
     }
 }
 

@@ -1,0 +1,163 @@
+//! Quantiles of many numbers: counted in steps of their range, and tabulated.
+
+use multiversion::multiversion;
+
+/// Knots of a quantile function; they are closer at its ends.
+const KNOTS: usize = 64;
+/// Steps in which values are counted.
+const STEPS: usize = 1024;
+
+/// How many of some values lie below each of even steps of their range. Linear within a step, of which so many make the
+/// range that what looking at some places leaves open is far more.
+pub(super) struct Counted {
+    low: f64,
+    step: f64,
+    /// Counts below the ends of the steps.
+    below: [u32; STEPS + 1],
+}
+
+impl Counted {
+    /// Counts values.
+    pub fn of(values: &[f32]) -> Counted {
+        let (lo, hi) = range(values);
+        let mut below = [0; STEPS + 1];
+        let per = if hi > lo {
+            STEPS as f32 / (hi - lo)
+        } else {
+            0.0
+        };
+        for v in values {
+            below[1 + (((v - lo) * per) as usize).min(STEPS - 1)] += 1;
+        }
+        for k in 0..STEPS {
+            below[k + 1] += below[k];
+        }
+        Counted {
+            low: f64::from(lo),
+            step: f64::from(hi - lo) / STEPS as f64,
+            below,
+        }
+    }
+
+    /// The value below which a share of all lies.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let wanted = share.clamp(0.0, 1.0) * f64::from(self.below[STEPS]);
+        let k = self
+            .below
+            .partition_point(|n| f64::from(*n) < wanted)
+            .clamp(1, STEPS);
+        let [a, b] = [k - 1, k].map(|k| f64::from(self.below[k]));
+        self.low + self.step * ((k - 1) as f64 + ((wanted - a) / (b - a).max(1.0)).clamp(0.0, 1.0))
+    }
+
+    /// Greatest less least value.
+    pub fn whole(&self) -> f64 {
+        self.step * STEPS as f64
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn range(values: &[f32]) -> (f32, f32) {
+    const LANES: usize = 16;
+    let (mut lo, mut hi) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let rows = values.chunks_exact(LANES);
+    let rest = rows.remainder();
+    for row in rows {
+        for l in 0..LANES {
+            lo[l] = if row[l] < lo[l] { row[l] } else { lo[l] };
+            hi[l] = if row[l] > hi[l] { row[l] } else { hi[l] };
+        }
+    }
+    let least = lo.iter().chain(rest).fold(f32::INFINITY, |a, b| a.min(*b));
+    (
+        least,
+        hi.iter()
+            .chain(rest)
+            .fold(f32::NEG_INFINITY, |a, b| a.max(*b)),
+    )
+}
+
+/// Adds w times the values.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(super) fn add_times(sum: &mut [f32], w: f32, values: &[f32]) {
+    sum.iter_mut().zip(values).for_each(|(o, v)| *o += w * v);
+}
+
+/// A tabulated quantile function.
+pub(super) struct Curve([f32; KNOTS + 1]);
+
+impl Curve {
+    /// One of which nothing is known.
+    pub const UNKNOWN: Curve = Curve([f32::NAN; KNOTS + 1]);
+
+    /// Whether anything is known of it.
+    pub fn is_known(&self) -> bool {
+        !self.0[0].is_nan()
+    }
+
+    /// Tabulates the quantiles of what was counted.
+    pub fn new(counted: &Counted) -> Curve {
+        Curve(core::array::from_fn(|k| {
+            let (s, _) = (std::f64::consts::FRAC_PI_2 * k as f64 / KNOTS as f64).sin_cos();
+            counted.quantile(s * s) as f32
+        }))
+    }
+
+    /// Value and slope at the share q. Below none it falls on as steeply as it rises in all.
+    pub fn at(&self, q: f64) -> (f64, f64) {
+        let whole = f64::from(self.0[KNOTS] - self.0[0]);
+        if q < 0.0 {
+            return (f64::from(self.0[0]) + q * whole, whole);
+        }
+        let knot = |k: usize| {
+            (std::f64::consts::FRAC_PI_2 * k as f64 / KNOTS as f64)
+                .sin()
+                .powi(2)
+        };
+        let x = q.min(1.0).sqrt().asin() / std::f64::consts::FRAC_PI_2 * KNOTS as f64;
+        let k = (x as usize).min(KNOTS - 1);
+        let (q0, q1) = (knot(k), knot(k + 1));
+        let (v0, v1) = (f64::from(self.0[k]), f64::from(self.0[k + 1]));
+        let slope = (v1 - v0) / (q1 - q0);
+        (v0 + slope * (q.min(1.0) - q0), slope)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers whose quantiles are known: v² of even v, and one number alone.
+    #[test]
+    fn quantiles_are_those_of_the_numbers() {
+        let values: Vec<f32> = (0..4099)
+            .map(|i| (i as f32 / 4098.0).powi(2) - 0.25)
+            .collect();
+        let counted = Counted::of(&values);
+        let curve = Curve::new(&counted);
+        assert!((counted.whole() - 1.0).abs() < 1e-6);
+        for i in 0..=100 {
+            let q = f64::from(i) / 100.0;
+            let want = q * q - 0.25;
+            // A step of the range is as wide as what its own numbers are apart at most.
+            assert!(
+                (counted.quantile(q) - want).abs() < 1.5e-3,
+                "{q}: {}",
+                counted.quantile(q)
+            );
+            assert!(
+                (curve.at(q).0 - want).abs() < 2.5e-3,
+                "{q}: {}",
+                curve.at(q).0
+            );
+        }
+        assert!(
+            (counted.quantile(0.0) + 0.25).abs() < 1e-6
+                && (counted.quantile(1.0) - 0.75).abs() < 1e-6
+        );
+        let (below, slope) = curve.at(-0.1);
+        assert!((below + 0.35).abs() < 1e-6 && (slope - 1.0).abs() < 1e-6);
+        let same = Counted::of(&[2.5; 7]);
+        assert_eq!([0.0, 0.3, 1.0].map(|q| same.quantile(q)), [2.5; 3]);
+    }
+}

@@ -1,0 +1,622 @@
+//! A map that carries a lattice along a line: cells across it and along it, in a frame that turns about it as little as may be.
+//!
+//! A cubic spline c goes through the control points. A place belongs to the nearest point of it, s is the length up to there, and
+//! its coordinates across are those in a frame N₁, N₂ that does not rotate about the line (double reflection: Wang, Jüttler,
+//! Zheng, Liu, Computation of rotation minimizing frames, ACM Trans. Graph. 27, 2008). With the curvature vector κ and
+//! d = x − c then ∇s = T/(1 − κ·d), ∇(d·N₁) = N₁. Cells fold where κ·d ≥ 1, at the centre of curvature, and tear where two points
+//! of the line are nearest. A line that closes has a whole number of cells, and what its frame has turned by after one round is
+//! spread over its length.
+
+use super::inverse::whole;
+use crate::fault::{Fault, number};
+use crate::field::Field;
+use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+
+/// Steps of the line between control points.
+const FINE: usize = 24;
+/// Steps of Newton's method from the nearest of these; the error squares each time.
+const STEPS: usize = 6;
+/// Places and weights of Gauss and Legendre on [−1, 1].
+const GAUSS: [(f64, f64); 5] = [
+    (0.0, 0.568_888_888_888_888_9),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// A line along which a lattice is swept, and what it is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    /// Control points, mm.
+    pub points: Vec<Vec3>,
+    /// Whether the last is followed by the first.
+    pub closed: bool,
+    /// Cell edges (mm): two across the line and one along it.
+    pub wavelength: Vec3,
+    /// Which way the first edge points at the start, but for what it has along the line; chosen if not given.
+    pub normal: Option<Vec3>,
+}
+
+/// A step of the line.
+#[derive(Clone, Copy, Debug)]
+struct Knot {
+    /// Where it is on the spline.
+    t: f64,
+    place: Vec3,
+    tangent: Vec3,
+    /// N₁, not yet turned.
+    normal: Vec3,
+    /// Length up to here, mm.
+    s: f64,
+}
+
+/// A lattice swept along a line. Phases are (a/λ₁, b/λ₂, s/λ₃).
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// For each span between control points, where it begins and its cubic.
+    spans: Vec<(f64, [Vec3; 4])>,
+    /// Where the last span ends: they are as long as their chords.
+    end: f64,
+    knots: Vec<Knot>,
+    closed: bool,
+    wavelength: Vec3,
+    length: f64,
+    /// By how much the frame is turned for each mm, radians.
+    twist: f64,
+    /// Within this distance of the line the nearest point is one, mm.
+    reach: f64,
+    /// Least and greatest length of a cell along the line where the lattice is wanted, mm.
+    along: [f64; 2],
+    /// The Jacobians where cells are shortest and longest.
+    extremes: [Mat3; 2],
+}
+
+/// How a place lies to the line.
+struct Local {
+    s: f64,
+    /// Coordinates along N₁ and N₂.
+    across: [f64; 2],
+    tangent: Vec3,
+    normals: [Vec3; 2],
+    /// 1 − κ·d.
+    room: f64,
+}
+
+impl Sweep {
+    /// Solves for the line; `looks` are places in the region, in which the map must neither fold nor tear.
+    ///
+    /// # Errors
+    /// Too few points, neighbours that coincide, lengths that are not positive, a normal along the line; a fold or a tear in
+    /// the region, with the place.
+    pub fn new(path: &Path, region: &dyn Field, looks: &[Vec3]) -> Result<Sweep, Fault> {
+        let Path { points, closed, .. } = path;
+        let least = if *closed { 3 } else { 2 };
+        if points.len() < least || points.iter().flatten().any(|v| !v.is_finite()) {
+            let message = format!(
+                "{} points; a line to sweep along needs at least {least}, of finite numbers",
+                points.len()
+            );
+            return Err(Fault::new("points", message));
+        }
+        if let Some(w) = path
+            .wavelength
+            .iter()
+            .find(|w| !(**w > 0.0 && w.is_finite()))
+        {
+            let message = format!(
+                "{} mm; a wavelength is a positive, finite length",
+                number(*w)
+            );
+            return Err(Fault::new("wavelength", message));
+        }
+        let (spans, end) = spline(points, *closed)?;
+        let mut made = Sweep {
+            spans,
+            end,
+            knots: Vec::new(),
+            closed: *closed,
+            wavelength: path.wavelength,
+            length: 0.0,
+            twist: 0.0,
+            reach: f64::INFINITY,
+            along: [path.wavelength[2]; 2],
+            extremes: [[[0.0; 3]; 3]; 2],
+        };
+        made.walk(path.normal)?;
+        let around = looks.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+        made.reach = made.found_reach(norm(around.size()));
+        made.refuse_folds(region, looks)?;
+        Ok(made)
+    }
+
+    /// The spline at t: place, first and second derivative. Straight on beyond the ends of an open line.
+    fn curve(&self, t: f64) -> (Vec3, Vec3, Vec3) {
+        let end = self.end;
+        let inside = if self.closed {
+            t.rem_euclid(end)
+        } else {
+            t.clamp(0.0, end)
+        };
+        let i = self.spans.partition_point(|s| s.0 <= inside).max(1) - 1;
+        let (from, [a, b, c, d]) = self.spans[i];
+        let x = inside - from;
+        let place = add(a, scale(add(b, scale(add(c, scale(d, x)), x)), x));
+        let first = add(b, scale(add(scale(c, 2.0), scale(d, 3.0 * x)), x));
+        if !self.closed && t != inside {
+            return (add(place, scale(first, t - inside)), first, [0.0; 3]);
+        }
+        (place, first, add(scale(c, 2.0), scale(d, 6.0 * x)))
+    }
+
+    /// The length from t₀ to t, mm.
+    fn stretch_of(&self, t0: f64, t: f64) -> f64 {
+        let half = 0.5 * (t - t0);
+        let at = |x: f64| norm(self.curve(t0 + half * (1.0 + x)).1);
+        half * GAUSS.iter().map(|(x, w)| w * at(*x)).sum::<f64>()
+    }
+
+    /// Lays the knots: lengths and frames.
+    fn walk(&mut self, normal: Option<Vec3>) -> Result<(), Fault> {
+        let end = self.end;
+        let starts = self.spans.iter().map(|s| s.0);
+        let bounds: Vec<f64> = starts.chain([end]).collect();
+        let ts = bounds
+            .windows(2)
+            .flat_map(|w| (0..FINE).map(move |i| w[0] + (w[1] - w[0]) * i as f64 / FINE as f64));
+        let ts: Vec<f64> = ts.chain([end]).collect();
+        let (start, slope, _) = self.curve(0.0);
+        let tangent = unit(slope);
+        let wanted = normal.unwrap_or_else(|| {
+            let least = (0..3).fold(0, |m, a| {
+                if tangent[a].abs() < tangent[m].abs() {
+                    a
+                } else {
+                    m
+                }
+            });
+            core::array::from_fn(|a| if a == least { 1.0 } else { 0.0 })
+        });
+        let flat = sub(wanted, scale(tangent, dot(wanted, tangent)));
+        if !(norm(flat) > 1e-6 * norm(wanted) && norm(flat).is_finite()) {
+            let message =
+                format!("{wanted:?} lies along the line at its start; give a direction across it");
+            return Err(Fault::new("normal", message));
+        }
+        let mut knots = vec![Knot {
+            t: 0.0,
+            place: start,
+            tangent,
+            normal: unit(flat),
+            s: 0.0,
+        }];
+        for t in ts.into_iter().skip(1) {
+            let last = knots[knots.len() - 1];
+            // An end that is the start again is not taken round it.
+            let (place, slope, _) = self.curve(if self.closed && t == end { 0.0 } else { t });
+            let tangent = unit(slope);
+            let s = last.s + self.stretch_of(last.t, t);
+            let normal = carried(&last, place, tangent);
+            knots.push(Knot {
+                t,
+                place,
+                tangent,
+                normal,
+                s,
+            });
+        }
+        let last = knots[knots.len() - 1];
+        self.length = last.s;
+        if self.closed {
+            let (n, m) = (knots[0].normal, cross(knots[0].tangent, knots[0].normal));
+            self.twist = -dot(last.normal, m).atan2(dot(last.normal, n)) / self.length;
+            let count = (self.length / self.wavelength[2]).round().max(1.0);
+            self.wavelength[2] = self.length / count;
+            self.along = [self.wavelength[2]; 2];
+        }
+        self.knots = knots;
+        Ok(())
+    }
+
+    /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at
+    /// most the least radius of curvature and half the width of the narrowest bottleneck. Open lines are followed `far` (mm)
+    /// beyond their ends.
+    fn found_reach(&self, far: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut all = self.knots.clone();
+        let ends = [(0, -1.0), (self.knots.len() - 1, 1.0)];
+        for (end, sign) in ends.into_iter().filter(|_| !self.closed) {
+            let k = self.knots[end];
+            let way = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
+            all.extend((1..=8 * FINE).map(|i| Knot {
+                place: add(k.place, scale(k.tangent, way(i))),
+                ..k
+            }));
+        }
+        for k in &self.knots {
+            let (_, slope, second) = self.curve(k.t);
+            let bend = norm(cross(slope, second)) / norm(slope).powi(3);
+            least = least.min(1.0 / bend.max(1e-300));
+        }
+        for k in &all {
+            for q in &all {
+                let way = sub(q.place, k.place);
+                let off = norm(cross(way, k.tangent));
+                if off > 1e-9 * self.length {
+                    least = least.min(dot(way, way) / (2.0 * off));
+                }
+            }
+        }
+        // Between the knots it may be a little less.
+        0.9 * least
+    }
+
+    /// The frame at t, after the knot before it.
+    fn frame(&self, i: usize, t: f64, place: Vec3, tangent: Vec3, s: f64) -> [Vec3; 2] {
+        let knot = &self.knots[i];
+        let n = if t == knot.t {
+            knot.normal
+        } else {
+            carried(knot, place, tangent)
+        };
+        let (sin, cos) = (self.twist * s).sin_cos();
+        let m = cross(tangent, n);
+        [
+            add(scale(n, cos), scale(m, sin)),
+            sub(scale(m, cos), scale(n, sin)),
+        ]
+    }
+
+    fn local(&self, p: Vec3) -> Local {
+        let mut near = (f64::INFINITY, 0);
+        for (i, k) in self.knots.iter().enumerate() {
+            let d = sub(p, k.place);
+            let r = dot(d, d);
+            if r < near.0 {
+                near = (r, i);
+            }
+        }
+        let last = self.knots.len() - 1;
+        let end = self.end;
+        // Straight on beyond the ends of an open line.
+        let beyond = [(0, -1.0), (last, 1.0)].into_iter().find_map(|(i, sign)| {
+            let k = &self.knots[i];
+            let d = sub(p, k.place);
+            let way = dot(d, k.tangent);
+            let ahead = !self.closed && sign * way > 0.0 && dot(d, d) - way * way < near.0;
+            ahead.then(|| self.knots[i].t + way / norm(self.curve(k.t).1))
+        });
+        let i = near.1;
+        let step = |i: usize| self.knots[i + 1].t - self.knots[i].t;
+        let lo = self.knots[i].t - step(if i == 0 { last - 1 } else { i - 1 });
+        let hi = self.knots[i].t + step(if i == last { 0 } else { i });
+        let mut t = beyond.unwrap_or(self.knots[i].t);
+        for _ in 0..if beyond.is_some() { 0 } else { STEPS } {
+            let (c, first, second) = self.curve(t);
+            let d = sub(p, c);
+            let slope = dot(first, first) - dot(d, second);
+            if slope <= 0.0 {
+                break;
+            }
+            t = (t + dot(d, first) / slope).clamp(lo, hi);
+            if !self.closed {
+                t = t.clamp(0.0, end);
+            }
+        }
+        let (c, first, second) = self.curve(t);
+        let (d, speed) = (sub(p, c), norm(first));
+        let tangent = scale(first, 1.0 / speed);
+        let bend = scale(
+            sub(second, scale(tangent, dot(second, tangent))),
+            1.0 / (speed * speed),
+        );
+        // Round a closed line t has one turn alone.
+        let round = if self.closed { t.rem_euclid(end) } else { t };
+        let i = if round <= 0.0 {
+            0
+        } else {
+            self.knots.partition_point(|k| k.t <= round).clamp(1, last) - 1
+        };
+        let s = if !self.closed && round > end {
+            self.length + (round - end) * speed
+        } else if !self.closed && round < 0.0 {
+            round * speed
+        } else {
+            self.knots[i].s + self.stretch_of(self.knots[i].t, round)
+        };
+        let normals = self.frame(i, round, c, tangent, s);
+        Local {
+            s,
+            across: normals.map(|n| dot(d, n)),
+            tangent,
+            normals,
+            room: 1.0 - dot(bend, d),
+        }
+    }
+
+    /// Refuses a map that folds or tears at places in the region.
+    fn refuse_folds(&mut self, region: &dyn Field, looks: &[Vec3]) -> Result<(), Fault> {
+        let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
+        let fold = |p: Vec3, radius: f64| {
+            let message = format!(
+                "the lattice folds at {}: the line bends there with a radius of {radius:.3} mm, and the region reaches its \
+                 centre; bend the line less, or keep the region nearer to it",
+                at(p)
+            );
+            Err(Fault::new("points", message))
+        };
+        for k in &self.knots {
+            let (c, first, second) = self.curve(k.t);
+            let speed = norm(first);
+            let bend = scale(
+                sub(second, scale(k.tangent, dot(second, k.tangent))),
+                1.0 / (speed * speed),
+            );
+            let bent = norm(bend);
+            let center = add(c, scale(bend, 1.0 / (bent * bent)));
+            if bent > 1e-9 / self.length && region.value(center) <= 0.0 {
+                let own = norm(sub(center, c)) <= self.away(center) * (1.0 + 1e-6);
+                if own {
+                    return fold(center, 1.0 / bent);
+                }
+            }
+        }
+        let mut range: [Option<(f64, Vec3)>; 2] = [None; 2];
+        let h = 0.125
+            * self
+                .wavelength
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min);
+        for p in looks {
+            let own = self.local(*p);
+            if own.room <= 0.0 {
+                return fold(*p, self.reach);
+            }
+            for (r, better) in range.iter_mut().zip([f64::lt, f64::gt]) {
+                if r.is_none_or(|r| better(&own.room, &r.0)) {
+                    *r = Some((own.room, *p));
+                }
+            }
+            for a in 0..3 {
+                let mut q = *p;
+                q[a] += h;
+                if region.value(q) > 0.0 {
+                    continue;
+                }
+                let other = self.local(q);
+                let mut way = (other.s - own.s).abs();
+                if self.closed {
+                    way = way.min(self.length - way);
+                }
+                // A step moves s by no more than it is long over the room there is.
+                if way > 4.0 * h / own.room.min(other.room).max(1e-3) {
+                    let message = format!(
+                        "the lattice tears at {}: two places of the line are as near, {way:.3} mm apart along it; keep the \
+                         region nearer to the line, or the line farther from itself",
+                        at(*p)
+                    );
+                    return Err(Fault::new("points", message));
+                }
+            }
+        }
+        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.knots[0].place)));
+        self.along = [least.0, most.0].map(|r| r * self.wavelength[2]);
+        self.extremes = [least.1, most.1].map(|p| self.jacobian(p));
+        Ok(())
+    }
+
+    /// The distance from the line, mm.
+    fn away(&self, p: Vec3) -> f64 {
+        let l = self.local(p);
+        l.across[0].hypot(l.across[1])
+    }
+
+    /// Cell edges as they come out (mm): a line that closes has a whole number of cells.
+    pub fn edges(&self) -> Vec3 {
+        self.wavelength
+    }
+
+    /// The length of the line, mm.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Least and greatest cell edge in the region, mm.
+    pub fn wavelengths(&self) -> [f64; 2] {
+        let [a, b, _] = self.wavelength;
+        [a.min(b).min(self.along[0]), a.max(b).max(self.along[1])]
+    }
+
+    /// A Jacobian typical of the map, but for its rotation.
+    pub fn typical(&self) -> Mat3 {
+        core::array::from_fn(|i| {
+            core::array::from_fn(|j| {
+                if i == j {
+                    1.0 / self.wavelength[i]
+                } else {
+                    0.0
+                }
+            })
+        })
+    }
+
+    /// The Jacobians where cells are shortest and longest.
+    pub fn extremes(&self) -> &[Mat3; 2] {
+        &self.extremes
+    }
+
+    /// The phase (turns) at a point (mm).
+    pub fn phase(&self, p: Vec3) -> Vec3 {
+        let l = self.local(p);
+        let w = self.wavelength;
+        [l.across[0] / w[0], l.across[1] / w[1], l.s / w[2]]
+    }
+
+    /// du/dx at a point, turns per mm.
+    pub fn jacobian(&self, p: Vec3) -> Mat3 {
+        let l = self.local(p);
+        let along = scale(l.tangent, 1.0 / l.room.max(1e-6));
+        let [a, b] = l.across;
+        let w = self.wavelength;
+        [
+            scale(add(l.normals[0], scale(along, self.twist * b)), 1.0 / w[0]),
+            scale(sub(l.normals[1], scale(along, self.twist * a)), 1.0 / w[1]),
+            scale(along, 1.0 / w[2]),
+        ]
+    }
+
+    /// A bound of the spectral norm of du/dx in a box, turns per mm: none where the nearest point may not be one.
+    pub fn stretch(&self, b: &Aabb) -> f64 {
+        let reach = norm(b.size()) / 2.0;
+        let away = self.away(b.center()) + reach;
+        if !(away < self.reach) {
+            return f64::INFINITY;
+        }
+        self.steep(1.0 - away / self.reach, away)
+    }
+
+    /// A bound of the spectral norm where the room is at least `room` and the distance from the line at most `away`.
+    fn steep(&self, room: f64, away: f64) -> f64 {
+        let [a, b, c] = self.wavelength;
+        // Rows at right angles but for the twist, whose norm is added.
+        (1.0 / a.min(b)).max(1.0 / (room * c)) + self.twist.abs() * away / (room * a.min(b))
+    }
+
+    /// A bound of the spectral norm of du/dx where the lattice is wanted, turns per mm.
+    pub fn steepest(&self) -> f64 {
+        let room = self.along[0] / self.wavelength[2];
+        self.steep(room.max(1e-3), self.reach)
+    }
+
+    /// The position (mm) that has the phase u.
+    pub fn position(&self, u: Vec3) -> Option<Vec3> {
+        let w = self.wavelength;
+        let mut s = u[2] * w[2];
+        if self.closed {
+            s = s.rem_euclid(self.length);
+        }
+        let last = self.knots.len() - 1;
+        let i = self.knots.partition_point(|k| k.s <= s).clamp(1, last) - 1;
+        // s rises with t at the speed of the spline, which is near one.
+        let mut t = self.knots[i].t;
+        for _ in 0..STEPS {
+            let have = if t > self.end && !self.closed {
+                self.length + (t - self.end) * norm(self.curve(t).1)
+            } else {
+                self.knots[i].s + self.stretch_of(self.knots[i].t, t)
+            };
+            t += (s - have) / norm(self.curve(t).1);
+        }
+        let (c, first, _) = self.curve(t);
+        let n = self.frame(i, t, c, unit(first), s);
+        Some(add(
+            c,
+            add(scale(n[0], u[0] * w[0]), scale(n[1], u[1] * w[1])),
+        ))
+    }
+
+    /// How many cells a line that closes has along it.
+    pub fn around(&self) -> Option<i32> {
+        self.closed
+            .then(|| (self.length / self.wavelength[2]).round() as i32)
+    }
+
+    /// The range of cells that may have a part in the box.
+    pub(super) fn cells(&self, b: &Aabb) -> [[i32; 2]; 3] {
+        let away = self.away(b.center()) + norm(b.size());
+        let w = self.wavelength;
+        let across = |a: usize| [whole(-away / w[a]) - 1, whole(away / w[a]) + 1];
+        let along = match self.around() {
+            Some(n) => [0, n - 1],
+            None => [
+                whole(-away / w[2]) - 1,
+                whole((self.length + away) / w[2]) + 1,
+            ],
+        };
+        [across(0), across(1), along]
+    }
+}
+
+/// The normal of a knot carried to the next place of the line by two reflections.
+fn carried(knot: &Knot, place: Vec3, tangent: Vec3) -> Vec3 {
+    let mirrored = |v: Vec3, n: Vec3| {
+        let long = dot(n, n);
+        if long > 0.0 {
+            sub(v, scale(n, 2.0 * dot(n, v) / long))
+        } else {
+            v
+        }
+    };
+    let way = sub(place, knot.place);
+    let (normal, along) = (mirrored(knot.normal, way), mirrored(knot.tangent, way));
+    let n = mirrored(normal, sub(tangent, along));
+    unit(sub(n, scale(tangent, dot(n, tangent))))
+}
+
+/// Where spans begin, and their cubics.
+type Spans = Vec<(f64, [Vec3; 4])>;
+
+/// The cubic spline through points at the lengths of their chords, natural at the ends or closed, and where it ends.
+fn spline(points: &[Vec3], closed: bool) -> Result<(Spans, f64), Fault> {
+    let n = points.len();
+    let count = if closed { n } else { n - 1 };
+    let at = |i: usize| points[i % n];
+    let chord: Vec<f64> = (0..count).map(|i| norm(sub(at(i + 1), at(i)))).collect();
+    let longest = chord.iter().copied().fold(0.0, f64::max);
+    if let Some(i) = chord.iter().position(|l| *l <= 1e-9 * longest) {
+        let message = format!("points {i} and {} coincide; leave one out", (i + 1) % n);
+        return Err(Fault::new("points", message));
+    }
+    // Second derivatives at the points: a few sweeps over equations whose diagonal is twice the rest.
+    let mut bend = vec![[0.0; 3]; count + 1];
+    let slope = |i: usize| scale(sub(at(i + 1), at(i)), 1.0 / chord[i]);
+    for _ in 0..200 {
+        for i in 0..=count {
+            let (before, after) = match (i, closed) {
+                (0, false) => continue,
+                (i, false) if i == count => continue,
+                (0, true) => (count - 1, 0),
+                (i, _) => (i - 1, i % count),
+            };
+            let right = scale(sub(slope(after), slope(before)), 6.0);
+            let (hb, ha) = (chord[before], chord[after]);
+            let near = add(
+                scale(bend[before], hb),
+                scale(
+                    bend[if closed {
+                        (after + 1) % count
+                    } else {
+                        after + 1
+                    }],
+                    ha,
+                ),
+            );
+            bend[i] = scale(sub(right, near), 1.0 / (2.0 * (hb + ha)));
+            if closed && i == 0 {
+                bend[count] = bend[0];
+            }
+        }
+    }
+    let mut from = 0.0;
+    let mut spans = Vec::with_capacity(count);
+    for i in 0..count {
+        let h = chord[i];
+        let (m0, m1) = (bend[i], bend[if closed { (i + 1) % count } else { i + 1 }]);
+        let b = sub(slope(i), scale(add(scale(m0, 2.0), m1), h / 6.0));
+        spans.push((
+            from,
+            [
+                at(i),
+                b,
+                scale(m0, 0.5),
+                scale(sub(m1, m0), 1.0 / (6.0 * h)),
+            ],
+        ));
+        from += h;
+    }
+    Ok((spans, from))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+use super::*;
+use crate::graph::{Hub, Profile};
+
+fn places() -> impl Iterator<Item = Vec3> {
+    (1..4000).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract()))
+}
+
+fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
+    let strut = |by| Strut {
+        ends: [0, 0],
+        by,
+        profile: Profile::Mid(0.2),
+    };
+    Pattern {
+        nodes: vec![Hub {
+            center,
+            radius: 0.25,
+        }],
+        struts: vec![
+            strut([1, 0, 0]),
+            strut([0, 1, 0]),
+            strut([0, 0, 1]),
+            strut([1, -1, 0]),
+        ],
+        steps,
+    }
+}
+
+/// Translations, a swirl about an axis with rings along it, a shrinking spiral, and one in which no two commute.
+fn samples() -> [Pattern; 4] {
+    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+    let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
+    let shrink = Similarity::new(0.9, [0.0, 0.0, 20.0], [0.0; 3], [0.0; 3]);
+    [
+        pattern(
+            [
+                (by([1.5, 0.0, 0.0]), 6),
+                (by([0.3, 1.4, 0.0]), 5),
+                (by([0.0, 0.2, 1.6]), 4),
+            ],
+            [0.0; 3],
+        ),
+        pattern(
+            [
+                (by([1.5, 0.0, 0.0]), 4),
+                (turn(24.0), 12),
+                (by([0.0, 0.0, 1.6]), 5),
+            ],
+            [4.0, 0.0, 0.0],
+        ),
+        pattern(
+            [(turn(20.0), 9), (shrink, 6), (by([0.0, 0.0, 1.6]), 3)],
+            [6.0, 0.0, 0.0],
+        ),
+        pattern(
+            [
+                (by([1.5, 0.0, 0.0]), 4),
+                (
+                    Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]),
+                    5,
+                ),
+                (
+                    Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]),
+                    4,
+                ),
+            ],
+            [3.0, 0.0, 0.0],
+        ),
+    ]
+}
+
+#[test]
+fn a_pattern_is_what_it_is_written_out() {
+    for (n, pattern) in samples().into_iter().enumerate() {
+        for fillet in [Fillet::None, Fillet::Tau(0.8)] {
+            let graph = pattern.expanded().expect("small");
+            let (hubs, beams) = pattern.counts();
+            assert_eq!(
+                (graph.hubs.len() as f64, graph.beams.len() as f64),
+                (hubs, beams)
+            );
+            let whole = Quadors::new(&graph, fillet).expect("quadors");
+            let laid = Laid::new(pattern.clone(), fillet).expect("laid");
+            let b = whole.bounds();
+            let (mut inside, mut out) = (0, 0);
+            for t in places() {
+                let p = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
+                let is = whole.contains(p);
+                assert_eq!(laid.contains(p), is, "{n} {p:?}");
+                let (v, own) = (laid.value(p), whole.value(p));
+                // Both fields have the sign of the solid, but for what rounding leaves on its surface.
+                if own.abs() > 1e-9 {
+                    assert_eq!(v < 0.0, own < 0.0, "{n} {p:?} {v} {own}");
+                }
+                inside += usize::from(is);
+                out += usize::from(!is);
+            }
+            assert!(inside > 20 && out > 200, "{n}: {inside} {out}");
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_the_values() {
+    for pattern in samples() {
+        let laid = Laid::new(pattern, Fillet::Tau(0.8)).expect("laid");
+        let all = laid.bounds();
+        for (i, t) in places().take(300).enumerate() {
+            let p: Vec3 = core::array::from_fn(|a| all.min[a] + t[a] * all.size()[a]);
+            let b = Aabb { min: p, max: p }.grown(0.05 * (1 + i % 7) as f64);
+            let range = laid.bound(&b);
+            for t in places().take(30) {
+                let q: Vec3 = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
+                let v = laid.value(q);
+                assert!(
+                    range.lo - 1e-12 <= v && v <= range.hi + 1e-12,
+                    "{v} {range:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn different_hubs_are_few_where_steps_commute() {
+    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+    let steps = [
+        (by([1.5, 0.0, 0.0]), 1000),
+        (by([0.0, 1.5, 0.0]), 1000),
+        (by([0.0, 0.0, 1.5]), 1000),
+    ];
+    let laid = Laid::new(pattern(steps, [0.0; 3]), Fillet::None).expect("laid");
+    let (_, kinds) = laid.kinds();
+    assert_eq!(kinds.len(), 27);
+    assert_eq!(kinds.iter().map(|k| k.1).sum::<f64>(), 1e9);
+    assert!(laid.contains([750.0, 751.5, 750.7]) && !laid.contains([750.7, 750.7, 750.7]));
+    assert_eq!(laid.pattern().counts().0, 1e9);
+}
