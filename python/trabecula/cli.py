@@ -394,7 +394,7 @@ def serve(argv: list[str] | None) -> int:
 
 def told(error: Exception) -> str:
     """What is said of an error, in one line."""
-    from .commands import Refused
+    from .errors import Refused
 
     if isinstance(error, OSError) and error.filename:
         return f"{os.fsdecode(error.filename)}: {error.strerror}"
