@@ -358,7 +358,7 @@ impl Sweep {
     pub fn stretch(&self, b: &Aabb) -> f64 {
         let reach = norm(b.size()) / 2.0;
         let away = self.away(b.center()) + reach;
-        if !(away < self.reach) {
+        if away >= self.reach {
             return f64::INFINITY;
         }
         self.steep(1.0 - away / self.reach, away)
