@@ -90,7 +90,7 @@ def test_lattices_that_do_not_meet_have_no_neck(tmp_path):
     solid = lt.load(file)
     with pytest.warns(lt.DesignWarning):
         (it,) = solid.build().transitions()
-    assert it["neck"] is None and it["loose"]["bodies"] > 0 and it["pieces"] > it["loose"]["bodies"]
+    assert it["neck"] is None and it["loose"]["bodies"] > 0 and it["pieces"] >= it["loose"]["bodies"]
 
 
 def test_grades_of_boundaries(tmp_path):
@@ -239,9 +239,7 @@ def test_check_tells_and_draws_the_transitions(tmp_path):
 def test_a_lattice_over_tetrahedra_takes_part():
     """Walls in tetrahedra pass into a network; without a blend they stand alone."""
     lattices = {
-        "a": lt.Lattice(
-            lt.cell.tet("primitive"), "upper", lt.map.tets(size=5), lt.level.fraction(0.3)
-        ),
+        "a": lt.Lattice(lt.cell.tet("primitive"), "upper", lt.map.tets(size=5), lt.level.fraction(0.45)),
         "b": lt.Lattice("gyroid", "upper", lt.map.affine(wavelength=4.0), lt.level.fraction(0.3)),
     }
     box = lt.region.box(size=[32, 12, 12])
@@ -249,8 +247,9 @@ def test_a_lattice_over_tetrahedra_takes_part():
     solid = lt.Design(region=box, lattice=lattices, blend=blend).build()
     (it,) = solid.transitions()
     assert it["neck"] is not None
+    # In tenths of the weight, by windows that the region cuts short; what tetrahedra have where they end is not the cell's own.
     for row in it["fractions"]:
-        assert abs(row["found"] - row["asked"]) < 0.03 and abs(row["asked"] - 0.3) < 0.05
+        assert abs(row["found"] - (0.45 - 0.15 * row["share"])) < 0.02
     mesh = solid.mesh(edge=0.4)
     assert mesh.closed and mesh.self_intersections == 0
     with pytest.raises(lt.DesignError, match="blend") as e:
@@ -263,7 +262,7 @@ def test_beams_take_part_with_the_fraction_they_have():
     beams = lt.Beams("octet", lt.map.affine(wavelength=5.0), radius=0.45)
     sheet = lt.Lattice("gyroid", "sheet", lt.map.affine(wavelength=4.0), lt.level.fraction(0.3))
     blend = lt.blend.between("a", "b", lt.grade.linear([1, 0, 0], {-10: 0, 10: 1}))
-    design = lt.Design(region=lt.region.box(size=[40, 16, 16]), lattice={"a": sheet}, beams={"b": beams}, blend=blend)
+    design = lt.Design(region=lt.region.box(size=[40, 20, 20]), lattice={"a": sheet}, beams={"b": beams}, blend=blend)
     (it,) = design.build().transitions()
     assert all(row["asked"] is not None for row in it["fractions"])
-    assert max(abs(row["found"] - row["asked"]) for row in it["fractions"]) < 0.02
+    assert max(abs(row["found"] - row["asked"]) for row in it["fractions"]) < 0.01

@@ -118,7 +118,7 @@ def test_zones_pass_into_each_other_and_keep_the_fraction():
     assert mesh.closed and mesh.pieces == 1
     # Second order in the steps of the surface, of which there are twenty to an edge.
     assert mesh.volume == pytest.approx(0.3 * report["tets"]["volume"], rel=0.02)
-    far = lt.region.box(size=1, center=[50, 0, 0])
+    far = lt.region.box(size=[1, 1, 1], center=[50, 0, 0])
     with pytest.raises(lt.DesignError, match="no tetrahedron's middle"):
         design(lt.cell.tet(zones={0: "iwp", 1: "diamond"}), zones={1: far}).build()
     with pytest.raises(lt.DesignError, match="which has no cell"):

@@ -55,6 +55,17 @@ def length(text: str) -> float:
     return value
 
 
+def height(text: str) -> float:
+    """A height in mm."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a height in mm, found {text!r}")
+    return value
+
+
 def samples(text: str) -> float:
     """Samples on a wavelength."""
     try:
@@ -253,6 +264,19 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--json", action="store_true", help="print the figures as JSON on stdout")
 
     p = command(
+        "slice",
+        "Slice the beams of a design at a height: loops of conic arcs, their exact area, a drawing.",
+        "The beams alone are sliced, as far as they reach: without the region that cuts them, and without a skin.\n\n"
+        "examples:\n  trabecula slice part.toml --z 5\n  trabecula slice part.toml --z 5 -o layer.svg --chord 0.005",
+    )
+    p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json) with beams")
+    p.add_argument("--z", type=height, required=True, metavar="MM", help="the height of the plane, mm")
+    p.add_argument("--beams", metavar="NAME", help="the beams that are meant (needed only if there are several)")
+    p.add_argument("-o", "--output", type=ending(("svg",)), metavar="OUT", help="the drawing to write (.svg)")
+    p.add_argument("--chord", type=length, default=0.01, metavar="MM", help="how far the drawing may be off (default: 0.01)")
+    p.add_argument("--json", action="store_true", help="print the figures as JSON on stdout")
+
+    p = command(
         "measure",
         "Measure a design or a mesh file: volume, areas, solid fraction, Euler number, pieces, closedness, quality.",
         "A design is meshed in memory first. A mesh file has a solid fraction and pores only against a region.\n"
@@ -370,7 +394,7 @@ def serve(argv: list[str] | None) -> int:
 
 def told(error: Exception) -> str:
     """What is said of an error, in one line."""
-    from .commands import Refused
+    from .errors import Refused
 
     if isinstance(error, OSError) and error.filename:
         return f"{os.fsdecode(error.filename)}: {error.strerror}"

@@ -18,6 +18,7 @@ from .islands import Islands, check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
+from .quadors import Quadors
 from .thickness import Thickness
 from .transition import Transitions
 
@@ -80,6 +81,15 @@ class Solid(Picture):
         that each beam joins.
         """
         return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
+
+    def quadors(self, name: str | None = None) -> Quadors:
+        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries."""
+        if name is None:
+            names = list(self.beams)
+            if len(names) != 1:
+                raise ValueError(f"name the beams that are meant: there are {', '.join(names) or 'none'}")
+            name = names[0]
+        return Quadors(self._core.quadors(name))
 
     def report(self) -> dict:
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``, and

@@ -21,6 +21,7 @@ use crate::error;
 use crate::file;
 use crate::islands;
 use crate::mesh::Mesh;
+use crate::quadors::Quadors;
 use crate::run::run;
 
 /// A region and the lattice in it.
@@ -50,7 +51,7 @@ type Graph<'py> = (
 );
 
 /// Points of Python (n, 3) as the core's.
-fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
     let a = p.as_array();
     if a.ncols() != 3 {
         return Err(PyValueError::new_err(format!(
@@ -186,6 +187,21 @@ impl Solid {
             ))
         };
         self.built.beams.iter().map(graph).collect()
+    }
+
+    /// The beams of a name as quadrics.
+    fn quadors(&self, name: &str) -> PyResult<Quadors> {
+        match self.built.beams.iter().find(|b| b.0 == name) {
+            Some((_, Beams::Truss(truss))) => Ok(Quadors {
+                quadors: truss.quadors.clone(),
+            }),
+            Some((_, Beams::Pattern(_))) => Err(PyValueError::new_err(format!(
+                "beams.{name} is a pattern, which is not held hub by hub: write it out as Beams(nodes=…, struts=…) from Solid.beams"
+            ))),
+            None => Err(PyValueError::new_err(format!(
+                "there are no beams named {name}"
+            ))),
+        }
     }
 
     /// Values at points (n, 3): negative in the solid.

@@ -477,7 +477,7 @@ impl Levels {
                     ([lo.0, hi.0], [lo.1, hi.1])
                 }
                 Table::Curves(curves) => {
-                    self.curved_gradients(strands, curves, &station.own, (w, dw), ends, at, &dy)
+                    self.curved_gradients(strands, (curves, &station.own), (w, dw), ends, at, &dy)
                 }
             };
             for e in 0..2 {
@@ -491,8 +491,7 @@ impl Levels {
     fn curved_gradients(
         &self,
         strands: &[Strand],
-        curves: &[Curve],
-        own: &[[f64; 2]],
+        (curves, own): (&[Curve], &[[f64; 2]]),
         (w, dw): (&[f64], &[Vec3]),
         ends: &[End],
         at: &Place,

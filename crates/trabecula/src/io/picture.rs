@@ -76,7 +76,7 @@ fn samples(row: &[u8], bits: usize, count: usize) -> Vec<f64> {
 /// Grey of a pixel of several channels: the first, if those of a colour agree; the last of two or four is how opaque it is.
 fn grey(row: &[f64], channels: usize) -> Result<Vec<f64>, Fault> {
     let each = row.chunks_exact(channels).map(|p| {
-        let colours = &p[..channels - usize::from(channels % 2 == 0)];
+        let colours = &p[..channels - usize::from(channels.is_multiple_of(2))];
         let same = colours.iter().all(|v| *v == colours[0]);
         same.then_some(p[0])
             .ok_or_else(|| fault("a picture in colours; a grade needs grey ones"))

@@ -7,10 +7,16 @@
 //! of the line are nearest. A line that closes has a whole number of cells, and what its frame has turned by after one round is
 //! spread over its length.
 
+mod line;
+mod room;
+#[cfg(test)]
+mod tests;
+
 use super::inverse::whole;
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+use line::{Knot, Spans, carried, spline};
 
 /// Steps of the line between control points.
 const FINE: usize = 24;
@@ -38,24 +44,11 @@ pub struct Path {
     pub normal: Option<Vec3>,
 }
 
-/// A step of the line.
-#[derive(Clone, Copy, Debug)]
-struct Knot {
-    /// Where it is on the spline.
-    t: f64,
-    place: Vec3,
-    tangent: Vec3,
-    /// N₁, not yet turned.
-    normal: Vec3,
-    /// Length up to here, mm.
-    s: f64,
-}
-
 /// A lattice swept along a line. Phases are (a/λ₁, b/λ₂, s/λ₃).
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// For each span between control points, where it begins and its cubic.
-    spans: Vec<(f64, [Vec3; 4])>,
+    spans: Spans,
     /// Where the last span ends: they are as long as their chords.
     end: f64,
     knots: Vec<Knot>,
@@ -218,39 +211,6 @@ impl Sweep {
         Ok(())
     }
 
-    /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at
-    /// most the least radius of curvature and half the width of the narrowest bottleneck. Open lines are followed `far` (mm)
-    /// beyond their ends.
-    fn found_reach(&self, far: f64) -> f64 {
-        let mut least = f64::INFINITY;
-        let mut all = self.knots.clone();
-        let ends = [(0, -1.0), (self.knots.len() - 1, 1.0)];
-        for (end, sign) in ends.into_iter().filter(|_| !self.closed) {
-            let k = self.knots[end];
-            let way = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
-            all.extend((1..=8 * FINE).map(|i| Knot {
-                place: add(k.place, scale(k.tangent, way(i))),
-                ..k
-            }));
-        }
-        for k in &self.knots {
-            let (_, slope, second) = self.curve(k.t);
-            let bend = norm(cross(slope, second)) / norm(slope).powi(3);
-            least = least.min(1.0 / bend.max(1e-300));
-        }
-        for k in &all {
-            for q in &all {
-                let way = sub(q.place, k.place);
-                let off = norm(cross(way, k.tangent));
-                if off > 1e-9 * self.length {
-                    least = least.min(dot(way, way) / (2.0 * off));
-                }
-            }
-        }
-        // Between the knots it may be a little less.
-        0.9 * least
-    }
-
     /// The frame at t, after the knot before it.
     fn frame(&self, i: usize, t: f64, place: Vec3, tangent: Vec3, s: f64) -> [Vec3; 2] {
         let knot = &self.knots[i];
@@ -334,78 +294,6 @@ impl Sweep {
         }
     }
 
-    /// Refuses a map that folds or tears at places in the region.
-    fn refuse_folds(&mut self, region: &dyn Field, looks: &[Vec3]) -> Result<(), Fault> {
-        let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
-        let fold = |p: Vec3, radius: f64| {
-            let message = format!(
-                "the lattice folds at {}: the line bends there with a radius of {radius:.3} mm, and the region reaches its \
-                 centre; bend the line less, or keep the region nearer to it",
-                at(p)
-            );
-            Err(Fault::new("points", message))
-        };
-        for k in &self.knots {
-            let (c, first, second) = self.curve(k.t);
-            let speed = norm(first);
-            let bend = scale(
-                sub(second, scale(k.tangent, dot(second, k.tangent))),
-                1.0 / (speed * speed),
-            );
-            let bent = norm(bend);
-            let center = add(c, scale(bend, 1.0 / (bent * bent)));
-            if bent > 1e-9 / self.length && region.value(center) <= 0.0 {
-                let own = norm(sub(center, c)) <= self.away(center) * (1.0 + 1e-6);
-                if own {
-                    return fold(center, 1.0 / bent);
-                }
-            }
-        }
-        let mut range: [Option<(f64, Vec3)>; 2] = [None; 2];
-        let h = 0.125
-            * self
-                .wavelength
-                .iter()
-                .copied()
-                .fold(f64::INFINITY, f64::min);
-        for p in looks {
-            let own = self.local(*p);
-            if own.room <= 0.0 {
-                return fold(*p, self.reach);
-            }
-            for (r, better) in range.iter_mut().zip([f64::lt, f64::gt]) {
-                if r.is_none_or(|r| better(&own.room, &r.0)) {
-                    *r = Some((own.room, *p));
-                }
-            }
-            for a in 0..3 {
-                let mut q = *p;
-                q[a] += h;
-                if region.value(q) > 0.0 {
-                    continue;
-                }
-                let other = self.local(q);
-                let mut way = (other.s - own.s).abs();
-                if self.closed {
-                    way = way.min(self.length - way);
-                }
-                // A step moves s by no more than it is long over the room there is.
-                if way > 4.0 * h / own.room.min(other.room).max(1e-3) {
-                    let message = format!(
-                        "the lattice tears at {}: two places of the line are as near, {way:.3} mm apart along it; keep the \
-                         region nearer to the line, or the line farther from itself",
-                        at(*p)
-                    );
-                    return Err(Fault::new("points", message));
-                }
-            }
-        }
-        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.knots[0].place)));
-        self.along = [least.0, most.0].map(|r| r * self.wavelength[2]);
-        self.extremes = [least.1, most.1].map(|p| self.jacobian(p));
-        Ok(())
-    }
-
     /// The distance from the line, mm.
     fn away(&self, p: Vec3) -> f64 {
         let l = self.local(p);
@@ -470,7 +358,7 @@ impl Sweep {
     pub fn stretch(&self, b: &Aabb) -> f64 {
         let reach = norm(b.size()) / 2.0;
         let away = self.away(b.center()) + reach;
-        if !(away < self.reach) {
+        if away >= self.reach {
             return f64::INFINITY;
         }
         self.steep(1.0 - away / self.reach, away)
@@ -537,86 +425,3 @@ impl Sweep {
         [across(0), across(1), along]
     }
 }
-
-/// The normal of a knot carried to the next place of the line by two reflections.
-fn carried(knot: &Knot, place: Vec3, tangent: Vec3) -> Vec3 {
-    let mirrored = |v: Vec3, n: Vec3| {
-        let long = dot(n, n);
-        if long > 0.0 {
-            sub(v, scale(n, 2.0 * dot(n, v) / long))
-        } else {
-            v
-        }
-    };
-    let way = sub(place, knot.place);
-    let (normal, along) = (mirrored(knot.normal, way), mirrored(knot.tangent, way));
-    let n = mirrored(normal, sub(tangent, along));
-    unit(sub(n, scale(tangent, dot(n, tangent))))
-}
-
-/// Where spans begin, and their cubics.
-type Spans = Vec<(f64, [Vec3; 4])>;
-
-/// The cubic spline through points at the lengths of their chords, natural at the ends or closed, and where it ends.
-fn spline(points: &[Vec3], closed: bool) -> Result<(Spans, f64), Fault> {
-    let n = points.len();
-    let count = if closed { n } else { n - 1 };
-    let at = |i: usize| points[i % n];
-    let chord: Vec<f64> = (0..count).map(|i| norm(sub(at(i + 1), at(i)))).collect();
-    let longest = chord.iter().copied().fold(0.0, f64::max);
-    if let Some(i) = chord.iter().position(|l| *l <= 1e-9 * longest) {
-        let message = format!("points {i} and {} coincide; leave one out", (i + 1) % n);
-        return Err(Fault::new("points", message));
-    }
-    // Second derivatives at the points: a few sweeps over equations whose diagonal is twice the rest.
-    let mut bend = vec![[0.0; 3]; count + 1];
-    let slope = |i: usize| scale(sub(at(i + 1), at(i)), 1.0 / chord[i]);
-    for _ in 0..200 {
-        for i in 0..=count {
-            let (before, after) = match (i, closed) {
-                (0, false) => continue,
-                (i, false) if i == count => continue,
-                (0, true) => (count - 1, 0),
-                (i, _) => (i - 1, i % count),
-            };
-            let right = scale(sub(slope(after), slope(before)), 6.0);
-            let (hb, ha) = (chord[before], chord[after]);
-            let near = add(
-                scale(bend[before], hb),
-                scale(
-                    bend[if closed {
-                        (after + 1) % count
-                    } else {
-                        after + 1
-                    }],
-                    ha,
-                ),
-            );
-            bend[i] = scale(sub(right, near), 1.0 / (2.0 * (hb + ha)));
-            if closed && i == 0 {
-                bend[count] = bend[0];
-            }
-        }
-    }
-    let mut from = 0.0;
-    let mut spans = Vec::with_capacity(count);
-    for i in 0..count {
-        let h = chord[i];
-        let (m0, m1) = (bend[i], bend[if closed { (i + 1) % count } else { i + 1 }]);
-        let b = sub(slope(i), scale(add(scale(m0, 2.0), m1), h / 6.0));
-        spans.push((
-            from,
-            [
-                at(i),
-                b,
-                scale(m0, 0.5),
-                scale(sub(m1, m0), 1.0 / (6.0 * h)),
-            ],
-        ));
-        from += h;
-    }
-    Ok((spans, from))
-}
-
-#[cfg(test)]
-mod tests;

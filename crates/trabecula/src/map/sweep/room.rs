@@ -1,0 +1,113 @@
+//! How far from its line a sweep is sound: where cells fold, where they tear, and within what distance neither can be.
+
+use super::{FINE, Knot, Sweep};
+use crate::fault::Fault;
+use crate::field::Field;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+
+impl Sweep {
+    /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at
+    /// most the least radius of curvature and half the width of the narrowest bottleneck. Open lines are followed `far` (mm)
+    /// beyond their ends.
+    pub(super) fn found_reach(&self, far: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut all = self.knots.clone();
+        let ends = [(0, -1.0), (self.knots.len() - 1, 1.0)];
+        for (end, sign) in ends.into_iter().filter(|_| !self.closed) {
+            let k = self.knots[end];
+            let way = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
+            all.extend((1..=8 * FINE).map(|i| Knot {
+                place: add(k.place, scale(k.tangent, way(i))),
+                ..k
+            }));
+        }
+        for k in &self.knots {
+            let (_, slope, second) = self.curve(k.t);
+            let bend = norm(cross(slope, second)) / norm(slope).powi(3);
+            least = least.min(1.0 / bend.max(1e-300));
+        }
+        for k in &all {
+            for q in &all {
+                let way = sub(q.place, k.place);
+                let off = norm(cross(way, k.tangent));
+                if off > 1e-9 * self.length {
+                    least = least.min(dot(way, way) / (2.0 * off));
+                }
+            }
+        }
+        // Between the knots it may be a little less.
+        0.9 * least
+    }
+
+    /// Refuses a map that folds or tears at places in the region.
+    pub(super) fn refuse_folds(&mut self, region: &dyn Field, looks: &[Vec3]) -> Result<(), Fault> {
+        let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
+        let fold = |p: Vec3, radius: f64| {
+            let message = format!(
+                "the lattice folds at {}: the line bends there with a radius of {radius:.3} mm, and the region reaches its \
+                 centre; bend the line less, or keep the region nearer to it",
+                at(p)
+            );
+            Err(Fault::new("points", message))
+        };
+        for k in &self.knots {
+            let (c, first, second) = self.curve(k.t);
+            let speed = norm(first);
+            let bend = scale(
+                sub(second, scale(k.tangent, dot(second, k.tangent))),
+                1.0 / (speed * speed),
+            );
+            let bent = norm(bend);
+            let center = add(c, scale(bend, 1.0 / (bent * bent)));
+            if bent > 1e-9 / self.length && region.value(center) <= 0.0 {
+                let own = norm(sub(center, c)) <= self.away(center) * (1.0 + 1e-6);
+                if own {
+                    return fold(center, 1.0 / bent);
+                }
+            }
+        }
+        let mut range: [Option<(f64, Vec3)>; 2] = [None; 2];
+        let h = 0.125
+            * self
+                .wavelength
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min);
+        for p in looks {
+            let own = self.local(*p);
+            if own.room <= 0.0 {
+                return fold(*p, self.reach);
+            }
+            for (r, better) in range.iter_mut().zip([f64::lt, f64::gt]) {
+                if r.is_none_or(|r| better(&own.room, &r.0)) {
+                    *r = Some((own.room, *p));
+                }
+            }
+            for a in 0..3 {
+                let mut q = *p;
+                q[a] += h;
+                if region.value(q) > 0.0 {
+                    continue;
+                }
+                let other = self.local(q);
+                let mut way = (other.s - own.s).abs();
+                if self.closed {
+                    way = way.min(self.length - way);
+                }
+                // A step moves s by no more than it is long over the room there is.
+                if way > 4.0 * h / own.room.min(other.room).max(1e-3) {
+                    let message = format!(
+                        "the lattice tears at {}: two places of the line are as near, {way:.3} mm apart along it; keep the \
+                         region nearer to the line, or the line farther from itself",
+                        at(*p)
+                    );
+                    return Err(Fault::new("points", message));
+                }
+            }
+        }
+        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.knots[0].place)));
+        self.along = [least.0, most.0].map(|r| r * self.wavelength[2]);
+        self.extremes = [least.1, most.1].map(|p| self.jacobian(p));
+        Ok(())
+    }
+}
