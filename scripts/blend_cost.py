@@ -1,4 +1,4 @@
-"""Writes docs/generated/blend_cost.md: the processor time of blends against that of their lattices, each filling the part alone."""
+"""Writes docs/generated/blend_cost.md: what blends cost, against their lattices each filling the part alone."""
 
 import time
 import warnings
@@ -72,9 +72,9 @@ def main():
     text = [
         "# What blends cost",
         "",
-        "Written by `scripts/blend_cost.py`: a bar of 48 × 24 × 24 mm, cells of 4 to 5 mm, an edge of 0.2 mm, one thread, processor",
-        "time of building and meshing. The ratio is that of the blend to the sum of its lattices, each filling the bar alone; the",
-        "share is that of the bar in which more than one lattice counts.",
+        "Written by `scripts/blend_cost.py`: a bar of 48 × 24 × 24 mm, cells of 4 to 5 mm, an edge of 0.2 mm, one thread,",
+        "processor time of building and meshing. The ratio is that of the blend to the sum of its lattices, each filling the",
+        "bar alone; the share is that of the bar in which more than one lattice counts.",
         "",
         "| blend | alone, s | " + " | ".join(f"ratio, {w}" for w in WIDTHS) + " |",
         "|---|---|---|---|",

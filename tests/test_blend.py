@@ -239,9 +239,7 @@ def test_check_tells_and_draws_the_transitions(tmp_path):
 def test_a_lattice_over_tetrahedra_takes_part():
     """Walls in tetrahedra pass into a network; without a blend they stand alone."""
     lattices = {
-        "a": lt.Lattice(
-            lt.cell.tet("primitive"), "upper", lt.map.tets(size=5), lt.level.fraction(0.45)
-        ),
+        "a": lt.Lattice(lt.cell.tet("primitive"), "upper", lt.map.tets(size=5), lt.level.fraction(0.45)),
         "b": lt.Lattice("gyroid", "upper", lt.map.affine(wavelength=4.0), lt.level.fraction(0.3)),
     }
     box = lt.region.box(size=[32, 12, 12])
