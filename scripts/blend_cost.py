@@ -1,4 +1,4 @@
-"""Writes docs/generated/blend_cost.md: what blends cost, against their lattices each filling the part alone."""
+"""Writes docs/generated/blend_cost.md: the processor time of blends against that of their lattices."""
 
 import time
 import warnings

@@ -378,3 +378,65 @@ def test_the_command(tmp_path):
     assert json.loads(out)["beams"]["core"]["smallest_angle"] == pytest.approx(60)
     status, out, _ = run("mesh", file, "-o", tmp_path / "d.stl", "--edge", 0.3, "--json")
     assert status == 0 and json.loads(out)["pieces"] == 1
+
+
+def whole(**beams):
+    """Octet beams in a box that does not cut them."""
+    box = lt.region.box(min=[-1, -1, -1], max=[21, 21, 21])
+    given = {"cell": "octet", "radius": 0.6, "fillet": "auto", "trim": "drop", "map": lt.map.affine(wavelength=10)}
+    return built(region=box, **(given | beams))
+
+
+def test_exact_figures_are_those_of_the_mesh_and_of_the_grid():
+    """Both roads come to the exact volume, area, centroid and inertia: the patches in proportion to the chord error."""
+    import judges
+
+    solid = whole()
+    exact = told(solid)
+    assert np.allclose(exact["centroid"], [10, 10, 10], atol=1e-9)
+    inertia = np.array(exact["inertia"])
+    # A cube's symmetry leaves one number.
+    assert np.allclose(inertia, inertia[0, 0] * np.eye(3), atol=1e-8 * inertia[0, 0])
+    off = []
+    for chord in (0.04, 0.01):
+        mesh = solid.mesh(chord=chord)
+        assert mesh.closed and mesh.pieces == 1 and mesh.self_intersections == 0
+        assert abs(judges.sound(mesh) / mesh.volume - 1) < 1e-6
+        # Sides within the chord error, triangles within 1.2 of it.
+        assert mesh.chord_error <= 1.2 * chord
+        off.append(abs(mesh.volume - exact["volume"]))
+        # What lies between surfaces that near to each other.
+        assert off[-1] < 1.1 * mesh.chord_error * exact["area"]
+    assert off[1] < off[0] / 3
+    grid = solid.mesh(edge=0.15)
+    # A radius is four steps of the grid, whose volume is of fourth order or, over seams of fillets, of third.
+    assert abs(grid.volume / exact["volume"] - 1) < 2e-3
+
+
+GYROID = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=4.0), level=lt.level.fraction(0.3))
+FRAME = {"nodes": SQUARE, "struts": RING, "radius": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("design", "why"),
+    [
+        (lambda: built(cell="octet", radius=0.3, map=lt.map.affine(wavelength=4)), "the region cuts some"),
+        (lambda: lt.Design(region=BOX, beams=lt.Beams(**FRAME), skin={"thickness": 0.5}).build(), "a skin or a kept zone"),
+        (lambda: lt.Design(region=BOX, lattice={"core": GYROID}).build(), "not one graph of beams"),
+    ],
+)
+def test_a_chord_error_is_for_uncut_beams_alone(design, why):
+    """What cannot be had is refused with the reason and the other road."""
+    with pytest.raises(ValueError, match=why):
+        design().mesh(chord=0.01)
+
+
+def test_a_chord_error_takes_the_place_of_a_spacing():
+    """One resolution, a length, and pieces that are not looked for."""
+    solid = whole()
+    for given in ({"edge": 0.1}, {"per_cell": 20}, {"islands": "drop"}):
+        with pytest.raises(ValueError, match="chord"):
+            solid.mesh(chord=0.01, **given)
+    for chord in (0, -1, float("nan")):
+        with pytest.raises(ValueError, match="chord"):
+            solid.mesh(chord=chord)

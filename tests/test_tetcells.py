@@ -105,10 +105,10 @@ def test_the_command_lists_them():
 def test_zones_pass_into_each_other_and_keep_the_fraction():
     """Zones by region on the background mesh: told apart, one piece, and as full as asked, also between them."""
     half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
-    solid = design(lt.cell.tet(zones={0: "primitive", 1: "diamond"}), level=lt.level.fraction(0.3), zones={1: half}).build()
+    solid = design(lt.cell.tet(zones={0: "p43m", 1: "f43m"}), level=lt.level.fraction(0.3), zones={1: half}).build()
     report = solid.report()["lattices"]["a"]
     zones = report["tets"]["zones"]
-    assert [z["cell"] for z in zones.values()] == ["primitive", "diamond"]
+    assert [z["cell"] for z in zones.values()] == ["p43m", "f43m"]
     assert sum(z["count"] for z in zones.values()) == report["tets"]["count"]
     # Levels settle until the tetrahedra about each node are within 0.001.
     assert report["fraction"] == pytest.approx(0.3, abs=2e-3)
@@ -118,7 +118,7 @@ def test_zones_pass_into_each_other_and_keep_the_fraction():
     assert mesh.closed and mesh.pieces == 1
     # Second order in the steps of the surface, of which there are twenty to an edge.
     assert mesh.volume == pytest.approx(0.3 * report["tets"]["volume"], rel=0.02)
-    far = lt.region.box(size=1, center=[50, 0, 0])
+    far = lt.region.box(size=[1, 1, 1], center=[50, 0, 0])
     with pytest.raises(lt.DesignError, match="no tetrahedron's middle"):
         design(lt.cell.tet(zones={0: "iwp", 1: "diamond"}), zones={1: far}).build()
     with pytest.raises(lt.DesignError, match="which has no cell"):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .design import Beams, Design, Lattice, load, skin
     from .errors import DesignError, DesignWarning
     from .mesh import Mesh
+    from .quadors import Quadors, Slice
     from .solid import Solid, Voxels, fraction, iso, spartan
     from .tets import TetMesh
     from .thickness import Thickness
@@ -33,6 +34,8 @@ __all__ = [
     "DesignWarning",
     "Lattice",
     "Mesh",
+    "Quadors",
+    "Slice",
     "Solid",
     "TetMesh",
     "Thickness",
@@ -63,6 +66,8 @@ _HOMES = {
     "DesignError": "errors",
     "DesignWarning": "errors",
     "Mesh": "mesh",
+    "Quadors": "quadors",
+    "Slice": "quadors",
     "Solid": "solid",
     "TetMesh": "tets",
     "Thickness": "thickness",

@@ -55,6 +55,17 @@ def length(text: str) -> float:
     return value
 
 
+def height(text: str) -> float:
+    """A height in mm."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a height in mm, found {text!r}")
+    return value
+
+
 def samples(text: str) -> float:
     """Samples on a wavelength."""
     try:
@@ -137,12 +148,16 @@ def parser() -> argparse.ArgumentParser:
         )
         return made
 
-    def resolution(p: argparse.ArgumentParser, word: str = "--edge") -> None:
+    def resolution(p: argparse.ArgumentParser, word: str = "--edge", chord: bool = False) -> None:
         either = p.add_mutually_exclusive_group()
         either.add_argument(word, type=length, metavar="MM", dest="edge", help="grid spacing in mm")
         either.add_argument(
             "--per-cell", type=samples, metavar="N", help="grid spacing as the smallest wavelength / N (default: 32)"
         )
+        if chord:
+            either.add_argument(
+                "--chord", type=length, metavar="MM", help="no grid: how far triangles may be from uncut beams alone, in mm"
+            )
         p.add_argument("--threads", type=count, metavar="N", help="threads (default: all); the result is the same")
         progress(p)
 
@@ -189,11 +204,12 @@ def parser() -> argparse.ArgumentParser:
         "what lies on the region's boundary: the lattice's own surface, for shells; no solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
-        "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01",
+        "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01\n"
+        "  trabecula mesh beams.toml -o beams.stl --chord 0.01",
     )
     p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json)")
     p.add_argument("-o", "--output", required=True, type=ending(MESH_OUT), metavar="OUT", help="the mesh to write")
-    resolution(p)
+    resolution(p, chord=True)
     p.add_argument(
         "--islands",
         choices=("keep", "drop", "error"),
@@ -245,6 +261,19 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--unit", choices=UNITS, help="the unit of a file's coordinates (default: mm)")
     p.add_argument("--split", action="store_true", help="cut a file's hexahedra, wedges and pyramids into tetrahedra")
     p.add_argument("--threads", type=count, metavar="N", help="threads (default: all); the result is the same")
+    p.add_argument("--json", action="store_true", help="print the figures as JSON on stdout")
+
+    p = command(
+        "slice",
+        "Slice the beams of a design at a height: loops of conic arcs, their exact area, a drawing.",
+        "The beams alone are sliced, as far as they reach: without the region that cuts them, and without a skin.\n\n"
+        "examples:\n  trabecula slice part.toml --z 5\n  trabecula slice part.toml --z 5 -o layer.svg --chord 0.005",
+    )
+    p.add_argument("design", type=ending(DESIGNS), metavar="DESIGN", help="a design file (.toml or .json) with beams")
+    p.add_argument("--z", type=height, required=True, metavar="MM", help="the height of the plane, mm")
+    p.add_argument("--beams", metavar="NAME", help="the beams that are meant (needed only if there are several)")
+    p.add_argument("-o", "--output", type=ending(("svg",)), metavar="OUT", help="the drawing to write (.svg)")
+    p.add_argument("--chord", type=length, default=0.01, metavar="MM", help="how far the drawing may be off (default: 0.01)")
     p.add_argument("--json", action="store_true", help="print the figures as JSON on stdout")
 
     p = command(
@@ -365,7 +394,7 @@ def serve(argv: list[str] | None) -> int:
 
 def told(error: Exception) -> str:
     """What is said of an error, in one line."""
-    from .commands import Refused
+    from .errors import Refused
 
     if isinstance(error, OSError) and error.filename:
         return f"{os.fsdecode(error.filename)}: {error.strerror}"

@@ -6,29 +6,37 @@ import json
 import os
 import time
 import warnings
-from difflib import get_close_matches
 
-from . import _core, beams, cell
+from . import _core, cell
 from .design import load
-from .errors import DesignError, DesignWarning
+from .errors import DesignError, DesignWarning, Refused
 from .input import read_text
+from .listings import cells, known_cell
 from .machine import fits
 from .mesh import READS, Mesh
 from .output import check_place, whole_file
 from .solid import Solid
 from .starter import STARTER
-from .transition import off
+from .telling import (
+    ABSENT,
+    counted,
+    flaws,
+    listed,
+    tell_beams,
+    tell_blend,
+    tell_distortion,
+    tell_tets,
+    tell_tiling,
+    tell_transitions,
+    tell_voids,
+)
 from .words import Progress, figure, say, span
 
-__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "tets", "voxels"]
+__all__ = ["Refused", "cells", "check", "measure", "mesh", "new", "render", "simplify", "slice", "tets", "voxels"]
 
 DESIGNS = ("toml", "json")
 #: How far a solved map is from what was asked for: names on the scale of a picture.
 SHOWN = {"angle": "angle off, degrees", "spacing": "spacing off, ratio", "density": "cells for each one wanted"}
-
-
-class Refused(Exception):
-    """A file or a request that cannot be served: one line, exit status 1."""
 
 
 def new(args) -> None:
@@ -80,96 +88,6 @@ def check(args) -> None:
         tell_blend(report["blend"])
 
 
-def tell_beams(name: str, it: dict) -> None:
-    """What a graph of beams is."""
-    least, most = it["hub_radius"]
-    if "repeats" in it:
-        times = " × ".join(map(str, it["repeats"]))
-        print(f"beams {name}: a pattern of {times}, {it['hubs']:.9g} hubs of {it['kinds']} kinds, {it['beams']:.9g} beams")
-        print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
-        print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
-        print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
-        return
-    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
-    low, high = it["length"]
-    print(f"  length     {span(low if low == high else [low, high])} mm, {figure(it['total_length'])} mm in all")
-    print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
-    print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
-    if it["fillet_radius"]:
-        tight, wide = it["fillet_radius"]
-        print(f"  fillets    radius {span(tight if tight == wide else [tight, wide])} mm in the tightest places")
-    print(f"  valence    {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}")
-    if it["smallest_angle"] is not None:
-        x, y, z = map(figure, it["smallest_angle_at"])
-        print(f"  angle      {it['smallest_angle']:.1f}° at least, at ({x}, {y}, {z}) mm")
-    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
-    done = {"cleaned": it["cleaned"], "trimmed": it["trimmed"]}
-    for what, counts in done.items():
-        told = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
-        if told:
-            print(f"  {what}    {', '.join(told)}")
-    print(f"  pieces     {it['pieces']}; {it['dangling']} nodes with a free end")
-
-
-def tell_tiling(t: dict) -> None:
-    """The mesh under a tetrahedral lattice, its walls and its creases."""
-    print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
-    for zone, it in (t["zones"] or {}).items():
-        print(f"  zone {zone}     {it['cell']} in {it['count']} tetrahedra; solid fraction {it['solid_fraction']:.4f}")
-    if t["ports"] is not None:
-        ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
-        print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
-    if t["thickness"]:
-        w = t["thickness"]
-        print(f"  walls      {figure(w['mean'])} mm on average, 90 % between {figure(w['low'])} and {figure(w['high'])} mm")
-    if t["creases"]:
-        c = t["creases"]
-        smooth = " (before smoothing)" if t["overlap"] else ""
-        print(f"  creases    {c['mean']:.0f}° on average, {c['max']:.0f}° at most at the faces of tetrahedra{smooth}")
-
-
-def tell_blend(blend: dict) -> None:
-    """A blend and its transitions."""
-    phases = f", phases {blend['phases']}" if blend["phases"] else ""
-    print(f"blend of {', '.join(blend['lattices'])} by {blend['by']}{phases}")
-    for it in blend["rbf"]:
-        print(f"  {it['path']}: {it['points']} points, delta {figure(it['delta'])} mm, condition {it['condition']:.2g}")
-    tell_transitions(blend["transitions"])
-
-
-def tell_transitions(found) -> None:
-    """How lattices pass into each other."""
-    for it in found:
-        print(f"transition {it['between'][0]} to {it['between'][1]}: {figure(it['volume'])} mm³")
-        rows = it["fractions"]
-        worst = off(it)
-        told = "" if worst is None else f", off by {worst:+.4f} at most"
-        print(f"  fraction   {span([min(r['found'] for r in rows), max(r['found'] for r in rows)])}{told}")
-        print(f"  pieces     {it['pieces']}")
-        neck = it["neck"]
-        text = "none: no way leads across"
-        if neck:
-            text = (
-                f"{neck['diameter']:.3g} mm at ({', '.join(figure(v) for v in neck['place'])}) mm, the widest way's narrowest"
-            )
-        print(f"  neck       {text}")
-        for word in ("loose", "dangling"):
-            text = f"{it[word]['bodies']}" + (f", {figure(it[word]['volume'])} mm³" if it[word]["bodies"] else "")
-            print(f"  {word:10} {text}")
-
-
-def tell_distortion(d: dict) -> None:
-    """How far a solved map is from what was asked for: three axes' angles and spacings, mean and greatest."""
-    worst = max(d["angle"], key=lambda a: a["max"])
-    print(f"  angle      off by {worst['mean']:.1f}° on average, {worst['max']:.1f}° at most, along the worst axis")
-    farthest = max(d["spacing"], key=lambda s: abs(s["max"] - 1))
-    print(
-        f"  spacing    {farthest['mean']:.2f} of what was asked for on average, up to {farthest['max']:.2f}; "
-        f"{100 * d['outside']:.1f} % outside 1/1.5 to 1.5"
-    )
-    print(f"  turn       {d['turn']:.1f}° per cell at most")
-
-
 def mesh(args) -> None:
     """``trabecula mesh``."""
     check_place(args.output)
@@ -180,7 +98,16 @@ def mesh(args) -> None:
     with Progress("meshing", args.progress) as progress:
         lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
         streams = not (any(lighter.values()) or args.open)
-        if kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
+        if args.chord is not None:
+            surface = solid.mesh(threads=args.threads, progress=progress, **options)
+            told = {"chord": args.chord, "chord_error": surface.chord_error}
+            if any(lighter.values()):
+                progress.clear()
+                surface = simplified(surface, args)
+            made = surface._summary() | told
+            progress.clear()
+            surface.write(args.output)
+        elif kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
         else:
             if not any(lighter.values()):
@@ -199,13 +126,13 @@ def mesh(args) -> None:
                 say("open at the region's boundary: volume and fraction are the closed part's")
             surface.write(args.output)
             tell_voids(made["voids"])
-    edge = solid.spacing(**resolved(args))
+    edge = solid.spacing(args.edge, args.per_cell)
     made["solid_fraction"] = made["volume"] / region_volume(solid, edge)
-    made["edge"] = edge
+    made["edge"] = None if args.chord is not None else edge
     made["bytes"] = os.path.getsize(args.output)
     made["seconds"] = round(time.perf_counter() - start, 3)
     left_out = made["islands"]
-    if left_out["dropped"]:
+    if left_out and left_out["dropped"]:
         place = ", ".join(figure(v) for v in left_out["largest"]["place"])
         say(
             f"{counted(left_out['dropped'])} dropped: {left_out['volume']:.3g} mm³ in all, {left_out['border']} at the "
@@ -213,9 +140,10 @@ def mesh(args) -> None:
         )
     if args.json:
         return print(json.dumps(made, indent=2))
+    size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
-        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; edge {edge:g} mm, "
+        f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
         f"{made['seconds']:.2f} s"
     )
 
@@ -336,21 +264,6 @@ def measure(args) -> None:
         tell_voids(figures["voids"])
 
 
-#: What is said where a figure is missing for another reason than that there is no region.
-ABSENT = {"quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
-
-
-def listed(figures: dict) -> list[tuple]:
-    """The figures line by line: those of a group under its name, without histograms."""
-    lines: list[tuple] = []
-    for key, value in figures.items():
-        if key == "voids":
-            continue
-        group = value.items() if isinstance(value, dict) else None
-        lines += [(f"{key}.{k}", v) for k, v in group if k != "histogram"] if group else [(key, value)]
-    return lines
-
-
 def keep_measured(args) -> None:
     """Refuses a histogram that would replace what is measured."""
     for name in filter(None, (args.file, args.region)):
@@ -370,96 +283,30 @@ def closes(solid: Solid, options: dict) -> bool:
     return True
 
 
-#: Voids that are told one by one.
-LISTED = 20
+def slice(args) -> None:
+    """``trabecula slice``."""
+    import numpy  # noqa: F401  wanted by drawings; see `interrupt` for why no import waits until then
 
-
-def tell_voids(voids: list[dict]) -> None:
-    """Warns of closed voids: powder and resin stay in them."""
-    if not voids:
-        return
-
-    def place(void: dict) -> str:
-        return "(" + ", ".join(figure(v) for v in void["point"]) + ") mm"
-
-    total = figure(sum(v["volume"] for v in voids))
-    if len(voids) == 1:
-        return say(f"warning: one closed void of {total} mm³ at {place(voids[0])}: powder or resin cannot drain from it")
-    listed = ", ".join(f"{figure(v['volume'])} mm³ at {place(v)}" for v in voids[:LISTED])
-    more = f", and {len(voids) - LISTED} smaller ones" if len(voids) > LISTED else ""
-    say(
-        f"warning: {len(voids)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "
-        f"Largest first: {listed}{more}"
-    )
-
-
-def flaws(mesh: Mesh) -> str:
-    """What keeps a mesh from being closed."""
-    kinds = ("with one triangle", "with more than two", "with two of the same direction")
-    found = [f"{n} edge{'s' if n > 1 else ''} {kind}" for n, kind in zip(mesh._core.flaws(), kinds, strict=True) if n]
-    return ", ".join(found) or "triangles with a corner twice"
-
-
-def cells(args) -> None:
-    """``trabecula cells``."""
-    if args.tet:
-        return tet_cells(args)
-    if args.beams:
-        return beam_cells(args)
-    listed = _core.cells()
-    if args.name:
-        known_cell(args.name, [c[0] for c in listed])
-        listed = [c for c in listed if c[0] == args.name]
-    facts = []
-    for name, title, formula, group, source in listed:
-        span_, parts = _core.cell_facts(name)
-        facts.append(
-            {
-                "name": name,
-                "title": title,
-                "formula": formula,
-                "group": group,
-                "range": list(span_),
-                "connected_fraction": {part: [list(w) for w in whole] for part, whole in parts},
-                "source": source,
-            }
-        )
+    if args.output:
+        check_place(args.output)
+        keep_file(args.design, args.output)
+    quadors = build(args.design, tell=not args.json).quadors(args.beams)
+    start = time.perf_counter()
+    cut = quadors.slice(args.z)
+    seconds = round(time.perf_counter() - start, 3)
+    if args.output:
+        cut.write(args.output, args.chord)
+    curves = sum(len(it["weights"]) for it in cut.loops)
+    figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
+    figures |= {"moved": cut.moved, "seconds": seconds}
     if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
-    for it in facts:
-        print(f"{it['name']}  ({it['title']})")
-        print(f"  f       {it['formula']}")
-        print(f"  group   {it['group']}")
-        print(f"  range   {it['range'][0]:.6g} to {it['range'][1]:.6g}")
-        for part, whole in it["connected_fraction"].items():
-            text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
-            print(f"  {part:7} in one piece at fractions {text}")
-        print(f"  source  {it['source']}")
-
-
-def tet_cells(args) -> None:
-    """``trabecula cells --tet``."""
-    names = _core.tet_cells()
-    if args.name:
-        known_cell(args.name, names)
-        names = [args.name]
-    facts = [cell.tet_facts(name) for name in names]
-    if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
-    for it in facts:
-        terms = ", ".join(
-            f"{t['amplitude']:g} {t['component'].title()} ({' '.join(str(h) for h in t['hkl'])})" for t in it["terms"]
-        )
-        dual = ", dual" if it["dual"] else ""
-        print(f"{it['name']}  ({it['title']})")
-        print(f"  series  group {it['group']}: {terms}")
-        print(f"  tetrahedron of edge {it['edge']:.4f} cells about {it['site'][0]:g} {it['site'][1]:g} {it['site'][2]:g}{dual}")
-        print(f"  part    {it['part']} at fraction {it['fraction']:g} (iso {it['iso']:.4f})")
-        ports = "1 port" if it["ports"] == 1 else f"{it['ports']} ports"
-        print(f"  faces   {ports} on each, {100 * it['face_fraction']:.1f} % of it")
-        for part, whole in it["connected_fraction"].items():
-            text = " and ".join(f"{a:.4f} to {b:.4f}" for a, b in whole) or "never"
-            print(f"  {part:7} in one piece that reaches all faces at fractions {text}")
+        return print(json.dumps(figures, indent=2))
+    print(f"area   {figure(cut.area)} mm², exact")
+    print(f"loops  {len(cut.loops)}, of {curves} arcs of conics; {cut.hubs} of {len(quadors)} hubs looked at")
+    if cut.moved:
+        print(f"moved  by {cut.moved:g} mm: the plane would touch the surface without cutting it")
+    if args.output:
+        say(f"{args.output}: written, {args.chord:g} mm off at most")
 
 
 def tets(args) -> None:
@@ -489,41 +336,6 @@ def tets(args) -> None:
         say(f"{args.output}: {report['quality']['tets']} tetrahedra, {report['seconds']:.2f} s")
 
 
-def tell_tets(report: dict) -> None:
-    """The figures of a tetrahedral mesh."""
-    q, fit = report["quality"], report["fit"]
-    extent = " × ".join(figure(b - a) for a, b in zip(*q["bounds"], strict=True))
-    size, angles, aspect = q["size"], q["dihedral"], q["aspect"]
-    print(f"tetrahedra  {q['tets']}, {q['nodes']} nodes, {counted(q['pieces'])}, by {report['mesher']}")
-    print(f"extent      {extent} mm, {figure(q['volume'])} mm³")
-    print(f"size        {figure(size['mean'])} mm on average, {figure(size['min'])} to {figure(size['max'])} mm")
-    inner = f"9 in 10 tetrahedra lie between {angles['min_p05']:.1f}° and {angles['max_p95']:.1f}°"
-    print(f"dihedral    {angles['min']:.1f}° to {angles['max']:.1f}°; {inner}")
-    print(f"aspect      {aspect['mean']:.2f} on average, {aspect['max']:.2f} at most (1 is regular)")
-    print(f"slivers     {q['slivers']} below 10° or above 170°; {q['inverted']} inverted")
-    if fit:
-        print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {fit['deviation']:.2g} mm at most")
-        print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
-
-
-def beam_cells(args) -> None:
-    """``trabecula cells --beams``."""
-    facts = beams.cells()
-    if args.name:
-        known_cell(args.name, [it["name"] for it in facts])
-        facts = [it for it in facts if it["name"] == args.name]
-    if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
-    for it in facts:
-        print(f"{it['name']}  ({it['title']})")
-        print(f"  group    {it['group']}")
-        print(f"  cell     {len(it['nodes'])} nodes, {len(it['struts'])} beams of {figure(it['length'])} edges in all")
-        print(f"  valence  {', '.join(f'{n} of {v}' for v, n in it['valence'].items())}")
-        print(f"  Maxwell  {it['maxwell']:+d}")
-        if it["aspect"] != [1.0, 1.0, 1.0]:
-            print(f"  edges    in the ratio {' : '.join(figure(v) for v in it['aspect'])} for its usual shape")
-
-
 def render(args) -> None:
     """``trabecula render``."""
     check_place(args.output)
@@ -544,19 +356,6 @@ def render(args) -> None:
 
 
 # --- what they share -------------------------------------------------------------------------------------------------
-
-
-def known_cell(name: str, known: list[str]) -> None:
-    """Refuses the name of no cell."""
-    if name not in known:
-        near = get_close_matches(name, known, 1)
-        hint = f'; did you mean "{near[0]}"?' if near else "."
-        raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
-
-
-def counted(pieces: int) -> str:
-    """A number of pieces."""
-    return "1 piece" if pieces == 1 else f"{pieces} pieces"
 
 
 def kind_of(path: str) -> str:
@@ -609,6 +408,8 @@ def build(path: str, tell: bool = True) -> Solid:
 
 def resolved(args) -> dict:
     """The resolution that was asked for."""
+    if getattr(args, "chord", None) is not None:
+        return {"chord": args.chord}
     if args.edge is not None:
         return {"edge": args.edge}
     return {"per_cell": 32 if args.per_cell is None else args.per_cell}

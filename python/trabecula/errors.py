@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["DesignError", "DesignWarning"]
+__all__ = ["DesignError", "DesignWarning", "Refused"]
 
 
 class DesignError(ValueError):
@@ -35,3 +35,7 @@ class DesignError(ValueError):
 
 class DesignWarning(UserWarning):
     """Something in a design that is allowed but may not be meant."""
+
+
+class Refused(Exception):
+    """A file or a request that cannot be served: one line, exit status 1."""

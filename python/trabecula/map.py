@@ -57,9 +57,9 @@ def phase(
     Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
     ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
     components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``weight`` says how much it
-    matters where: what no map can follow is left to where it is small. ``angle_weight`` is what an error of angle counts
-    for the same error of spacing: above 1 cells are nearer to their directions, below 1 to their sizes. ``step`` is the
-    spacing in mm of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
+    matters where: what no map can follow is left to where it is small. ``angle_weight`` is what an error of angle counts for
+    the same error of spacing: above 1 cells are nearer to their directions, below 1 to their sizes. ``step`` is the spacing
+    in mm of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
     """
     given = settings(
         wavelength=wavelength,

@@ -76,11 +76,13 @@ class Mesh(Picture):
         region: _core.Region | None = None,
         edge: float | None = None,
         islands: dict | None = None,
+        chord_error: float | None = None,
     ):
         self._core = core
         self._region = region
         self._edge = edge
         self._islands = islands
+        self._chord_error = chord_error
         self._simplification: dict | None = None
 
     @staticmethod
@@ -247,6 +249,13 @@ class Mesh(Picture):
     def pieces(self) -> int:
         """Number of separate solids; a cavity is not a piece."""
         return self._figures["pieces"]
+
+    @property
+    def chord_error(self) -> float | None:
+        """How far a mesh made by ``Solid.mesh(chord=...)`` is from the surface (mm), to first order, at thirds and quarters
+        of its triangles; None for others.
+        """
+        return self._chord_error
 
     @property
     def islands(self) -> dict | None:

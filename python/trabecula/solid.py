@@ -18,6 +18,7 @@ from .islands import Islands, check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
+from .quadors import Quadors
 from .thickness import Thickness
 from .transition import Transitions
 
@@ -80,6 +81,15 @@ class Solid(Picture):
         that each beam joins.
         """
         return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
+
+    def quadors(self, name: str | None = None) -> Quadors:
+        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries."""
+        if name is None:
+            names = list(self.beams)
+            if len(names) != 1:
+                raise ValueError(f"name the beams that are meant: there are {', '.join(names) or 'none'}")
+            name = names[0]
+        return Quadors(self._core.quadors(name))
 
     def report(self) -> dict:
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``, and
@@ -205,6 +215,7 @@ class Solid(Picture):
         threads: int | None = None,
         progress: Progress | None = None,
         islands: Islands = "keep",
+        chord: float | None = None,
     ) -> Mesh:
         """The surface as a closed mesh.
 
@@ -213,8 +224,19 @@ class Solid(Picture):
 
         ``islands``: what becomes of all pieces but the largest. ``"keep"`` leaves them, with a warning; ``"drop"`` leaves
         them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
+
+        ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
+        the beams' and fillets' own patches and stay within so many mm of them; ``Mesh.chord_error`` is how near they came.
+        All pieces are kept.
         """
         check_islands(islands)
+        if chord is not None:
+            if edge is not None or per_cell is not None:
+                raise ValueError("give a chord error or the spacing of a grid, not both")
+            if islands != "keep":
+                raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
+            core, error = self._core.mesh_beams(positive("chord", chord), _threads(threads), progress)
+            return Mesh(core, self._core.region, chord_error=error)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.

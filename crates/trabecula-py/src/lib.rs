@@ -8,6 +8,7 @@ mod file;
 mod islands;
 mod machine;
 mod mesh;
+mod quadors;
 mod run;
 mod solid;
 mod tets;
@@ -42,6 +43,8 @@ mod _core {
     use crate::design::Design;
     #[pymodule_export]
     use crate::mesh::Mesh;
+    #[pymodule_export]
+    use crate::quadors::{Quadors, Slice};
     #[pymodule_export]
     use crate::solid::{Region, Solid, Voxels};
     #[pymodule_export]

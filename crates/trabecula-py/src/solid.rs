@@ -21,6 +21,7 @@ use crate::error;
 use crate::file;
 use crate::islands;
 use crate::mesh::Mesh;
+use crate::quadors::Quadors;
 use crate::run::run;
 
 /// A region and the lattice in it.
@@ -50,7 +51,7 @@ type Graph<'py> = (
 );
 
 /// Points of Python (n, 3) as the core's.
-fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
     let a = p.as_array();
     if a.ncols() != 3 {
         return Err(PyValueError::new_err(format!(
@@ -188,6 +189,21 @@ impl Solid {
         self.built.beams.iter().map(graph).collect()
     }
 
+    /// The beams of a name as quadrics.
+    fn quadors(&self, name: &str) -> PyResult<Quadors> {
+        match self.built.beams.iter().find(|b| b.0 == name) {
+            Some((_, Beams::Truss(truss))) => Ok(Quadors {
+                quadors: truss.quadors.clone(),
+            }),
+            Some((_, Beams::Pattern(_))) => Err(PyValueError::new_err(format!(
+                "beams.{name} is a pattern, which is not held hub by hub: write it out as Beams(nodes=…, struts=…) from Solid.beams"
+            ))),
+            None => Err(PyValueError::new_err(format!(
+                "there are no beams named {name}"
+            ))),
+        }
+    }
+
     /// Values at points (n, 3): negative in the solid.
     fn field<'py>(
         &self,
@@ -257,6 +273,24 @@ impl Solid {
         let mesh = Mesh::new(surface, self.design.clone());
         let (told, words) = islands::told(py, &pieces)?;
         Ok((mesh, told, words))
+    }
+
+    /// The surface of beams alone, from their patches, within `chord` (mm) of them; and how far it is from them, mm.
+    #[pyo3(signature = (chord, threads=None, progress=None))]
+    fn mesh_beams(
+        &self,
+        py: Python<'_>,
+        chord: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Mesh, f64)> {
+        let made = run(py, threads, progress, |_| {
+            self.built.lone_beams()?.mesh(chord)
+        })?;
+        let (mesh, error) = made.map_err(error::fault)?;
+        let cut = vec![false; mesh.triangles.len()];
+        let surface = extract::Surface { mesh, cut };
+        Ok((Mesh::new(surface, self.design.clone()), error))
     }
 
     /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume, areas and

@@ -35,9 +35,11 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
+use crate::fault::Fault;
 use crate::io::Elements;
 use crate::lattice::Lattice;
 use crate::mesh::Mesh;
+use crate::quador::Quadors;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
 use crate::tets::TetMesh;
@@ -255,6 +257,14 @@ impl Built {
     /// which the wall folds, else null.
     pub fn report(&self) -> Json {
         report::report(self)
+    }
+
+    /// The beams that the whole design is, whose surface can be meshed without a grid.
+    ///
+    /// # Errors
+    /// What else there is: lattices, a blend, a skin or kept zones, a pattern, a region that cuts the beams.
+    pub fn lone_beams(&self) -> Result<&Quadors, Fault> {
+        beams::alone(self)
     }
 
     /// The transitions between the lattices of a blend, as JSON: for each the two names (`between`), `volume`, `pieces` (`loose`

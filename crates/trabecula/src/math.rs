@@ -119,6 +119,40 @@ pub fn spectral_norm(m: &Mat3) -> f64 {
     a[0][0].max(a[1][1]).max(a[2][2]).max(0.0).sqrt()
 }
 
+/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
+pub fn eigen(m: &Mat3) -> (Vec3, Mat3) {
+    let mut a = *m;
+    let mut vectors = IDENTITY;
+    for _ in 0..16 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q].abs() <= 1e-18 * (a[p][p].abs() + a[q][q].abs()) {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = if theta < 0.0 { -1.0 } else { 1.0 } / (theta.abs() + theta.hypot(1.0));
+            let c = 1.0 / t.hypot(1.0);
+            let s = t * c;
+            // a ← JᵀaJ, rows of `vectors` ← Jᵀ vectors.
+            for k in 0..3 {
+                let (x, y) = (a[k][p], a[k][q]);
+                (a[k][p], a[k][q]) = (c * x - s * y, s * x + c * y);
+            }
+            for k in 0..3 {
+                let (x, y) = (a[p][k], a[q][k]);
+                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
+                let (x, y) = (vectors[p][k], vectors[q][k]);
+                (vectors[p][k], vectors[q][k]) = (c * x - s * y, s * x + c * y);
+            }
+        }
+    }
+    debug_assert!(
+        (norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs())
+    );
+    let mut order = [0, 1, 2];
+    order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
+    (order.map(|i| a[i][i]), order.map(|i| vectors[i]))
+}
+
 /// R = Rx Ry Rz for angles in degrees: z is turned first, then y, then x, about fixed axes.
 ///
 /// Exact (no rounding) at multiples of 90 degrees, so that a lattice turned onto the axes stays separable.

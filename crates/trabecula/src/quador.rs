@@ -9,16 +9,23 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
+mod band;
+pub mod bezier;
+mod classes;
+pub mod closest;
 pub mod complex;
+mod facets;
 mod field;
+mod foot;
 pub mod hub;
 mod index;
 pub mod integral;
 mod mesh;
+pub mod patch;
 pub mod pencil;
 pub mod quadric;
 pub mod query;
-mod tiling;
+pub mod slice;
 
 use hub::{Affine, Hub, Stub};
 use index::Index;

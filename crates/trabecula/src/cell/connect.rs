@@ -17,7 +17,7 @@ mod forest;
 mod grid;
 mod sublattice;
 
-pub(super) use critical::{Critical, Function, critical, eigen, sample};
+pub(super) use critical::{Critical, Function, critical, sample};
 use forest::{Forest, Joined};
 use grid::{AROUND, DIRECTIONS, Grid, groups};
 use sublattice::{Int3, Sublattice};

@@ -1,9 +1,8 @@
 //! Curvature of the mid-surface f = 0 in space.
 
-use super::connect::eigen;
 use super::series::Series;
 use super::thickness::least;
-use crate::math::{Mat3, Vec3, apply, dot, norm, product, scale, transpose};
+use crate::math::{Mat3, Vec3, apply, dot, eigen, norm, product, scale, transpose};
 
 /// Least radius of curvature (mm) of the surface f = 0 where phases are u = `to_phase` · x; infinite where it is flat,
 /// `None` where there is no surface.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde_json::{Value as Json, json};
 
-use super::Warning;
 use super::build::{LOOKS, Place};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
 use super::pattern;
+use super::{Built, Warning};
 use super::{map, sample, samples};
 use crate::fault::{Fault, counted, number};
 use crate::field::Field;
@@ -81,7 +81,7 @@ pub(super) fn beams(
     // A hub and its stubs lie within a box, and that within a ball.
     let whole = (0..quadors.len()).into_par_iter().all(|i| {
         let b = quadors.hold(i);
-        space.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
+        space.bound(&b).hi <= 0.0 || space.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
     });
     let truss = Truss {
         whole,
@@ -98,6 +98,32 @@ pub(super) fn beams(
     check_open(&*truss.quadors, place)?;
     warn(&truss, &fillets, spec, place, warnings);
     Ok(Beams::Truss(Arc::new(truss)))
+}
+
+/// The beams that a design is made of, if of nothing else.
+pub(super) fn alone(built: &Built) -> Result<&Quadors, Fault> {
+    let refuse = |why: &str| {
+        let message = format!(
+            "a mesh to a chord error is made of the beams' own patches, and {why}; give the spacing of a grid (edge) instead"
+        );
+        Err(Fault::new("chord", message))
+    };
+    let [(_, beams)] = &built.beams[..] else {
+        return refuse("this design is not one graph of beams");
+    };
+    if !built.lattices.is_empty() || !built.tilings.is_empty() {
+        return refuse("this design has a lattice too");
+    }
+    if !built.solid.filled.is_empty() {
+        return refuse("a skin or a kept zone of this design would cut them");
+    }
+    match beams {
+        Beams::Pattern(_) => refuse("a pattern is not written out"),
+        Beams::Truss(truss) if truss.whole => Ok(&truss.quadors),
+        Beams::Truss(_) => refuse(
+            "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")",
+        ),
+    }
 }
 
 /// A frame before it is cleaned and trimmed.
@@ -510,6 +536,8 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
     let thin = (0..graph.beams.len())
         .map(|b| quadors.pencil(b).waist())
         .fold(f64::INFINITY, f64::min);
+    // Of a part that the region cuts there is no closed form.
+    let mass = truss.whole.then(|| quadors.mass().ok()).flatten();
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
@@ -521,8 +549,10 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
         "hub_radius": [least, most],
         "length": facts.length,
         "total_length": facts.total,
-        // Of a part that the region cuts there is no closed form.
-        "volume": (truss.whole).then(|| quadors.volume().ok()).flatten(),
+        "volume": mass.map(|m| m.volume),
+        "area": mass.map(|m| m.area),
+        "centroid": mass.map(|m| m.centroid()),
+        "inertia": mass.map(|m| m.inertia()),
         "valence": valence,
         "fillet_radius": truss.fillet,
         "smallest_angle": facts.angle.map(|a| a.0),

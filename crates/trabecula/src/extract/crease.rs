@@ -1,4 +1,5 @@
-//! Edges that a face has of its own, such as those of a mesh, where it alone makes the surface.
+//! Edges that a face has of its own, such as those of a mesh: where it alone makes the surface, and (`fit`) where it meets
+//! others.
 //!
 //! The line in which a face meets the side of a cell runs straight from one grid edge to another. Where an edge of the
 //! face pierces the side it gets a corner there, if it lies nearer to the face with it. A grid edge that the face
@@ -10,7 +11,10 @@
 //! Comput. Graph. Forum 24 (2005) 537.
 
 mod chord;
+mod fill;
+mod fit;
 mod rim;
+mod side;
 mod twice;
 
 use std::collections::HashMap;
@@ -25,6 +29,7 @@ use super::knot::middle;
 use super::signs::{Signs, bits};
 use super::tile::Nodes;
 pub(super) use chord::Chord;
+pub(super) use fit::Fits;
 
 /// Pieces of edges that are this many steps long or more are shown, however little the face turns there.
 const LONG: f64 = 3.0;
@@ -37,7 +42,9 @@ const SHARP: f64 = 0.436;
 pub(super) struct Edges {
     /// For each row of cells: those that are filled by their rims.
     pub cells: Vec<u64>,
-    /// The face that makes the surface in these.
+    /// Those of them in which the face meets others.
+    fitted: Vec<u64>,
+    /// The face that has the edges.
     pub face: HashMap<usize, usize>,
     /// The chords of sides, by the lowest node of the side and the axis normal to it.
     sides: HashMap<(usize, usize), Vec<Chord>>,
@@ -73,6 +80,8 @@ impl Edges {
     pub fn clear(&mut self, shape: [usize; 3]) {
         self.cells.clear();
         self.cells.resize(shape[1] * shape[2], 0);
+        self.fitted.clear();
+        self.fitted.resize(shape[1] * shape[2], 0);
         self.face.clear();
         self.sides.clear();
         self.twice.clear();
@@ -156,8 +165,10 @@ impl Edges {
             };
             let mut cell = nodes.at(side.0);
             for _ in 0..2 {
-                self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
-                self.face.insert(nodes.index(cell), seen.face);
+                if seen.alone(cell) {
+                    self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
+                    self.face.insert(nodes.index(cell), seen.face);
+                }
                 cell[side.1] = cell[side.1].wrapping_sub(1);
             }
             for c in &chords {
@@ -334,29 +345,71 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     }
 }
 
-/// Whether a face alone would make the surface in a cell if it crossed it, whatever the other faces are there.
-fn decides(local: &Local, signs: &Signs, face: usize, [i, j, k]: [usize; 3]) -> bool {
-    let live = local.live.len();
-    let (mut varies, mut negative) = (0u64, 0u64);
-    for f in (0..live).filter(|f| *f != face) {
-        match signs.corners(f, i, j, k) {
-            0 => {}
-            0xff => negative |= 1 << f,
-            _ => varies |= 1 << f,
+/// What faces but one are at the corners of a cell.
+struct Others<'a> {
+    local: &'a Local,
+    cell: [usize; 3],
+    own: u64,
+    negative: u64,
+    varies: u64,
+}
+
+impl<'a> Others<'a> {
+    fn of(local: &'a Local, signs: &Signs, face: usize, [i, j, k]: [usize; 3]) -> Others<'a> {
+        let (mut varies, mut negative) = (0u64, 0u64);
+        for f in (0..local.live.len()).filter(|f| *f != face) {
+            match signs.corners(f, i, j, k) {
+                0 => {}
+                0xff => negative |= 1 << f,
+                _ => varies |= 1 << f,
+            }
+        }
+        Others {
+            local,
+            cell: [i, j, k],
+            own: 1 << face,
+            negative,
+            varies,
         }
     }
-    let holds = |mask: u64| {
+
+    fn holds(&self, mask: u64) -> bool {
+        let [i, j, k] = self.cell;
+        let live = self.local.live.len();
         let sign = |f: usize| match f.checked_sub(live) {
-            Some(flat) => Signs::beside(local, flat, j, k) >> i,
+            Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
             None => mask >> f,
         };
-        local.tree.solid(&sign) & 1 == 1
-    };
-    // The tree never falls when a face becomes negative: so two cases stand for all that vary.
-    let own = 1 << face;
-    [negative, negative | varies]
-        .iter()
-        .all(|n| holds(n | own) && !holds(n & !own))
+        self.local.tree.solid(&sign) & 1 == 1
+    }
+
+    /// Whether the face makes all the surface there may be, whatever the others are: the tree never falls when a face becomes
+    /// negative, so two cases stand for all.
+    fn leave_all(&self) -> bool {
+        self.each_case(|without, with| with && !without)
+    }
+
+    /// Whether it makes a difference in none of the two cases.
+    fn leave_none(&self) -> bool {
+        self.each_case(|without, with| with == without)
+    }
+
+    fn each_case(&self, is: impl Fn(bool, bool) -> bool) -> bool {
+        let cases = [self.negative, self.negative | self.varies];
+        cases
+            .iter()
+            .all(|n| is(self.holds(*n), self.holds(n | self.own)))
+    }
+
+    /// Whether there is no surface at all.
+    fn is_dead(&self) -> bool {
+        self.holds(self.negative) == self.holds(self.negative | self.varies | self.own)
+    }
+}
+
+/// Whether a face alone would make the surface in a cell if it crossed it, whatever the other faces are there.
+fn decides(local: &Local, signs: &Signs, face: usize, cell: [usize; 3]) -> bool {
+    Others::of(local, signs, face, cell).leave_all()
 }
 
 /// The point of a segment nearest to another one.

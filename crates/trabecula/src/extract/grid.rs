@@ -14,6 +14,9 @@ use super::crease;
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
 pub(super) const TILE: usize = 61;
 
+/// Most faces beside the one that cells are fitted to: the two sides of a sheet, and a skin's.
+const MOST_BESIDE: usize = 3;
+
 /// Most node planes along an axis.
 const MOST: f64 = 4e6;
 
@@ -35,6 +38,8 @@ pub(super) struct Grid {
     creases: Vec<HashMap<usize, Vec<u32>>>,
     /// Whether one face at most has edges of its own.
     pub one_creased: bool,
+    /// The one face with edges of its own to which cells are fitted where it meets others.
+    pub fitted: Option<usize>,
 }
 
 /// What is known of the solid in a block without sampling it.
@@ -185,11 +190,20 @@ impl Grid {
             laid,
             creases: Vec::new(),
             one_creased: true,
+            fitted: None,
         };
         grid.creases = (grid.faces.iter())
             .map(|f| crease::by_tile(&grid, &f.creases))
             .collect();
-        grid.one_creased = grid.creases.iter().filter(|c| !c.is_empty()).count() < 2;
+        let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
+        let (first, second) = (creased.next(), creased.next());
+        grid.one_creased = second.is_none();
+        // Where many faces meet in a fitted cell single precision muddles more than dividing it anew mends.
+        let cuts = grid.faces.iter().filter(|f| f.cut).count();
+        let few = cuts == 1 && grid.faces.len() <= 1 + MOST_BESIDE;
+        // Caps on planes of the grid know of knots alone.
+        let fits = few && grid.one_creased && grid.laid.iter().all(Option::is_none);
+        grid.fitted = first.filter(|_| fits);
         grid.few_enough().map(|()| grid)
     }
 
@@ -239,6 +253,11 @@ impl Grid {
         let n = self.tiles();
         let found = self.creases[face].get(&(i + n[0] * (j + n[1] * k)));
         (!self.creases[face].is_empty()).then(|| found.map_or(&[][..], |f| f))
+    }
+
+    /// Whether a face has edges of its own.
+    pub(super) fn has_creases(&self, face: usize) -> bool {
+        !self.creases[face].is_empty()
     }
 
     /// The tile at a position in the order x fastest.

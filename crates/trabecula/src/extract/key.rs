@@ -1,13 +1,14 @@
 //! Names of vertices.
 
 /// The name of a vertex in a block: the lowest node of its simplex, the steps (sets of axes, each within the next) to
-/// the others, and the faces that meet in it.
+/// the others, and the faces that meet in it. In a side that is fitted to an edge, also the corners it lies between.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Key(u64);
 
 impl Key {
     const NODE: u32 = 18;
     const FACE: u32 = 7;
+    const POINTS: u32 = Key::NODE + 9 + 3 * Key::FACE;
     /// The first two steps of the point inside a plain cell or its side: no simplex repeats a step.
     const CENTER: u64 = 0o11;
 
@@ -37,6 +38,17 @@ impl Key {
     pub fn corner(node: usize, span: usize, face: usize, which: usize) -> Key {
         let faces = Key::new(0, &[], &[face; 3][..which]);
         Key(Key::center(node, span).0 | faces.0)
+    }
+
+    /// A point in a side where faces meet, between points of the side by their numbers, which are below sixteen.
+    pub fn between(node: usize, span: usize, points: &[usize], faces: &[usize]) -> Key {
+        let points = points.iter().fold(0, |w, p| w << 5 | (*p as u64 + 1));
+        Key(Key::center(node, span).0 | Key::new(0, &[], faces).0 | points << Key::POINTS)
+    }
+
+    /// Whether it is one of these.
+    pub fn is_between(self) -> bool {
+        self.0 >> Key::POINTS != 0
     }
 
     /// Of a point of a grid edge that a face crosses twice: one for the lower, two for the upper one; zero for others.
@@ -77,6 +89,8 @@ impl Key {
         let faces = self
             .faces()
             .fold(0u128, |w, f| w << 16 | (face(f) as u128 + 1));
-        node << 57 | u128::from(self.steps()) << 48 | faces
+        // In a side at most two faces meet: the third one's room is free.
+        let points = u128::from(self.0 >> Key::POINTS) << 32;
+        node << 57 | u128::from(self.steps()) << 48 | faces | points
     }
 }

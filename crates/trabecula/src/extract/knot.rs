@@ -23,14 +23,14 @@ use std::ops::Range;
 use crate::math::{Vec3, add, scale};
 use crate::mesh::{Mesh, is_embedded};
 
-use super::crease::Edges;
+use super::crease::{Edges, Fits};
 use super::grid::{Grid, Local};
 use super::islands::Spread;
 use super::key::Key;
-use super::signs::{Signs, bits};
+use super::signs::Signs;
 use super::table::{CASES, EDGES};
 use super::tile::{Nodes, Numbers};
-use simplex::{Halves, Spot};
+pub(super) use simplex::{Simplex, Spot};
 
 /// What is not on plain cells' edges.
 #[derive(Default)]
@@ -63,6 +63,7 @@ pub(super) struct Knots<'a> {
     pub edges: &'a Edges,
     /// Nodes at which the faces are moved a little.
     pub moved: HashSet<usize>,
+    pub fits: Fits,
 }
 
 /// The six ways from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron they make
@@ -96,8 +97,18 @@ impl Knots<'_> {
         n
     }
 
+    /// The vertex of a name that has this place; made if it is new.
+    pub fn named(&mut self, key: Key, place: Vec3) -> u32 {
+        if let Some(&n) = self.extra.names.get(&key) {
+            return n;
+        }
+        let n = self.push(key, place);
+        self.extra.names.insert(key, n);
+        n
+    }
+
     /// The number of a vertex that a plain cell has too.
-    fn numbered(&self, key: Key) -> Option<u32> {
+    pub fn numbered(&self, key: Key) -> Option<u32> {
         let steps = key.steps();
         if !(steps.is_power_of_two() && steps < 8) {
             return None;
@@ -116,6 +127,11 @@ impl Knots<'_> {
     /// Adds a convex polygon by its vertices' names.
     pub fn polygon(&mut self, ring: &[Key], cut: bool) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
+        self.fan(&names, cut);
+    }
+
+    /// Adds a convex polygon by its vertices.
+    pub fn fan(&mut self, names: &[u32], cut: bool) {
         for i in 2..names.len() {
             self.extra
                 .triangles
@@ -197,8 +213,13 @@ impl Knots<'_> {
         self.cone(Key::center(low, span), middle(&rim), &names, true);
     }
 
+    /// Whether cells are fitted to a face.
+    pub fn is_fitted(&self, face: usize) -> bool {
+        self.grid.fitted == Some(self.local.live[face])
+    }
+
     /// Which signs are solid in a cell.
-    fn holds(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
+    pub fn holds(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
         let live = self.local.live.len();
         let sign = |f: usize| match f.checked_sub(live) {
             Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
@@ -216,7 +237,7 @@ impl Knots<'_> {
             if mixed == 0 || self.holds(cell, negative) == self.holds(cell, negative | mixed) {
                 continue;
             }
-            for piece in self.cut(&simplex, right, negative, mixed) {
+            for piece in self.cut(&simplex, right, (negative, mixed), [None; 4]) {
                 if !self.holds(cell, piece.negative) {
                     continue;
                 }
@@ -245,7 +266,9 @@ impl Knots<'_> {
     /// near to each other's common points that single precision mixes them up. Where that happens in a cell the faces
     /// are moved by chance at its nodes, by far less than the cell is wide, and the cells there are cut again.
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
-        let cells: Vec<[usize; 3]> = self.signs.knotted_cells().collect();
+        let fitted = |c: &[usize; 3]| self.edges.is_fitted(self.nodes, *c);
+        let cells = self.signs.knotted_cells().filter(|c| !fitted(c));
+        let cells: Vec<[usize; 3]> = cells.collect();
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
         // Not moved before all have been looked at: what is found in a cell must not depend on the cells before it, which
         // a neighbouring tile may not see.
@@ -311,22 +334,7 @@ impl Knots<'_> {
             if right != upper {
                 ring.reverse();
             }
-            let mut pieces = vec![(negative, ring)];
-            for f in bits(mixed) {
-                let mut next = Vec::with_capacity(2 * pieces.len());
-                for (negative, ring) in pieces {
-                    let Halves {
-                        inside, outside, ..
-                    } = self.split(&simplex, &ring, f);
-                    if inside.len() > 2 {
-                        next.push((negative | 1 << f, inside));
-                    }
-                    if outside.len() > 2 {
-                        next.push((negative, outside));
-                    }
-                }
-                pieces = next;
-            }
+            let pieces = self.split_by(&simplex, negative, mixed, ring);
             all.extend(pieces.into_iter().map(|(negative, ring)| {
                 (
                     negative,
@@ -358,10 +366,21 @@ impl Knots<'_> {
     ) -> (Vec<Key>, Option<Key>) {
         let mut steps: Vec<(Key, Key)> = Vec::new();
         let on = |k: &Key| k.faces().any(|f| f == face);
-        for (negative, ring) in self.side_pieces(cell, axis, upper) {
-            if negative >> face & 1 == 1 {
-                let edges = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
-                steps.extend(edges.filter(|(a, b)| on(a) && on(b)));
+        let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
+        let fitted = self.fits.sides.get(&(low, axis));
+        let cut = match fitted {
+            Some(_) => Vec::new(),
+            None => self.side_pieces(cell, axis, upper),
+        };
+        if let Some(side) = fitted.filter(|_| self.is_fitted(face)) {
+            let chords = side.chords.iter();
+            steps.extend(chords.flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
+        } else {
+            for (negative, ring) in fitted.map_or(&cut, |s| &s.pieces) {
+                if negative >> face & 1 == 1 {
+                    let edges = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
+                    steps.extend(edges.filter(|(a, b)| on(a) && on(b)));
+                }
             }
         }
         let mut path = Vec::new();

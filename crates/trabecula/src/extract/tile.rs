@@ -28,7 +28,7 @@ use crate::math::Vec3;
 
 use super::bodies::Bodies;
 use super::cap;
-use super::crease::{self, Edges, Seen};
+use super::crease::{self, Edges, Fits, Seen};
 use super::grid::{Flat, Grid, Local, TILE};
 use super::key::Key;
 use super::knot::{Extra, Knots};
@@ -190,6 +190,10 @@ impl<'a> Nodes<'a> {
         }
     }
 
+    pub fn count(&self) -> usize {
+        self.shape.iter().product()
+    }
+
     pub fn at(&self, n: usize) -> [usize; 3] {
         [
             n % self.shape[0],
@@ -238,12 +242,13 @@ pub(super) fn extract<'a>(
         let first = tile[a] * TILE - from[a];
         first..(first + TILE).min(nodes.shape[a] - 1)
     });
-    sample(s, grid, &local, &block);
+    follow(s, grid, &local, &nodes, tile);
+    sample(s, grid, &local, &block, &nodes);
     let crossed = s.signs.sort(&local);
     if !crossed && local.flat.is_empty() {
         return None;
     }
-    follow(s, grid, &local, &nodes, tile);
+    take(s, grid, &local, &nodes);
     list_vertices(s, &nodes);
     let mut first = 0;
     for (i, &face) in local.live.iter().enumerate() {
@@ -278,7 +283,7 @@ pub(super) fn extract<'a>(
 
 /// Fills the samples and signs of the live faces. The lattice's are dear, so they are asked for only where the region
 /// can hold solid.
-fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
+fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block, nodes: &Nodes) {
     s.signs.shape = block.shape();
     let count = local.live.len();
     if s.samples.len() < count {
@@ -296,7 +301,9 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block) {
         } else {
             let wanted = wanted.get_or_insert_with(|| {
                 let known = local.live.iter().filter(|f| grid.faces[**f].cut).count();
-                s.signs.wanted(local, known)
+                let mut wanted = s.signs.wanted(local, known);
+                s.edges.wanted(nodes, &mut wanted);
+                wanted
             });
             face.field.fill_where(block, wanted, out);
         }
@@ -311,7 +318,18 @@ fn follow(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usi
         if let Some(segments) = grid.creases(id, tile) {
             s.edges
                 .follow(nodes, &grid.faces[id].creases, face, segments);
+        }
+    }
+}
+
+/// Tells the cells that faces with edges make the surface in, alone or with others.
+fn take(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
+    for (face, &id) in local.live.iter().enumerate() {
+        if grid.has_creases(id) {
             s.edges.take(local, &mut s.signs, nodes, face);
+        }
+        if grid.fitted == Some(id) {
+            s.edges.fit(local, &mut s.signs, nodes, face);
         }
     }
 }
@@ -365,6 +383,7 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         extra: &mut s.extra,
         edges: &s.edges,
         moved: HashSet::new(),
+        fits: Fits::default(),
     };
     if knotted {
         knots.all(own);
@@ -373,11 +392,16 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         let key = Key::new(v.low(nodes), &[1 << v.axis], &[usize::from(v.face)]);
         knots.places[i] = knots.place(key);
     }
+    knots.fit_sides(own);
     for &(cell, face) in &s.plain.seams {
         knots.seam(cell, face);
     }
     for (cell, face) in crease::cells(knots.edges, nodes, own) {
-        knots.edged(cell, face);
+        if knots.edges.is_fitted(nodes, cell) {
+            knots.fitted(cell, face);
+        } else {
+            knots.edged(cell, face);
+        }
     }
     for flat in 0..local.flat.len() {
         cap::close(&mut knots, flat, own);

@@ -128,6 +128,45 @@ impl Index {
         (out.len() <= most).then_some(out)
     }
 
+    /// The boxes in the cells that a plane n·x = level goes through, in order and once each.
+    pub fn across(&self, normal: Vec3, level: f64) -> Vec<u32> {
+        let mut out = Vec::new();
+        if self.items.is_empty() {
+            return out;
+        }
+        // Columns along the axis that the plane is steepest to, and where it passes through each.
+        let a = (0..3)
+            .max_by(|&i, &j| normal[i].abs().total_cmp(&normal[j].abs()))
+            .unwrap_or(2);
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        let edge = |axis: usize| 1.0 / self.per[axis];
+        let reach = 0.5 * (normal[b].abs() * edge(b) + normal[c].abs() * edge(c));
+        for i in 0..self.cells[b] {
+            for j in 0..self.cells[c] {
+                let middle =
+                    |axis: usize, k: usize| self.origin[axis] + (k as f64 + 0.5) * edge(axis);
+                let rest = level - normal[b] * middle(b, i) - normal[c] * middle(c, j);
+                let (at, half) = (rest / normal[a], reach / normal[a].abs() + 1e-9 * edge(a));
+                let end = self.origin[a] + self.cells[a] as f64 * edge(a);
+                if at + half < self.origin[a] || at - half > end {
+                    continue;
+                }
+                let mut cell = [0; 3];
+                (cell[b], cell[c]) = (i, j);
+                for k in self.step(a, at - half)..=self.step(a, at + half) {
+                    cell[a] = k;
+                    let at = self.cell(cell);
+                    out.extend_from_slice(
+                        &self.items[self.starts[at] as usize..self.starts[at + 1] as usize],
+                    );
+                }
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+
     /// Calls `f` with the boxes of each cell along a ray and where the ray leaves the cell, until it answers no.
     pub fn along(&self, origin: Vec3, way: Vec3, f: &mut impl FnMut(&[u32], f64) -> bool) {
         if self.items.is_empty() || !way.iter().chain(&origin).all(|v| v.is_finite()) {

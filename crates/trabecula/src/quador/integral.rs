@@ -1,25 +1,24 @@
 //! Volume, area, centroid and inertia, from the faces.
 //!
 //! By the divergence theorem ∫ dV = ⅓∮ x·n dA, ∫ x dV = ¼∮ x (x·n) dA and ∫ xxᵀ dV = ⅕∮ xxᵀ (x·n) dA over a closed surface.
-//! On a stub, x·n dA = (Bz/2 + C) dz dψ. On any other face the surface is its quadric seen from the hub's centre: a fan of
-//! segments from a point of the face to its seams, each taken out to the quadric by the root of a quadratic. What is
-//! integrated is analytic in each piece, so Gauss's rule gains digits in proportion to its nodes; it is given enough that
-//! the whole comes out to 1e-10.
+//! On a stub, x·n dA = (Bz/2 + C) dz dψ. Fillets and corners are swept band by band by half planes; on the ball a fan of arcs
+//! runs from the middle of a face to its seams. What is integrated is analytic in each piece, so Gauss's rule gains digits in
+//! proportion to its nodes; it is given enough that the whole comes out to 1e-10, and what does not settle is refused.
 
 use core::f64::consts::{FRAC_PI_4, PI};
-use std::cell::Cell;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use crate::fault::Fault;
-use crate::math::{Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::math::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
+use super::band::{Band, Frame, Section, bands, girdle, middle};
+use super::classes::Classes;
 use super::complex::{Complex, Face};
 use super::hub::Hub;
-use super::quadric::{Conic, Quadric};
-use super::tiling::{Curve, Seams, Tiles, middle};
+use super::quadric::Conic;
 
 /// Integrals over a solid of density one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,8 +31,8 @@ pub struct Mass {
     pub first: Vec3,
     /// ∫ x xᵀ dV, mm⁵.
     pub second: Mat3,
-    /// Solid angle at the hub's centre, of patches: what shows that they were filled.
-    angle: f64,
+    /// By how much rules differ where halving came to its end, as a share of the whole.
+    doubt: f64,
 }
 
 impl Mass {
@@ -75,7 +74,7 @@ impl Mass {
     pub fn plus(mut self, o: &Mass) -> Mass {
         self.volume += o.volume;
         self.area += o.area;
-        self.angle += o.angle;
+        self.doubt += o.doubt;
         self.first = add(self.first, o.first);
         for i in 0..3 {
             self.second[i] = add(self.second[i], o.second[i]);
@@ -127,40 +126,28 @@ fn rule(n: usize) -> Vec<(f64, f64)> {
 /// How fine the quadrature is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Order {
-    /// Nodes of the rule whose result is taken.
-    pub nodes: usize,
-    /// Nodes of the rule that it is compared with.
-    pub check: usize,
+    /// Nodes of the rules that are tried one after the other, until two agree.
+    pub nodes: &'static [usize],
     /// How far they may differ, of the hub's volume (and area, and second moment), in each part.
     pub differ: f64,
 }
 
-/// Enough for 1e-10: a rule of ten nodes has half as many digits again as one of seven, with which it agrees to eight.
+/// Enough for 1e-10: the better of two rules that agree is right to half as many digits again.
 pub(super) const USUAL: Order = Order {
-    nodes: 10,
-    check: 7,
-    differ: 2e-9,
+    nodes: &[7, 10, 14, 20],
+    differ: 1e-10,
 };
 
-/// How far the solid angle of a face may be from what its seams go round: what it is integrated to, times a few pieces.
-const FILLED: f64 = 1e-9;
+/// What parts that no number of halvings brings to agree may come to, of the hub's volume (and area, and second moment).
+const DOUBT: f64 = 1e-10;
 
-/// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be cut into
-/// triangles.
+/// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be cut into bands,
+/// or its parts do not come to agree.
 pub(super) fn hub_mass<const ALL: bool>(
     hub: &Hub,
     complex: &Complex,
     order: Order,
 ) -> Option<Mass> {
-    filled::<ALL>(hub, complex, order).map(|f| f.0)
-}
-
-/// As `hub_mass`, and how coarsely (radians of turn) seams may be drawn for every face to be filled.
-pub(super) fn filled<const ALL: bool>(
-    hub: &Hub,
-    complex: &Complex,
-    order: Order,
-) -> Option<(Mass, f64)> {
     let mut out = Mass::default();
     // A guess of the whole, for what is small beside it.
     let mut size = Mass {
@@ -179,67 +166,87 @@ pub(super) fn filled<const ALL: bool>(
         complex,
         order,
         size,
-        turn: Cell::new(TURNS[0]),
     };
     for face in &complex.faces {
         match face.rim {
             Some(stub) => work.stub::<ALL>(face, stub as usize, &mut out),
-            None => work.patch::<ALL>(face, &mut out)?,
+            None if face.label == 0 => work.ball::<ALL>(face, &mut out),
+            None => {
+                let (frame, bands) = bands(hub, complex, face)?;
+                for band in &bands {
+                    let part = |n, a, b| stripe::<ALL>(complex, &frame, band, n, a, b);
+                    work.settle::<ALL>(
+                        &part,
+                        [0.0, 1.0],
+                        [0.0, 1.0],
+                        16,
+                        !ALL && frame.fillet,
+                        &mut out,
+                    );
+                }
+            }
         }
     }
-    Some((out, work.turn.get()))
+    (out.doubt <= DOUBT).then_some(out)
 }
-
-/// How far seams turn between points of their drawings, radians, coarsest first.
-const TURNS: [f64; 5] = [0.8, 0.4, 0.2, 0.1, 0.05];
 
 struct Work<'a> {
     hub: &'a Hub<'a>,
     complex: &'a Complex,
     order: Order,
     size: Mass,
-    /// The finest turn that a face needed.
-    turn: Cell<f64>,
 }
 
 impl Work<'_> {
-    /// Adds what `part` gives, for a number of nodes and ranges along a seam and across the face, halving ranges until two
-    /// rules agree.
-    fn halve<const ALL: bool>(
+    /// Adds what `part` gives, for a number of nodes and ranges along a seam and across the face, with more nodes and then
+    /// halving ranges until two rules agree. `line` tells that it is in closed form across.
+    fn settle<const ALL: bool>(
         &self,
         part: &impl Fn(usize, [f64; 2], [f64; 2]) -> Mass,
         along: [f64; 2],
         across: [f64; 2],
         depth: u32,
+        line: bool,
         out: &mut Mass,
     ) {
-        let (rough, fine) = (
-            part(self.order.check, along, across),
-            part(self.order.nodes, along, across),
-        );
-        let near = |a: f64, b: f64, size: f64| (a - b).abs() <= self.order.differ * size;
         let trace = |m: &Mass| m.second[0][0] + m.second[1][1] + m.second[2][2];
-        let agree = near(rough.volume, fine.volume, self.size.volume)
-            && (!ALL
-                || near(rough.area, fine.area, self.size.area)
-                    && near(trace(&rough), trace(&fine), self.size.second[0][0]));
-        if agree || depth == 0 {
+        let apart = |a: &Mass, b: &Mass| {
+            let volume = (a.volume - b.volume).abs() / self.size.volume;
+            if !ALL {
+                return volume;
+            }
+            let area = (a.area - b.area).abs() / self.size.area;
+            volume
+                .max(area)
+                .max((trace(a) - trace(b)).abs() / self.size.second[0][0])
+        };
+        let nodes = self.order.nodes;
+        let (mut rough, mut fine) = (Mass::default(), part(nodes[0], along, across));
+        for &n in &nodes[1..] {
+            (rough, fine) = (fine, part(n, along, across));
+            if apart(&rough, &fine) <= self.order.differ {
+                *out = out.plus(&fine);
+                return;
+            }
+        }
+        if depth == 0 {
+            fine.doubt = apart(&rough, &fine);
             *out = out.plus(&fine);
             return;
         }
         // The side that says more about the difference.
         let (t, u) = ((along[0] + along[1]) / 2.0, (across[0] + across[1]) / 2.0);
-        let halves = [
-            part(self.order.check, [along[0], t], across),
-            part(self.order.check, [t, along[1]], across),
-        ];
-        let gained = (halves[0].volume + halves[1].volume - rough.volume).abs();
-        if gained > 0.5 * (fine.volume - rough.volume).abs() || depth.is_multiple_of(4) {
-            self.halve::<ALL>(part, [along[0], t], across, depth - 1, out);
-            self.halve::<ALL>(part, [t, along[1]], across, depth - 1, out);
+        let n = nodes[nodes.len() - 2];
+        let gained = || {
+            let halves = part(n, [along[0], t], across).plus(&part(n, [t, along[1]], across));
+            apart(&halves, &rough) > 0.5 * apart(&rough, &fine)
+        };
+        if line || depth.is_multiple_of(4) || gained() {
+            self.settle::<ALL>(part, [along[0], t], across, depth - 1, line, out);
+            self.settle::<ALL>(part, [t, along[1]], across, depth - 1, line, out);
         } else {
-            self.halve::<ALL>(part, along, [across[0], u], depth - 1, out);
-            self.halve::<ALL>(part, along, [u, across[1]], depth - 1, out);
+            self.settle::<ALL>(part, along, [across[0], u], depth - 1, line, out);
+            self.settle::<ALL>(part, along, [u, across[1]], depth - 1, line, out);
         }
     }
 
@@ -260,11 +267,12 @@ impl Work<'_> {
                     conic.end / parts * p as f64,
                     conic.end / parts * (p + 1) as f64,
                 ];
-                self.halve::<ALL>(
+                self.settle::<ALL>(
                     &|n, a, b| part(conic, turn, n, a, b),
                     along,
                     [0.0, 1.0],
                     16,
+                    false,
                     out,
                 );
             }
@@ -276,21 +284,19 @@ impl Work<'_> {
         let [a, b, c] = s.section;
         let primitive = |z: f64| (b / 4.0 * z + c) * z;
         let top = primitive(s.split);
-        self.seams::<ALL>(
-            face,
-            &|conic, sign, n, along, across| {
+        let (frame, bands) = girdle(self.complex, face, s.axis);
+        for (band, seam, sign) in bands {
+            let part = |n: usize, along: [f64; 2], across: [f64; 2]| {
                 let mut out = Mass::default();
                 for &(t, w) in gauss(n) {
-                    let (x, dx) = conic.with_slope(along[0] + t * (along[1] - along[0]));
-                    let z = dot(x, s.axis);
-                    let side = sub(x, scale(s.axis, z));
-                    let turn = sign * w * (along[1] - along[0]) * dot(s.axis, cross(side, dx))
-                        / dot(side, side);
+                    let (phi, slope) = band.longitude(along[0] + t * (along[1] - along[0]));
+                    let side = frame.meridian(phi);
+                    let z = dot(s.axis, frame.meet(self.complex, &seam, side).0);
+                    let turn = w * slope * (along[1] - along[0]) * sign;
                     if !ALL {
                         out.volume += turn * (top - primitive(z)) / 3.0;
                         continue;
                     }
-                    let side = unit(side);
                     let (from, height) = (
                         z + across[0] * (s.split - z),
                         (across[1] - across[0]) * (s.split - z),
@@ -309,9 +315,9 @@ impl Work<'_> {
                     }
                 }
                 out
-            },
-            out,
-        );
+            };
+            self.settle::<ALL>(&part, [0.0, 1.0], [0.0, 1.0], 16, !ALL, out);
+        }
         // The disc in the split plane: no surface of the lattice, but of the hub's part.
         let (z, disc) = (s.split, PI * s.squared(s.split));
         out.volume += z * disc / 3.0;
@@ -328,181 +334,128 @@ impl Work<'_> {
         }
     }
 
-    /// A face that is not a stub's. On the ball, a fan from its middle; else its triangles, and the
-    /// slivers between their sides and the seams.
-    fn patch<const ALL: bool>(&self, face: &Face, out: &mut Mass) -> Option<()> {
+    /// A face on the ball: a fan from its middle.
+    fn ball<const ALL: bool>(&self, face: &Face, out: &mut Mass) {
         if face.loops.is_empty() {
-            let r = (-face.quadric.c).sqrt();
+            let r = self.hub.radius;
             out.volume += 4.0 / 3.0 * PI * r.powi(3);
             out.area += 4.0 * PI * r * r;
             for i in 0..3 {
                 out.second[i][i] += 4.0 / 15.0 * PI * r.powi(5);
             }
-            return Some(());
+            return;
         }
         let apex = middle(self.complex, face);
-        if face.label == 0 {
-            let ball = |conic: &Conic, sign: f64, n, [a, b]: [f64; 2], across: [f64; 2]| {
-                let curve = |t: f64| {
-                    let (x, dx) = conic.with_slope(a + t * (b - a));
-                    (x, scale(dx, sign * (b - a)))
-                };
-                fan::<ALL>(&face.quadric, apex, &curve, n, across)
+        let part = |conic: &Conic, sign: f64, n, [a, b]: [f64; 2], across: [f64; 2]| {
+            let curve = |t: f64| {
+                let (x, dx) = conic.with_slope(a + t * (b - a));
+                (x, scale(dx, sign * (b - a)))
             };
-            self.seams::<ALL>(face, &ball, out);
-            return Some(());
-        }
-        let number = self
-            .complex
-            .faces
-            .iter()
-            .position(|f| core::ptr::eq(f, face))? as u32;
-        // Seen from the centre the face is as large as its seams go round: ∮ det(o, x, dx)/(1 + cos β) on the sphere.
-        let o = unit(apex);
-        let mut round = 0.0;
-        for &(arc, forward) in face.loops.iter().flatten() {
-            let conic = &self.complex.arcs[arc as usize].conic;
-            let parts = 8;
-            for p in 0..parts {
-                for &(t, w) in gauss(16) {
-                    let step = conic.end / f64::from(parts);
-                    let (x, dx) = conic.with_slope((f64::from(p) + t) * step);
-                    let e = unit(x);
-                    let sign = if forward { 1.0 } else { -1.0 };
-                    round += sign * w * step * dot(o, cross(e, dx)) / (norm(x) * (1.0 + dot(o, e)));
-                }
-            }
-        }
-        let (made, turn) = TURNS.iter().find_map(|&turn| {
-            let seams = Seams::new(self.complex, turn);
-            let mut tiles = Tiles::new(&seams);
-            tiles.put(seams.triangles(face, apex)?, apex, number);
-            // An arc of a circle of 50 degrees is a ninth of its chord high.
-            tiles.refine(self.complex, &|away, length| away > length / 9.0)?;
-            let mut made = Mass::default();
-            for &(t, _) in &tiles.triangles {
-                for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                    let side = tiles.curve(self.complex, face, a, b);
-                    sector::<ALL>(
-                        &face.quadric,
-                        t.map(|i| tiles.points[i as usize]),
-                        &side,
-                        self.order.nodes,
-                        &mut made,
-                    );
-                }
-            }
-            ((made.angle - round).abs() < FILLED).then_some((made, turn))
-        })?;
-        self.turn.set(self.turn.get().min(turn));
-        *out = out.plus(&made);
-        Some(())
+            fan::<ALL>(self.hub.radius, apex, &curve, n, across)
+        };
+        self.seams::<ALL>(face, &part, out);
     }
 }
 
-/// The share of the surface over a triangle that lies before one of its sides, seen from the triangle's middle: the surface is
-/// a height over a plane, and the side a curve on it.
-fn sector<const ALL: bool>(
-    q: &Quadric,
-    [a, b, c]: [Vec3; 3],
-    side: &Curve,
+/// The share of the surface over part of a band.
+fn stripe<const ALL: bool>(
+    complex: &Complex,
+    frame: &Frame,
+    band: &Band,
     n: usize,
-    out: &mut Mass,
-) {
-    // The mean normal of the surface: a thin triangle's own may be any across its length.
-    let up = unit(
-        [a, b, c]
-            .iter()
-            .fold([0.0; 3], |u, x| add(u, unit(q.half_slope(*x)))),
-    );
-    let middle = scale(add(a, add(b, c)), 1.0 / 3.0);
-    let middle = sub(middle, scale(up, dot(sub(middle, a), up)));
-    let two = q.form(up, up);
-    for &(t, w) in gauss(n) {
-        let (x, dx) = side.at(t);
-        let x = sub(x, scale(up, dot(sub(x, a), up)));
-        let way = sub(x, middle);
-        let turn = w * dot(up, cross(way, dx));
-        // Along the way the height solves two h² + 2 one h + none = 0, whose terms are polynomials.
-        let ones = [dot(q.half_slope(middle), up), q.form(way, up)];
-        let nones = [
-            q.at(middle),
-            2.0 * dot(q.half_slope(middle), way),
-            q.form(way, way),
-        ];
-        for &(s, v) in gauss(n) {
-            let (one, none) = (
-                ones[0] + s * ones[1],
-                nones[0] + s * (nones[1] + s * nones[2]),
-            );
-            let root = (one * one - two * none).max(0.0).sqrt();
-            let h = -none / (one + root.copysign(one));
-            let place = add(add(middle, scale(way, s)), scale(up, h));
-            let slope = q.half_slope(place);
-            // Half the slope along `up` is the root itself.
-            let steep = turn * v * s / root.copysign(one);
-            let flux = dot(place, slope) * steep;
-            out.angle += flux / dot(place, place).powf(1.5);
-            if ALL {
-                out.surface(place, flux, norm(slope) * steep.abs() * turn.signum());
+    along: [f64; 2],
+    across: [f64; 2],
+) -> Mass {
+    let mut out = Mass::default();
+    let q = &frame.quadric;
+    // x·½∇Q is linear where Q vanishes: α + β g along the meridian.
+    let alpha = dot(q.b, frame.origin) - q.c;
+    let linear = sub(apply(&q.m, frame.origin), q.b);
+    for &(u, w) in gauss(n) {
+        let (phi, slope) = band.longitude(along[0] + u * (along[1] - along[0]));
+        let meridian = frame.meridian(phi);
+        let weight = w * slope * (along[1] - along[0]);
+        let section = Section::new(frame, meridian);
+        let [low, high] = band.borders.map(|b| {
+            if frame.fillet {
+                section.border(frame, complex, &b, meridian)
             } else {
-                out.volume += flux / 3.0;
+                frame.latitude(complex, &b, meridian)
+            }
+        });
+        let (from, height) = (
+            low + across[0] * (high - low),
+            (across[1] - across[0]) * (high - low),
+        );
+        if !ALL && frame.fillet {
+            let beta = dot(linear, meridian);
+            out.volume += weight * section.swept(from, from + height, alpha, beta) / 3.0;
+            continue;
+        }
+        for &(v, w) in gauss(n) {
+            let at = from + v * height;
+            // The place from the origin, and dA = steep |½∇Q| along and across.
+            let (away, steep) = if frame.fillet {
+                let (g, h) = section.at(at);
+                (add(scale(meridian, g), scale(frame.axes[2], h)), g)
+            } else {
+                let (sin, cos) = at.sin_cos();
+                let p = add(scale(meridian, cos), scale(frame.axes[2], sin));
+                let (one, two) = (dot(q.b, p), q.form(p, p));
+                let root = (one * one - q.c * two).max(0.0).sqrt();
+                let s = -q.c / (one + root);
+                (scale(p, s), cos * s * s / root)
+            };
+            let half = q.half_slope(away);
+            let (place, steep) = (add(frame.origin, away), w * weight * height * steep);
+            if ALL {
+                out.surface(place, steep * dot(place, half), steep * norm(half));
+            } else {
+                out.volume += steep * dot(place, half) / 3.0;
             }
         }
     }
+    out
 }
 
-/// The share of the part of a quadric that a fan of segments from `apex` to a curve (place and derivative over [0, 1]) fills, as
-/// far across as told.
+/// The share of the part of a ball that a fan from `apex` to a curve (place and derivative over [0, 1]) fills, as far across as
+/// told. What runs round the far side is counted with its sign, so the fan need not stay in the face.
 fn fan<const ALL: bool>(
-    q: &Quadric,
+    r: f64,
     apex: Vec3,
     curve: &dyn Fn(f64) -> (Vec3, Vec3),
     n: usize,
     across: [f64; 2],
 ) -> Mass {
     let mut out = Mass::default();
-    let (o, far) = (unit(apex), norm(apex));
-    let (bo, oo) = (dot(q.b, apex), q.form(apex, apex));
+    let o = unit(apex);
     for &(t, w) in gauss(n) {
         let (x, dx) = curve(t);
-        let turn = w * (across[1] - across[0]) * dot(apex, cross(x, dx));
-        let length = norm(x);
-        let cos = dot(o, x) / length;
-        if cos > 0.3 {
-            // Straight segments p = (1 − t) o + t x: the solid angle is t det(o, x, dx) dt/|p|³.
-            let (bx, ox, xx) = (dot(q.b, x), q.form(apex, x), q.form(x, x));
-            for &(t, w) in gauss(n) {
-                let t = across[0] + t * (across[1] - across[0]);
-                let u = 1.0 - t;
-                let (one, two) = (u * bo + t * bx, u * u * oo + 2.0 * u * t * ox + t * t * xx);
-                let exit = -q.c / (one + (one * one - q.c * two).max(0.0).sqrt());
-                let flux = turn * w * t * exit * exit * exit;
-                if ALL {
-                    let place = scale(add(scale(apex, u), scale(x, t)), exit);
-                    let h = q.half_slope(place);
-                    out.surface(place, flux, flux * norm(h) / dot(place, h));
-                } else {
-                    out.volume += flux / 3.0;
-                }
-            }
-        } else {
-            // Great circles, as a segment would pass near the centre: β sin(tβ) det/sin²β of unit vectors.
-            let e = scale(x, 1.0 / length);
-            let beta = cos.clamp(-1.0, 1.0).acos();
-            let sin = beta.sin();
-            let turn = turn / (far * length * length * sin * sin);
-            for &(t, w) in gauss(n) {
-                let t = across[0] + t * (across[1] - across[0]);
+        let (length, e) = (norm(x), unit(x));
+        let turn = w * (across[1] - across[0]) * dot(o, cross(e, dx)) / length;
+        let cos = dot(o, e);
+        for &(t, w) in gauss(n) {
+            let t = across[0] + t * (across[1] - across[0]);
+            let (p, angle) = if cos > 0.3 {
+                // Straight segments p = (1 − t) o + t e: the solid angle is t det(o, e, de) dt/|p|³.
+                let p = add(scale(o, 1.0 - t), scale(e, t));
+                let size = norm(p);
+                (scale(p, 1.0 / size), t / (size * size * size))
+            } else {
+                // Great circles, as a segment would pass near the centre: β sin(tβ) det/sin²β.
+                let beta = cos.clamp(-1.0, 1.0).acos();
+                let sin = beta.sin();
                 let p = add(
                     scale(o, ((1.0 - t) * beta).sin() / sin),
                     scale(e, (t * beta).sin() / sin),
                 );
-                let exit = q.exit(p);
-                let place = scale(p, exit);
-                let h = q.half_slope(place);
-                let flux = turn * w * beta * (t * beta).sin() * exit * exit * exit;
-                out.surface(place, flux, flux * norm(h) / dot(place, h));
+                (p, beta * (t * beta).sin() / (sin * sin))
+            };
+            let area = turn * w * angle * r * r;
+            if ALL {
+                out.surface(scale(p, r), r * area, area);
+            } else {
+                out.volume += r * area / 3.0;
             }
         }
     }
@@ -518,15 +471,16 @@ pub(super) fn tangled(hub: usize) -> Fault {
 }
 
 impl Quadors {
-    /// Volume, area, centroid and inertia of the whole, to 1e-10: of the parts of all hubs. Beams must not meet but in hubs.
+    /// Volume, area, centroid and inertia of the whole, to 1e-10: of the parts of all hubs, equal ones found once. Beams must not
+    /// meet but in hubs.
     ///
     /// # Errors
     /// Beams that overlap too far for closed forms.
     pub fn mass(&self) -> Result<Mass, Fault> {
-        self.sum(|i| {
-            let mass = hub_mass::<true>(&self.hub(i), &self.complex(i)?, USUAL);
-            Ok(mass.ok_or_else(|| tangled(i))?.moved(self.center(i)))
-        })
+        let (classes, each) = self.each::<true>()?;
+        let all =
+            (classes.of.iter().enumerate()).map(|(i, &c)| each[c as usize].moved(self.center(i)));
+        Ok(all.fold(Mass::default(), |sum, m| sum.plus(&m)))
     }
 
     /// The volume alone, mm³.
@@ -534,10 +488,24 @@ impl Quadors {
     /// # Errors
     /// As for `mass`.
     pub fn volume(&self) -> Result<f64, Fault> {
-        let all = self.sum(|i| {
-            hub_mass::<false>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
-        })?;
-        Ok(all.volume)
+        let (classes, each) = self.each::<false>()?;
+        let all = each.iter().zip(&classes.count);
+        Ok(all.map(|(m, &n)| m.volume * n as f64).sum())
+    }
+
+    /// Integrals over a hub of each class about its centre.
+    fn each<const ALL: bool>(&self) -> Result<(Classes, Vec<Mass>), Fault> {
+        self.exact()?;
+        let classes = self.classes();
+        let of = |&i: &usize| {
+            hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
+        };
+        let each = classes
+            .sample
+            .par_iter()
+            .map(of)
+            .collect::<Result<_, _>>()?;
+        Ok((classes, each))
     }
 
     /// The volume of the part of one hub, mm³.
@@ -555,18 +523,5 @@ impl Quadors {
     /// Hubs whose seams do not close.
     pub fn complex(&self, hub: usize) -> Result<Complex, Fault> {
         Complex::new(&self.hub(hub)).map_err(|f| f.under(&format!("hubs[{hub}]")))
-    }
-
-    fn sum(&self, of: impl Fn(usize) -> Result<Mass, Fault> + Sync) -> Result<Mass, Fault> {
-        self.exact()?;
-        const RUN: usize = 64;
-        let runs: Vec<Mass> = (0..self.len().div_ceil(RUN))
-            .into_par_iter()
-            .map(|r| {
-                (r * RUN..((r + 1) * RUN).min(self.len()))
-                    .try_fold(Mass::default(), |sum, i| Ok(sum.plus(&of(i)?)))
-            })
-            .collect::<Result<_, Fault>>()?;
-        Ok(runs.iter().fold(Mass::default(), |a, b| a.plus(b)))
     }
 }

@@ -1,6 +1,6 @@
 //! Critical points of a function on the torus, from its gradients.
 
-use crate::math::{Mat3, Vec3, add, apply, dot, norm, scale, sub};
+use crate::math::{Mat3, Vec3, add, dot, eigen, norm, scale, sub};
 
 /// Values and gradients per turn at phases.
 pub(in crate::cell) type Function<'a> = &'a (dyn Fn(&[Vec3], &mut [f64], &mut [Vec3]) + Sync);
@@ -70,38 +70,4 @@ pub(in crate::cell) fn critical(f: Function, start: Vec3, reach: f64) -> Option<
         }
     }
     None
-}
-
-/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
-pub(in crate::cell) fn eigen(m: &Mat3) -> (Vec3, Mat3) {
-    let mut a = *m;
-    let mut vectors = crate::math::IDENTITY;
-    for _ in 0..16 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q].abs() <= 1e-18 * (a[p][p].abs() + a[q][q].abs()) {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = if theta < 0.0 { -1.0 } else { 1.0 } / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
-            let s = t * c;
-            // a ← JᵀaJ, rows of `vectors` ← Jᵀ vectors.
-            for k in 0..3 {
-                let (x, y) = (a[k][p], a[k][q]);
-                (a[k][p], a[k][q]) = (c * x - s * y, s * x + c * y);
-            }
-            for k in 0..3 {
-                let (x, y) = (a[p][k], a[q][k]);
-                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
-                let (x, y) = (vectors[p][k], vectors[q][k]);
-                (vectors[p][k], vectors[q][k]) = (c * x - s * y, s * x + c * y);
-            }
-        }
-    }
-    debug_assert!(
-        (norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs())
-    );
-    let mut order = [0, 1, 2];
-    order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
-    (order.map(|i| a[i][i]), order.map(|i| vectors[i]))
 }

@@ -89,8 +89,7 @@ impl Edges {
         Some(ways.iter().map(chord).collect())
     }
 
-    /// The points of the boundary of a side, counter-clockwise about its axis; none if cells beside it are not the face's
-    /// alone.
+    /// The points of the boundary of a side, counter-clockwise about its axis; none if cells beside it cannot follow.
     fn boundary<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         seen: &Seen<P>,
@@ -106,7 +105,7 @@ impl Edges {
         }
         let mut below = at;
         below[axis] -= 1;
-        if !seen.alone(at) || !seen.alone(below) {
+        if !self.joins(seen, at) || !self.joins(seen, below) {
             return None;
         }
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);

@@ -11,12 +11,22 @@ use crate::mesh::exact::{drop_axis, orient2d};
 const INNER: f64 = 0.5;
 
 /// A rim's way through a side: from a point on the side's boundary, perhaps over others, to one.
-struct Step {
+pub(super) struct Step {
     from: Key,
     via: Vec<Key>,
     to: Key,
     /// The side: its axis, and whether it is the upper one.
     side: (usize, bool),
+}
+
+impl Step {
+    pub fn path(&self) -> Vec<Key> {
+        let ends = (std::iter::once(self.from), std::iter::once(self.to));
+        ends.0
+            .chain(self.via.iter().copied())
+            .chain(ends.1)
+            .collect()
+    }
 }
 
 impl Knots<'_> {
@@ -74,11 +84,27 @@ impl Knots<'_> {
     }
 
     /// The ways of all rims through the sides of a cell: counter-clockwise seen from the void.
-    fn steps(&self, cell: [usize; 3], face: usize) -> Vec<Step> {
+    pub(super) fn steps(&self, cell: [usize; 3], face: usize) -> Vec<Step> {
         let node = self.nodes.index(cell);
         let mut steps = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let low = node + self.offset(usize::from(upper) << axis);
+            if let Some(side) = self.fits.sides.get(&(low, axis)) {
+                steps.extend(side.chords.iter().map(|c| {
+                    let mut path = c.clone();
+                    if !upper {
+                        path.reverse();
+                    }
+                    let last = path.len() - 1;
+                    Step {
+                        from: path[0],
+                        via: path[1..last].to_vec(),
+                        to: path[last],
+                        side: (axis, upper),
+                    }
+                }));
+                continue;
+            }
             if let Some(chords) = self.edges.sides.get(&(low, axis)) {
                 steps.extend(chords.iter().map(|c| Step {
                     from: if upper { c.from } else { c.to },
@@ -161,11 +187,7 @@ impl Knots<'_> {
             inner.insert(key, v);
         }
         for s in steps {
-            let path: Vec<Key> = std::iter::once(s.from)
-                .chain(s.via.iter().copied())
-                .chain(std::iter::once(s.to))
-                .collect();
-            for w in path.windows(2) {
+            for w in s.path().windows(2) {
                 let (a, b) = (pairs[&w[0]], pairs[&w[1]]);
                 let (c, d) = (inner[&w[0]], inner[&w[1]]);
                 self.extra.triangles.push(([c, a, b], cut));
@@ -267,8 +289,8 @@ impl Knots<'_> {
     }
 }
 
-/// The triangles of a simple polygon, by clipping ears.
-fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
+/// The triangles of a simple polygon, by clipping its best ear again and again.
+pub(super) fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let area: f64 = (0..ring.len())
         .map(|i| {
@@ -282,15 +304,28 @@ fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
     while left.len() > 3 {
         let n = left.len();
         let corner = |i: usize| (left[(i + n - 1) % n], left[i], left[(i + 1) % n]);
-        let ear = (0..n).find(|&i| {
-            let (a, b, c) = corner(i);
+        let is_ear = |i: &usize| {
+            let (a, b, c) = corner(*i);
             let holds = |p: usize| turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
             turn(a, b, c) > 0 && !left.iter().any(|p| ![a, b, c].contains(p) && holds(*p))
-        });
-        let (a, b, c) = corner(ear.unwrap_or(0));
+        };
+        let height = |i: &usize| {
+            let (a, b, c) = corner(*i);
+            lowest([a, b, c].map(|i| ring[i]))
+        };
+        let ears = (0..n).filter(is_ear);
+        let best = ears.max_by(|i, j| height(i).total_cmp(&height(j)));
+        let (a, b, c) = corner(best.unwrap_or(0));
         found.push([a, b, c]);
-        left.remove(ear.unwrap_or(0));
+        left.remove(best.unwrap_or(0));
     }
     found.push([left[0], left[1], left[2]]);
     found
+}
+
+/// The height of a triangle above its longest side, as a share of that.
+fn lowest([a, b, c]: [[f64; 2]; 3]) -> f64 {
+    let side = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    area.abs() / side(a, b).max(side(b, c)).max(side(c, a))
 }

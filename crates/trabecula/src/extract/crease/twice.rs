@@ -3,8 +3,9 @@
 use super::{Edges, Seen};
 use crate::math::Vec3;
 
-/// Crossings nearer to each other than this share of the grid edge are left out.
-const CLOSE: f64 = 1.0 / 128.0;
+/// Crossings nearer to each other than so many times what points keep from nodes are left out. Beyond the edge a side is
+/// then cut off straight, by much more than what is left out.
+const CLOSE: f64 = 2.0;
 /// Rounds in which a crossing is found: each at least halves what is left, most of them do far better.
 const ROUNDS: usize = 40;
 
@@ -26,7 +27,7 @@ impl Edges {
         edges.sort_unstable();
         edges.dedup();
         for (node, axis) in edges {
-            if let Some(points) = seen.twice(node, axis) {
+            if let Some(points) = seen.twice(self, node, axis) {
                 self.twice.insert((node, axis), points);
             }
         }
@@ -41,7 +42,7 @@ impl Edges {
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     /// The two points at which the face crosses a grid edge whose ends are on the same side of it.
-    fn twice(&self, node: usize, axis: usize) -> Option<[Vec3; 2]> {
+    fn twice(&self, edges: &Edges, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
         if at[axis] + 2 > nodes.shape[axis]
@@ -57,23 +58,23 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
             .any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
         let mut beside = around;
         let (u, v) = (beside.next()?, beside.next()?);
-        let all_alone = || {
+        let all_join = || {
             [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().all(|(x, y)| {
                 let mut cell = at;
                 cell[u] -= x;
                 cell[v] -= y;
-                self.alone(cell)
+                edges.joins(self, cell)
             })
         };
-        if on_plane || !all_alone() {
+        if on_plane || !all_join() {
             return None;
         }
         let height = |t: f64| self.height(node, axis, t);
-        let (t, low) = deepest(&height, a, 1.0 - b)?;
         let margin = self.grid.margin;
+        let (t, low) = deepest(&height, (a, 1.0 - b), CLOSE * margin)?;
         let p = root(&height, (0.0, a.max(1e-12)), (t, low)).max(margin);
         let q = root(&height, (1.0, b.max(1e-12)), (t, low)).min(1.0 - margin);
-        (q - p >= CLOSE).then(|| [p, q].map(|t| self.along(node, axis, t)))
+        (q - p >= CLOSE * margin).then(|| [p, q].map(|t| self.along(node, axis, t)))
     }
 
     /// Whether the face crosses none of the grid edges of a cell.
@@ -84,7 +85,8 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
             let Some([a, b]) = self.open(low + by, axis) else {
                 return true;
             };
-            deepest(&|t| self.height(low + by, axis, t), a, 1.0 - b).is_none()
+            let height = |t| self.height(low + by, axis, t);
+            deepest(&height, (a, 1.0 - b), CLOSE * self.grid.margin).is_none()
         };
         matches!(self.signs.corners(self.face, i, j, k), 0 | 0xff)
             && (0..3).all(|axis| {
@@ -99,7 +101,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         let ends = [node, node + self.nodes.stride[axis]];
         let [p, q] = ends.map(|n| self.signs.is_negative(self.face, n));
         let [a, b] = ends.map(|n| f64::from(self.samples[n].abs()) / self.length(node, axis));
-        (p == q && a + b < 1.0 - CLOSE).then_some([a, b])
+        (p == q && a + b < 1.0 - CLOSE * self.grid.margin).then_some([a, b])
     }
 
     fn length(&self, node: usize, axis: usize) -> f64 {
@@ -127,8 +129,8 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
 
 /// A place between two where a function is not above zero that falls and rises by no more than its argument; none if
 /// there is none but by a hair.
-fn deepest(height: &impl Fn(f64) -> f64, from: f64, to: f64) -> Option<(f64, f64)> {
-    let mut open = vec![(from, to)];
+fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Option<(f64, f64)> {
+    let mut open = vec![range];
     for _ in 0..ROUNDS {
         // The widest of what is left first.
         let i = (0..open.len()).max_by(|a, b| {
@@ -136,7 +138,7 @@ fn deepest(height: &impl Fn(f64) -> f64, from: f64, to: f64) -> Option<(f64, f64
             width(a).total_cmp(&width(b))
         })?;
         let (a, b) = open.swap_remove(i);
-        if b - a < CLOSE {
+        if b - a < close {
             return None;
         }
         let t = (a + b) / 2.0;

@@ -5,33 +5,33 @@ use crate::extract::key::Key;
 use crate::extract::signs::bits;
 use crate::math::{Vec3, add, cross, scale, sub};
 
-/// Vertices of a simplex of the grid, in rising order.
+/// Vertices of a simplex of the grid, in rising order; or of one of a fitted cell, which may be points as well.
 #[derive(Clone, Copy)]
-pub(super) struct Simplex {
-    pub(super) nodes: [usize; 4],
-    pub(super) count: usize,
+pub(in crate::extract) struct Simplex {
+    pub nodes: [usize; 4],
+    pub count: usize,
 }
 
 /// A vertex while a simplex is cut: the corners of the side that it lies in, and the faces that meet there, as bits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Spot {
-    pub(super) corners: u8,
-    pub(super) faces: u64,
+pub(in crate::extract) struct Spot {
+    pub corners: u8,
+    pub faces: u64,
 }
 
 /// A side of a piece, counter-clockwise seen from outside.
 #[derive(Clone)]
-pub(super) struct Side {
+pub(in crate::extract) struct Side {
     /// The face it lies on; none if it is part of the simplex's own side.
-    pub(super) face: Option<usize>,
-    pub(super) ring: Vec<Spot>,
+    pub face: Option<usize>,
+    pub ring: Vec<Spot>,
 }
 
 /// A convex piece of a tetrahedron.
-pub(super) struct Piece {
+pub(in crate::extract) struct Piece {
     /// The faces that are negative in it.
-    pub(super) negative: u64,
-    pub(super) sides: Vec<Side>,
+    pub negative: u64,
+    pub sides: Vec<Side>,
 }
 
 /// How far the faces are moved at the nodes of a cell that single precision cannot hold, in steps.
@@ -55,7 +55,10 @@ impl Knots<'_> {
     }
 
     /// The value of a face at a node, kept away from zero: a plane that passed through a node would leave needles.
-    pub(super) fn value(&self, face: usize, node: usize) -> f64 {
+    pub(in crate::extract) fn value(&self, face: usize, node: usize) -> f64 {
+        if let Some(point) = node.checked_sub(self.nodes.count()) {
+            return self.fits.value(point, face);
+        }
         let id = self.local.live[face];
         let scale = self.grid.faces[id].slope * self.grid.step;
         let (v, least) = (
@@ -75,14 +78,14 @@ impl Knots<'_> {
     }
 
     /// A number between −1 and 1 that depends on the face and the node alone.
-    pub(super) fn chance(&self, id: usize, node: usize) -> f64 {
+    pub(in crate::extract) fn chance(&self, id: usize, node: usize) -> f64 {
         let mix = |h: u64, x: u64| (h ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
         let bits = self.nodes.place(node).map(f64::to_bits);
         let h = mix(bits.into_iter().fold(id as u64 + 1, mix), 0x5851_f42d);
         (h >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    pub(super) fn simplex(&self, node: usize, steps: &[usize]) -> Simplex {
+    pub(in crate::extract) fn simplex(&self, node: usize, steps: &[usize]) -> Simplex {
         let mut nodes = [node; 4];
         for (n, s) in nodes[1..].iter_mut().zip(steps) {
             *n = node + self.offset(*s);
@@ -100,7 +103,7 @@ impl Knots<'_> {
     }
 
     /// The name of a spot of a simplex.
-    pub(super) fn key(&self, simplex: &Simplex, spot: Spot) -> Key {
+    pub(in crate::extract) fn key(&self, simplex: &Simplex, spot: Spot) -> Key {
         let mut nodes = (0..4)
             .filter(|c| spot.corners >> c & 1 == 1)
             .map(|c| simplex.nodes[c]);
@@ -158,10 +161,10 @@ impl Knots<'_> {
         w.map(|x| (x / sum).clamp(0.0, 1.0))
     }
 
-    /// The value of a face at a spot.
-    pub(super) fn at(&self, simplex: &Simplex, spot: Spot, face: usize) -> f64 {
+    /// The side of a simplex that a spot lies in, and the faces that meet in it.
+    fn part(&self, simplex: &Simplex, spot: Spot) -> (Simplex, [usize; 3], usize) {
         let mut part = Simplex {
-            nodes: [0; 4],
+            nodes: [simplex.nodes[0]; 4],
             count: 0,
         };
         for c in (0..4).filter(|c| spot.corners >> c & 1 == 1) {
@@ -174,14 +177,50 @@ impl Knots<'_> {
             faces[met] = f;
             met += 1;
         }
+        (part, faces, met)
+    }
+
+    /// The value of a face at a spot.
+    pub(super) fn at(&self, simplex: &Simplex, spot: Spot, face: usize) -> f64 {
+        let (part, faces, met) = self.part(simplex, spot);
         let shares = self.shares(&part, &faces[..met]);
         (0..part.count)
             .map(|c| shares[c] * self.value(face, part.nodes[c]))
             .sum()
     }
 
+    /// The place of a node or a point.
+    pub fn place_of(&self, node: usize) -> Vec3 {
+        match node.checked_sub(self.nodes.count()) {
+            Some(point) => self.fits.place(point),
+            None => self.nodes.place(node),
+        }
+    }
+
+    /// The place of a spot of a simplex. Points may be near to each other: a spot between two keeps away from both,
+    /// by `apart` times what crossings keep from nodes.
+    pub fn spot_place(&self, simplex: &Simplex, spot: Spot, apart: f64) -> Vec3 {
+        let (part, faces, met) = self.part(simplex, spot);
+        let mut shares = self.shares(&part, &faces[..met]);
+        let places = part.nodes.map(|n| self.place_of(n));
+        if part.count == 2 {
+            let length = sub(places[1], places[0])
+                .map(f64::abs)
+                .into_iter()
+                .fold(0.0, f64::max);
+            let least = (apart * self.grid.margin * self.grid.step / length).min(1.0 / 3.0);
+            shares[1] = shares[1].clamp(least, 1.0 - least);
+        }
+        (1..part.count).fold(places[0], |p, c| {
+            add(p, scale(sub(places[c], places[0]), shares[c]))
+        })
+    }
+
     /// The place of a vertex: a function of its name and the samples at its nodes alone.
     pub fn place(&self, key: Key) -> Vec3 {
+        if let Some(place) = self.spaced(key) {
+            return place;
+        }
         let simplex = self.key_simplex(key);
         let (mut faces, mut met) = ([0; 3], 0);
         for f in key.faces() {
@@ -200,7 +239,7 @@ impl Knots<'_> {
     }
 
     /// Where faces cross the edge between two nodes, in order, as shares of it.
-    pub(super) fn crossings(&self, edge: &Simplex) -> Vec<(f64, usize)> {
+    pub(in crate::extract) fn crossings(&self, edge: &Simplex) -> Vec<(f64, usize)> {
         let mut found: Vec<(f64, usize)> = Vec::with_capacity(4);
         for f in 0..self.local.live.len() {
             let (a, b) = (self.value(f, edge.nodes[0]), self.value(f, edge.nodes[1]));
@@ -219,13 +258,20 @@ impl Knots<'_> {
         self.crossings(&edge).into_iter().map(name).collect()
     }
 
+    fn is_negative(&self, face: usize, node: usize) -> bool {
+        match node.checked_sub(self.nodes.count()) {
+            Some(point) => self.fits.value(point, face) <= 0.0,
+            None => self.signs.is_negative(face, node),
+        }
+    }
+
     /// The faces that are negative at all of the corners, and those that change sign between them.
-    pub(super) fn faces_of(&self, simplex: &Simplex) -> (u64, u64) {
+    pub(in crate::extract) fn faces_of(&self, simplex: &Simplex) -> (u64, u64) {
         let (mut all, mut some) = (0, 0);
         for f in 0..self.local.live.len() {
             let count = simplex.nodes[..simplex.count]
                 .iter()
-                .filter(|n| self.signs.is_negative(f, **n))
+                .filter(|n| self.is_negative(f, **n))
                 .count();
             all |= u64::from(count == simplex.count) << f;
             some |= u64::from(count > 0) << f;
@@ -233,20 +279,23 @@ impl Knots<'_> {
         (all, some & !all)
     }
 
-    /// The pieces of a tetrahedron between the planes of the mixed faces.
-    pub(super) fn cut(
+    /// The pieces of a tetrahedron between the planes of the mixed faces. `walls` are faces that its own sides lie on,
+    /// each across from a corner.
+    pub(in crate::extract) fn cut(
         &self,
         simplex: &Simplex,
         right: bool,
-        negative: u64,
-        mixed: u64,
+        (negative, mixed): (u64, u64),
+        walls: [Option<usize>; 4],
     ) -> Vec<Piece> {
-        let sides = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].map(|mut c: [u8; 3]| {
+        let sides = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+        let sides = [0, 1, 2, 3].map(|across| {
+            let mut c: [u8; 3] = sides[across];
             if !right {
                 c.swap(1, 2);
             }
             Side {
-                face: None,
+                face: walls[across],
                 ring: c
                     .map(|c| Spot {
                         corners: 1 << c,
@@ -310,6 +359,31 @@ impl Knots<'_> {
                         negative: piece.negative,
                         sides: outside,
                     });
+                }
+            }
+            pieces = next;
+        }
+        pieces
+    }
+
+    /// The parts of a polygon between faces, with those that are negative there.
+    pub(in crate::extract) fn split_by(
+        &self,
+        simplex: &Simplex,
+        negative: u64,
+        mixed: u64,
+        ring: Vec<Spot>,
+    ) -> Vec<(u64, Vec<Spot>)> {
+        let mut pieces = vec![(negative, ring)];
+        for f in bits(mixed) {
+            let mut next = Vec::with_capacity(2 * pieces.len());
+            for (negative, ring) in pieces {
+                let halves = self.split(simplex, &ring, f);
+                if halves.inside.len() > 2 {
+                    next.push((negative | 1 << f, halves.inside));
+                }
+                if halves.outside.len() > 2 {
+                    next.push((negative, halves.outside));
                 }
             }
             pieces = next;

@@ -15,13 +15,19 @@ pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
         signs,
         numbers,
         vertices,
+        edges,
         ..
     } = s;
     vertices.clear();
     numbers.resize_with(signs.negative.len(), Numbers::default);
     let any_knot = signs.knotted.iter().any(|w| *w != 0);
     for (face, numbers) in numbers.iter_mut().enumerate() {
-        list_face(signs, numbers, vertices, nodes, face, any_knot);
+        let knots = if any_knot {
+            Some(edges.knots(signs, face))
+        } else {
+            None
+        };
+        list_face(signs, numbers, vertices, nodes, face, knots.as_deref());
     }
 }
 
@@ -32,7 +38,7 @@ fn list_face(
     vertices: &mut Vec<Vertex>,
     nodes: &Nodes,
     face: usize,
-    any_knot: bool,
+    knots: Option<&[u64]>,
 ) {
     let [nx, ny, nz] = nodes.shape;
     let inner = below(nx - 1);
@@ -53,11 +59,7 @@ fn list_face(
                 let used = change & signs.edges_of(&signs.plain[face], axis, j, k);
                 numbers.crossed[axis].push(used);
                 numbers.offset[axis].push(vertices.len() as u32);
-                let fixed = if any_knot {
-                    signs.edges_of(&signs.knotted, axis, j, k)
-                } else {
-                    0
-                };
+                let fixed = knots.map_or(0, |knots| signs.edges_of(knots, axis, j, k));
                 let mut bits = used;
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;

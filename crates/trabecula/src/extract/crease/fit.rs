@@ -1,0 +1,266 @@
+//! Cells in which a face with edges meets others: which they are, and the points that they have beside nodes.
+//!
+//! Such a cell is divided into tetrahedra so that the patch of the face with edges is made of sides of them: each side of
+//! the cell is cut along its chords and into triangles, and the tetrahedra run from these to a point inside. So the face
+//! needs no values there. Every other face is the plane of its values at a tetrahedron's corners, as in a knot, but these
+//! corners are points of the edges as well as nodes.
+//!
+//! On a grid edge the other faces stay what their values at its two nodes make of them, and at points inside a side or
+//! a cell they keep between their values at the nodes around: then none shows where a neighbour would not see it.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use super::side::{Corner, Side};
+use super::{Edges, Others, Seen};
+use crate::extract::grid::Local;
+use crate::extract::key::Key;
+use crate::extract::knot::Knots;
+use crate::extract::signs::Signs;
+use crate::extract::tile::Nodes;
+use crate::math::Vec3;
+
+/// Points that are no nodes, and the sides of cells that they divide.
+#[derive(Default)]
+pub(in crate::extract) struct Fits {
+    /// Places of the points.
+    places: Vec<Vec3>,
+    /// Values of all live faces at them.
+    values: Vec<Vec<f64>>,
+    /// The first of those that are the same point, with other values.
+    first: Vec<usize>,
+    pub(super) numbers: HashMap<Key, usize>,
+    /// By the lowest node and the axis normal to the side.
+    pub sides: HashMap<(usize, usize), Rc<Side>>,
+}
+
+impl Fits {
+    pub fn place(&self, point: usize) -> Vec3 {
+        self.places[point]
+    }
+
+    pub fn value(&self, point: usize, face: usize) -> f64 {
+        self.values[point][face]
+    }
+}
+
+impl Edges {
+    /// Takes the cells in which a face with edges meets others out of those to be cut as knots.
+    pub fn fit(&mut self, local: &Local, signs: &mut Signs, nodes: &Nodes, face: usize) {
+        let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| {
+            !matches!(signs.corners(face, i, j, k), 0 | 0xff)
+        };
+        let mut found: Vec<[usize; 3]> = signs.knotted_cells().collect();
+        found.retain(|c| mixed(signs, *c));
+        for &node in self.pieces.keys() {
+            let cell = nodes.at(node);
+            let others = Others::of(local, signs, face, cell);
+            if !mixed(signs, cell)
+                && others.varies != 0
+                && !others.leave_all()
+                && !others.leave_none()
+            {
+                found.push(cell);
+            }
+        }
+        for cell in found {
+            let [i, j, k] = cell;
+            let row = k * nodes.shape[1] + j;
+            for plain in &mut signs.plain {
+                plain[row] &= !(1 << i);
+            }
+            signs.plain[face][row] |= 1 << i;
+            signs.knotted[row] |= 1 << i;
+            self.cells[row] |= 1 << i;
+            self.fitted[row] |= 1 << i;
+            self.face.insert(nodes.index(cell), face);
+        }
+    }
+
+    /// Whether a face meets others in a cell in which it is fitted.
+    pub fn is_fitted(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
+        self.fitted[k * nodes.shape[1] + j] >> i & 1 == 1
+    }
+
+    /// The cells that place the vertices of a face on their grid edges by the values at the nodes.
+    pub fn knots<'a>(&self, signs: &'a Signs, face: usize) -> Cow<'a, [u64]> {
+        if self.fitted.is_empty() || !self.has(face) {
+            return Cow::Borrowed(&signs.knotted);
+        }
+        let rows = signs.knotted.iter().zip(&self.fitted);
+        Cow::Owned(rows.map(|(k, f)| k & !f).collect())
+    }
+
+    /// Adds to the nodes at which the other faces are asked for those about pieces of edges.
+    pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
+        for &node in self.pieces.keys() {
+            let [i, j, k] = nodes.at(node);
+            let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);
+            let row = around(i, 0).fold(0, |w, i| w | 1u64 << i);
+            for k in around(k, 2) {
+                for j in around(j, 1) {
+                    wanted[k * nodes.shape[1] + j] |= row;
+                }
+            }
+        }
+    }
+
+    /// Whether a cell can follow whatever a side or a grid edge of it gets.
+    pub(super) fn joins<P: Fn(usize, usize) -> Option<Vec3>>(
+        &self,
+        seen: &Seen<P>,
+        cell: [usize; 3],
+    ) -> bool {
+        if seen.alone(cell) {
+            return true;
+        }
+        let fits = seen.grid.fitted == Some(seen.local.live[seen.face]);
+        let dead = || Others::of(seen.local, seen.signs, seen.face, cell).is_dead();
+        fits && (self.is_fitted(seen.nodes, cell) || dead())
+    }
+}
+
+impl Knots<'_> {
+    /// A value kept away from zero, as those at nodes are.
+    pub(super) fn kept(&self, face: usize, v: f64) -> f64 {
+        let id = self.local.live[face];
+        let least = self.grid.margin * self.grid.faces[id].slope * self.grid.step;
+        if v <= 0.0 {
+            v.min(-least)
+        } else {
+            v.max(least)
+        }
+    }
+
+    /// The value of a face at a share of a grid edge: between those at its nodes.
+    pub(super) fn value_along(&self, face: usize, node: usize, axis: usize, share: f64) -> f64 {
+        let [a, b] = [node, node + self.offset(1 << axis)].map(|n| self.value(face, n));
+        self.kept(face, a + (b - a) * share)
+    }
+
+    /// Where on a grid edge a place is.
+    pub(super) fn share_of(&self, node: usize, axis: usize, place: Vec3) -> f64 {
+        let (axis_nodes, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        (place[axis] - axis_nodes[at]) / (axis_nodes[at + 1] - axis_nodes[at])
+    }
+
+    /// The points in which the face with edges crosses a grid edge, the lower one first.
+    pub(super) fn points_of(&self, node: usize, axis: usize, face: usize) -> Vec<(Key, Vec3)> {
+        if let Some(points) = self.edges.twice.get(&(node, axis)) {
+            return (0..2)
+                .map(|i| (Key::crossing(node, axis, face, i), points[i]))
+                .collect();
+        }
+        let ends = [node, node + self.offset(1 << axis)];
+        let [p, q] = ends.map(|n| self.signs.is_negative(face, n));
+        let key = Key::new(node, &[1 << axis], &[face]);
+        match self.numbered(key) {
+            Some(v) if p != q => vec![(key, self.places[v as usize])],
+            _ if p != q => vec![(key, self.place(key))],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Where the others than the fitted face cross a grid edge that this crosses too: as their values at its nodes say, but
+    /// on their side of its points, and apart from these and from each other.
+    pub fn spaced(&self, key: Key) -> Option<Vec3> {
+        let axis = (0..3).find(|a| key.is_along(*a))?;
+        let fitted = self.grid.fitted?;
+        let fitted = self.local.live.iter().position(|f| *f == fitted)?;
+        let (node, face) = (key.node(), key.faces().next()?);
+        if face == fitted {
+            return None;
+        }
+        let points = self.points_of(node, axis, fitted);
+        if points.is_empty() {
+            return None;
+        }
+        let at: Vec<f64> = points
+            .iter()
+            .map(|p| self.share_of(node, axis, p.1))
+            .collect();
+        let stretch = |f: usize| {
+            let same = |s: &&f64| {
+                (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0)
+            };
+            at.iter().take_while(same).count()
+        };
+        let here = stretch(face);
+        let edge = self.simplex(node, &[1 << axis]);
+        let others = self.crossings(&edge).into_iter();
+        let mut all: Vec<(f64, usize)> = others
+            .filter(|(_, f)| *f != fitted && stretch(*f) == here)
+            .collect();
+        let low = if here == 0 { 0.0 } else { at[here - 1] };
+        let high = at.get(here).copied().unwrap_or(1.0);
+        let count = all.len();
+        let apart = self.grid.margin.min((high - low) / (count + 1) as f64);
+        let mut before = low;
+        for s in &mut all {
+            s.0 = s.0.max(before + apart);
+            before = s.0;
+        }
+        let mut after = high;
+        for s in all.iter_mut().rev() {
+            s.0 = s.0.min(after - apart);
+            after = s.0;
+        }
+        let share = all.iter().find(|s| s.1 == face)?.0;
+        let mut place = self.nodes.place(node);
+        let (axis_nodes, i) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        place[axis] += share * (axis_nodes[i + 1] - axis_nodes[i]);
+        Some(place)
+    }
+
+    /// Adds a point that is no node; gives its number.
+    pub(super) fn add_point(&mut self, place: Vec3, values: Vec<f64>) -> usize {
+        self.fits.places.push(place);
+        self.fits.values.push(values);
+        let id = self.nodes.count() + self.fits.places.len() - 1;
+        self.fits.first.push(id);
+        id
+    }
+
+    /// The number that stands for a node or a point and those that are the same.
+    pub(super) fn first_of(&self, id: usize) -> usize {
+        id.checked_sub(self.nodes.count())
+            .map_or(id, |p| self.fits.first[p])
+    }
+
+    /// The same point with other values of the same signs, by chance.
+    pub(super) fn shaken(&mut self, low: usize, corner: &Corner, attempt: usize) -> usize {
+        let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
+            return corner.id;
+        };
+        let faces = 0..self.local.live.len();
+        let shaken = faces.map(|f| {
+            let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
+            self.kept(
+                f,
+                self.fits.values[point][f] * (1.0 + 0.7 * self.chance(seed, low)),
+            )
+        });
+        let values = shaken.collect();
+        let id = self.add_point(self.fits.places[point], values);
+        let first = self.fits.first[point];
+        self.fits.first[id - self.nodes.count()] = first;
+        id
+    }
+
+    /// The values of all live faces at a place, between those at some nodes.
+    pub(super) fn values_between(&self, place: Vec3, around: &[usize]) -> Vec<f64> {
+        let value = |f: usize| {
+            let at = around.iter().map(|n| self.value(f, *n));
+            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                (l.min(v), h.max(v))
+            });
+            if (low <= 0.0) == (high <= 0.0) {
+                return low;
+            }
+            let id = self.local.live[f];
+            self.kept(f, self.grid.faces[id].field.value(place).clamp(low, high))
+        };
+        (0..self.local.live.len()).map(value).collect()
+    }
+}

@@ -1,0 +1,487 @@
+//! The walk along the seams of a hub.
+//!
+//! From a vertex on, the next event along a conic is the least root of a few quadratics, and the whole is found by walking.
+//! Symmetric hubs have more than two events in one place; each stub's G is shifted, for the planes alone, by its own 1e-12 of
+//! the radius, which keeps events apart, and what comes out shorter than that is made one place afterwards. Pieces touch along a
+//! seam, so a seam that is off by δ is off the surface by δ².
+
+use crate::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
+
+use super::super::hub::{Affine, Hub, Stub};
+use super::super::quadric::{Conic, Quadric, piece};
+use super::{Arc, Complex, Face, Key, MERGE, NONE, Vertex};
+
+/// How far planes are shifted, in radii of the hub.
+const SHIFT: f64 = 2e-12;
+
+/// A number of the order of one (greater by the seed) for a stub, well mixed: in a symmetric hub no few of them may add up to
+/// nothing.
+pub(in crate::quador) fn shift(stub: usize, seed: u64) -> f64 {
+    let hash = (stub as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let hash = (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let hash = (hash ^ hash >> 32).wrapping_mul(0x94D0_49BB_1331_11EB);
+    let unit = (hash >> 11) as f64 / (1u64 << 53) as f64;
+    8f64.powi(seed as i32) * (0.5 + unit)
+}
+
+pub(super) struct Walk<'a> {
+    hub: &'a Hub<'a>,
+    /// G of the stubs, shifted.
+    g: Vec<Affine>,
+    vertices: Vec<Vertex>,
+    arcs: Vec<Arc>,
+    /// Arcs at each vertex.
+    at: Vec<[u32; 4]>,
+    pieces: Vec<(u64, Quadric, Affine)>,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(hub: &'a Hub<'a>, seed: u64) -> Walk<'a> {
+        let shifted = |(i, s): (usize, &Stub)| Affine {
+            a: s.g.a,
+            b: s.g.b + SHIFT * shift(i, seed) * hub.radius,
+        };
+        Walk {
+            hub,
+            g: hub.stubs.iter().enumerate().map(shifted).collect(),
+            vertices: Vec::new(),
+            arcs: Vec::new(),
+            at: Vec::new(),
+            pieces: Vec::new(),
+        }
+    }
+
+    /// The quadric of a label, and σ of the shifted G.
+    fn piece(&mut self, label: u64) -> (Quadric, Affine) {
+        if let Some(&(_, q, s)) = self.pieces.iter().find(|p| p.0 == label) {
+            return (q, s);
+        }
+        let (q, mut sigma) = piece(self.hub, label);
+        if !self.hub.sharp {
+            // σ is linear in G, and so is its shift.
+            let (mut shift, mut t) = (0.0, 1.0);
+            for (i, s) in self
+                .hub
+                .stubs
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| label >> i & 1 == 1)
+            {
+                shift += s.share * s.weight * (self.g[i].b - s.g.b);
+                t += s.share * s.share * s.weight;
+            }
+            sigma.b += shift / t;
+        }
+        self.pieces.push((label, q, sigma));
+        (q, sigma)
+    }
+
+    /// What vanishes where stub m joins a label; in a sharp hub, G itself (of label 0, nothing).
+    fn toggle(&self, m: usize, sigma: &Affine) -> Affine {
+        self.g[m].plus(-self.hub.stubs[m].share, sigma)
+    }
+
+    fn sharp_g(&self, label: u64) -> Affine {
+        if label == 0 {
+            Affine::default()
+        } else {
+            self.g[label.trailing_zeros() as usize]
+        }
+    }
+
+    /// The plane between two labels, positive towards the greater.
+    fn plane(&mut self, [a, b]: [u64; 2]) -> Affine {
+        if self.hub.sharp {
+            return self.sharp_g(b).plus(-1.0, &self.sharp_g(a));
+        }
+        let sigma = self.piece(a).1;
+        self.toggle((a ^ b).trailing_zeros() as usize, &sigma)
+    }
+
+    /// Calls `f` with every event that can end the seam between labels a < b, and the function that is negative before it.
+    fn guards(&mut self, [a, b]: [u64; 2], f: &mut impl FnMut(u64, Affine)) {
+        let n = self.hub.stubs.len();
+        if self.hub.sharp {
+            let own = self.sharp_g(b);
+            for m in (0..n).map(|i| 1 << i).chain([0]) {
+                if m != a && m != b {
+                    f(m, self.sharp_g(m).plus(-1.0, &own));
+                }
+            }
+            return;
+        }
+        let sigma = self.piece(a).1;
+        for m in 0..n {
+            let bit = 1u64 << m;
+            let toggle = self.toggle(m, &sigma);
+            if a & bit != 0 {
+                f(bit, Affine::default().plus(-1.0, &toggle));
+            } else if b & bit == 0 {
+                f(bit, toggle);
+            }
+        }
+    }
+
+    /// The labels around the end of the seam [a, b] at event m.
+    fn around(&self, [a, b]: [u64; 2], m: u64) -> [u64; 4] {
+        if self.hub.sharp {
+            let mut l = [a, b, m];
+            l.sort_unstable();
+            return [l[0], l[1], l[2], u64::MAX];
+        }
+        let (j, low) = (a ^ b, a & !m);
+        let (j, m) = (j.min(m), j.max(m));
+        [low, low | j, low | j | m, low | m]
+    }
+
+    /// The seams that leave a vertex, as pairs of labels a < b, and the event that ends them there.
+    fn seams(&self, around: [u64; 4]) -> impl Iterator<Item = ([u64; 2], u64)> + use<> {
+        let [p, q, r, s] = around;
+        let order = |a: u64, b: u64| [a.min(b), a.max(b)];
+        let all = if self.hub.sharp {
+            [
+                (order(p, q), r),
+                (order(q, r), p),
+                (order(p, r), q),
+                ([0, 0], 0),
+            ]
+        } else {
+            [
+                (order(p, q), p ^ s),
+                (order(q, r), p ^ q),
+                (order(s, r), p ^ q),
+                (order(p, s), p ^ q),
+            ]
+        };
+        // Of a filleted vertex, seams that differ by j end by m and the other way round.
+        let (j, m) = (p ^ q, p ^ s);
+        let sharp = self.hub.sharp;
+        all.into_iter()
+            .filter(|(l, _)| l[0] != l[1])
+            .map(move |(l, e)| {
+                if sharp {
+                    (l, e)
+                } else {
+                    (l, if l[0] ^ l[1] == j { m } else { j })
+                }
+            })
+    }
+
+    /// Follows the seam between labels from a place on it along a direction: the conic up to its end, and the event there.
+    fn trace(
+        &mut self,
+        labels: [u64; 2],
+        from: Vec3,
+        tangent: Vec3,
+        born: Option<u64>,
+    ) -> Option<(Conic, Option<u64>)> {
+        let quadric = self.piece(labels[0]).0;
+        let plane = self.plane(labels);
+        let mut conic = Conic::new(&quadric, unit(plane.a), from, tangent)?;
+        let mut event = None;
+        let (probe, mut end) = (conic, conic.end);
+        self.guards(labels, &mut |m, f| {
+            let along = [f.at(from), dot(f.a, probe.e[0]), dot(f.a, probe.e[1])];
+            if let Some(t) = probe.roots(along, born == Some(m)).next()
+                && t < end
+            {
+                (end, event) = (t, Some(m));
+            }
+        });
+        if conic.open().is_some_and(|t| t <= end) {
+            return None;
+        }
+        conic.end = end;
+        Some((conic, event))
+    }
+
+    /// The vertex with these labels nearest to a place, made if it is new.
+    fn vertex(&mut self, around: [u64; 4], near: Vec3) -> Option<u32> {
+        let (j, m) = if self.hub.sharp {
+            (around[1], around[2])
+        } else {
+            (around[1], around[3])
+        };
+        let base = around[0];
+        let quadric = self.piece(base).0;
+        let order = |a: u64, b: u64| [a.min(b), a.max(b)];
+        let planes = [self.plane(order(base, j)), self.plane(order(base, m))];
+        let mut at = near;
+        for _ in 0..3 {
+            let slope = scale(quadric.half_slope(at), 2.0);
+            let rows = [planes[0].a, planes[1].a, slope];
+            let step = apply(
+                &inverse(&rows),
+                [planes[0].at(at), planes[1].at(at), quadric.at(at)],
+            );
+            if !step.iter().all(|v| v.is_finite()) {
+                return None;
+            }
+            at = sub(at, step);
+        }
+        if norm(sub(at, near)) > 1e-5 * (norm(near) + self.hub.radius) {
+            return None;
+        }
+        let far = dot(quadric.half_slope(at), cross(planes[0].a, planes[1].a)) > 0.0;
+        let key = Key { around, far };
+        if let Some(i) = self.vertices.iter().position(|v| v.key == key) {
+            return Some(i as u32);
+        }
+        self.vertices.push(Vertex { at, key });
+        self.at.push([NONE; 4]);
+        Some(self.vertices.len() as u32 - 1)
+    }
+
+    fn push(&mut self, ends: [u32; 2], labels: [u64; 2], conic: Conic) {
+        let plane = self.plane(labels);
+        let outward = self.piece(labels[0]).0.half_slope(conic.v);
+        let left = dot(plane.a, cross(outward, conic.e[0]));
+        let sides = if left > 0.0 {
+            [labels[1], labels[0]]
+        } else {
+            labels
+        };
+        let id = self.arcs.len() as u32;
+        self.arcs.push(Arc {
+            ends,
+            sides,
+            conic,
+            plane,
+        });
+        for v in if ends[0] == ends[1] {
+            vec![ends[0]]
+        } else {
+            ends.to_vec()
+        } {
+            if let Some(slot) = self
+                .at
+                .get_mut(v as usize)
+                .and_then(|s| s.iter_mut().find(|s| **s == NONE))
+            {
+                *slot = id;
+            }
+        }
+    }
+
+    /// A place on the seam that bounds the pure part of a stub, and the labels there: along a generator, the last event before
+    /// the split.
+    fn seed(&mut self, i: usize) -> Option<([u64; 2], Vec3)> {
+        let s = self.hub.stubs[i];
+        let own = 1u64 << i;
+        let (_, sigma) = self.piece(own);
+        let side = unit(cross(
+            s.axis,
+            if s.axis[0].abs() < 0.6 {
+                [1.0, 0.0, 0.0]
+            } else {
+                [0.0, 1.0, 0.0]
+            },
+        ));
+        // An odd azimuth, away from what symmetric hubs have in common.
+        let (sin, cos) = 0.737_f64.sin_cos();
+        let side = add(scale(side, cos), scale(cross(s.axis, side), sin));
+        let place = |z: f64| add(scale(s.axis, z), scale(side, s.squared(z).max(0.0).sqrt()));
+        let mut best = (s.contact, [0, own]);
+        let (a, b, c) = (s.section[0], s.section[1], s.section[2]);
+        for m in 0..self.hub.stubs.len() {
+            if m == i {
+                continue;
+            }
+            let f = if self.hub.sharp {
+                self.g[m].plus(-1.0, &self.g[i])
+            } else {
+                self.toggle(m, &sigma)
+            };
+            // p z + f₀ + r ρ(z) = 0.
+            let (p, r) = (dot(f.a, s.axis), dot(f.a, side));
+            let (two, one, none) = (
+                p * p - r * r * a,
+                2.0 * p * f.b - r * r * b,
+                f.b * f.b - r * r * c,
+            );
+            let root = (one * one - 4.0 * two * none).max(0.0).sqrt();
+            let q = -(one + root.copysign(one)) / 2.0;
+            for z in [q / two, none / q] {
+                let good =
+                    z > best.0 && z < s.split && f.at(place(z)).abs() < 1e-7 * self.hub.radius;
+                if good {
+                    let other = 1u64 << m;
+                    best = (
+                        z,
+                        if self.hub.sharp {
+                            [own.min(other), own.max(other)]
+                        } else {
+                            [own, own | other]
+                        },
+                    );
+                }
+            }
+        }
+        let (z, labels) = best;
+        // On the shifted plane and the quadric at once.
+        let (quadric, plane) = (self.piece(labels[0]).0, self.plane(labels));
+        let mut x = place(z);
+        for _ in 0..3 {
+            let slope = scale(quadric.half_slope(x), 2.0);
+            let rows = [plane.a, slope, cross(plane.a, slope)];
+            x = sub(x, apply(&inverse(&rows), [plane.at(x), quadric.at(x), 0.0]));
+        }
+        x.iter().all(|v| v.is_finite()).then_some((labels, x))
+    }
+
+    /// Walks all seams; `None` if an event has no place.
+    pub(super) fn run(&mut self) -> Option<()> {
+        for i in 0..self.hub.stubs.len() {
+            let own = 1u64 << i;
+            if self.arcs.iter().any(|a| a.sides.contains(&own)) {
+                continue;
+            }
+            let (labels, from) = self.seed(i)?;
+            let quadric = self.piece(labels[0]).0;
+            let tangent = unit(cross(self.plane(labels).a, quadric.half_slope(from)));
+            let (conic, event) = self.trace(labels, from, tangent, None)?;
+            match event {
+                None => {
+                    let v = self.vertices.len() as u32;
+                    self.vertices.push(Vertex {
+                        at: from,
+                        key: Key {
+                            around: [labels[0], labels[1], u64::MAX, i as u64],
+                            far: false,
+                        },
+                    });
+                    self.at.push([NONE; 4]);
+                    self.push([v, v], labels, conic);
+                }
+                Some(m) => {
+                    let first = self.vertex(self.around(labels, m), conic.at(conic.end))?;
+                    let mut todo = first as usize;
+                    while todo < self.vertices.len() {
+                        self.leave(todo as u32)?;
+                        todo += 1;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// Follows every seam that leaves a vertex and was not yet arrived by.
+    fn leave(&mut self, v: u32) -> Option<()> {
+        let Vertex { at, key } = self.vertices[v as usize];
+        for (labels, event) in self.seams(key.around) {
+            let is = |a: &u32| {
+                *a != NONE && {
+                    let s = self.arcs[*a as usize].sides;
+                    s == labels || s == [labels[1], labels[0]]
+                }
+            };
+            if self.at[v as usize].iter().any(is) {
+                continue;
+            }
+            let quadric = self.piece(labels[0]).0;
+            let mut tangent = unit(cross(self.plane(labels).a, quadric.half_slope(at)));
+            let mut rise = 0.0;
+            self.guards(labels, &mut |m, f| {
+                if m == event {
+                    rise = dot(f.a, tangent);
+                }
+            });
+            if rise > 0.0 {
+                tangent = scale(tangent, -1.0);
+            }
+            let (conic, end) = self.trace(labels, at, tangent, Some(event))?;
+            let to = self.vertex(self.around(labels, end?), conic.at(conic.end))?;
+            if self.vertices.len() > 4096 {
+                return None;
+            }
+            self.push([v, to], labels, conic);
+        }
+        Some(())
+    }
+
+    /// Faces of the arcs, short arcs made one place; `None` if it is no sphere.
+    pub(super) fn finish(mut self) -> Option<Complex> {
+        // The next arc of a face at a vertex is the other one there that borders it.
+        let mut used = vec![[false; 2]; self.arcs.len()];
+        let mut faces: Vec<Face> = Vec::new();
+        for first in 0..self.arcs.len() {
+            for side in 0..2 {
+                if used[first][side] {
+                    continue;
+                }
+                let label = self.arcs[first].sides[side];
+                let (mut loops, mut arc, mut left) = (Vec::new(), first, side);
+                loop {
+                    if used[arc][left] {
+                        return None;
+                    }
+                    used[arc][left] = true;
+                    loops.push((arc as u32, left == 0));
+                    let a = self.arcs[arc];
+                    let to = a.ends[1 - left];
+                    if a.ends[0] == a.ends[1] {
+                        break;
+                    }
+                    let next = self.at[to as usize].iter().find(|&&n| {
+                        n != NONE
+                            && n as usize != arc
+                            && self.arcs[n as usize].sides.contains(&label)
+                    })?;
+                    arc = *next as usize;
+                    let b = &self.arcs[arc];
+                    left = usize::from(b.ends[0] != to);
+                    if b.sides[left] != label {
+                        return None;
+                    }
+                    if (arc, left) == (first, side) {
+                        break;
+                    }
+                }
+                let closed =
+                    loops.len() == 1 && self.arcs[first].ends[0] == self.arcs[first].ends[1];
+                // Loops without a vertex bound one ring together.
+                let ring = |f: &&mut Face| {
+                    f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1))
+                };
+                if let Some(f) = faces.iter_mut().find(ring) {
+                    f.loops.push(loops);
+                    continue;
+                }
+                let rim = (label.count_ones() == 1).then(|| label.trailing_zeros());
+                let quadric = self.piece(label).0;
+                faces.push(Face {
+                    label,
+                    quadric,
+                    loops: vec![loops],
+                    rim,
+                });
+            }
+        }
+        if self.hub.stubs.is_empty() {
+            let quadric = self.piece(0).0;
+            faces.push(Face {
+                label: 0,
+                quadric,
+                loops: Vec::new(),
+                rim: None,
+            });
+        }
+        // Each stub shows, once.
+        for i in 0..self.hub.stubs.len() {
+            if faces.iter().filter(|f| f.label == 1 << i).count() != 1 {
+                return None;
+            }
+        }
+        let complex = Complex {
+            vertices: self.vertices,
+            arcs: self.arcs,
+            faces,
+        };
+        if complex.euler() != 2 {
+            return None;
+        }
+        let complex = complex.merged(MERGE * self.hub.radius);
+        (complex.euler() == 2).then_some(complex)
+    }
+}

@@ -1,0 +1,153 @@
+"""Exact queries of beams: points, rays, nearest places, plane slices, and the faces of hubs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from . import _core
+from .given import number, positive, three, whole
+from .output import extension, whole_file
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Quadors", "Slice"]
+
+
+class Quadors:
+    """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
+
+    These are the beams alone, as far as they reach: no region cuts them, no skin is added.
+    """
+
+    def __init__(self, core: _core.Quadors):
+        self._core = core
+
+    def __len__(self) -> int:
+        return self._core.hubs
+
+    def __repr__(self) -> str:
+        return f"<trabecula.Quadors of {self._core.hubs} hubs and {self._core.beams} beams>"
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points (n, 3) in mm are in the solid."""
+        return self._core.contains(_points("points", points))
+
+    def rays(self, origins: ArrayLike, ways: ArrayLike) -> dict[str, NDArray]:
+        """Where rays from ``origins`` (n, 3) along ``ways`` (n, 3) first enter the solid.
+
+        ``distance`` in lengths of the way, infinite without a hit; ``normals`` out of the solid; ``hubs``, -1 without.
+        """
+        distance, normals, hubs = self._core.rays(_points("origins", origins), _points("ways", ways))
+        return {"distance": distance, "normals": normals, "hubs": hubs}
+
+    def closest(self, points: ArrayLike) -> dict[str, NDArray]:
+        """The place of the surface nearest to each of points (n, 3) in mm, exact up to rounding.
+
+        ``points`` (n, 3) on the surface; ``normals`` out of the solid there; ``distance``, negative in the solid;
+        ``hubs`` that the places belong to.
+        """
+        at, normals, distance, hubs = self._core.closest(_points("points", points))
+        return {"points": at, "normals": normals, "distance": distance, "hubs": hubs}
+
+    def slice(
+        self, z: float | None = None, *, point: Sequence[float] | None = None, normal: Sequence[float] = (0, 0, 1)
+    ) -> Slice:
+        """The slice at a height ``z`` (mm), or by the plane through a ``point`` with a ``normal``."""
+        if (z is None) == (point is None):
+            raise ValueError("give z, or a point (and a normal), not both")
+        if point is None:
+            if list(normal) != [0, 0, 1]:
+                raise ValueError("z is along the normal (0, 0, 1); give a point to slice along another one")
+            point = (0, 0, number("z", z))
+        return Slice(self._core.slice(three("point", point), three("normal", normal)))
+
+    def hub(self, hub: int) -> dict[str, Any]:
+        """The surface of a hub, up to where its beams are parted, as faces of quadrics; places are from its ``center``.
+
+        ``vertices`` (n, 3). ``arcs``: the ``vertices`` that each joins (one twice if it closes on itself), the ``faces``
+        to its left and right, and rational quadratic Bézier ``points`` (k, 3, 3) with ``weights`` (k,). ``faces``: the
+        ``beams`` that shape each (none the ball, one its own surface, two a fillet, more a corner), its ``quadric`` as a
+        symmetric 4 × 4 matrix, negative inside, ``loops`` of (arc, forward) with the face to the left, and the beam whose
+        ``rim`` bounds it too. ``patches``: exact biquadratic ``points`` (3, 3, 3) and ``weights`` (3, 3) over ``range``
+        ((s, s), (t, t)), and ``loops`` of sides in space (``points``, ``weights``) and in (s, t) (``parameters``,
+        ``parameter_weights``), with the ``arcs`` that they are part of. ``unpatched``: faces left out of them.
+        """
+        return self._core.hub(whole("hub", hub, 0, len(self) - 1))
+
+
+class Slice:
+    """A plane slice of beams. Made by ``Quadors.slice``."""
+
+    def __init__(self, core: _core.Slice):
+        self._core = core
+
+    def __repr__(self) -> str:
+        return f"<trabecula.Slice of {self.area:g} mm²>"
+
+    @property
+    def area(self) -> float:
+        """The solid's area, mm², in closed form."""
+        return self._core.area
+
+    @property
+    def moved(self) -> float:
+        """How far the plane was moved along its normal, mm: not zero only where it would touch the surface, not cut it."""
+        return self._core.moved
+
+    @property
+    def hubs(self) -> int:
+        """How many hubs the plane reaches; no others were looked at."""
+        return self._core.hubs
+
+    @property
+    def plane(self) -> dict[str, list[float]]:
+        """The plane's ``origin``, its axes ``u`` and ``v`` (x and y for a slice by z), and its ``normal``."""
+        return dict(zip(("origin", "u", "v", "normal"), map(list, self._core.plane), strict=True))
+
+    @cached_property
+    def loops(self) -> list[dict[str, NDArray]]:
+        """Closed loops of conic arcs, the solid to the left: outlines run counter-clockwise, holes clockwise.
+
+        Rational quadratic Bézier curves, one after the other: ``points`` (n, 3, 2) in the plane's (u, v), mm; ``weights``
+        (n,) of the middle points (below 1 an ellipse, above a hyperbola); ``hubs`` (n,); and ``conics`` (n, 6): a, b, c,
+        d, e, f of a u² + 2 b uv + c v² + 2 d u + 2 e v + f = 0 with (u, v) from ``about`` (n, 2).
+        """
+        return self._core.loops()
+
+    def polygons(self, chord: float = 0.01) -> list[NDArray[np.float64]]:
+        """The loops as polygons (n, 2) that are nowhere further than ``chord`` (mm) from them."""
+        return self._core.polygons(positive("chord", chord))
+
+    def svg(self, chord: float = 0.01) -> str:
+        """A drawing in mm, v upwards, the solid filled."""
+        import numpy as np
+
+        loops = self.polygons(chord)
+        corners = np.concatenate(loops) if loops else np.zeros((1, 2))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        width, height = np.maximum(high - low, 1e-6)
+        path = " ".join("M " + " L ".join(f"{u:.9g} {-v:.9g}" for u, v in loop) + " Z" for loop in loops)
+        box = f"{low[0]:.9g} {-high[1]:.9g} {width:.9g} {height:.9g}"
+        size = f'width="{width:.9g}mm" height="{height:.9g}mm" viewBox="{box}"'
+        return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n<path fill-rule="nonzero" d="{path}"/>\n</svg>\n'
+
+    def write(self, path: str | os.PathLike[str], chord: float = 0.01) -> None:
+        """Writes the drawing (.svg)."""
+        extension(path, ("svg",))
+        drawn = self.svg(chord)
+        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+            out.write(drawn)
+
+
+def _points(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    import numpy as np
+
+    points = np.asarray(given, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3), found {points.shape}")
+    return np.ascontiguousarray(points)
