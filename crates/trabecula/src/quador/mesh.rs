@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::fault::{Fault, number};
-use crate::math::{Vec3, add, cross, dot, scale, sub, unit};
+use crate::math::{Aabb, Vec3, add, cross, dot, scale, sub, unit};
 use crate::mesh::Mesh;
 
 use super::Quadors;
@@ -26,6 +26,7 @@ struct Part {
     points: Vec<Vec3>,
     rims: usize,
     triangles: Vec<[u32; 3]>,
+    bounds: Aabb,
     /// How far the triangles are from the surface, mm.
     error: f64,
 }
@@ -89,38 +90,83 @@ impl Quadors {
         ))
     }
 
-    /// Whether triangles of hubs that are joined cross: those of beams that nearly touch, drawn coarsely. Within a hub they
-    /// cannot.
+    /// Whether triangles of hubs that are joined, or that a third one joins, cross: those of beams that nearly touch, drawn
+    /// coarsely. Within a hub they cannot.
     fn crossed(&self, classes: &Classes, parts: &[Part], chord: f64) -> bool {
-        let beside = |i: usize| {
-            let other = |s: &Stub| self.ends[s.beam as usize][1 - s.end] as usize;
-            self.hub(i).stubs.iter().map(other).collect::<Vec<usize>>()
-        };
-        // Each hub with those beside it, as far as they differ by their classes.
-        let mut kinds: HashMap<Vec<u32>, usize> = HashMap::new();
+        let mut pairs: HashMap<[i64; 5], [usize; 2]> = HashMap::new();
+        let per = 1e6 / self.scale;
         for i in 0..self.len() {
-            let key = core::iter::once(i).chain(beside(i));
-            kinds
-                .entry(key.map(|j| classes.of[j]).collect())
-                .or_insert(i);
+            let hub = self.hub(i);
+            let other = |s: &Stub| self.ends[s.beam as usize][1 - s.end] as usize;
+            let near: Vec<usize> = core::iter::once(i)
+                .chain(hub.stubs.iter().map(other))
+                .collect();
+            for (n, &a) in near.iter().enumerate() {
+                for &b in &near[n + 1..] {
+                    let [a, b] = [a.min(b), a.max(b)];
+                    let (ca, cb) = (classes.of[a] as usize, classes.of[b] as usize);
+                    let by = sub(self.center(b), self.center(a));
+                    let apart = (0..3).any(|k| {
+                        let (p, q) = (parts[ca].bounds, parts[cb].bounds);
+                        p.max[k] < by[k] + q.min[k] || p.min[k] > by[k] + q.max[k]
+                    });
+                    if !apart {
+                        let [x, y, z] = by.map(|v| (v * per).round() as i64);
+                        pairs
+                            .entry([ca as i64, cb as i64, x, y, z])
+                            .or_insert([a, b]);
+                    }
+                }
+            }
         }
-        let crosses = |hubs: &[usize]| {
-            let mesh = self.laid(hubs.iter().copied(), classes, parts, chord);
-            mesh.is_ok_and(|m| crate::mesh::self_intersections(&m, 1) > 0)
-        };
-        // Where nearly all differ it is less work to look at the whole at once.
-        if kinds.len() > 64 && 4 * kinds.len() > self.len() {
-            let all: Vec<usize> = (0..self.len()).collect();
-            return crosses(&all);
+        let pairs: Vec<[usize; 2]> = pairs.into_values().collect();
+        pairs
+            .into_par_iter()
+            .any(|[a, b]| self.cross(a, b, classes, parts, chord))
+    }
+
+    /// Whether triangles of two hubs cross. What lies on different sides of the plane in which their beam is parted does not,
+    /// nor what lies where only one of them is.
+    fn cross(&self, a: usize, b: usize, classes: &Classes, parts: &[Part], chord: f64) -> bool {
+        let of = |i: usize| (&parts[classes.of[i] as usize], self.center(i));
+        let ends = [a, b].map(of);
+        let parted = [(a, b), (b, a)].map(|(i, other)| {
+            let hub = self.hub(i);
+            let mut from = 0;
+            for s in hub.stubs {
+                let n = self.ring(s.beam as usize, chord);
+                if self.ends[s.beam as usize][1 - s.end] as usize == other {
+                    // All but the points of this rim are short of the plane.
+                    let short = |(k, p): (usize, &Vec3)| {
+                        (from..from + n).contains(&k)
+                            || dot(*p, s.axis) < s.split - 1e-9 * self.scale
+                    };
+                    return of(i).0.points.iter().enumerate().all(short);
+                }
+                from += n;
+            }
+            false
+        });
+        if parted == [true, true] {
+            return false;
         }
-        let kinds: Vec<usize> = kinds.into_values().collect();
-        kinds.into_par_iter().any(|i| {
-            let mut hubs = beside(i);
-            hubs.push(i);
-            hubs.sort_unstable();
-            hubs.dedup();
-            crosses(&hubs)
-        })
+        let common = ends
+            .map(|(part, center)| Aabb {
+                min: add(part.bounds.min, center),
+                max: add(part.bounds.max, center),
+            })
+            .into_iter()
+            .reduce(Aabb::intersection)
+            .unwrap_or(Aabb::EMPTY);
+        self.laid([a, b].into_iter(), classes, parts, chord)
+            .is_ok_and(|mut mesh| {
+                let v = &mesh.vertices;
+                mesh.triangles.retain(|t| {
+                    let of = t.iter().fold(Aabb::EMPTY, |b, n| b.with(v[*n as usize]));
+                    !of.intersection(common).is_empty()
+                });
+                crate::mesh::self_intersections(&mesh, 1) > 0
+            })
     }
 
     /// Parts in their places, joined by the points of the rims between them.
@@ -199,6 +245,7 @@ impl Part {
         let error = facets.refine(chord)?;
         Some(Part {
             rims: rings.iter().sum(),
+            bounds: facets.points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)),
             points: facets.points,
             triangles: facets.triangles,
             error,
