@@ -96,6 +96,15 @@ def slack(name, part, damaged):
     return gone * widest
 
 
+def redrawn(name, part, damaged):
+    """By how much lattices may differ where damage puts more corners on edges of the part: a cell on either side of each is
+    fitted to other pieces of the same edge, which moves its surface, about a square step, by less than a tenth of a step:
+    but for few places edges are within a twentieth (`tests/laws/crease.rs`).
+    """
+    more = len(damaged[0]) - len(part[0]) if name == "t_junctions" else 0
+    return more * 2 * 0.1 * ROUGH**3
+
+
 KINDS = [(cell, skin) for cell in LATTICES for skin in (False, True)]
 CASES = [(p, d, *k) for p in parts.PARTS for d in parts.DAMAGES for k in KINDS]
 if not EVERYTHING:
@@ -124,7 +133,8 @@ def test_damaged_parts_are_filled_alike(tmp_path, name, damage, cell, skin):
     off = slack(damage, part, damaged)
     assert abs(made.report()["region"]["volume"] - judges.volume(*part)) <= off
     # Where a cap bends another way than the surface did the skin goes with it, on both its sides.
-    assert abs(judges.sound(made.mesh(edge=ROUGH)) - volumes[cell, skin]) <= 2 * off + 1e-6 * volumes[cell, skin]
+    more = redrawn(damage, part, damaged)
+    assert abs(judges.sound(made.mesh(edge=ROUGH)) - volumes[cell, skin]) <= 2 * off + more + 1e-6 * volumes[cell, skin]
 
 
 FOLDER = Path(os.environ["TRABECULA_PARTS"]) if "TRABECULA_PARTS" in os.environ else None
