@@ -18,11 +18,12 @@ if TYPE_CHECKING:
     from typing import Any
 
     from . import beams, blend, cell, grade, level, map, region
-    from .design import Beams, Design, Lattice, load, skin
+    from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
+    from .levels import fraction, iso
     from .mesh import Mesh
     from .quadors import Quadors, Slice
-    from .solid import Solid, Voxels, fraction, iso, spartan
+    from .solid import Solid, Voxels
     from .tets import TetMesh
     from .thickness import Thickness
     from .transition import Transitions
@@ -73,9 +74,9 @@ _HOMES = {
     "Thickness": "thickness",
     "Transitions": "transition",
     "Voxels": "solid",
-    "spartan": "solid",
-    "iso": "solid",
-    "fraction": "solid",
+    "spartan": "design",
+    "iso": "levels",
+    "fraction": "levels",
     "__version__": "_core",
 }
 _MODULES = ("beams", "blend", "cell", "grade", "level", "map", "region")

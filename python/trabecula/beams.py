@@ -7,8 +7,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from typing import Any
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Any
 
 __all__ = ["cell", "cells", "names"]
 
@@ -40,6 +41,8 @@ def cell(name: str) -> dict[str, Any]:
     """One cell, as ``cells`` gives it."""
     known = {it["name"]: it for it in cells()}
     if name not in known:
+        from difflib import get_close_matches
+
         near = get_close_matches(name, known, 1)
         hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
         raise KeyError(f"no cell of beams is named {name}{hint}")

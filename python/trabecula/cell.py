@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
 
 from .given import plain, settings
 
@@ -120,6 +119,8 @@ def group(symbol: int | str) -> dict:
 def __getattr__(name: str) -> Callable[[], str]:
     known = [] if name.startswith("_") else names()
     if name not in known:
+        from difflib import get_close_matches
+
         near = get_close_matches(name, known, 1)
         hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
         raise AttributeError(f"trabecula.cell has no cell {name}{hint if known else ''}")

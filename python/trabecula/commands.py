@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 import warnings
 
 from . import _core, cell
-from .design import load
 from .errors import DesignError, DesignWarning, Refused
 from .input import read_text
 from .listings import cells, known_cell
@@ -25,6 +23,7 @@ from .telling import (
     tell_beams,
     tell_blend,
     tell_distortion,
+    tell_json,
     tell_tets,
     tell_tiling,
     tell_transitions,
@@ -63,7 +62,7 @@ def check(args) -> None:
     elif args.transitions is not None:
         raise Refused("--transitions is for designs with a blend; this one has none")
     if args.json:
-        return print(json.dumps(report, indent=2))
+        return tell_json(report)
     low, high = report["region"]["bounds"]
     about = "" if report["region"]["volume_exact"] else "about "
     extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
@@ -139,7 +138,7 @@ def mesh(args) -> None:
             f"region's boundary; the largest of {left_out['largest']['volume']:.3g} mm³ about ({place}) mm"
         )
     if args.json:
-        return print(json.dumps(made, indent=2))
+        return tell_json(made)
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
@@ -158,7 +157,7 @@ def simplify(args) -> None:
     made.write(args.output)
     report = {**made.simplification, "seconds": round(time.perf_counter() - start, 3)}
     if args.json:
-        print(json.dumps(report, indent=2))
+        tell_json(report)
 
 
 def simplified(mesh: Mesh, args) -> Mesh:
@@ -194,7 +193,7 @@ def voxels(args) -> None:
     made["solid_fraction"] = made["volume"] / region_volume(solid, grid.step)
     made["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
-        return print(json.dumps(made, indent=2))
+        return tell_json(made)
     shape = " × ".join(map(str, grid.shape))
     say(
         f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
@@ -243,7 +242,7 @@ def measure(args) -> None:
     if args.json:
         if found:
             figures["transitions"] = list(found)
-        return print(json.dumps(figures, indent=2))
+        return tell_json(figures)
     units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
     lines = listed(figures)
     width = max(15, *(len(key) for key, _ in lines))
@@ -300,7 +299,7 @@ def slice(args) -> None:
     figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
     figures |= {"moved": cut.moved, "seconds": seconds}
     if args.json:
-        return print(json.dumps(figures, indent=2))
+        return tell_json(figures)
     print(f"area   {figure(cut.area)} mm², exact")
     print(f"loops  {len(cut.loops)}, of {curves} arcs of conics; {cut.hubs} of {len(quadors)} hubs looked at")
     if cut.moved:
@@ -330,7 +329,7 @@ def tets(args) -> None:
         keep_file(os.path.join(os.path.dirname(os.path.abspath(args.file)), report["mesher"]), args.output)
         made.write(args.output)
     if args.json:
-        return print(json.dumps(report, indent=2))
+        return tell_json(report)
     tell_tets(report)
     if args.output:
         say(f"{args.output}: {report['quality']['tets']} tetrahedra, {report['seconds']:.2f} s")
@@ -364,25 +363,21 @@ def kind_of(path: str) -> str:
 
 
 def files_of(tree) -> list[str]:
-    """The files that a region names."""
+    """The files that a design names: what stands under ``path``, or as a table of beams."""
     if isinstance(tree, dict):
-        own = [tree["path"]] if isinstance(tree.get("path"), str) else []
+        own = [tree[k] for k in ("path", "nodes", "struts") if isinstance(tree.get(k), str)]
         return own + [name for branch in tree.values() for name in files_of(branch)]
     return [name for branch in tree for name in files_of(branch)] if isinstance(tree, list) else []
 
 
-def read_by(design: str) -> list[str]:
-    """The files that a design reads."""
-    data = load(design).to_dict()
-    tables = [b[k] for b in (data.get("beams") or {}).values() for k in ("nodes", "struts") if isinstance(b.get(k), str)]
-    regions = [data.get("region"), data.get("blend") or {}, *(data.get("keep") or {}).values()]
-    return files_of(regions) + tables
-
-
 def keep_inputs(design: str, output: str) -> None:
     """Refuses an output that is the design, or a file that the design reads."""
+    if not os.path.exists(output):
+        return
+    from .design import load
+
     folder = os.path.dirname(os.path.abspath(design))
-    for name in [design, *(os.path.join(folder, f) for f in read_by(design))]:
+    for name in [design, *(os.path.join(folder, f) for f in files_of(load(design).to_dict()))]:
         keep_file(name, output)
 
 
@@ -397,7 +392,8 @@ def build(path: str, tell: bool = True) -> Solid:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DesignWarning)
         try:
-            solid = load(path).build()
+            read = _core.Design.from_text(read_text(path), kind_of(path) == "json", path)
+            solid = Solid(read.build(os.path.dirname(os.path.abspath(path))))
         except DesignError as error:
             raise Refused(str(error)) from None
     if tell:

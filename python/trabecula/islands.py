@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from typing import Literal, get_args
 
 from .errors import DesignWarning
 
-__all__ = ["Islands", "check_islands", "left_out", "warn_islands"]
+__all__ = ["check_islands", "left_out", "warn_islands"]
 
-Islands = Literal["keep", "drop", "error"]
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Literal
+
+    Islands = Literal["keep", "drop", "error"]
 
 
 def check_islands(islands: object) -> None:
     """Refuses what is no word for it, before any work is done."""
-    if not (isinstance(islands, str) and islands in get_args(Islands)):
+    if not (isinstance(islands, str) and islands in ("keep", "drop", "error")):
         raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
 
 

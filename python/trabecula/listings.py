@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from difflib import get_close_matches
-
 from . import _core, beams, cell
 from .errors import Refused
+from .telling import tell_json
 from .words import figure
 
 
@@ -35,7 +33,7 @@ def cells(args) -> None:
             }
         )
     if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+        return tell_json(facts[0] if args.name else facts)
     for it in facts:
         print(f"{it['name']}  ({it['title']})")
         print(f"  f       {it['formula']}")
@@ -55,7 +53,7 @@ def tet_cells(args) -> None:
         names = [args.name]
     facts = [cell.tet_facts(name) for name in names]
     if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+        return tell_json(facts[0] if args.name else facts)
     for it in facts:
         terms = ", ".join(
             f"{t['amplitude']:g} {t['component'].title()} ({' '.join(str(h) for h in t['hkl'])})" for t in it["terms"]
@@ -79,7 +77,7 @@ def beam_cells(args) -> None:
         known_cell(args.name, [it["name"] for it in facts])
         facts = [it for it in facts if it["name"] == args.name]
     if args.json:
-        return print(json.dumps(facts[0] if args.name else facts, indent=2, ensure_ascii=False))
+        return tell_json(facts[0] if args.name else facts)
     for it in facts:
         print(f"{it['name']}  ({it['title']})")
         print(f"  group    {it['group']}")
@@ -93,6 +91,8 @@ def beam_cells(args) -> None:
 def known_cell(name: str, known: list[str]) -> None:
     """Refuses the name of no cell."""
     if name not in known:
+        from difflib import get_close_matches
+
         near = get_close_matches(name, known, 1)
         hint = f'; did you mean "{near[0]}"?' if near else "."
         raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')

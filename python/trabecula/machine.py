@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import shutil
 
 from . import _core
 from .output import check_place, special
@@ -19,6 +18,16 @@ def file_size(kind: str, triangles: float, vertices: float | None = None) -> flo
     """Bytes of a mesh file. A closed surface has half as many vertices as triangles."""
     per_triangle, per_vertex = SIZES[kind]
     return 1000 + per_triangle * triangles + per_vertex * (triangles / 2 if vertices is None else vertices)
+
+
+def _free_disk(folder: str) -> float:
+    """Bytes that may still be written there."""
+    if hasattr(os, "statvfs"):
+        disk = os.statvfs(folder)
+        return float(disk.f_bavail * disk.f_frsize)
+    import shutil  # slow to import, and so left to systems that need it
+
+    return float(shutil.disk_usage(folder).free)
 
 
 def fits(
@@ -38,7 +47,7 @@ def fits(
     elif special(os.fsdecode(path)):
         return
     else:
-        have = float(shutil.disk_usage(os.path.dirname(check_place(path))).free)
+        have = _free_disk(os.path.dirname(check_place(path)))
     if have is None or need <= 0.9 * have:
         return
     kind = "memory" if path is None else "disk space"

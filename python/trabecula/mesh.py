@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 from . import _core
 from .given import number, positive, whole
@@ -14,6 +12,7 @@ from .machine import file_size, fits
 from .output import extension, whole_file
 from .thickness import Thickness
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any

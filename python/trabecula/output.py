@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 import stat
-import tempfile
 import zlib
 from collections.abc import Iterator
 
@@ -116,7 +115,11 @@ def _temporary(real: str) -> tuple[str, int | None]:
                 with contextlib.suppress(OSError):
                     _remove_stale(os.path.join(folder, other))
     while True:
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=prefix, suffix=suffix)
+        temporary = os.path.join(folder, f"{prefix}{os.urandom(6).hex()}{suffix}")
+        try:
+            handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        except FileExistsError:
+            continue
         if fcntl is not None:
             with contextlib.suppress(OSError):  # a file system without locks
                 fcntl.flock(handle, fcntl.LOCK_EX)

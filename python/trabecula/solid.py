@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _core
-from .design import Design, Lattice
 from .errors import DesignWarning
-from .given import number, positive, three, whole
-from .islands import Islands, check_islands, left_out, warn_islands
+from .given import positive, whole
+from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
 from .output import check_place, extension, special, whole_file
@@ -22,14 +19,19 @@ from .quadors import Quadors
 from .thickness import Thickness
 from .transition import Transitions
 
+TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
+    from typing import Any
+
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Solid", "Voxels", "fraction", "iso", "spartan"]
+    from .islands import Islands
 
-Progress = Callable[[int, int], Any]
-PartName = Literal["sheet", "lower", "upper"]
+    Progress = Callable[[int, int], Any]
+
+__all__ = ["Solid", "Voxels"]
+
 VOXEL_FORMATS = ("npy", "vti")
 PER_CELL = 32
 
@@ -100,11 +102,15 @@ class Solid(Picture):
         the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
         level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which the wall folds.
         """
+        import json
+
         return json.loads(self._core.report())
 
     def transitions(self) -> Transitions:
         """The transitions between the lattices of a blend: bodies that are loose or dangle, the narrowest neck, and the
         fraction along each. The lattices alone are looked at, without skin and kept zones."""
+        import json
+
         return Transitions(json.loads(self._core.transitions()))
 
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -358,65 +364,6 @@ class Voxels:
         fits(1000.0 + count, f"{count:.3g} voxels", path, self.step, 3, "step")
         with whole_file(path) as temporary:
             self._core.write(temporary, kind)
-
-
-def spartan(
-    name: Literal["diamond", "gyroid"],
-    wavelength: float | Sequence[float] = (4, 4, 4),
-    rotate: Sequence[float] = (0, 0, 0),
-    porosity: float | dict = 0.7,
-    region: dict | None = None,
-    fit: Literal["table", "spartan"] = "table",
-) -> Design:
-    """The seven variables of "Equations for SPARTAN Gyroids and Diamonds" in one call.
-
-    Positions are scaled to phases and rotated there (``map.spartan``); solid is f ≤ t. The note's gyroid is the mirror
-    image of the usual one, so ``"gyroid"`` here is the cell ``gyroid_mirrored``. The porosity is met exactly, by the
-    cell's own distribution; ``fit="spartan"`` uses the note's polynomial for the diamond (porosity within 0.0031), and a
-    fit of ours in the same form for the gyroid, for which the note gives none. ``region`` is a box of 4 × 4 × 4
-    wavelengths about the origin unless given.
-    """
-    from . import level, map
-
-    cells = {"diamond": "diamond", "gyroid": "gyroid_mirrored", "gyroid_mirrored": "gyroid_mirrored"}
-    if name not in cells:
-        raise ValueError(f'spartan: the note has "gyroid" and "diamond", found {name!r}')
-    waves = three("wavelength", wavelength)
-    lattice = Lattice(
-        cell=cells[name],
-        part="lower",
-        map=map.spartan(wavelength=waves, rotate=rotate),
-        level=level.porosity(porosity, fit=fit),
-    )
-    box = {"box": {"size": [4 * w for w in waves]}} if region is None else region
-    return Design(region=box, lattice={name: lattice})
-
-
-@overload
-def iso(cell: str | dict, fraction: float, part: PartName = "sheet") -> float: ...
-@overload
-def iso(cell: str | dict, fraction: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
-def iso(cell, fraction, part="sheet"):
-    """The level t at which this part of the cell has this solid fraction; numbers or arrays."""
-    return _levels(cell, fraction, part, True)
-
-
-@overload
-def fraction(cell: str | dict, iso: float, part: PartName = "sheet") -> float: ...
-@overload
-def fraction(cell: str | dict, iso: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
-def fraction(cell, iso, part="sheet"):
-    """The solid fraction of this part of the cell at level t; numbers or arrays."""
-    return _levels(cell, iso, part, False)
-
-
-def _levels(cell, values, part, to_iso):
-    if not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
-        return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
-    import numpy as np
-
-    given = np.asarray(values, dtype=np.float64)
-    return np.array(_core.levels(cell, part, given.ravel().tolist(), to_iso)).reshape(given.shape)
 
 
 def _a(word: str) -> str:

@@ -7,6 +7,13 @@ from .transition import off
 from .words import figure, say, span
 
 
+def tell_json(figures: dict) -> None:
+    """Figures as JSON on stdout."""
+    import json
+
+    print(json.dumps(figures, indent=2))
+
+
 def tell_beams(name: str, it: dict) -> None:
     """What a graph of beams is."""
     least, most = it["hub_radius"]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from functools import cached_property
-from typing import Any
 
 from . import _core
 from .output import extension, whole_file
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import Any
 
 __all__ = ["Thickness"]
 

@@ -1,0 +1,43 @@
+"""Levels and fractions of a cell, before there is any part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, overload
+
+from . import _core
+from .given import number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["fraction", "iso"]
+
+PartName = Literal["sheet", "lower", "upper"]
+
+
+@overload
+def iso(cell: str | dict, fraction: float, part: PartName = "sheet") -> float: ...
+@overload
+def iso(cell: str | dict, fraction: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
+def iso(cell, fraction, part="sheet"):
+    """The level t at which this part of the cell has this solid fraction; numbers or arrays."""
+    return _levels(cell, fraction, part, True)
+
+
+@overload
+def fraction(cell: str | dict, iso: float, part: PartName = "sheet") -> float: ...
+@overload
+def fraction(cell: str | dict, iso: NDArray[np.float64], part: PartName = "sheet") -> NDArray[np.float64]: ...
+def fraction(cell, iso, part="sheet"):
+    """The solid fraction of this part of the cell at level t; numbers or arrays."""
+    return _levels(cell, iso, part, False)
+
+
+def _levels(cell, values, part, to_iso):
+    if not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
+        return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
+    import numpy as np
+
+    given = np.asarray(values, dtype=np.float64)
+    return np.array(_core.levels(cell, part, given.ravel().tolist(), to_iso)).reshape(given.shape)
