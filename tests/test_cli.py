@@ -257,7 +257,7 @@ def test_what_a_design_reads_is_kept(tmp_path, cube):
     """No output takes the place of a file that the design is made from, wherever it is named."""
     run("mesh", cube, "-o", "cell.stl", "--edge", "1", cwd=tmp_path)
     made = (tmp_path / "cell.stl").read_bytes()
-    text = '[region.box]\nsize = [8, 8, 8]\n[lattice.a]\ncell.file.path = "cell.stl"\npart = "lower"\n'
+    text = 'schema = 1\n[region.box]\nsize = [8, 8, 8]\n[lattice.a]\ncell.file.path = "cell.stl"\npart = "lower"\n'
     (tmp_path / "a.toml").write_text(text + "map.affine.wavelength = 4\nlevel.fraction = 0.3\n")
     told = run("mesh", "a.toml", "-o", "cell.stl", "--edge", "1", cwd=tmp_path, status=1).stderr
     assert "read by this design" in told and (tmp_path / "cell.stl").read_bytes() == made
