@@ -423,7 +423,7 @@ def test_a_disk_without_room(tmp_path, monkeypatch, name):
     """Every format is refused before it is written."""
     from trabecula import machine
 
-    monkeypatch.setattr(machine.shutil, "disk_usage", lambda path: type("Usage", (), {"free": 5000})())
+    monkeypatch.setattr(machine, "free_disk", lambda folder: 5000.0)
     voxels = name.endswith(("npy", "vti"))
     made = SOLID.voxels(step=0.25) if voxels else MESH
     with pytest.raises(ValueError, match="of disk space"):

@@ -296,7 +296,7 @@ def test_interrupted_while_it_starts(tmp_path, cube):
     )
     default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
     mesh = ("mesh", "a.stl")
-    starts = {"argparse": mesh, "trabecula._core": mesh, "trabecula.design": mesh, "trabecula.solid": mesh}
+    starts = {"argparse": mesh, "trabecula._core": mesh, "trabecula.mesh": mesh, "trabecula.solid": mesh}
     for name, rest in {**starts, "numpy": ("voxels", "a.npy")}.items():
         words = [sys.executable, "-c", code, name, *rest]
         done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=default)

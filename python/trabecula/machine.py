@@ -20,7 +20,7 @@ def file_size(kind: str, triangles: float, vertices: float | None = None) -> flo
     return 1000 + per_triangle * triangles + per_vertex * (triangles / 2 if vertices is None else vertices)
 
 
-def _free_disk(folder: str) -> float:
+def free_disk(folder: str) -> float:
     """Bytes that may still be written there."""
     if hasattr(os, "statvfs"):
         disk = os.statvfs(folder)
@@ -47,7 +47,7 @@ def fits(
     elif special(os.fsdecode(path)):
         return
     else:
-        have = _free_disk(os.path.dirname(check_place(path)))
+        have = free_disk(os.path.dirname(check_place(path)))
     if have is None or need <= 0.9 * have:
         return
     kind = "memory" if path is None else "disk space"
