@@ -5,7 +5,7 @@
 //! forms of the angle's sine and cosine, it is one of degree four. All real roots are found, between those of the derivative,
 //! and each foot is then brought to the last digit by Newton's method.
 
-use crate::math::{Mat3, Vec3, add, apply, dot, eigen, norm, scale, sub, transpose, unit};
+use crate::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
 
 use super::quadric::{Conic, Quadric};
 
@@ -288,32 +288,14 @@ fn roots(c: &[f64]) -> Vec<f64> {
             out.push(x);
         }
         let Some(&y) = stops.get(k + 1) else { break };
-        let (mut a, mut b) = (x, y);
-        let rising = value(b) > 0.0;
-        if rising == (value(a) > 0.0) {
+        let rising = value(y) > 0.0;
+        if rising == (value(x) > 0.0) {
             continue;
         }
-        let mut x = (a + b) / 2.0;
-        for _ in 0..100 {
-            let v = value(x);
-            if (v > 0.0) == rising {
-                b = x;
-            } else {
-                a = x;
-            }
-            let newton = x - v / slope(x);
-            let next = if newton > a && newton < b {
-                newton
-            } else {
-                (a + b) / 2.0
-            };
-            if (next - x).abs() <= 4.0 * f64::EPSILON * x.abs() || b - a <= f64::EPSILON * x.abs() {
-                x = next;
-                break;
-            }
-            x = next;
-        }
-        out.push(x);
+        let near = [0.0, 4.0 * f64::EPSILON];
+        out.push(root([x, y], (x + y) / 2.0, rising, near, |x| {
+            [value(x), slope(x)]
+        }));
     }
     out.sort_by(f64::total_cmp);
     out

@@ -1,5 +1,7 @@
 //! Where a cubic first rises through zero.
 
+use crate::math::root;
+
 /// The first place in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
 pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
     // a + s (c1 + s (c2 + s c3)).
@@ -10,9 +12,9 @@ pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
     let slope = |s: f64| c1 + s * (2.0 * c2 + 3.0 * s * c3);
     // Between its turning points the cubic is monotone.
     let mut stops = [1.0; 3];
-    let root = c2 * c2 - 3.0 * c1 * c3;
-    if root > 0.0 {
-        let q = -(c2 + root.sqrt().copysign(c2));
+    let inner = c2 * c2 - 3.0 * c1 * c3;
+    if inner > 0.0 {
+        let q = -(c2 + inner.sqrt().copysign(c2));
         let (x, y) = (q / (3.0 * c3), c1 / q);
         let inside = |s: f64| if s > 0.0 && s < 1.0 { s } else { 1.0 };
         let (x, y) = (inside(x), inside(y));
@@ -24,33 +26,16 @@ pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
             lo = hi;
             continue;
         }
-        // Newton's method, kept between the ends.
-        let (mut l, mut h) = (lo, hi);
-        let (fl, fh) = (value(l), value(h));
-        let mut s = if fh > fl {
-            l - fl * (h - l) / (fh - fl)
+        let (l, h) = (value(lo), value(hi));
+        // The chord's guess.
+        let start = if h > l {
+            lo - l * (hi - lo) / (h - l)
         } else {
-            l
+            lo
         };
-        for _ in 0..40 {
-            let v = value(s);
-            if v < 0.0 {
-                l = s;
-            } else {
-                h = s;
-            }
-            let next = s - v / slope(s);
-            let next = if next > l && next < h {
-                next
-            } else {
-                0.5 * (l + h)
-            };
-            if (next - s).abs() < 1e-13 {
-                return next;
-            }
-            s = next;
-        }
-        return s;
+        return root([lo, hi], start, true, [1e-13, 0.0], |s| {
+            [value(s), slope(s)]
+        });
     }
     1.0
 }
