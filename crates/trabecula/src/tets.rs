@@ -11,6 +11,16 @@ pub use background::{ANGLES, Fit, background};
 pub use check::Checked;
 pub use quality::{Quality, SLIVER, Spread};
 
+/// A cube as six tetrahedra around a diagonal; bit a of a corner's number says on which side it is along axis a.
+pub(crate) const CUBE: [[usize; 4]; 6] = [
+    [0, 1, 3, 7],
+    [0, 3, 2, 7],
+    [0, 2, 6, 7],
+    [0, 6, 4, 7],
+    [0, 4, 5, 7],
+    [0, 5, 1, 7],
+];
+
 /// A tetrahedral mesh of a domain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
@@ -163,14 +173,7 @@ pub(crate) mod tests {
         let corner = |i: usize| core::array::from_fn(|a| (i >> a & 1) as f64);
         TetMesh {
             nodes: (0..8).map(corner).collect(),
-            tets: vec![
-                [0, 1, 3, 7],
-                [0, 3, 2, 7],
-                [0, 2, 6, 7],
-                [0, 6, 4, 7],
-                [0, 4, 5, 7],
-                [0, 5, 1, 7],
-            ],
+            tets: CUBE.map(|t| t.map(|i| i as u32)).to_vec(),
             zones: Vec::new(),
         }
     }

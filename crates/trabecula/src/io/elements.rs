@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::fault::{Fault, counted};
 use crate::math::{Vec3, add, scale};
-use crate::tets::{TetMesh, volume};
+use crate::tets::{CUBE, TetMesh, volume};
 
 /// Points and cells; kinds are VTK's numbers of cell types.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -165,14 +165,7 @@ impl Elements {
         for (cell, s, corners) in self.solids() {
             let cuts: &[[usize; 4]] = match s.name {
                 "tetrahedron" => &[[0, 1, 2, 3]],
-                "voxel" => &[
-                    [0, 1, 3, 7],
-                    [0, 3, 2, 7],
-                    [0, 2, 6, 7],
-                    [0, 6, 4, 7],
-                    [0, 4, 5, 7],
-                    [0, 5, 1, 7],
-                ],
+                "voxel" => &CUBE,
                 "hexahedron" => &[
                     [0, 1, 2, 6],
                     [0, 2, 3, 6],
