@@ -22,6 +22,27 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// The box from `min` to `max` of twelve triangles.
+    pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
+        let corner =
+            |i: usize| core::array::from_fn(|a| if i >> a & 1 == 1 { max[a] } else { min[a] });
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        Mesh {
+            vertices: (0..8).map(corner).collect(),
+            triangles: quads
+                .iter()
+                .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+                .collect(),
+        }
+    }
+
     /// The corners of triangle `i`.
     #[inline]
     pub fn corners(&self, i: usize) -> [Vec3; 3] {

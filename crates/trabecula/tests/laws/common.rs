@@ -26,26 +26,6 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Region {
     Arc::new(Cuboid::new(min, max).expect("box"))
 }
 
-/// The box from `min` to `max` as twelve triangles.
-pub fn box_mesh(min: Vec3, max: Vec3) -> Mesh {
-    let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 1 { max[a] } else { min[a] });
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    Mesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: quads
-            .iter()
-            .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect(),
-    }
-}
-
 /// Regions of all kinds, by three numbers about one.
 pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
     let cylinder = |axis| {

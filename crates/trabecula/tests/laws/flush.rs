@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::common::{Random, box_mesh, cases, fault, lattice};
+use crate::common::{Random, cases, fault, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
 use trabecula::math::{Mat3, Vec3, add, apply, rotation, scale};
+use trabecula::mesh::Mesh;
 use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
     Union,
@@ -33,7 +34,7 @@ fn number(some: &mut Random, from: usize, below: usize) -> f64 {
 
 /// A box as a mesh.
 fn mesh_box(lo: Vec3, hi: Vec3, frame: &Frame) -> Region {
-    let mut mesh = box_mesh(lo, hi);
+    let mut mesh = Mesh::cuboid(lo, hi);
     mesh.vertices.iter_mut().for_each(|v| *v = frame.place(*v));
     Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("mesh"))
 }

@@ -13,8 +13,6 @@ use trabecula::mesh::Mesh;
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
 
-use crate::common::box_mesh;
-
 fn bare(mesh: Mesh) -> Surface {
     Surface {
         cut: vec![false; mesh.triangles.len()],
@@ -29,7 +27,7 @@ fn wall(mesh: Mesh, step: f64) -> Spread {
 }
 
 fn block(min: Vec3, size: Vec3) -> Mesh {
-    box_mesh(min, add(min, size))
+    Mesh::cuboid(min, add(min, size))
 }
 
 fn turned(mut mesh: Mesh, degrees: Vec3) -> Mesh {

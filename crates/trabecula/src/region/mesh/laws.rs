@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::tests::{ball, cuboid, with};
+use super::tests::{ball, with};
 use super::*;
 use crate::math::{Mat3, add, apply, rotation};
 use crate::region::tests::random;
@@ -160,7 +160,7 @@ fn too_many_holes_are_refused_in_numbers() {
         said.contains("100 holes") && said.contains("50.0 %") && said.contains("300 open edges"),
         "{said}"
     );
-    let mut lid = cuboid([0.0; 3], [1.0; 3]);
+    let mut lid = Mesh::cuboid([0.0; 3], [1.0; 3]);
     lid.triangles.truncate(10);
     assert!(refused(lid, Repair::Auto).contains("16.7 %"));
 }
@@ -286,7 +286,7 @@ fn boxes_agree(boxes: &[(Vec3, Vec3)], turn: &Mat3) {
     let mut mesh = Mesh::default();
     let mut truth: Vec<crate::region::Region> = Vec::new();
     for (lo, hi) in boxes {
-        mesh = with(mesh, cuboid(*lo, *hi), false);
+        mesh = with(mesh, Mesh::cuboid(*lo, *hi), false);
         truth.push(Arc::new(Cuboid::new(*lo, *hi).unwrap()));
     }
     let by = [0.3, -0.2, 0.1];
@@ -344,7 +344,7 @@ fn flush_equal_and_touching_boxes_are_united() {
 #[test]
 fn seams_corners_on_sides_and_slivers_are_closed() {
     // Six faces of a cube, each with its own corners, off by a few ten-thousandths.
-    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let cube = Mesh::cuboid([0.0; 3], [1.0; 3]);
     let mut mesh = Mesh::default();
     let mut seed = 12;
     for pair in cube.triangles.chunks(2) {
@@ -367,7 +367,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     );
 
     // A corner on a side that its neighbour does not have.
-    let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+    let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([0.5, 0.5, 0.0]); // on the diagonal of the lower face
     let [a, b, c] = mesh.triangles[0];
     assert_eq!([a, b, c], [0, 2, 3]);
@@ -378,7 +378,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     assert!(region.winding.is_none());
 
     // The same a hair off: a hole as thin as the hair.
-    let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+    let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([0.5, 0.5, 1e-5]);
     mesh.triangles[0] = [0, 2, 8];
     mesh.triangles.push([8, 2, 3]);
@@ -500,7 +500,7 @@ fn winding_numbers_are_whole_and_the_tree_is_near_them() {
 
 #[test]
 fn degenerate_and_stray_triangles_go() {
-    let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+    let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([0.5, 0.0, 0.0]);
     mesh.triangles.extend([[0, 1, 8], [3, 3, 5]]);
     let region = auto(mesh);
@@ -509,16 +509,16 @@ fn degenerate_and_stray_triangles_go() {
         (Some(1.0), 2)
     );
     // A flat fin on a side of the box encloses nothing.
-    let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+    let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([2.0, 0.5, 2.0]);
     mesh.triangles.extend([[7, 5, 8], [5, 7, 8]]);
     assert!((auto(mesh).volume().unwrap() - 1.0).abs() < 1e-12);
     for bad in [f64::NAN, f64::INFINITY] {
-        let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+        let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
         mesh.vertices[3][1] = bad;
         assert!(refused(mesh, Repair::Auto).contains("vertex 3"));
     }
-    let flat = cuboid([0.0; 3], [1.0, 1.0, 1e-13]);
+    let flat = Mesh::cuboid([0.0; 3], [1.0, 1.0, 1e-13]);
     assert!(refused(flat, Repair::Auto).contains("flat"));
 }
 

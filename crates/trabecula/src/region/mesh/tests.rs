@@ -1,7 +1,6 @@
 use super::tree::normal;
 use super::*;
 use crate::math::add;
-pub(super) use crate::mesh::samples::cuboid;
 use crate::region::tests::{check_shape, random};
 use std::collections::HashMap;
 
@@ -72,7 +71,7 @@ pub(super) fn with(mut a: Mesh, b: Mesh, inside_out: bool) -> Mesh {
 #[test]
 fn a_box_of_triangles_is_the_box() {
     let (lo, hi) = ([-1.0, -0.7, -1.1], [0.9, 1.2, 0.8]);
-    let mesh = MeshRegion::new(cuboid(lo, hi), Repair::Auto).unwrap();
+    let mesh = MeshRegion::new(Mesh::cuboid(lo, hi), Repair::Auto).unwrap();
     let exact = crate::region::Cuboid::new(lo, hi).unwrap();
     check_shape("box mesh", &mesh, 2.0, 1.0);
     let mut seed = 5;
@@ -95,7 +94,7 @@ fn flat_faces_are_exactly_zero() {
     for _ in 0..200 {
         let lo = [0; 3].map(|_| random(&mut seed) * 100.0);
         let hi = lo.map(|v| v + 1.0 + random(&mut seed).abs() * 30.0);
-        let mesh = MeshRegion::new(cuboid(lo, hi), Repair::Auto).unwrap();
+        let mesh = MeshRegion::new(Mesh::cuboid(lo, hi), Repair::Auto).unwrap();
         for axis in 0..3 {
             for plane in [lo[axis], hi[axis]] {
                 for _ in 0..50 {
@@ -160,7 +159,7 @@ fn the_seed_never_matters() {
         assert_eq!((a.square, a.triangle), (b.square, b.triangle));
     }
     // The centre of a regular body is equally far from every face.
-    let cube = MeshRegion::new(cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
+    let cube = MeshRegion::new(Mesh::cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
     for s in 0..12 {
         assert_eq!(
             cube.tree.nearest([0.0; 3], s).triangle,
@@ -201,7 +200,7 @@ fn nearest_points_of_a_triangle_by_sampling() {
 
 #[test]
 fn what_is_not_one_solid_is_refused_in_numbers() {
-    let good = || cuboid([0.0; 3], [1.0; 3]);
+    let good = || Mesh::cuboid([0.0; 3], [1.0; 3]);
     let said = |mesh: Mesh| MeshRegion::new(mesh, Repair::Refuse).unwrap_err().message;
     let change = |f: &dyn Fn(&mut Mesh)| {
         let mut m = good();
@@ -225,11 +224,11 @@ fn what_is_not_one_solid_is_refused_in_numbers() {
     assert!(change(&|m| m.triangles[5][1] = 8).contains("triangle 5"));
     assert!(change(&|m| m.vertices.iter_mut().for_each(|v| v[2] *= 1e-14)).contains("flat"));
     assert!(said(Mesh::default()).contains("at least four"));
-    let apart = || cuboid([3.0; 3], [4.0; 3]);
+    let apart = || Mesh::cuboid([3.0; 3], [4.0; 3]);
     let two = MeshRegion::new(with(good(), apart(), false), Repair::Refuse).unwrap();
     assert_eq!(two.volume(), Some(2.0));
     assert!(said(with(good(), apart(), true)).contains("1 body that was inside out"));
-    let inner = || cuboid([0.25; 3], [0.75; 3]);
+    let inner = || Mesh::cuboid([0.25; 3], [0.75; 3]);
     assert!(said(with(good(), inner(), false)).contains("12 triangles inside the solid"));
     let hollow = MeshRegion::new(with(good(), inner(), true), Repair::Auto).unwrap();
     assert_eq!(hollow.volume(), Some(0.875));
@@ -238,7 +237,7 @@ fn what_is_not_one_solid_is_refused_in_numbers() {
 
 #[test]
 fn corners_written_with_two_roundings_are_one() {
-    let mut mesh = cuboid([10.0; 3], [11.0; 3]);
+    let mut mesh = Mesh::cuboid([10.0; 3], [11.0; 3]);
     // Every triangle its own corners, off by less than single precision tells at 11 mm.
     let mut seed = 4;
     let corners: Vec<Vec3> = (0..12).flat_map(|i| mesh.corners(i)).collect();
