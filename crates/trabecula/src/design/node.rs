@@ -170,9 +170,6 @@ pub(super) struct At<'a> {
     line: Option<usize>,
 }
 
-/// A word of later versions: the word, and what to use until then.
-pub(super) type Later = (&'static str, &'static str);
-
 impl<'a> At<'a> {
     pub fn root(node: &'a Node) -> Self {
         At {
@@ -205,18 +202,8 @@ impl<'a> At<'a> {
         self.error(format!("expected {what}, found {found}"))
     }
 
-    fn unknown(&self, what: &str, word: &str, allowed: &[&str], later: &[Later]) -> DesignError {
+    fn unknown(&self, what: &str, word: &str, allowed: &[&str]) -> DesignError {
         let line = self.line.or(self.node.line);
-        if let Some((word, instead)) = later.iter().find(|l| l.0 == word) {
-            let e = DesignError::new(
-                &self.path,
-                format!("\"{word}\" is not in this version yet; {instead}"),
-            );
-            return DesignError {
-                line,
-                ..e.found(*word)
-            };
-        }
         DesignError {
             line,
             ..DesignError::unknown(&self.path, what, word, allowed)
@@ -244,17 +231,12 @@ impl<'a> At<'a> {
     }
 
     /// The entries of a table whose keys are all among `allowed`.
-    pub fn fields(
-        &self,
-        what: &str,
-        allowed: &[&str],
-        later: &[Later],
-    ) -> Result<Fields<'a>, DesignError> {
+    pub fn fields(&self, what: &str, allowed: &[&str]) -> Result<Fields<'a>, DesignError> {
         let what = format!("{what} (a table with {})", allowed.join(", "));
         let entries = self.entries(&what)?;
         for (key, at) in &entries {
             if !allowed.contains(key) {
-                return Err(at.unknown("key", key, allowed, later));
+                return Err(at.unknown("key", key, allowed));
             }
         }
         Ok(Fields {
@@ -264,19 +246,14 @@ impl<'a> At<'a> {
     }
 
     /// The one kind named by a table with one key.
-    pub fn kind(
-        &self,
-        what: &str,
-        allowed: &[&str],
-        later: &[Later],
-    ) -> Result<(&'a str, At<'a>), DesignError> {
+    pub fn kind(&self, what: &str, allowed: &[&str]) -> Result<(&'a str, At<'a>), DesignError> {
         let entries = self.entries(&format!(
             "a {what} as a table named by its kind: {}",
             allowed.join(", ")
         ))?;
         for (key, at) in &entries {
             if !allowed.contains(key) {
-                return Err(at.unknown(what, key, allowed, later));
+                return Err(at.unknown(what, key, allowed));
             }
         }
         let mut entries = entries.into_iter();
@@ -324,7 +301,7 @@ impl<'a> At<'a> {
                 line: self.line.or(self.node.line),
                 ..DesignError::unknown_but(&self.path, what, word, &names, Some(*right))
             },
-            _ => self.unknown(what, word, &names, &[]),
+            _ => self.unknown(what, word, &names),
         })
     }
 

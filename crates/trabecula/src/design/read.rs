@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Design;
 use super::data::*;
 use super::error::DesignError;
-use super::node::{At, Later, Node};
+use super::node::{At, Node};
 use crate::cell::catalogue;
 use crate::cell::tet::ready_cells;
 use crate::fault::{self, counted};
@@ -33,7 +33,7 @@ const REGIONS: [&str; 9] = [
     "difference",
     "offset",
 ];
-const LATER_CELL: [Later; 1] = [("waves", "use a named cell or a series")];
+
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
     let f = At::root(node).fields(
@@ -41,7 +41,6 @@ pub(super) fn design(node: &Node) -> Read<Design> {
         &[
             "schema", "units", "region", "lattice", "beams", "blend", "skin", "keep",
         ],
-        &[],
     )?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
     let number = schema.number()?;
@@ -133,7 +132,7 @@ pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
     {
         return Ok(design(node)?.region);
     }
-    let f = at.fields("a region file", &["schema", "units", "region"], &[])?;
+    let f = at.fields("a region file", &["schema", "units", "region"])?;
     region(f.need(
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
@@ -173,12 +172,12 @@ fn three(at: &At) -> Read<[f64; 3]> {
 }
 
 fn region(at: &At) -> Read<RegionSpec> {
-    let (kind, at) = at.kind("region", &REGIONS, &[])?;
+    let (kind, at) = at.kind("region", &REGIONS)?;
     let at = &at;
     Ok(match kind {
         "box" => RegionSpec::Box(cuboid(at)?),
         "cylinder" => {
-            let f = at.fields("a cylinder", &["base", "axis", "radius", "height"], &[])?;
+            let f = at.fields("a cylinder", &["base", "axis", "radius", "height"])?;
             RegionSpec::Cylinder(CylinderSpec {
                 base: three(f.need("base", "the middle of the lower face, [x, y, z] in mm")?)?,
                 axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
@@ -187,7 +186,7 @@ fn region(at: &At) -> Read<RegionSpec> {
             })
         }
         "sphere" => {
-            let f = at.fields("a sphere", &["center", "radius"], &[])?;
+            let f = at.fields("a sphere", &["center", "radius"])?;
             RegionSpec::Sphere(SphereSpec {
                 center: f.read("center", [0.0; 3], three)?,
                 radius: f.need("radius", "mm")?.number()?,
@@ -196,7 +195,7 @@ fn region(at: &At) -> Read<RegionSpec> {
         "halfspace" => RegionSpec::HalfSpace(halfspace(at)?),
         "mesh" => mesh(at)?,
         "offset" => {
-            let f = at.fields("an offset", &["of", "by"], &[])?;
+            let f = at.fields("an offset", &["of", "by"])?;
             RegionSpec::Offset(OffsetSpec {
                 of: Box::new(region(f.need("of", "the region to grow or shrink")?)?),
                 by: f.need("by", "mm; positive grows")?.number()?,
@@ -241,7 +240,7 @@ const SIDES: [(&str, &str); 14] = [
 ];
 
 fn skin(at: &At) -> Read<SkinSpec> {
-    let f = at.fields("a skin", &["thickness", "open"], &[])?;
+    let f = at.fields("a skin", &["thickness", "open"])?;
     let thickness = f.need("thickness", "how far below the surface it reaches, mm")?;
     Ok(SkinSpec {
         thickness: grade(thickness)?,
@@ -279,7 +278,7 @@ fn keeps(at: &At) -> Read<Keeps> {
 }
 
 fn halfspace(at: &At) -> Read<HalfSpaceSpec> {
-    let f = at.fields("a half-space", &["point", "normal"], &[])?;
+    let f = at.fields("a half-space", &["point", "normal"])?;
     Ok(HalfSpaceSpec {
         point: three(f.need("point", "a point on the plane, mm")?)?,
         normal: three(f.need("normal", "the direction out of the solid")?)?,
@@ -287,7 +286,7 @@ fn halfspace(at: &At) -> Read<HalfSpaceSpec> {
 }
 
 fn cuboid(at: &At) -> Read<BoxSpec> {
-    let f = at.fields("a box", &["size", "center", "min", "max"], &[])?;
+    let f = at.fields("a box", &["size", "center", "min", "max"])?;
     let corners = ["min", "max"].iter().find_map(|k| f.get(k));
     let size = ["size", "center"].iter().find_map(|k| f.get(k));
     match (size, corners) {
@@ -306,7 +305,7 @@ fn cuboid(at: &At) -> Read<BoxSpec> {
 }
 
 fn mesh(at: &At) -> Read<RegionSpec> {
-    let f = at.fields("a mesh", &["path", "unit", "scale", "repair"], &[])?;
+    let f = at.fields("a mesh", &["path", "unit", "scale", "repair"])?;
     let repairs = [("auto", RepairSpec::Auto), ("refuse", RepairSpec::Refuse)];
     Ok(RegionSpec::Mesh(MeshSpec {
         path: f
@@ -355,7 +354,7 @@ fn lattice(at: &At) -> Read<LatticeSpec> {
             return Err(entry.error(format!("{key} goes under [{}.{table}]", at.path)));
         }
     }
-    let f = at.fields("a lattice", &["cell", "part", "map", "level"], &[])?;
+    let f = at.fields("a lattice", &["cell", "part", "map", "level"])?;
     let parts = [
         ("sheet", PartSpec::Sheet),
         ("lower", PartSpec::Lower),
@@ -390,9 +389,9 @@ fn cell(at: &At) -> Read<CellSpec> {
         }
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
     }
-    let (kind, at) = at.kind("cell", &["series", "file", "tet"], &LATER_CELL)?;
+    let (kind, at) = at.kind("cell", &["series", "file", "tet"])?;
     if kind == "file" {
-        let f = at.fields("a cell from a file", &["path", "terms"], &[])?;
+        let f = at.fields("a cell from a file", &["path", "terms"])?;
         let path = f.need("path", "numbers (npy) or a mesh of one cell")?;
         return Ok(CellSpec::Kind(CellKind::File(FileCellSpec {
             path: path.text("a path")?.to_string(),
@@ -402,7 +401,7 @@ fn cell(at: &At) -> Read<CellSpec> {
     if kind == "tet" {
         return Ok(CellSpec::Kind(CellKind::Tet(tet(&at)?)));
     }
-    let f = at.fields("a series", &["terms", "group"], &[])?;
+    let f = at.fields("a series", &["terms", "group"])?;
     let terms = f.need(
         "terms",
         "a list of { hkl = [h, k, l], amplitude = 1, phase = 0 }",
@@ -423,7 +422,7 @@ fn tet(at: &At) -> Read<TetCellSpec> {
     let own = ["group", "terms", "site", "dual", "edge"];
     let mut keys = vec!["name", "zones"];
     keys.extend(own);
-    let f = at.fields("a tetrahedral cell", &keys, &[])?;
+    let f = at.fields("a tetrahedral cell", &keys)?;
     if let Some(zones) = f.get("zones") {
         if let Some(other) = ["name"].iter().chain(&own).find_map(|k| f.get(k)) {
             return Err(
@@ -494,7 +493,7 @@ fn group(at: &At) -> Read<String> {
 }
 
 fn term(at: &At) -> Read<TermSpec> {
-    let f = at.fields("a term", &["hkl", "amplitude", "phase", "component"], &[])?;
+    let f = at.fields("a term", &["hkl", "amplitude", "phase", "component"])?;
     let components = [("re", Component::Re), ("im", Component::Im)];
     let hkl = f.need("hkl", "three whole numbers")?;
     let numbers: [f64; 3] = hkl.numbers("three whole numbers [h, k, l]")?;
@@ -523,7 +522,6 @@ fn level(at: &At) -> Read<LevelSpec> {
             "fit",
             "mid",
         ],
-        &[],
     )?;
     let given: Vec<_> = ["iso", "fraction", "porosity", "thickness"]
         .into_iter()

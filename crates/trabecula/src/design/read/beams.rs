@@ -32,7 +32,7 @@ const CELLS: [(&str, &str); 16] = [
 ];
 
 pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
-    let f = at.fields("beams", &KEYS, &[])?;
+    let f = at.fields("beams", &KEYS)?;
     let cell = f.get("cell").map(cell).transpose()?;
     let own = f.get("nodes").or(f.get("struts"));
     let pattern = f.get("pattern").map(pattern).transpose()?;
@@ -140,7 +140,7 @@ fn places(at: &At, what: &str) -> Read<Vec<RowSpec>> {
 }
 
 fn pattern(at: &At) -> Read<PatternSpec> {
-    let f = at.fields("a pattern", &["nodes", "struts", "repeat"], &[])?;
+    let f = at.fields("a pattern", &["nodes", "struts", "repeat"])?;
     let nodes = places(
         f.need("nodes", "rows of x, y, z and perhaps a radius, mm")?,
         "rows of x, y, z and perhaps a radius, mm",
@@ -192,7 +192,7 @@ fn pattern(at: &At) -> Read<PatternSpec> {
 }
 
 fn repeat(at: &At) -> Read<RepeatSpec> {
-    let f = at.fields("a step", &["count", "by", "rotate", "scale", "about"], &[])?;
+    let f = at.fields("a step", &["count", "by", "rotate", "scale", "about"])?;
     Ok(RepeatSpec {
         count: f
             .need("count", "how often, the original counted")?
@@ -237,7 +237,7 @@ fn profile(at: &At) -> Read<ProfileSpec> {
         ];
         return at.word("profile", &words);
     }
-    let (kind, at) = at.kind("profile", &["waist", "lambda"], &[])?;
+    let (kind, at) = at.kind("profile", &["waist", "lambda"])?;
     let v = at.number()?;
     Ok(if kind == "waist" {
         ProfileSpec::Waist(v)
@@ -256,7 +256,7 @@ fn fillet(at: &At) -> Read<FilletSpec> {
             "a bare number says not what it is; for a radius in mm write fillet = { radius = 0.5 }",
         ));
     }
-    let (kind, at) = at.kind("fillet", &["radius", "tau", "alpha", "beta"], &[])?;
+    let (kind, at) = at.kind("fillet", &["radius", "tau", "alpha", "beta"])?;
     let v = at.number()?;
     Ok(match kind {
         "radius" => FilletSpec::Radius(v),

@@ -11,7 +11,7 @@ use crate::fault::counted;
 
 /// The blend of lattices with these names.
 pub(super) fn blend(at: &At, names: &[&str]) -> Read<BlendSpec> {
-    let f = at.fields("a blend", &["between", "weight", "of", "by"], &[])?;
+    let f = at.fields("a blend", &["between", "weight", "of", "by"])?;
     let by = f.read("by", BySpec::Fraction, |at| {
         at.word(
             "word",

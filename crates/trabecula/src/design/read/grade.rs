@@ -11,15 +11,15 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
     if at.is_list() || at.is_text() {
         return Err(at.expected("a number or a grade (a table with linear, depth, radial, formula, grid, points, field, sigmoid, region, distance or rbf)"));
     }
-    let (kind, at) = at.kind("grade", &GRADES, &[])?;
+    let (kind, at) = at.kind("grade", &GRADES)?;
     Ok(GradeSpec::Kind(match kind {
         "formula" => GradeKind::Formula(at.text("a formula in x, y, z as text")?.to_string()),
         "depth" => {
-            let f = at.fields("a grade by depth", &["stops"], &[])?;
+            let f = at.fields("a grade by depth", &["stops"])?;
             GradeKind::Depth(DepthSpec { stops: stops(&f)? })
         }
         "radial" => {
-            let f = at.fields("a radial grade", &["center", "axis", "stops"], &[])?;
+            let f = at.fields("a radial grade", &["center", "axis", "stops"])?;
             GradeKind::Radial(RadialSpec {
                 center: f.read("center", [0.0; 3], three)?,
                 axis: f.read("axis", None, |at| three(at).map(Some))?,
@@ -28,7 +28,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         }
         "grid" => {
             let keys = ["path", "array", "origin", "step", "remap"];
-            let f = at.fields("a grade on a grid", &keys, &[])?;
+            let f = at.fields("a grade on a grid", &keys)?;
             GradeKind::Grid(GridSpec {
                 path: file(&f)?,
                 array: f.read("array", None, |at| Ok(Some(at.text("a name")?.to_string())))?,
@@ -44,7 +44,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             })
         }
         "points" => {
-            let f = at.fields("a grade at points", &["path", "neighbours", "remap"], &[])?;
+            let f = at.fields("a grade at points", &["path", "neighbours", "remap"])?;
             GradeKind::Points(PointsSpec {
                 path: file(&f)?,
                 neighbours: f.read("neighbours", 8.0, At::number)?,
@@ -53,7 +53,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         }
         "field" => GradeKind::Field(field(&at)?),
         "sigmoid" => {
-            let f = at.fields("a smooth step", &["of", "at", "width"], &[])?;
+            let f = at.fields("a smooth step", &["of", "at", "width"])?;
             GradeKind::Sigmoid(SigmoidSpec {
                 of: Box::new(grade(f.need("of", "the number that it is a step of")?)?),
                 at: f.read("at", 0.0, At::number)?,
@@ -63,7 +63,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             })
         }
         "region" => {
-            let f = at.fields("a region as a number", &["of", "width"], &[])?;
+            let f = at.fields("a region as a number", &["of", "width"])?;
             GradeKind::Region(WithinSpec {
                 of: Box::new(region(
                     f.need("of", "a region, such as { sphere = { radius = 5 } }")?,
@@ -75,7 +75,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         }
         "distance" => {
             let keys = ["points", "path", "closed", "axis", "sharpness"];
-            let f = at.fields("a distance to a line", &keys, &[])?;
+            let f = at.fields("a distance to a line", &keys)?;
             GradeKind::Distance(DistanceSpec {
                 points: control(&f)?,
                 closed: f.read("closed", false, At::truth)?,
@@ -85,7 +85,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         }
         "rbf" => {
             let keys = ["points", "path", "values", "delta", "axis"];
-            let f = at.fields("radial basis functions", &keys, &[])?;
+            let f = at.fields("radial basis functions", &keys)?;
             GradeKind::Rbf(RbfSpec {
                 points: control(&f)?,
                 values: f.read("values", None, |at| {
@@ -101,7 +101,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             })
         }
         _ => {
-            let f = at.fields("a linear grade", &["along", "stops"], &[])?;
+            let f = at.fields("a linear grade", &["along", "stops"])?;
             let along = three(f.need("along", "the direction [x, y, z]")?)?;
             GradeKind::Linear(LinearSpec {
                 along,
@@ -133,7 +133,7 @@ pub(super) fn control(f: &Fields) -> Read<ControlSpec> {
 /// An array of a result.
 pub(super) fn field(at: &At) -> Read<FieldSpec> {
     let keys = ["path", "array", "component", "remap"];
-    let f = at.fields("a field of a result", &keys, &[])?;
+    let f = at.fields("a field of a result", &keys)?;
     let array = f.need(
         "array",
         "the name of an array of points or cells in the file",

@@ -25,7 +25,6 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         &[
             "affine", "spartan", "phase", "cylinder", "sphere", "sweep", "tets",
         ],
-        &[],
     )?;
     if kind == "tets" {
         return Ok(MapSpec::Tets(tets(&at)?));
@@ -37,7 +36,6 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         let f = at.fields(
             "a map round an axis",
             &["wavelength", "around", "center", "axis"],
-            &[],
         )?;
         let wavelength = f.need(
             "wavelength",
@@ -58,7 +56,7 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
     }
     if kind == "sweep" {
         let keys = ["wavelength", "points", "path", "closed", "normal"];
-        let f = at.fields("a map along a line", &keys, &[])?;
+        let f = at.fields("a map along a line", &keys)?;
         let wavelength = f.need(
             "wavelength",
             "the cell's edge in mm, one number or three: two across the line and one along it",
@@ -78,7 +76,6 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         let f = at.fields(
             "a map about a centre",
             &["wavelength", "around", "center", "axis"],
-            &[],
         )?;
         return Ok(MapSpec::Sphere(SphereMapSpec {
             wavelength: f
@@ -92,7 +89,7 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         }));
     }
     if kind == "spartan" {
-        let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"], &[])?;
+        let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"])?;
         let (wavelength, rotate, offset) = common(&f)?;
         return Ok(MapSpec::Spartan(SpartanSpec {
             wavelength,
@@ -100,11 +97,7 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
             offset,
         }));
     }
-    let f = at.fields(
-        "an affine map",
-        &["wavelength", "rotate", "offset", "skew"],
-        &[],
-    )?;
+    let f = at.fields("an affine map", &["wavelength", "rotate", "offset", "skew"])?;
     let (wavelength, rotate, offset) = common(&f)?;
     Ok(MapSpec::Affine(AffineSpec {
         wavelength,
@@ -125,7 +118,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     let keys = [
         "size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road",
     ];
-    let f = at.fields("a map over tetrahedra", &keys, &[])?;
+    let f = at.fields("a map over tetrahedra", &keys)?;
     let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
     let joined = Joined {
         overlap: f.read("overlap", 0.0, At::number)?,
@@ -193,11 +186,7 @@ fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
 }
 
 fn skew(at: &At) -> Read<SkewSpec> {
-    let f = at.fields(
-        "shears in degrees",
-        &["xy", "xz", "yx", "yz", "zx", "zy"],
-        &[],
-    )?;
+    let f = at.fields("shears in degrees", &["xy", "xz", "yx", "yz", "zx", "zy"])?;
     let angle = |key| f.read(key, 0.0, At::number);
     Ok(SkewSpec {
         xy: angle("xy")?,
@@ -220,7 +209,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         "domain",
         "folds",
     ]);
-    let f = at.fields("a phase map", &keys, &[])?;
+    let f = at.fields("a phase map", &keys)?;
     let given: Vec<&str> = TURNS.into_iter().filter(|k| f.get(k).is_some()).collect();
     if let [first, rest @ ..] = given.as_slice() {
         let single = |k: &str| k.starts_with("rotate_");
@@ -251,7 +240,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         rotate_z: maybe("rotate_z")?,
         direction: f.read("direction", None, |at| vector(at).map(Some))?,
         frame: f.read("frame", None, |at| {
-            let f = at.fields("a frame", &["x", "z"], &[])?;
+            let f = at.fields("a frame", &["x", "z"])?;
             Ok(Some(FrameSpec {
                 x: vector(f.need("x", "the direction of the cell's x axis")?)?,
                 z: vector(f.need("z", "the direction of the cell's z axis")?)?,
@@ -269,7 +258,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
 
 fn vector(at: &At) -> Read<VectorSpec> {
     if !at.is_list() {
-        let f = at.fields("a vector", &["field"], &[])?;
+        let f = at.fields("a vector", &["field"])?;
         let field = f.need("field", "an array of three numbers of a result")?;
         return Ok(VectorSpec::Field(VectorField {
             field: super::grade::field(field)?,
@@ -281,7 +270,7 @@ fn vector(at: &At) -> Read<VectorSpec> {
 
 fn tensor(at: &At) -> Read<TensorSpec> {
     if !at.is_list() {
-        let f = at.fields("a tensor", &["field", "order"], &[])?;
+        let f = at.fields("a tensor", &["field", "order"])?;
         let field = f.need("field", "an array of six or nine numbers of a result")?;
         let orders = [("vtk", TensorOrder::Vtk), ("voigt", TensorOrder::Voigt)];
         return Ok(TensorSpec::Field(TensorField {
