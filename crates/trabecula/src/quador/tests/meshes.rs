@@ -1,0 +1,108 @@
+//! Surfaces in triangles.
+
+use super::*;
+
+#[test]
+fn equal_hubs_are_found_wherever_they_are() {
+    let one = Quadors::new(&cubic(3, 0.0), Fillet::Auto).expect("a lattice");
+    let classes = one.classes();
+    // Corners, edges, faces and the inside of a cube, by what is missing.
+    assert_eq!((classes.sample.len(), one.len()), (27, 64));
+    let each: f64 = (0..one.len())
+        .map(|i| one.hub_volume(i).expect("exact"))
+        .sum();
+    assert!((one.volume().expect("exact") / each - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn meshes_are_closed_and_converge_at_second_order() {
+    let mut random = Random(3);
+    let mut graphs: Vec<(Graph, Fillet)> = vec![
+        (cubic(1, 1.0), Fillet::Auto),
+        (cubic(1, 1.0), Fillet::None),
+        (star(1.0, &[], |_| Profile::Cone), Fillet::Auto),
+    ];
+    for (n, fillet) in [
+        (1, Fillet::Auto),
+        (2, Fillet::Auto),
+        (3, Fillet::Tau(0.7)),
+        (6, Fillet::Auto),
+        (6, Fillet::None),
+        (9, Fillet::Tau(0.7)),
+        (14, Fillet::Auto),
+    ] {
+        graphs.push((random_star(&mut random, n), fillet));
+    }
+    let chords = [0.03, 0.0075];
+    let mut errors = [0.0f64; 2];
+    for (graph, fillet) in graphs {
+        let q = Quadors::new(&graph, fillet).expect("a lattice");
+        if !q.overlaps().is_empty() {
+            continue;
+        }
+        let exact = q.mass().expect("exact");
+        for (chord, sum) in chords.iter().zip(&mut errors) {
+            let (mesh, error) = q.mesh(*chord).expect("meshed");
+            let m = crate::measure::size(&mesh);
+            let name = format!("{} beams {fillet:?} at {chord}", graph.beams.len());
+            assert!(
+                m.closed && m.pieces == 1 && m.cavities == 0,
+                "{name}: {m:?}"
+            );
+            // As read back from single precision, too.
+            let mut low = mesh.clone();
+            let round = |c: &mut f64| *c = f64::from(*c as f32);
+            low.vertices.iter_mut().flatten().for_each(round);
+            for mesh in [&mesh, &low] {
+                assert_eq!(crate::mesh::self_intersections(mesh, 1), 0, "{name}");
+                let flat = (0..mesh.triangles.len()).any(|i| crate::mesh::degenerate(mesh, i));
+                assert!(!flat, "{name}");
+            }
+            // Sides stay within the chord error, insides of triangles within 1.2 of it.
+            assert!(error <= 1.2 * chord, "{name}: {error}");
+            // What lies between two surfaces that are no further apart than that; distances are told to first order.
+            let off = exact.volume - mesh.volume();
+            assert!(off.abs() < 1.1 * error * exact.area, "{name}: {off}");
+            *sum += (off / exact.volume).powi(2);
+        }
+    }
+    // Halving edges is a quarter of the chord error, and second order a quarter of what is lost.
+    let [a, b] = errors.map(f64::sqrt);
+    assert!(b < a / 3.0, "{a} {b}");
+}
+
+/// Symmetric hubs, whole and in part as at the border of a block: corners of four, seams in planes through the centre.
+#[test]
+fn symmetric_hubs_are_meshed() {
+    let octet = orbit([1.0, 1.0, 0.0]);
+    let part = |axes: &[usize]| {
+        let kept = |v: &&Vec3| axes.iter().all(|&a| v[a] >= -1e-9);
+        octet.iter().filter(kept).copied().collect::<Vec<Vec3>>()
+    };
+    for axes in [
+        six(),
+        orbit([1.0, 1.0, 1.0]),
+        part(&[]),
+        part(&[2]),
+        part(&[0, 2]),
+        part(&[0, 1, 2]),
+    ] {
+        for fillet in [Fillet::Auto, Fillet::None] {
+            let q = equal(&axes, 14.0, fillet);
+            let (mut mesh, _) = q.mesh(0.03).expect("meshed");
+            let m = crate::measure::size(&mesh);
+            assert!(
+                m.closed && m.euler == 2 && m.pieces == 1,
+                "{fillet:?} {m:?}"
+            );
+            let round = |c: &mut f64| *c = f64::from(*c as f32);
+            mesh.vertices.iter_mut().flatten().for_each(round);
+            assert_eq!(
+                crate::mesh::self_intersections(&mesh, 1),
+                0,
+                "{fillet:?} {}",
+                axes.len()
+            );
+        }
+    }
+}
