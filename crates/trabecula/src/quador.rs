@@ -9,7 +9,6 @@ use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
 use crate::math::{Aabb, Vec3, norm, scale, sub};
 
-mod band;
 pub mod bezier;
 mod classes;
 pub mod closest;
@@ -25,6 +24,8 @@ pub mod patch;
 pub mod pencil;
 pub mod quadric;
 pub mod query;
+mod rule;
+mod sheet;
 pub mod slice;
 
 use hub::{Affine, Hub, Stub};

@@ -4,11 +4,12 @@
 //! over), where an affine function vanishes; `walk` finds the whole by following seams from event to event.
 
 use crate::fault::Fault;
-use crate::math::{Vec3, norm, sub};
+use crate::math::{Vec3, add, cross, norm, scale, sub, unit};
 
 use super::bezier::{Bezier, curves};
 use super::hub::{Affine, Hub};
 use super::quadric::{Conic, Quadric};
+use super::rule::gauss;
 
 mod walk;
 
@@ -121,6 +122,24 @@ impl Complex {
 }
 
 impl Complex {
+    /// The middle of a face on the ball that its seams go round once: of a cap, or of all but one.
+    pub(super) fn pole(&self, face: &Face) -> Vec3 {
+        let (mut sum, mut arrow) = ([0.0; 3], [0.0; 3]);
+        for &(arc, forward) in face.loops.iter().flatten() {
+            let conic = &self.arcs[arc as usize].conic;
+            for &(t, w) in gauss(4) {
+                let (x, dx) = conic.with_slope(t * conic.end);
+                let turn = w * conic.end * if forward { 1.0 } else { -1.0 };
+                sum = add(sum, scale(unit(x), w * conic.end * norm(dx)));
+                arrow = add(arrow, scale(cross(x, dx), turn));
+            }
+        }
+        // Seams may go round half the sphere or more: their area as a vector points to the face all the same.
+        let flat = norm(arrow) <= 1e-3 * norm(sum);
+        let p = unit(if flat { sum } else { arrow });
+        scale(p, face.quadric.exit(p))
+    }
+
     /// The same with arcs shorter than `least` made one place.
     fn merged(self, least: f64) -> Complex {
         let mut to: Vec<u32> = (0..self.vertices.len() as u32).collect();

@@ -211,7 +211,7 @@ impl<'a> Facets<'a> {
             && face.label == 0
         {
             // A cap, or all but a cap: around the middle.
-            let middle = super::band::middle(self.complex, face);
+            let middle = self.complex.pole(face);
             let place = |i: u32| self.points[i as usize];
             let number = self.points.len() as u32;
             let fan: Vec<[u32; 3]> = (0..alone.len())

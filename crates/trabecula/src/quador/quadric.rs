@@ -193,6 +193,51 @@ impl Conic {
     }
 }
 
+/// Part of a conic by a number of 0 to 1, in its plane: the line through the start turns from one place to the other as its direction
+/// goes straight from one to the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    q: f64,
+    m: [f64; 3],
+    from: [f64; 2],
+    by: [f64; 2],
+}
+
+impl Run {
+    /// The place, along e₁ and e₂ from v, and its derivative.
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> ([f64; 2], [f64; 2]) {
+        let ([dc, ds], [m11, m12, m22]) = (self.by, self.m);
+        let (c, s) = (self.from[0] + t * dc, self.from[1] + t * ds);
+        let d = m11 * c * c + 2.0 * m12 * s * c + m22 * s * s;
+        let dd = 2.0 * (m11 * c * dc + m12 * (s * dc + c * ds) + m22 * s * ds);
+        let over = 1.0 / d;
+        let f = -self.q * over;
+        let g = f * dd * over;
+        let slope = [f * (ds * c + s * dc) - g * s * c, s * (2.0 * f * ds - g * s)];
+        ([f * s * c, f * s * s], slope)
+    }
+}
+
+impl Conic {
+    /// The part between two angles less than half a turn apart.
+    pub(super) fn run(&self, from: f64, to: f64) -> Run {
+        let ((s, c), (s1, c1)) = (from.sin_cos(), to.sin_cos());
+        Run {
+            q: self.q,
+            m: self.m,
+            from: [c, s],
+            by: [c1 - c, s1 - s],
+        }
+    }
+
+    /// A vector of the plane.
+    #[inline(always)]
+    pub(super) fn plane(&self, [x, y]: [f64; 2]) -> Vec3 {
+        add(scale(self.e[0], x), scale(self.e[1], y))
+    }
+}
+
 /// atan(s/c) in [0, π).
 fn angle(s: f64, c: f64) -> f64 {
     let t = s.atan2(c);

@@ -171,3 +171,44 @@ fn integrals_are_those_of_points_thrown_at_random() {
         }
     }
 }
+
+#[test]
+#[ignore]
+fn speed() {
+    for n in [6, 12] {
+        for fillet in [Fillet::None, Fillet::Auto, Fillet::Tau(0.8)] {
+            let mut random = Random(77);
+            let all: Vec<Quadors> = (0..300)
+                .map(|_| Quadors::new(&random_star(&mut random, n), fillet).expect("a star"))
+                .filter(|q| q.overlaps().iter().all(|o| o.hub != 0))
+                .collect();
+            let start = cpu();
+            let complexes: Vec<_> = all.iter().map(|q| q.complex(0).expect("a hub")).collect();
+            let walked = (cpu() - start) / all.len() as f64;
+            let start = cpu();
+            let sum: f64 = (all.iter().zip(&complexes))
+                .map(|(q, c)| {
+                    integral::hub_mass::<false>(&q.hub(0), c, integral::USUAL).expect("whole").volume
+                })
+                .sum();
+            let done = (cpu() - start) / all.len() as f64;
+            let start = cpu();
+            let area: f64 = (all.iter().zip(&complexes)).take(50)
+                .map(|(q, c)| {
+                    integral::hub_mass::<true>(&q.hub(0), c, integral::USUAL).expect("whole").area
+                })
+                .sum();
+            let whole = (cpu() - start) / 50.0;
+            let arcs: usize = complexes.iter().map(|c| c.arcs.len()).sum();
+            println!(
+                "{n} {fillet:?} {} hubs, {:.1} arcs: walk {:.1} us, volume {:.1} us, all {:.1} us, {sum:.12} {area:.12}",
+                all.len(), arcs as f64 / all.len() as f64, walked * 1e6, done * 1e6, whole * 1e6
+            );
+        }
+    }
+}
+
+fn cpu() -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").expect("linux");
+    told.split(' ').next().expect("one").parse::<f64>().expect("ns") * 1e-9
+}
