@@ -185,6 +185,22 @@ impl Conic {
         .filter(keep)
     }
 
+    /// The cotangent of the first angle of `roots`, which falls from ∞ at 0 to −∞ at π; −∞ if there is none.
+    #[inline]
+    pub fn first(&self, f: [f64; 3], zero: bool) -> f64 {
+        let f0 = if zero { 0.0 } else { f[0] };
+        greatest([
+            f0 * self.m[0],
+            2.0 * f0 * self.m[1] - self.q * f[1],
+            f0 * self.m[2] - self.q * f[2],
+        ])
+    }
+
+    /// The cotangent of `open`, −∞ if there is none.
+    pub fn opening(&self) -> f64 {
+        greatest([self.m[0], 2.0 * self.m[1], self.m[2]])
+    }
+
     /// Where it first runs to infinity.
     pub fn open(&self) -> Option<f64> {
         let [a, b] = angles([self.m[0], 2.0 * self.m[1], self.m[2]]);
@@ -214,7 +230,10 @@ impl Run {
         let over = 1.0 / d;
         let f = -self.q * over;
         let g = f * dd * over;
-        let slope = [f * (ds * c + s * dc) - g * s * c, s * (2.0 * f * ds - g * s)];
+        let slope = [
+            f * (ds * c + s * dc) - g * s * c,
+            s * (2.0 * f * ds - g * s),
+        ];
         ([f * s * c, f * s * s], slope)
     }
 }
@@ -248,6 +267,17 @@ fn angle(s: f64, c: f64) -> f64 {
     } else {
         t
     }
+}
+
+/// The greatest finite root of c₀x² + c₁x + c₂; −∞ if there is none.
+fn greatest([c0, c1, c2]: [f64; 3]) -> f64 {
+    let square = c1 * c1 - 4.0 * c0 * c2;
+    if square < 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let q = -(c1 + square.sqrt().copysign(c1)) / 2.0;
+    let finite = |x: f64| if x.is_finite() { x } else { f64::NEG_INFINITY };
+    finite(q / c0).max(finite(c2 / q))
 }
 
 /// The angles at which c₀ cos² + c₁ sin cos + c₂ sin² vanishes.

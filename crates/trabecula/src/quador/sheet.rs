@@ -9,7 +9,7 @@
 //! What has no such form, areas and moments, is integrated across too: from B, over σ = η/(2 + νζ), which is central projection from
 //! the place opposite, or along the axis.
 
-use crate::math::{Vec3, add, apply, cross, determinant, dot, scale, sub, unit};
+use crate::math::{Vec3, add, apply, cross, determinant, dot, eigen, scale, sub, unit};
 
 use super::complex::{Complex, Face};
 use super::hub::Hub;
@@ -36,32 +36,31 @@ enum Form {
     Sleeve([f64; 3], f64),
 }
 
-/// A sheet along one conic, by the numbers of its plane.
+/// The two sheets that meet along a conic, by the numbers of its plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Flat {
-    base: Vec3,
-    along: Vec3,
-    height: Vec3,
-    form: Form,
+pub(super) struct Seam {
+    /// ½ B·(y × dy) and d·(y × dy) by df and f × df, and ζ by 1 and f, where f is the place in the plane.
+    base: [[f64; 2]; 3],
+    along: [[f64; 2]; 3],
+    height: [[f64; 2]; 3],
+    /// Both quadratics in ζ that d·(y × dy) is multiplied by the quotient of.
+    over: [[f64; 2]; 3],
+    under: [[f64; 2]; 3],
 }
 
-/// What is opposite to B keeps at least so far from a face: (2 + νζ)/2, which is 1 at B and 0 there.
+/// How far what is opposite to B is wanted from a face: (2 + νζ)/2, which is 1 at B and 0 there.
+const GOOD: f64 = 0.2;
+/// How far at least.
 const CLEAR: f64 = 0.01;
-/// From here on B is taken without looking for a better one.
-const GOOD: f64 = 0.3;
 /// How long d may be, in lengths of what it is for a sphere: what is added to cancel takes digits along.
 const SLANT: f64 = 1e4;
 
 impl Form {
-    /// What d·(y × dy) is multiplied by.
-    #[inline(always)]
-    fn at(self, zeta: f64) -> f64 {
+    /// What d·(y × dy) is multiplied by: the quotient of two quadratics in ζ, from the constant on.
+    fn quotient(self) -> [[f64; 3]; 2] {
         match self {
-            Form::Cap(nu) => -0.5 * zeta / (2.0 + nu * zeta),
-            Form::Sleeve([a, b, c], top) => {
-                let primitive = |z: f64| (b / 4.0 * z + c) * z;
-                (primitive(top) - primitive(zeta)) / ((a * zeta + b) * zeta + c)
-            }
+            Form::Cap(nu) => [[0.0, -0.5, 0.0], [2.0, nu, 0.0]],
+            Form::Sleeve([a, b, c], top) => [[(b / 4.0 * top + c) * top, -c, -b / 4.0], [c, b, a]],
         }
     }
 }
@@ -73,9 +72,14 @@ fn adjugate(q: &Quadric) -> [Vec3; 3] {
 }
 
 impl Sheet {
-    /// The sheet of a face of a hub; `middles` are the places in the middle of all arcs. `None` if there is none from which all of
-    /// the face is seen.
-    pub fn new(hub: &Hub, complex: &Complex, face: &Face, middles: &[Vec3]) -> Option<Sheet> {
+    /// The sheet of a face of a hub, given the places in the middle of all arcs and the cotangents of the angles at which they end.
+    /// `None` if there is none from which all of the face is seen.
+    pub fn new(
+        hub: &Hub,
+        complex: &Complex,
+        face: &Face,
+        (middles, ends): (&[Vec3], &[f64]),
+    ) -> Option<Sheet> {
         let q = &face.quadric;
         let arcs = || face.loops.iter().flatten().map(|&(a, _)| a as usize);
         if let Some(stub) = face.rim {
@@ -90,39 +94,30 @@ impl Sheet {
         }
         if face.label == 0 {
             // Opposite is the middle of a stub.
-            let stub = arcs().flat_map(|a| complex.arcs[a].sides).max()?.trailing_zeros();
+            let stub = arcs()
+                .flat_map(|a| complex.arcs[a].sides)
+                .max()?
+                .trailing_zeros();
             return Sheet::cap(q, scale(hub.stubs[stub as usize].axis, -hub.radius));
         }
         if face.loops.len() > 1 {
             let arc = &complex.arcs[arcs().next()?];
             return Sheet::ring(q, &arc.conic, arc.plane.a);
         }
-        let mut sum = [0.0; 3];
-        let mut count = 0.0;
-        for a in arcs() {
-            (sum, count) = (add(sum, middles[a]), count + 1.0);
-        }
+        let middles = || arcs().map(|a| middles[a]);
+        let (sum, count) = middles().fold(([0.0; 3], 0.0), |(s, n), m| (add(s, m), n + 1.0));
         let mean = scale(sum, 1.0 / count);
         let normal = unit(q.half_slope(mean));
         let middle = add(mean, scale(normal, q.along(mean, normal)));
-        let mut best: Option<(f64, Sheet)> = None;
-        for base in core::iter::once(middle).chain(arcs().map(|a| middles[a])) {
-            let Some(sheet) = Sheet::cap(q, base) else { continue };
-            let clear = |x: Vec3| match sheet.form {
-                Form::Cap(nu) => 1.0 + 0.5 * nu * dot(sheet.normal, sub(x, base)),
-                Form::Sleeve(..) => 0.0,
-            };
-            let least = arcs()
-                .map(|a| clear(middles[a]).min(clear(complex.arcs[a].conic.v)))
-                .fold(f64::INFINITY, f64::min);
-            if least > best.map_or(CLEAR, |b| b.0) {
-                best = Some((least, sheet));
-            }
-            if least > GOOD {
-                break;
-            }
-        }
-        best.map(|b| b.1)
+        let seen = |least: f64| {
+            let bases = core::iter::once(middle).chain(middles());
+            bases
+                .filter_map(|base| Sheet::cap(q, base))
+                .find(|sheet| arcs().all(|a| sheet.clear(&complex.arcs[a].conic, ends[a], least)))
+        };
+        seen(GOOD)
+            .or_else(|| Sheet::waist(q))
+            .or_else(|| seen(CLEAR))
     }
 
     /// What is seen from opposite a place of a quadric.
@@ -140,7 +135,9 @@ impl Sheet {
         if !short(along) {
             // A cylinder's axis has no part in it.
             let rows = adjugate(q);
-            let axis = rows.into_iter().max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
+            let axis = rows
+                .into_iter()
+                .max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
             let mut filled = *q;
             let axis = unit(axis);
             filled.square(1.0, &super::hub::Affine { a: axis, b: 0.0 });
@@ -159,6 +156,31 @@ impl Sheet {
         })
     }
 
+    /// Whether all of a seam, which ends at the angle of this cotangent, is farther from what is opposite to B than a share of all
+    /// there is.
+    fn clear(&self, conic: &Conic, end: f64, least: f64) -> bool {
+        let Form::Cap(nu) = self.form else {
+            return false;
+        };
+        let [v, e, f] = [sub(conic.v, self.base), conic.e[0], conic.e[1]]
+            .map(|v| 0.5 * nu * dot(self.normal, v));
+        let start = 1.0 - least + v;
+        start > 0.0 && conic.first([start, e, f], false) < end
+    }
+
+    /// A hyperboloid of one sheet, which all lies around its axis; `None` if it is none.
+    fn waist(q: &Quadric) -> Option<Sheet> {
+        let (m, axes) = eigen(&q.m);
+        let last = (0..3).min_by(|&i, &j| m[i].total_cmp(&m[j]))?;
+        let negative = m.iter().filter(|v| **v < 0.0).count();
+        let base = (0..3).fold([0.0; 3], |sum, i| {
+            sub(sum, scale(axes[i], dot(axes[i], q.b) / m[i]))
+        });
+        (negative == 1 && q.at(base) < 0.0)
+            .then(|| Sheet::sleeve(q, base, axes[last], axes[last]))
+            .flatten()
+    }
+
     /// A ring about the axis through the middles of its sections parallel to one of its ends.
     fn ring(q: &Quadric, end: &Conic, plane: Vec3) -> Option<Sheet> {
         let [m11, m12, m22] = end.m;
@@ -167,38 +189,35 @@ impl Sheet {
         let base = add(end.v, middle);
         let rows = adjugate(q);
         let along = unit([0, 1, 2].map(|i| dot(rows[i], plane)));
+        Sheet::sleeve(q, base, along, plane)
+    }
+
+    /// About the axis through a place, where sections normal to `normal` have their middles.
+    fn sleeve(q: &Quadric, base: Vec3, along: Vec3, normal: Vec3) -> Option<Sheet> {
         let section = [
             -q.form(along, along),
             -2.0 * dot(q.half_slope(base), along),
             -q.at(base),
         ];
-        let sheet = Sheet {
+        let normal = scale(normal, 1.0 / dot(normal, along));
+        normal.iter().all(|v| v.is_finite()).then_some(Sheet {
             quadric: *q,
             base,
-            normal: scale(plane, 1.0 / dot(plane, along)),
+            normal,
             along,
             form: Form::Sleeve(section, 0.0),
-        };
-        sheet.normal.iter().all(|v| v.is_finite()).then_some(sheet)
-    }
-
-    /// The sheet in the plane of a conic.
-    pub fn flat(&self, conic: &Conic) -> Flat {
-        let (y, [e, f]) = (sub(conic.v, self.base), conic.e);
-        let turns = [cross(y, e), cross(y, f), cross(e, f)];
-        Flat {
-            base: turns.map(|t| 0.5 * dot(self.base, t)),
-            along: turns.map(|t| dot(self.along, t)),
-            height: [y, e, f].map(|v| dot(self.normal, v)),
-            form: self.form,
-        }
+        })
     }
 
     /// The form on a short way by from x.
     pub fn short(&self, x: Vec3, by: Vec3) -> f64 {
         let y = sub(x, self.base);
-        let turn = cross(y, by);
-        0.5 * dot(self.base, turn) + self.form.at(dot(self.normal, y)) * dot(self.along, turn)
+        let (turn, zeta) = (cross(y, by), dot(self.normal, y));
+        let [over, under] = self
+            .form
+            .quotient()
+            .map(|[a, b, c]| (c * zeta + b) * zeta + a);
+        0.5 * dot(self.base, turn) + over / under * dot(self.along, turn)
     }
 
     /// The place a share u of 0 to 1 across the face from the seam's place x with derivative dx on, half the slope there, and what
@@ -222,7 +241,10 @@ impl Sheet {
                 let z = zeta + u * (top - zeta);
                 let wide = (q(z) / q(zeta)).max(0.0).sqrt();
                 let eta = sub(y, scale(d, zeta));
-                (add(scale(eta, wide), scale(d, z)), (top - zeta) * turn / q(zeta))
+                (
+                    add(scale(eta, wide), scale(d, z)),
+                    (top - zeta) * turn / q(zeta),
+                )
             }
         };
         let place = add(self.base, place);
@@ -230,12 +252,47 @@ impl Sheet {
     }
 }
 
-impl Flat {
-    /// The form at a place of the conic's plane with its derivative.
+impl Seam {
+    /// Both sheets in the plane of a conic.
+    pub fn new(of: [&Sheet; 2], conic: &Conic) -> Seam {
+        let [e, f] = conic.e;
+        let each = of.map(|s| {
+            let y = sub(conic.v, s.base);
+            let turns = [cross(y, e), cross(y, f), cross(e, f)];
+            let [over, under] = s.form.quotient();
+            [
+                turns.map(|t| 0.5 * dot(s.base, t)),
+                turns.map(|t| dot(s.along, t)),
+                [y, e, f].map(|v| dot(s.normal, v)),
+                over,
+                under,
+            ]
+        });
+        let [base, along, height, over, under] =
+            [0, 1, 2, 3, 4].map(|n| [0, 1, 2].map(|k| [each[0][n][k], each[1][n][k]]));
+        Seam {
+            base,
+            along,
+            height,
+            over,
+            under,
+        }
+    }
+
+    /// The form of the first sheet less that of the second at a place of the plane with its derivative.
     #[inline(always)]
     pub fn at(&self, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) -> f64 {
-        let way = [dx, dy, x * dy - y * dx];
-        let [h, hx, hy] = self.height;
-        dot(self.base, way) + self.form.at(h + hx * x + hy * y) * dot(self.along, way)
+        let turn = x * dy - y * dx;
+        let way = |c: &[[f64; 2]; 3], [a, b, d]: [f64; 3]| {
+            [0, 1].map(|k| c[0][k] * a + c[1][k] * b + c[2][k] * d)
+        };
+        let base = way(&self.base, [dx, dy, turn]);
+        let along = way(&self.along, [dx, dy, turn]);
+        let zeta = way(&self.height, [1.0, x, y]);
+        let quadratic =
+            |c: &[[f64; 2]; 3]| [0, 1].map(|k| (c[2][k] * zeta[k] + c[1][k]) * zeta[k] + c[0][k]);
+        let (over, under) = (quadratic(&self.over), quadratic(&self.under));
+        let [a, b] = [0, 1].map(|k| base[k] + over[k] / under[k] * along[k]);
+        a - b
     }
 }

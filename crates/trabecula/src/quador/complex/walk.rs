@@ -179,19 +179,21 @@ impl<'a> Walk<'a> {
         let plane = self.plane(labels);
         let mut conic = Conic::new(&quadric, unit(plane.a), from, tangent)?;
         let mut event = None;
-        let (probe, mut end) = (conic, conic.end);
+        let (probe, mut end) = (conic, f64::NEG_INFINITY);
         self.guards(labels, &mut |m, f| {
             let along = [f.at(from), dot(f.a, probe.e[0]), dot(f.a, probe.e[1])];
-            if let Some(t) = probe.roots(along, born == Some(m)).next()
-                && t < end
-            {
-                (end, event) = (t, Some(m));
+            let cot = probe.first(along, born == Some(m));
+            if cot > end {
+                (end, event) = (cot, Some(m));
             }
         });
-        if conic.open().is_some_and(|t| t <= end) {
+        let open = conic.opening();
+        if open >= end && open.is_finite() {
             return None;
         }
-        conic.end = end;
+        if event.is_some() {
+            conic.end = 1f64.atan2(end);
+        }
         Some((conic, event))
     }
 
@@ -218,6 +220,10 @@ impl<'a> Walk<'a> {
                 return None;
             }
             at = sub(at, step);
+            // Newton's steps square: what is left is below the last digit.
+            if dot(step, step) < 1e-20 * dot(at, at) {
+                break;
+            }
         }
         if norm(sub(at, near)) > 1e-5 * (norm(near) + self.hub.radius) {
             return None;
@@ -248,11 +254,12 @@ impl<'a> Walk<'a> {
             conic,
             plane,
         });
-        for v in if ends[0] == ends[1] {
-            vec![ends[0]]
+        let distinct = if ends[0] == ends[1] {
+            &ends[..1]
         } else {
-            ends.to_vec()
-        } {
+            &ends
+        };
+        for &v in distinct {
             if let Some(slot) = self
                 .at
                 .get_mut(v as usize)
