@@ -2,8 +2,8 @@
 //!
 //! Where the surface is smooth it is a foot of the point on one of the quadrics, inside the face or on its seam, where both faces
 //! have one normal: so all feet on all quadrics are looked at, and those that are not on the surface are left out. Creases of
-//! sharp hubs are looked at too, for points in the solid. Hubs, and faces, that a proven bound of their distance
-//! holds off are not looked at.
+//! sharp hubs are looked at too, for points in the solid. Hubs, and faces, that a box or a proven bound of their distance
+//! holds off are not looked at, and beyond the nearest foot on a quadric only where another could be nearer.
 
 use std::sync::OnceLock;
 
@@ -11,6 +11,7 @@ use crate::fault::Fault;
 use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
 
 use super::Quadors;
+use super::complex::{Complex, Face};
 use super::foot::{Axes, away, feet_on_arc};
 use super::hub::Hub;
 use super::quadric::{Conic, Quadric};
@@ -37,12 +38,41 @@ struct Patch {
     axes: Axes,
     /// The greatest |eigenvalue|: how fast its slope may change.
     bend: f64,
+    /// What holds its faces.
+    bounds: Aabb,
+}
+
+/// What holds a face: the points of its seams' curves, and where it is farthest along an axis in between.
+fn bounds(hub: &Hub, complex: &Complex, face: &Face) -> Aabb {
+    let arcs = face.loops.iter().flatten();
+    let seams = arcs.flat_map(|&(a, _)| complex.arcs[a as usize].curves());
+    let points = seams.flat_map(|c| c.points);
+    if let Some(stub) = face.rim {
+        let s = &hub.stubs[stub as usize];
+        let low = points.map(|p| dot(p, s.axis)).fold(s.split, f64::min);
+        let side = s.axis.map(|a| s.thickest() * (1.0 - a * a).max(0.0).sqrt());
+        let ends = Aabb::EMPTY
+            .with(scale(s.axis, low))
+            .with(scale(s.axis, s.split));
+        return Aabb {
+            min: sub(ends.min, side),
+            max: add(ends.max, side),
+        };
+    }
+    let outline = points.fold(Aabb::EMPTY, Aabb::with);
+    match face.quadric.extremes() {
+        None => hub.bounds(),
+        Some(tops) => (tops.into_iter())
+            .filter(|x| hub.value(*x).abs() <= 1e-6 * (dot(*x, *x) + hub.radius * hub.radius))
+            .fold(outline, Aabb::with),
+    }
 }
 
 /// What the feet on one hub are found by.
 struct Faces {
     patches: Vec<Patch>,
-    creases: Vec<Conic>,
+    /// Creases, and what holds them.
+    creases: Vec<(Conic, Aabb)>,
 }
 
 /// Nearest places on a lattice; what is found out about a hub is kept.
@@ -99,20 +129,33 @@ impl Nearest<'_> {
     fn faces(&self, hub: usize) -> Result<&Faces, Fault> {
         let made = self.hubs[hub].get_or_init(|| {
             let complex = self.quadors.complex(hub)?;
+            let hub = self.quadors.hub(hub);
             let mut patches: Vec<Patch> = Vec::new();
             for f in &complex.faces {
-                if patches.iter().all(|p| p.label != f.label) {
+                let bounds = bounds(&hub, &complex, f).grown(1e-9 * hub.radius);
+                if let Some(p) = patches.iter_mut().find(|p| p.label == f.label) {
+                    p.bounds = p.bounds.union(bounds);
+                } else {
                     let (m, _) = crate::math::eigen(&f.quadric.m);
                     patches.push(Patch {
                         label: f.label,
                         quadric: f.quadric,
                         axes: Axes::new(&f.quadric),
                         bend: m.iter().fold(0.0, |a: f64, v| a.max(v.abs())),
+                        bounds,
                     });
                 }
             }
-            let creases = if self.quadors.hub(hub).sharp {
-                complex.arcs.iter().map(|a| a.conic).collect()
+            let creases = if hub.sharp {
+                complex
+                    .arcs
+                    .iter()
+                    .map(|a| {
+                        let points = a.curves().into_iter().flat_map(|c| c.points);
+                        let held = points.fold(Aabb::EMPTY, Aabb::with);
+                        (a.conic, held.grown(1e-9 * hub.radius))
+                    })
+                    .collect()
             } else {
                 Vec::new()
             };
@@ -150,11 +193,16 @@ impl Nearest<'_> {
             seen.extend(hubs.iter().map(|h| h.1));
             seen.sort_unstable();
             hubs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            // The nearest foot on each quadric first; others, which are costlier, where they could be nearer still.
+            let mut later = Vec::new();
             for (away, h) in hubs {
-                if best.is_some_and(|b| away >= b.distance.abs()) {
+                if beaten(away, &best) {
                     break;
                 }
-                self.on_hub(h as usize, p, &mut best)?;
+                self.on_hub(h as usize, p, &mut best, &mut later)?;
+            }
+            for rest in later {
+                self.on_rest(rest, p, &mut best)?;
             }
             match best {
                 Some(b) if b.distance.abs() <= reach => return Ok(b),
@@ -170,46 +218,59 @@ impl Nearest<'_> {
         }
     }
 
-    /// Takes what is nearer on a hub.
-    fn on_hub(&self, h: usize, p: Vec3, best: &mut Option<Closest>) -> Result<(), Fault> {
+    /// Takes what is nearer on a hub: feet that are nearest to their quadrics, and on creases. What else there may be is for later.
+    fn on_hub(
+        &self,
+        h: usize,
+        p: Vec3,
+        best: &mut Option<Closest>,
+        later: &mut Vec<Rest>,
+    ) -> Result<(), Fault> {
         let faces = self.faces(h)?;
         let (hub, center) = (self.quadors.hub(h), self.quadors.center(h));
         let x = sub(p, center);
-        let mut feet = Vec::new();
         let mut order: Vec<(f64, usize)> = faces
             .patches
             .iter()
             .enumerate()
             .map(|(i, f)| {
                 let slope = 2.0 * norm(f.quadric.half_slope(x));
-                (clear(f.quadric.at(x), slope, f.bend), i)
+                let clear = clear(f.quadric.at(x), slope, f.bend);
+                (clear.max(f.bounds.distance(x)), i)
             })
+            .filter(|(bound, _)| !beaten(*bound, best))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (bound, i) in order {
-            if best.is_some_and(|b| bound * (1.0 - 1e-12) >= b.distance.abs()) {
+        for (bound, patch) in order {
+            if beaten(bound, best) {
                 break;
             }
-            let f = &faces.patches[i];
-            feet.clear();
-            f.axes.feet(x, &mut feet);
-            for &foot in &feet {
-                let normal = unit(f.quadric.half_slope(foot));
-                let away = sub(x, foot);
-                let side = if dot(away, normal) < 0.0 { -1.0 } else { 1.0 };
-                let found = Closest {
-                    at: add(center, foot),
-                    normal,
-                    distance: side * norm(away),
-                    hub: h as u32,
-                    stubs: f.label,
-                };
-                take(&hub, foot, found, best);
+            let f = &faces.patches[patch];
+            let mut rest = Rest {
+                hub: h,
+                patch,
+                bound,
+                told: false,
+            };
+            if let Some(foot) = f.axes.nearest(x) {
+                if beaten(foot.away, best) {
+                    continue;
+                }
+                rest.bound = bound.max(foot.away);
+                if let Some(at) = f.axes.place(&foot) {
+                    rest.told = true;
+                    self.take(h, f, x, at, best);
+                }
             }
+            later.push(rest);
         }
         // From outside a crease is never nearest: the solid's angle there is more than half a turn.
         if hub.value(x) < 0.0 {
-            for c in &faces.creases {
+            let mut feet = Vec::new();
+            for (c, held) in &faces.creases {
+                if beaten(held.distance(x), best) {
+                    continue;
+                }
                 feet.clear();
                 feet_on_arc(c, x, &mut feet);
                 for &foot in &feet {
@@ -226,6 +287,57 @@ impl Nearest<'_> {
         }
         Ok(())
     }
+
+    /// Takes what is nearer among the other feet on a quadric.
+    fn on_rest(&self, rest: Rest, p: Vec3, best: &mut Option<Closest>) -> Result<(), Fault> {
+        if beaten(rest.bound, best) {
+            return Ok(());
+        }
+        let f = &self.faces(rest.hub)?.patches[rest.patch];
+        let x = sub(p, self.quadors.center(rest.hub));
+        let within = best.map_or(f64::INFINITY, |b| b.distance.abs());
+        let mut few = Vec::new();
+        let told = rest.told && f.axes.others(x, within, &mut few);
+        let mut feet: Vec<Vec3> = few.iter().filter_map(|foot| f.axes.place(foot)).collect();
+        if !told || feet.len() < few.len() {
+            feet.clear();
+            f.axes.feet(x, &mut feet);
+        }
+        for foot in feet {
+            self.take(rest.hub, f, x, foot, best);
+        }
+        Ok(())
+    }
+
+    /// Takes a foot of x on a face if it is nearer.
+    fn take(&self, h: usize, f: &Patch, x: Vec3, foot: Vec3, best: &mut Option<Closest>) {
+        let normal = unit(f.quadric.half_slope(foot));
+        let away = sub(x, foot);
+        let side = if dot(away, normal) < 0.0 { -1.0 } else { 1.0 };
+        let found = Closest {
+            at: add(self.quadors.center(h), foot),
+            normal,
+            distance: side * norm(away),
+            hub: h as u32,
+            stubs: f.label,
+        };
+        take(&self.quadors.hub(h), foot, found, best);
+    }
+}
+
+/// Feet that were left for later.
+struct Rest {
+    hub: usize,
+    patch: usize,
+    /// No nearer than this.
+    bound: f64,
+    /// Whether the nearest foot on the whole quadric is known.
+    told: bool,
+}
+
+/// Whether what is no nearer than a bound cannot be nearest.
+fn beaten(bound: f64, best: &Option<Closest>) -> bool {
+    best.is_some_and(|b| bound * (1.0 - 1e-12) >= b.distance.abs())
 }
 
 /// Takes a foot if it is on the surface of the hub's part, but for rounding, and nearer.

@@ -19,6 +19,18 @@ pub(super) struct Axes {
     c: f64,
 }
 
+/// A foot along the axes of its quadric.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Foot {
+    p: Vec3,
+    x: Vec3,
+    mu: f64,
+    /// How far it is from p.
+    pub away: f64,
+}
+
+/// 1 + μm below which a foot is not told from a circle of them.
+const DEGENERATE: f64 = 1e-5;
 /// Azimuths that are tried where a whole circle is equally near.
 const ROUND: usize = 32;
 
@@ -42,6 +54,139 @@ impl Axes {
 
     fn half_slope(&self, x: Vec3) -> Vec3 {
         [0, 1, 2].map(|i| self.m[i] * x[i] + self.b[i])
+    }
+
+    /// x(μ), Q there, its derivative, and the least 1 + μm.
+    #[inline]
+    fn along(&self, p: Vec3, mu: f64) -> (Vec3, [f64; 2], f64) {
+        let (mut value, mut slope, mut near) = (self.c, 0.0, f64::INFINITY);
+        let mut x = [0.0; 3];
+        for i in 0..3 {
+            let (m, b) = (self.m[i], self.b[i]);
+            let w = 1.0 + mu * m;
+            let over = 1.0 / w;
+            x[i] = (p[i] - mu * b) * over;
+            value += x[i] * (m * x[i] + 2.0 * b);
+            let g = (m * p[i] + b) * over;
+            slope -= 2.0 * g * g * over;
+            near = near.min(w);
+        }
+        (x, [value, slope], near)
+    }
+
+    /// The nearest of all feet of p; `None` where it is not told from others.
+    ///
+    /// Where 1 + μM is positive Q(x(μ)) falls, so it has one root at most, and the nearest foot is there (Moré 1993).
+    pub(super) fn nearest(&self, p: Vec3) -> Option<Foot> {
+        let p = apply(&self.turn, p);
+        let size = self.m.iter().fold(0.0f64, |a, m| a.max(m.abs()));
+        let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
+        for m in self.m {
+            if m > 0.0 {
+                low = low.max(-1.0 / m);
+            } else if m < 0.0 {
+                high = high.min(-1.0 / m);
+            }
+        }
+        let mut mu = 0.0;
+        for _ in 0..40 {
+            let (_, [value, slope], near) = self.along(p, mu);
+            if near < DEGENERATE {
+                return None;
+            }
+            if value > 0.0 {
+                low = mu;
+            } else {
+                high = mu;
+            }
+            let step = -value / slope;
+            let next = mu + step;
+            // Newton's steps square: the next one is below the last digit.
+            if step.abs() * size <= 1e-9 * near {
+                return Some(self.foot(p, next));
+            }
+            mu = if next > low && next < high {
+                next
+            } else if low.is_finite() && high.is_finite() {
+                0.5 * (low + high)
+            } else {
+                2.0 * mu + step.signum() / size
+            };
+        }
+        None
+    }
+
+    /// The other feet of p within a distance from which the distance grows on all sides; `false` where they are not told apart.
+    ///
+    /// There 1 + μM is positive across g, so it has one negative eigenvalue at most, −t of the greatest or the least m, and
+    /// gᵀ(1 + μM)⁻¹g ≤ 0, which is where Q(x(μ)) rises: with γ = Mp + b and w = 1 + μm, t³ Σ γᵢ²/wᵢ³ of the two others grows with
+    /// t, so this is from t = 0 up to some t, and Q has one root there at most. As |x − p| ≥ |γ|(1 + t)/(|m| t) small t are too far.
+    pub(super) fn others(&self, p: Vec3, within: f64, out: &mut Vec<Foot>) -> bool {
+        let p = apply(&self.turn, p);
+        let gamma = self.half_slope(p);
+        let size = dot(p, p) + self.c.abs();
+        for k in 0..3 {
+            let m = self.m[k];
+            let (far, own) = (within * m.abs(), gamma[k].abs());
+            if far <= own {
+                continue;
+            }
+            let ratio = [1, 2].map(|i| self.m[(k + i) % 3] / m);
+            let end = (ratio.iter().filter(|r| **r > 0.0))
+                .fold(f64::INFINITY, |e, r| e.min(1.0 / r - 1.0));
+            let mut low = own / (far - own);
+            if low < DEGENERATE && end > 0.0 {
+                return false;
+            }
+            let mu = |t: f64| -(1.0 + t) / m;
+            // Of Q's sign at t = 0 there is no root before where it changes, or where Q falls.
+            let before = |t: f64| {
+                let (_, [value, slope], _) = self.along(p, mu(t));
+                (slope >= 0.0).then_some((value > 0.0) == (m > 0.0))
+            };
+            if low >= end || before(low) != Some(true) {
+                continue;
+            }
+            let mut high = end;
+            for _ in 0..60 {
+                let t = if high.is_finite() {
+                    0.5 * (low + high)
+                } else {
+                    2.0 * low + 1.0
+                };
+                match before(t) {
+                    None => high = t,
+                    Some(true) => low = t,
+                    Some(false) => {
+                        let ends = [mu(low).min(mu(t)), mu(low).max(mu(t))];
+                        let near = [0.0, 4.0 * f64::EPSILON];
+                        let at = root(ends, mu(t), true, near, |mu| self.along(p, mu).1);
+                        out.push(self.foot(p, at));
+                        break;
+                    }
+                }
+                if high - low <= 1e-9 * high {
+                    // Q may touch zero.
+                    if self.along(p, mu(low)).1[0].abs() < 1e-6 * size {
+                        return false;
+                    }
+                    break;
+                }
+            }
+        }
+        true
+    }
+
+    fn foot(&self, p: Vec3, mu: f64) -> Foot {
+        let x = self.along(p, mu).0;
+        let away = norm(sub(x, p));
+        Foot { p, x, mu, away }
+    }
+
+    /// A foot brought to the last digit, where it lies in space.
+    pub(super) fn place(&self, foot: &Foot) -> Option<Vec3> {
+        let x = self.polished(foot.p, foot.x, foot.mu)?;
+        Some(apply(&transpose(&self.turn), x))
     }
 
     /// The feet of p on the whole quadric; where p is about as near to all of a circle or sphere, some places of it.

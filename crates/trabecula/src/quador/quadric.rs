@@ -1,6 +1,6 @@
 //! Quadrics, and the conics that planes cut out of them.
 
-use crate::math::{Mat3, Vec3, add, apply, dot, scale};
+use crate::math::{Mat3, Vec3, add, apply, determinant, dot, inverse, scale};
 
 use super::hub::{Affine, Hub};
 
@@ -51,6 +51,23 @@ impl Quadric {
         let (one, two) = (dot(self.b, p), self.form(p, p));
         // c < 0 at the centre: of the two roots 1/t the greater is the first exit.
         -self.c / (one + (one * one - self.c * two).max(0.0).sqrt())
+    }
+
+    /// The places whose normals are along an axis, both ways; `None` on cylinders and paraboloids, which need not have them.
+    pub(super) fn extremes(&self) -> Option<[Vec3; 6]> {
+        let size = self.m.iter().flatten().fold(0.0f64, |a, v| a.max(v.abs()));
+        if determinant(&self.m).abs() < 1e-9 * size.powi(3) {
+            return None;
+        }
+        let inverse = inverse(&self.m);
+        let middle = scale(apply(&inverse, self.b), -1.0);
+        // Mx + b = s e with Q = 0; NaN where no place has that normal.
+        let rest = -self.at(middle);
+        Some(core::array::from_fn(|k| {
+            let a = k / 2;
+            let s = (rest / inverse[a][a]).sqrt() * if k % 2 == 0 { 1.0 } else { -1.0 };
+            add(middle, scale(inverse[a], s))
+        }))
     }
 
     /// How far along n from p the nearer of the two places on the quadric lies; NaN if there is none.
