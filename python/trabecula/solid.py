@@ -34,6 +34,8 @@ __all__ = ["Solid", "Voxels"]
 
 VOXEL_FORMATS = ("npy", "vti")
 PER_CELL = 32
+#: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
+TRIANGLE = 2 * (12 + 12)
 
 
 class Solid(Picture):
@@ -241,7 +243,10 @@ class Solid(Picture):
                 raise ValueError("give a chord error or the spacing of a grid, not both")
             if islands != "keep":
                 raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
-            core, error = self._core.mesh_beams(positive("chord", chord), _threads(threads), progress)
+            need = self._core.expected_beams(positive("chord", chord))
+            # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
+            fits(2 * TRIANGLE * need, f"{need:.3g} triangles", edge=chord, power=1, word="chord")
+            core, error = self._core.mesh_beams(chord, _threads(threads), progress)
             return Mesh(core, self._core.region, chord_error=error)
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)

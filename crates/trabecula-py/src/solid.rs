@@ -275,6 +275,12 @@ impl Solid {
         Ok((mesh, told, words))
     }
 
+    /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches.
+    fn expected_beams(&self, py: Python<'_>, chord: f64) -> PyResult<f64> {
+        let told = run(py, None, None, |_| self.built.lone_beams()?.expected(chord))?;
+        told.map_err(error::fault)
+    }
+
     /// The surface of beams alone, from their patches, within `chord` (mm) of them; and how far it is from them, mm.
     #[pyo3(signature = (chord, threads=None, progress=None))]
     fn mesh_beams(

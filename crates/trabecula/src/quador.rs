@@ -12,6 +12,7 @@ use crate::math::{Aabb, Vec3, norm, scale, sub};
 pub mod bezier;
 mod classes;
 pub mod closest;
+pub mod collide;
 pub mod complex;
 mod facets;
 mod field;

@@ -6,6 +6,7 @@ use crate::field::Field;
 use crate::graph::{Cleaned, Facts, Graph, Trimmed};
 use crate::pattern::Laid;
 use crate::quador::Quadors;
+use crate::quador::collide::Collision;
 
 /// Beams as they fill a region.
 #[derive(Clone)]
@@ -57,4 +58,6 @@ pub struct Truss {
     pub trimmed: Trimmed,
     /// Nodes inside the region with a single strut.
     pub dangling: usize,
+    /// Beams that meet in the region without a common hub.
+    pub collisions: Vec<Collision>,
 }

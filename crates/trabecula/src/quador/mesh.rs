@@ -42,6 +42,24 @@ pub(super) fn across(axis: Vec3) -> Vec3 {
     unit(sub(pole, scale(axis, dot(pole, axis))))
 }
 
+/// Kinds of hubs that are looked at to tell how many triangles there will be.
+const LOOKS: usize = 64;
+/// The least chord error, of the typical radius, at which they are counted: beyond it they grow as it says.
+const COARSE: f64 = 0.003;
+
+fn check(chord: f64) -> Result<(), Fault> {
+    if chord > 0.0 && chord.is_finite() {
+        return Ok(());
+    }
+    Err(Fault::new(
+        "chord",
+        format!(
+            "{} mm is no chord error: give a finite number above zero",
+            number(chord)
+        ),
+    ))
+}
+
 impl Quadors {
     /// Points on the rim of a beam for a chord error.
     fn ring(&self, beam: usize, chord: f64) -> usize {
@@ -51,20 +69,44 @@ impl Quadors {
         ((PI / half).ceil() as usize).max(8)
     }
 
+    /// How many triangles `mesh` makes, about: of some kinds of hubs, at a coarser chord error if need be.
+    ///
+    /// # Errors
+    /// As for `mesh`.
+    pub fn expected(&self, chord: f64) -> Result<f64, Fault> {
+        check(chord)?;
+        self.exact()?;
+        // Halving the chord error doubles the triangles.
+        let coarse = chord.max(COARSE * self.scale);
+        let classes = self.classes();
+        let step = classes.sample.len().div_ceil(LOOKS);
+        let each = (0..classes.sample.len())
+            .into_par_iter()
+            .step_by(step)
+            .map(|c| {
+                let i = classes.sample[c];
+                let hub = self.hub(i);
+                let rings: Vec<usize> = (hub.stubs.iter())
+                    .map(|s| self.ring(s.beam as usize, coarse))
+                    .collect();
+                let part = Part::new(&hub, &self.complex(i)?, &rings, coarse);
+                let n = classes.count[c] as f64;
+                Ok([
+                    n * part.ok_or_else(|| tangled(i))?.triangles.len() as f64,
+                    n,
+                ])
+            });
+        let each = each.collect::<Result<Vec<[f64; 2]>, Fault>>()?;
+        let sum = |k: usize| each.iter().map(|e| e[k]).sum::<f64>();
+        Ok(sum(0) / sum(1) * self.len() as f64 * coarse / chord)
+    }
+
     /// The surface as triangles that stay within `chord` (mm) of it where they were asked to, and how far they do stay, mm.
     ///
     /// # Errors
     /// A chord error that is no length, beams that overlap too far, and more points than 32 bits can number.
     pub fn mesh(&self, chord: f64) -> Result<(Mesh, f64), Fault> {
-        if !(chord > 0.0 && chord.is_finite()) {
-            return Err(Fault::new(
-                "chord",
-                format!(
-                    "{} mm is no chord error: give a finite number above zero",
-                    number(chord)
-                ),
-            ));
-        }
+        check(chord)?;
         self.exact()?;
         let classes = self.classes();
         // Where beams that nearly touch would cross, all is drawn finer.
