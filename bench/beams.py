@@ -5,11 +5,15 @@ python bench/beams.py --trabecula .venv/bin/trabecula
 
 The design is a block of filleted octet cells that its region does not cut, so its volume is known in closed form (`check`). The
 surface is made from the patches to a chord error, and on a grid with about as many triangles.
+
+Before that, exact queries by processor time: the volume of hubs of which no two are equal, and nearest places.
 """
 
 import argparse
 import json
+import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -27,6 +31,51 @@ map.affine.wavelength = 10
 """
 
 
+#: Prints processor seconds of one call, by another interpreter that has the package.
+QUERIES = """
+import sys, time, warnings
+import numpy as np
+import trabecula as lt
+
+cell, n, count = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+warnings.simplefilter("ignore")
+unit = [[0, 0, 0]] if cell == "sc" else [[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]
+ways = [[1, 0, 0], [0, 1, 0], [0, 0, 1]] if cell == "sc" else [
+    [0.5, 0.5, 0], [0.5, -0.5, 0], [0.5, 0, 0.5], [0.5, 0, -0.5], [0, 0.5, 0.5], [0, 0.5, -0.5]]
+grid = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+nodes = np.round((grid + np.array(unit)).reshape(-1, 3) * 2).astype(int)
+number = {tuple(p): i for i, p in enumerate(nodes)}
+steps = np.round(np.array(ways) * 2).astype(int)
+struts = [[i, number[tuple(p + s)]] for i, p in enumerate(nodes) for s in steps if tuple(p + s) in number]
+random = np.random.default_rng(1)
+places = 5.0 * nodes + random.uniform(-0.4, 0.4, nodes.shape)
+radii = random.uniform(0.5, 0.6, len(nodes))
+beams = lt.Beams(nodes=np.column_stack([places, radii]).tolist(), struts=struts, radius=0.45, fillet="auto")
+size = 10.0 * n + 10
+quadors = lt.Design(region=lt.region.box(min=[-10] * 3, max=[size] * 3), beams=beams).build().quadors()
+start = time.process_time()
+volume = quadors.volume()
+taken = time.process_time() - start
+print(len(quadors), 2 * len(struts) / len(quadors), taken)
+points = random.uniform(0, 10 * n, (count, 3))
+quadors.closest(points)
+start = time.process_time()
+quadors.closest(points)
+print(count, 0, time.process_time() - start)
+"""
+
+
+def queries(python, cell, n):
+    """Prints the rates of one kind of hubs."""
+    told = subprocess.run([python, "-c", QUERIES, cell, str(n), "20000"], capture_output=True, text=True, check=True).stdout
+    (hubs, valence, seconds), (points, _, near) = [map(float, line.split()) for line in told.splitlines()]
+    print(
+        f"{'volume':14} {seconds:7.2f} s  of {hubs:.0f} distinct hubs, valence {valence:.1f} in the mean: "
+        f"{1e6 * seconds / hubs:.0f} µs each on one processor, {2 * hubs / seconds:.0f}/s on two"
+    )
+    print(f"{'nearest':14} {near:7.2f} s  of {points:.0f} points: {1e6 * near / points:.1f} µs each on one processor")
+
+
 def ran(command):
     """(seconds, what it printed) of a command."""
     start = time.perf_counter()
@@ -42,6 +91,9 @@ def main():
     options.add_argument("--chord", type=float, nargs="+", default=[0.02, 0.005], help="chord errors, mm")
     options.add_argument("--edge", type=float, nargs="+", default=[0.2, 0.1], help="spacings of the grid, mm")
     a = options.parse_args()
+    python = shutil.which("python", path=str(Path(a.trabecula).resolve().parent)) or sys.executable
+    for cell, n in [("sc", 20), ("fcc", 10)]:
+        queries(python, cell, n)
     with tempfile.TemporaryDirectory() as folder:
         design, out = Path(folder) / "octet.toml", Path(folder) / "octet.stl"
         design.write_text(DESIGN.format(end=10 * a.cells + 1))

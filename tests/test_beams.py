@@ -428,6 +428,29 @@ def test_a_chord_error_is_for_uncut_beams_alone(design, why):
         design().mesh(chord=0.01)
 
 
+def test_a_mesh_that_memory_has_no_room_for_is_refused_beforehand():
+    """At a hundred-thousandth of the radius a block of some hundred beams is of thousands of millions of triangles."""
+    with pytest.raises(ValueError, match=r"chord 1e-08 mm needs about .* of memory for .* triangles.*try chord"):
+        whole().mesh(chord=1e-8)
+
+
+def test_beams_that_cross_without_a_node_are_told():
+    """One solid on a grid, but without exact figures: what is shared would count twice."""
+    apart = {"nodes": [[1, 5, 5], [9, 5, 5], [5, 1, 5.9], [5, 9, 5.9]], "struts": [[0, 1], [2, 3]], "radius": 0.5}
+    with pytest.warns(lt.DesignWarning, match=r"1 pair of beams run into each other .* at \(5.000, 5.000, 5.450\) mm"):
+        solid = lt.Design(region=BOX, beams=lt.Beams(**apart)).build()
+    report = told(solid)
+    assert report["collisions"] == 1 and report["volume"] is None
+    with pytest.raises(ValueError, match="runs into beam 1"):
+        solid.quadors().volume()
+    with pytest.raises(ValueError, match="without a common node"):
+        solid.mesh(chord=0.05)
+    assert solid.mesh(edge=0.1).pieces == 1
+    clear = built(**(apart | {"radius": 0.44}))
+    assert told(clear)["collisions"] == 0
+    assert clear.quadors().volume() == pytest.approx(told(clear)["volume"], rel=1e-12)
+
+
 def test_a_chord_error_takes_the_place_of_a_spacing():
     """One resolution, a length, and pieces that are not looked for."""
     solid = whole()

@@ -35,6 +35,10 @@ class Quadors:
     def __repr__(self) -> str:
         return f"<trabecula.Quadors of {self._core.hubs} hubs and {self._core.beams} beams>"
 
+    def volume(self) -> float:
+        """The volume in mm³, fillets included, to 1e-10. Beams that run into each other without a node are refused."""
+        return self._core.volume()
+
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether points (n, 3) in mm are in the solid."""
         return self._core.contains(_points("points", points))

@@ -81,6 +81,11 @@ impl Quadors {
         self.quadors.beams()
     }
 
+    /// The volume of the whole, mm³.
+    fn volume(&self, py: Python<'_>) -> PyResult<f64> {
+        run(py, None, None, |_| self.quadors.sole_volume())?.map_err(error::fault)
+    }
+
     /// Whether points (n, 3) are in the solid.
     fn contains<'py>(
         &self,

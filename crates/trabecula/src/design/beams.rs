@@ -122,6 +122,9 @@ pub(super) fn alone(built: &Built) -> Result<&Quadors, Fault> {
     }
     match beams {
         Beams::Pattern(_) => refuse("a pattern is not written out"),
+        Beams::Truss(truss) if !truss.collisions.is_empty() => {
+            refuse("some of these run into each other without a common node")
+        }
         Beams::Truss(truss) if truss.whole => Ok(&truss.quadors),
         Beams::Truss(_) => refuse(
             "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")",

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::fault::{Fault, counted};
+use crate::graph::place;
 use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
 use super::Quadors;
@@ -50,6 +52,27 @@ impl Quadors {
         };
         let each: Vec<Vec<Collision>> = (0..self.beams()).into_par_iter().map(first).collect();
         each.into_iter().flatten().collect()
+    }
+
+    /// The volume of the whole, mm³, if beams meet in hubs alone.
+    ///
+    /// # Errors
+    /// As for `volume`, and beams that run into each other elsewhere.
+    pub fn sole_volume(&self) -> Result<f64, Fault> {
+        let found = self.collisions();
+        let Some(c) = found.first() else {
+            return self.volume();
+        };
+        Err(Fault::new(
+            format!("beams[{}]", c.beams[0]),
+            format!(
+                "it runs into beam {} at {} without a common node ({} in all), and what they share has no closed form: make them \
+                 thinner, or put nodes there",
+                c.beams[1],
+                place(c.at),
+                counted(found.len(), "such pair")
+            ),
+        ))
     }
 
     /// The radius of a beam, with the balls at its ends, at a share s of its length.
