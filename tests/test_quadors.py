@@ -135,3 +135,36 @@ def test_the_command_draws_a_slice(tmp_path):
     assert drawn.count("M ") == told["loops"] and drawn.startswith("<svg")
     words[words.index("--z") + 1] = "high"
     assert subprocess.run(words, capture_output=True).returncode == 2
+
+
+def test_a_pattern_answers_as_the_graph_that_it_stands_for():
+    """Repeats that turn and shrink, in a region that holds them: slices, volume, nearest places and its own patches."""
+    steps = [{"count": 8, "rotate": [0, 0, 45]}, {"count": 3, "scale": 0.8, "by": [0, 0, 3]}]
+    struts = [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0]]
+    given = {"nodes": [[8, 0, 0, 0.6]], "struts": struts, "repeat": steps}
+    region = lt.region.box(min=[-10, -10, -2], max=[10, 10, 12])
+    pattern = lt.Design(region=region, beams=lt.Beams(pattern=given, profile="cone", fillet="auto")).build()
+    graph = pattern.beams["core"]
+    nodes = np.column_stack([graph["centers"], graph["radii"]]).tolist()
+    beams = lt.Beams(nodes=nodes, struts=graph["struts"].tolist(), profile="cone", fillet="auto")
+    truss = lt.Design(region=region, beams=beams).build()
+    ours, theirs = pattern.quadors(), truss.quadors()
+    assert ours.slice(z=1.5).area == pytest.approx(theirs.slice(z=1.5).area, rel=1e-10)
+    # Of the program, kind by kind, and of every hub.
+    volume = pattern.report()["beams"]["core"]["volume"]
+    assert ours.volume() == pytest.approx(volume, rel=1e-9) == theirs.volume()
+    points = np.random.default_rng(3).uniform([-10, -10, -2], [10, 10, 12], (50, 3))
+    assert np.allclose(ours.closest(points)["distance"], theirs.closest(points)["distance"], atol=1e-9)
+    mesh = pattern.mesh(chord=0.02)
+    assert mesh.closed and abs(mesh.volume / volume - 1) < 0.05
+
+
+def test_a_pattern_too_large_to_be_written_out_is_refused():
+    """Its field answers still."""
+    steps = [{"count": 1000, "by": [1, 0, 0]}, {"count": 1000, "by": [0, 1, 0]}, {"count": 1000, "by": [0, 0, 1]}]
+    given = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0]], "repeat": steps}
+    solid = lt.Design(region=BOX, beams=lt.Beams(pattern=given, radius=0.2)).build()
+    for ask in (solid.quadors, lambda: solid.mesh(chord=0.01)):
+        with pytest.raises(ValueError, match="written out hub by hub, up to"):
+            ask()
+    assert solid.field([[5, 5, 5]]) < 0

@@ -190,14 +190,19 @@ impl Solid {
     }
 
     /// The beams of a name as quadrics.
-    fn quadors(&self, name: &str) -> PyResult<Quadors> {
+    fn quadors(&self, py: Python<'_>, name: &str) -> PyResult<Quadors> {
         match self.built.beams.iter().find(|b| b.0 == name) {
             Some((_, Beams::Truss(truss))) => Ok(Quadors {
                 quadors: truss.quadors.clone(),
             }),
-            Some((_, Beams::Pattern(_))) => Err(PyValueError::new_err(format!(
-                "beams.{name} is a pattern, which is not held hub by hub: write it out as Beams(nodes=…, struts=…) from Solid.beams"
-            ))),
+            Some((_, Beams::Pattern(laid))) => {
+                let written = run(py, None, None, |_| laid.written())?;
+                let written =
+                    written.map_err(|f| error::fault(f.under(&format!("beams.{name}"))))?;
+                Ok(Quadors {
+                    quadors: written.into(),
+                })
+            }
             None => Err(PyValueError::new_err(format!(
                 "there are no beams named {name}"
             ))),

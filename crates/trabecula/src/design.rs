@@ -263,7 +263,7 @@ impl Built {
     ///
     /// # Errors
     /// What else there is: lattices, a blend, a skin or kept zones, a pattern, a region that cuts the beams.
-    pub fn lone_beams(&self) -> Result<&Quadors, Fault> {
+    pub fn lone_beams(&self) -> Result<Arc<Quadors>, Fault> {
         beams::alone(self)
     }
 

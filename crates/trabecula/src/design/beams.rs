@@ -78,15 +78,10 @@ pub(super) fn beams(
         .collect();
     let narrow = fillets.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
     let wide = fillets.iter().map(|f| f.1).fold(0.0, f64::max);
-    // A hub and its stubs lie within a box, and that within a ball.
-    let whole = (0..quadors.len()).into_par_iter().all(|i| {
-        let b = quadors.hold(i);
-        space.bound(&b).hi <= 0.0 || space.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
-    });
     let mut collisions = quadors.collisions();
     collisions.retain(|c| inside(c.at));
     let truss = Truss {
-        whole,
+        whole: whole(&quadors, space),
         collisions,
         facts: wire.facts(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
@@ -103,8 +98,17 @@ pub(super) fn beams(
     Ok(Beams::Truss(Arc::new(truss)))
 }
 
+/// Whether all beams lie in a region.
+fn whole(quadors: &Quadors, region: &dyn Field) -> bool {
+    // A hub and its stubs lie within a box, and that within a ball.
+    (0..quadors.len()).into_par_iter().all(|i| {
+        let b = quadors.hold(i);
+        region.bound(&b).hi <= 0.0 || region.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
+    })
+}
+
 /// The beams that a design is made of, if of nothing else.
-pub(super) fn alone(built: &Built) -> Result<&Quadors, Fault> {
+pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
     let refuse = |why: &str| {
         let message = format!(
             "a mesh to a chord error is made of the beams' own patches, and {why}; give the spacing of a grid (edge) instead"
@@ -120,16 +124,24 @@ pub(super) fn alone(built: &Built) -> Result<&Quadors, Fault> {
     if !built.solid.filled.is_empty() {
         return refuse("a skin or a kept zone of this design would cut them");
     }
-    match beams {
-        Beams::Pattern(_) => refuse("a pattern is not written out"),
-        Beams::Truss(truss) if !truss.collisions.is_empty() => {
-            refuse("some of these run into each other without a common node")
+    let (quadors, apart, whole) = match beams {
+        Beams::Truss(t) => (t.quadors.clone(), t.collisions.is_empty(), t.whole),
+        Beams::Pattern(laid) => {
+            let written = laid.written()?;
+            let whole = whole(&written, &*built.solid.region);
+            let apart = written.collisions().is_empty();
+            (Arc::new(written), apart, whole)
         }
-        Beams::Truss(truss) if truss.whole => Ok(&truss.quadors),
-        Beams::Truss(_) => refuse(
-            "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")",
-        ),
+    };
+    if !apart {
+        return refuse("some of these run into each other without a common node");
     }
+    if !whole {
+        return refuse(
+            "the region cuts some (make it larger by a hub's radius, or take out what leaves it with trim = \"drop\")",
+        );
+    }
+    Ok(quadors)
 }
 
 /// A frame before it is cleaned and trimmed.

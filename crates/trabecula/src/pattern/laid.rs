@@ -25,6 +25,7 @@ struct Kind {
 /// A pattern laid out in space: membership and distance without visiting every beam.
 pub struct Laid {
     pattern: Pattern,
+    fillet: Fillet,
     classes: [Classes; 3],
     /// The different hubs, each with its neighbours.
     quadors: Quadors,
@@ -134,6 +135,7 @@ impl Laid {
             least,
             quadors,
             pattern,
+            fillet,
         };
         laid.hold();
         Ok(laid)
@@ -276,6 +278,25 @@ impl Laid {
         inside
     }
 
+    /// The whole written out hub by hub, for what is asked of hubs.
+    ///
+    /// # Errors
+    /// More beams than are written out.
+    pub fn written(&self) -> Result<Quadors, Fault> {
+        let (_, beams) = self.pattern.counts();
+        if beams > WRITTEN {
+            let message = format!(
+                "this pattern stands for {} beams; for slices, nearest places and its own patches it is written out hub by hub, \
+                 up to {} beams (about {} GB): repeat less often, or ask for its field",
+                number(beams),
+                number(WRITTEN),
+                number(WRITTEN * EACH / 1e9)
+            );
+            return Err(Fault::new("", message));
+        }
+        Quadors::new(&self.pattern.expanded()?, self.fillet)
+    }
+
     /// The pattern.
     pub fn pattern(&self) -> &Pattern {
         &self.pattern
@@ -409,6 +430,10 @@ fn span((step, count): &(Similarity, u32), p: &Aabb, b: &Aabb) -> std::ops::Rang
     }
     low as usize..high as usize + 1
 }
+
+/// Most beams of a pattern that is written out, and bytes of each: two stubs and a share of a hub and of the index.
+const WRITTEN: f64 = 1e6;
+const EACH: f64 = 1000.0;
 
 /// Hubs that the bound of a box looks at one by one.
 const LOOKED: usize = 96;
