@@ -32,11 +32,17 @@ impl Quadors {
             .collect();
         let index = Index::new(held.iter().copied());
         let first = |a: usize| {
-            let near = index.touching(&held[a], usize::MAX / 64);
-            let later = near.unwrap_or_default().into_iter();
-            later
-                .map(|b| b as usize)
-                .filter(|&b| b > a && !held[a].intersection(held[b]).is_empty())
+            let mut near: Vec<usize> = Vec::new();
+            let meets = |b: &usize| {
+                let (p, q) = (&held[a], &held[*b]);
+                *b > a && (0..3).all(|k| p.min[k] <= q.max[k] && q.min[k] <= p.max[k])
+            };
+            index.about(&held[a], &mut |items| {
+                near.extend(items.iter().map(|b| *b as usize).filter(meets));
+            });
+            near.sort_unstable();
+            near.dedup();
+            near.into_iter()
                 .filter(|&b| self.ends[a].iter().all(|h| !self.ends[b].contains(h)))
                 .filter_map(|b| {
                     let [s, t] = nearest(axis(a), axis(b));

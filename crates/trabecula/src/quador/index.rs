@@ -128,6 +128,21 @@ impl Index {
         (out.len() <= most).then_some(out)
     }
 
+    /// Calls `f` with the boxes in the cells that a box touches, row by row of cells, some more than once.
+    pub fn about(&self, b: &Aabb, f: &mut impl FnMut(&[u32])) {
+        if self.items.is_empty() {
+            return;
+        }
+        let (lo, hi) = self.range(b);
+        for z in lo[2]..=hi[2] {
+            for y in lo[1]..=hi[1] {
+                let row = self.cell([lo[0], y, z]);
+                let end = row + hi[0] - lo[0] + 1;
+                f(&self.items[self.starts[row] as usize..self.starts[end] as usize]);
+            }
+        }
+    }
+
     /// The boxes in the cells that a plane n·x = level goes through, in order and once each.
     pub fn across(&self, normal: Vec3, level: f64) -> Vec<u32> {
         let mut out = Vec::new();
