@@ -138,7 +138,7 @@ def test_the_command_draws_a_slice(tmp_path):
 
 
 def test_a_pattern_answers_as_the_graph_that_it_stands_for():
-    """Repeats that turn and shrink, in a region that holds them: slices, volume, nearest places and its own patches."""
+    """Repeats that turn and shrink, in a region that holds them: slices, volume and nearest places."""
     steps = [{"count": 8, "rotate": [0, 0, 45]}, {"count": 3, "scale": 0.8, "by": [0, 0, 3]}]
     struts = [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0]]
     given = {"nodes": [[8, 0, 0, 0.6]], "struts": struts, "repeat": steps}
@@ -155,8 +155,18 @@ def test_a_pattern_answers_as_the_graph_that_it_stands_for():
     assert ours.volume() == pytest.approx(volume, rel=1e-9) == theirs.volume()
     points = np.random.default_rng(3).uniform([-10, -10, -2], [10, 10, 12], (50, 3))
     assert np.allclose(ours.closest(points)["distance"], theirs.closest(points)["distance"], atol=1e-9)
-    mesh = pattern.mesh(chord=0.02)
-    assert mesh.closed and abs(mesh.volume / volume - 1) < 0.05
+
+
+def test_a_pattern_is_meshed_from_its_patches():
+    """Within the chord error of a surface whose area is, at most, that of its balls and beams."""
+    steps = [{"count": 3, "by": way} for way in ([4, 0, 0], [0, 4, 0], [0, 0, 4])]
+    struts = [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]]
+    given = {"nodes": [[1, 1, 1, 0.6]], "struts": struts, "repeat": steps}
+    solid = lt.Design(region=BOX, beams=lt.Beams(pattern=given, profile="cone", fillet="none")).build()
+    mesh = solid.mesh(chord=0.02)
+    area = 27 * 4 * math.pi * 0.6**2 + 54 * 2 * math.pi * 0.6 * 4
+    assert mesh.closed and mesh.pieces == 1 and mesh.self_intersections == 0
+    assert abs(mesh.volume - solid.quadors().volume()) < mesh.chord_error * area
 
 
 def test_a_pattern_too_large_to_be_written_out_is_refused():
@@ -164,7 +174,7 @@ def test_a_pattern_too_large_to_be_written_out_is_refused():
     steps = [{"count": 1000, "by": [1, 0, 0]}, {"count": 1000, "by": [0, 1, 0]}, {"count": 1000, "by": [0, 0, 1]}]
     given = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0]], "repeat": steps}
     solid = lt.Design(region=BOX, beams=lt.Beams(pattern=given, radius=0.2)).build()
-    for ask in (solid.quadors, lambda: solid.mesh(chord=0.01)):
+    for ask in (lambda: solid.quadors("core"), lambda: solid.mesh(chord=0.01)):
         with pytest.raises(ValueError, match="written out hub by hub, up to"):
             ask()
     assert solid.field([[5, 5, 5]]) < 0
