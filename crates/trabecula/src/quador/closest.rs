@@ -8,6 +8,7 @@
 use std::sync::OnceLock;
 
 use crate::fault::Fault;
+use crate::field::Field;
 use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
 
 use super::Quadors;
@@ -176,7 +177,9 @@ impl Nearest<'_> {
             ));
         }
         let q = self.quadors;
-        let mut reach = q.cap.max(self.bounds.distance(p) * (1.0 + 1e-12));
+        // The field is of the size of the distance; where it is not, all is looked at once more, farther out.
+        let guess = (1.5 * q.value(p).abs()).clamp(0.1 * q.scale, q.cap);
+        let mut reach = guess.max(self.bounds.distance(p) * (1.0 + 1e-12));
         let mut best: Option<Closest> = None;
         let mut seen: Vec<u32> = Vec::new();
         loop {
@@ -187,6 +190,7 @@ impl Nearest<'_> {
             let found = q.index.touching(&near, usize::MAX / 64).unwrap_or_default();
             let mut hubs: Vec<(f64, u32)> = found
                 .into_iter()
+                .filter(|h| q.balls[*h as usize].bounds.distance(p) <= reach)
                 .filter(|h| seen.binary_search(h).is_err())
                 .map(|h| (q.clearance(h as usize, p), h))
                 .collect();
