@@ -139,7 +139,7 @@ class TetMesh(Picture):
             return
         from . import elements
 
-        elements.needed()
+        elements.needed(kind)
         with whole_file(path) as temporary:
             elements.write(temporary, kind, self.nodes, self.tets, self.zones)
 
