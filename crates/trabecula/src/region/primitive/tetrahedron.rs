@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::{HalfSpace, Shape, along, finite, one_face, rounded};
 use crate::face::{Face, Tree};
 use crate::fault::{Fault, number};
-use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 
 /// The faces, counter-clockwise seen from outside where corners are in positive order.
@@ -152,6 +151,7 @@ impl Shape for Tetrahedron {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::field::Field;
     use crate::region::tests::check_shape;
 
     const CORNERS: [Vec3; 4] = [
