@@ -5,7 +5,8 @@
 //! places nor triangles. Tetrahedra with equal numbers at their nodes are looked at once.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use super::census::Links;
 use super::piece::{Piece, Scratch};
@@ -46,34 +47,47 @@ pub struct Join {
 pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
     let work = Work::in_steps(tiling, STEPS).ok()?;
     let map = &tiling.map;
-    let (mut links, mut scratch) = (Links::default(), Scratch::default());
-    let mut known: HashMap<(Vec<u64>, u8), Arc<Piece>> = HashMap::new();
+    // The first tetrahedron of each kind, and the kind of each.
+    let (mut firsts, mut kinds, mut known) = (Vec::new(), Vec::new(), HashMap::new());
+    for t in 0..map.len() {
+        let kind = *known
+            .entry((numbers(tiling, t), work.mask(t)))
+            .or_insert_with(|| {
+                firsts.push(t);
+                firsts.len() - 1
+            });
+        kinds.push(kind);
+        if firsts.len() > MOST {
+            return None;
+        }
+    }
+    let piece = |scratch: &mut Scratch, t: &usize| {
+        let made = match work.piece(*t, scratch) {
+            Of::Own(piece) => *piece,
+            Of::Same(piece) => piece.clone(),
+        };
+        // All but what is placed.
+        Piece {
+            places: Vec::new(),
+            triangles: Vec::new(),
+            ..made
+        }
+    };
+    let pieces: Vec<Piece> = firsts
+        .par_iter()
+        .map_init(Scratch::default, piece)
+        .collect();
+    let mut links = Links::default();
     // For each piece of solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
-    let mut open = vec![0u8; map.len()];
-    for t in 0..map.len() {
-        let key = (numbers(tiling, t), work.mask(t));
-        let piece = match known.get(&key) {
-            Some(piece) => piece.clone(),
-            None if known.len() > MOST => return None,
-            None => {
-                let made = match work.piece(t, &mut scratch) {
-                    Of::Own(piece) => Arc::from(piece),
-                    Of::Same(piece) => Arc::new(piece.clone()),
-                };
-                known.insert(key, Arc::clone(&made));
-                made
-            }
-        };
+    for (t, kind) in kinds.iter().enumerate() {
+        let piece = &pieces[*kind];
         let first = links.next(piece.bounds.len());
         let sums = vec![Sum::NONE; piece.bounds.len()];
-        links.add(map, t, work.mask(t), &piece, &sums).ok()?;
+        links.add(map, t, work.mask(t), piece, &sums).ok()?;
         for s in 0..piece.solids {
             of.push(t);
             solids.push(first + s);
-        }
-        for (face, runs) in piece.faces.iter().enumerate() {
-            open[t] |= u8::from(!runs.is_empty()) << face;
         }
     }
     let wholes = links.wholes(&solids);
@@ -113,7 +127,7 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
                 joined: main(a).is_some() && main(a) == main(b),
             });
             join.faces += 1;
-            join.open += usize::from(open[t] >> face & 1);
+            join.open += usize::from(!pieces[kinds[t]].faces[face].is_empty());
         }
     }
     Some(Foretold {
