@@ -68,10 +68,12 @@ def main():
                 command = [a.trabecula, "mesh", str(design), "-o", str(out), "--edge", repr(edge), "--json"]
                 all_wall, all_cpu, peak, told = ran(command)
                 triangles = json.loads(told)["triangles"]
-                more = all_cpu - cpu
+                rate = triangles / (all_cpu - cpu) / 1e6
+                each = triangles / quality["tets"]
+                took = f"{all_wall:6.2f} s, cpu {all_cpu:6.2f} s, {peak:6.0f} MB"
                 print(
-                    f"{name:8} {steps:3} steps   {all_wall:6.2f} s, cpu {all_cpu:6.2f} s, {peak:6.0f} MB: {triangles} triangles, "
-                    f"{triangles / quality['tets']:.0f} a tetrahedron; surface {triangles / more / 1e6:.2f} million a cpu second"
+                    f"{name:8} {steps:3} steps   {took}: {triangles} triangles, {each:.0f} a tetrahedron; "
+                    f"{rate:.2f} million a cpu second"
                 )
 
 
