@@ -22,9 +22,13 @@ pub enum Phases {
     Drifting,
 }
 
-/// Places looked at where one distribution serves all, and in each neighbourhood.
+/// Places looked at where one distribution serves all, and in each neighbourhood. A thousand even places tell a fraction
+/// to some thousandths; the sixty-four neighbourhoods in a window of two cells look at other ones each, so that what is
+/// left of their errors together is far below.
 const EVERYWHERE: usize = 1 << 16;
-const NEARBY: usize = 1 << 12;
+const NEARBY: usize = 1 << 10;
+/// Neighbourhoods along an axis after which places are the same again.
+const APART: usize = 4;
 /// Most neighbourhoods.
 const MOST: f64 = 100_000.0;
 /// Most waves of a series whose beats are looked at.
@@ -100,39 +104,26 @@ impl Joint {
     /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
     /// ever fewer up to two steps away along each axis (a raised cosine, in which whole waves leave no trace).
     pub fn places(&self, i: usize) -> Vec<Vec3> {
-        // Multiples of the powers of the root of x⁴ = x + 1, the most even such sequence; each neighbourhood goes on in it.
-        let even = |k: usize| -> Vec3 {
-            [
-                0.819_172_513_396_164_4,
-                0.671_043_606_703_789_2,
-                0.549_700_477_901_970_3,
-            ]
-            .map(|a| (0.5 + a * (k + i * NEARBY) as f64).fract())
-        };
         if let Some(back) = &self.common {
             return (0..EVERYWHERE).map(even).map(|u| apply(back, u)).collect();
         }
         let [nx, ny, _] = self.shape;
         let at = [i % nx, i / nx % ny, i / nx / ny];
         let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
-        let table = raised_cosine();
-        (0..NEARBY)
-            .map(even)
-            .map(|u| {
-                core::array::from_fn(|a| {
-                    let x = u[a] * (table.len() - 1) as f64;
-                    let j = (x as usize).min(table.len() - 2);
-                    let s = table[j] + (table[j + 1] - table[j]) * (x - j as f64);
-                    // Solved maps end where the region does: what would lie beyond is mirrored.
-                    let p = middle[a] + 2.0 * self.step * s;
-                    let Some(b) = &self.bounds else { return p };
-                    let (lo, hi) = (b.min[a], b.max[a]);
-                    let p = if p > hi { 2.0 * hi - p } else { p };
-                    let p = if p < lo { 2.0 * lo - p } else { p };
-                    p.clamp(lo, hi)
-                })
+        let [x, y, z] = at.map(|n| n % APART);
+        let some = &windows()[((z * APART + y) * APART + x) * NEARBY..][..NEARBY];
+        let place = |s: &Vec3| -> Vec3 {
+            core::array::from_fn(|a| {
+                // Solved maps end where the region does: what would lie beyond is mirrored.
+                let p = middle[a] + 2.0 * self.step * s[a];
+                let Some(b) = &self.bounds else { return p };
+                let (lo, hi) = (b.min[a], b.max[a]);
+                let p = if p > hi { 2.0 * hi - p } else { p };
+                let p = if p < lo { 2.0 * lo - p } else { p };
+                p.clamp(lo, hi)
             })
-            .collect()
+        };
+        some.iter().map(place).collect()
     }
 
     /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
@@ -223,27 +214,43 @@ impl Joint {
     }
 }
 
-/// The inverse of the distribution with density (1 + cos πs)/2 on [−1, 1], at even shares.
-fn raised_cosine() -> &'static [f64] {
-    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
+/// The k-th place of an even sequence in the unit cube: multiples of the powers of the root of x⁴ = x + 1.
+fn even(k: usize) -> Vec3 {
+    [
+        0.819_172_513_396_164_4,
+        0.671_043_606_703_789_2,
+        0.549_700_477_901_970_3,
+    ]
+    .map(|a| (0.5 + a * k as f64).fract())
+}
+
+/// Places of neighbourhoods, one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³.
+fn windows() -> &'static [Vec3] {
+    static TABLE: OnceLock<Vec<Vec3>> = OnceLock::new();
     TABLE.get_or_init(|| {
         const N: usize = 512;
         let below =
             |s: f64| 0.5 * (1.0 + s + (std::f64::consts::PI * s).sin() / std::f64::consts::PI);
-        (0..=N)
-            .map(|i| {
-                let share = i as f64 / N as f64;
-                let (mut lo, mut hi) = (-1.0, 1.0);
-                for _ in 0..60 {
-                    let mid = 0.5 * (lo + hi);
-                    if below(mid) < share {
-                        lo = mid
-                    } else {
-                        hi = mid
-                    }
+        let inverse = |share: f64| {
+            let (mut lo, mut hi) = (-1.0, 1.0);
+            for _ in 0..60 {
+                let mid = 0.5 * (lo + hi);
+                if below(mid) < share {
+                    lo = mid
+                } else {
+                    hi = mid
                 }
-                0.5 * (lo + hi)
-            })
+            }
+            0.5 * (lo + hi)
+        };
+        let table: Vec<f64> = (0..=N).map(|i| inverse(i as f64 / N as f64)).collect();
+        let warp = |u: f64| {
+            let x = u * N as f64;
+            let j = (x as usize).min(N - 1);
+            table[j] + (table[j + 1] - table[j]) * (x - j as f64)
+        };
+        (0..APART.pow(3) * NEARBY)
+            .map(|k| even(k).map(warp))
             .collect()
     })
 }
