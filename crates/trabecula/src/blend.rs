@@ -26,7 +26,7 @@ pub use joint::Phases;
 pub use strand::Constituent;
 pub use weights::Weights;
 
-use added::{End, HIGH, LOW};
+use added::{At, End, HIGH, LOW};
 use joint::Joint;
 use levels::Levels;
 use simplex::Place;
@@ -63,15 +63,6 @@ pub struct Blend {
     /// Set for one side alone.
     side: Option<Side>,
     slope: f64,
-}
-
-/// What is found at a point on the way to its value.
-#[derive(Default)]
-struct At {
-    /// Where the shares lie.
-    place: Place,
-    /// The quantiles of the lattices, where they vary.
-    q: Vec<[f64; 2]>,
 }
 
 /// Places at which the root mean square of a core is found.
@@ -175,13 +166,14 @@ impl Blend {
 
     /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`. `added`
     /// tells what the levels add to an end, from where the shares lie and the lattices' quantiles.
+    #[inline]
     fn value_at(
         &self,
         p: Vec3,
         f: f64,
         (w, high): (&[f64], &[f64]),
         at: &mut At,
-        mut added: impl FnMut(&Levels, usize, &At) -> f64,
+        mut added: impl FnMut(&Levels, usize, &mut At) -> f64,
     ) -> f64 {
         let alone = w.contains(&1.0);
         let levels = self.levels.as_deref().filter(|_| !alone);
@@ -195,7 +187,8 @@ impl Blend {
                 }));
             }
         }
-        let of = |end: usize| {
+        let mut value: Option<f64> = None;
+        for &end in self.ends() {
             let mut level = 0.0;
             for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
                 level += w[i] * s.end(end, high[i], alone);
@@ -203,12 +196,10 @@ impl Blend {
             if let Some(levels) = levels {
                 level += added(levels, end, at);
             }
-            if end == HIGH { f - level } else { level - f }
-        };
-        (self.ends().iter().copied())
-            .map(of)
-            .reduce(f64::max)
-            .unwrap_or(f64::NAN)
+            let of = if end == HIGH { f - level } else { level - f };
+            value = Some(value.map_or(of, |v| v.max(of)));
+        }
+        value.unwrap_or(f64::NAN)
     }
 
     /// The value where F, LO and HI are these.
@@ -282,7 +273,7 @@ impl Field for Blend {
                 let w = &w[k * n..][..n];
                 let own = (w, &high[k * n..][..n]);
                 *o = self.value_at(*p, f[k], own, &mut at, |levels, end, at| {
-                    levels.added(&self.strands, *p, (w, &at.place), &at.q, end)
+                    levels.added(&self.strands, *p, w, at, end)
                 });
             }
         }

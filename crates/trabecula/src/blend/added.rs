@@ -20,84 +20,108 @@ pub(super) struct End {
     pub slopes: [Vec3; 2],
 }
 
-/// What is asked of the numbers of a node.
-#[derive(Clone, Copy)]
-enum Ask {
-    /// What is added to an end.
-    End(usize),
-    /// The value at a share.
-    Quantile(f64),
+/// What is found at a point on the way to its value.
+#[derive(Default)]
+pub(super) struct At {
+    /// Where the shares lie.
+    pub place: Place,
+    /// The quantiles of the lattices, where they vary.
+    pub q: Vec<[f64; 2]>,
+    terms: Vec<Term>,
 }
 
-impl Ask {
-    /// The answer, and how it changes with the share.
-    #[inline]
-    fn of(self, numbers: &[f32]) -> (f64, f64) {
-        match self {
-            Ask::End(e) => (f64::from(numbers[e]), 0.0),
-            Ask::Quantile(q) => quantile(numbers, q),
-        }
-    }
+/// A node's part in what is added: how often its number counts and, of a quantile function, at which share. (No enum: read
+/// ahead of its tag, a small whole number would be taken for a subnormal one, and those are slow.)
+#[derive(Clone, Copy)]
+struct Term {
+    node: usize,
+    times: f64,
+    q: f64,
 }
 
 /// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
 #[derive(Default)]
 pub(super) struct Row {
-    /// For each neighbourhood along x the numbers there, between those along y and z, and for which y and z.
-    columns: Vec<([f64; 2], Table)>,
+    /// Between which neighbourhoods along y and z it lies.
+    across: [(usize, f64); 2],
+    /// How many rows have been.
+    count: u64,
+    /// For each neighbourhood along x the numbers there, and in which row.
+    columns: Vec<(u64, Table)>,
+}
+
+impl Row {
+    /// Begins the row at this y and z.
+    pub fn enter(&mut self, levels: &Levels, at: [f64; 2]) {
+        let along = |a: usize| {
+            let (n, share, _) = levels.joint.along(a + 1, at[a]);
+            (n, share)
+        };
+        self.across = [along(0), along(1)];
+        self.count += 1;
+        if self.columns.is_empty() {
+            let column = |_| (0, levels.table());
+            self.columns = (0..levels.joint.shape[0]).map(column).collect();
+        }
+    }
 }
 
 impl Levels {
-    /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at `place`, and quantiles `q`.
+    /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at a place and have quantiles.
     pub fn added(
         &self,
         strands: &[Strand],
         p: Vec3,
-        (w, place): (&[f64], &Place),
-        q: &[[f64; 2]],
+        w: &[f64],
+        at: &mut At,
         end: usize,
     ) -> f64 {
-        let corners = self.joint.corners(p);
-        self.level(strands, (w, place), q, end, |node, ask| {
-            let near = corners.iter().filter(|c| c.1 > 0.0);
-            near.map(|c| c.1 * ask.of(self.numbers(c.0, strands, node)).0)
-                .sum()
-        })
+        let mut sum = self.terms(strands, w, at, end);
+        for (i, near, _) in self.joint.corners(p).iter().filter(|c| c.1 > 0.0) {
+            for t in &at.terms {
+                let numbers = self.numbers(*i, strands, t.node);
+                sum += near * t.times * self.ask(numbers, end, t.q).0;
+            }
+        }
+        sum
     }
 
-    /// The same, its neighbours in a row having been asked before.
+    /// The same at x in a row that has been entered.
     pub fn added_in_row(
         &self,
         strands: &[Strand],
-        p: Vec3,
-        (w, place): (&[f64], &Place),
-        q: &[[f64; 2]],
+        x: f64,
+        w: &[f64],
+        at: &mut At,
         end: usize,
         row: &mut Row,
     ) -> f64 {
-        if row.columns.is_empty() {
-            let column = |_| ([f64::NAN; 2], self.table());
-            row.columns = (0..self.joint.shape[0]).map(column).collect();
-        }
-        let [x, y, z] = core::array::from_fn(|a| self.joint.along(a, p[a]));
-        self.level(strands, (w, place), q, end, |node, ask| {
-            let mut sum = 0.0;
-            for (i, near) in [(x.0, 1.0 - x.1), (x.0 + 1, x.1)] {
-                if near > 0.0 {
-                    let (at, column) = &mut row.columns[i];
-                    if *at != [p[1], p[2]] {
-                        *at = [p[1], p[2]];
-                        column.clear();
-                    }
-                    if column.get(node).is_none() {
-                        let across = [(y.0, y.1), (z.0, z.1)];
-                        self.between(strands, i, node, across, column.add(node));
-                    }
-                    sum += near * column.get(node).map_or(0.0, |v| ask.of(v).0);
-                }
+        let mut sum = self.terms(strands, w, at, end);
+        let (first, share, _) = self.joint.along(0, x);
+        for (i, near) in [(first, 1.0 - share), (first + 1, share)] {
+            if near <= 0.0 {
+                continue;
             }
-            sum
-        })
+            let (count, column) = &mut row.columns[i];
+            if *count != row.count {
+                *count = row.count;
+                column.clear();
+            }
+            let mut here = 0.0;
+            for t in &at.terms {
+                let found = match column.get(t.node) {
+                    Some(numbers) => self.ask(numbers, end, t.q),
+                    None => {
+                        let numbers = column.add(t.node);
+                        self.between(strands, i, t.node, row.across, numbers);
+                        self.ask(numbers, end, t.q)
+                    }
+                };
+                here += t.times * found.0;
+            }
+            sum += near * here;
+        }
+        sum
     }
 
     /// Adds a node's numbers at the i-th neighbourhood along x, between those along y and z.
@@ -106,11 +130,11 @@ impl Levels {
         strands: &[Strand],
         i: usize,
         node: usize,
-        at: [(usize, f64); 2],
+        across: [(usize, f64); 2],
         out: &mut [f32],
     ) {
         let [nx, ny, _] = self.joint.shape;
-        let [y, z] = at.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
+        let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
         for (k, share_z) in z.into_iter().filter(|z| z.1 > 0.0) {
             for (j, share_y) in y.into_iter().filter(|y| y.1 > 0.0) {
                 let numbers = self.numbers((k * ny + j) * nx + i, strands, node);
@@ -122,29 +146,44 @@ impl Levels {
         }
     }
 
-    /// What is added to an end, where `sum` puts together what the neighbourhoods answer for a node.
-    fn level(
-        &self,
-        strands: &[Strand],
-        (w, place): (&[f64], &Place),
-        q: &[[f64; 2]],
-        end: usize,
-        mut sum: impl FnMut(usize, Ask) -> f64,
-    ) -> f64 {
+    /// What is added to an end by the numbers of a node (at the share q), and how it changes with that.
+    #[inline(always)]
+    fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
+        match self.is_uniform() {
+            true => (f64::from(numbers[end]), 0.0),
+            false => quantile(numbers, q),
+        }
+    }
+
+    /// Finds which nodes have a part in what is added to an end; what is added besides.
+    fn terms(&self, strands: &[Strand], w: &[f64], at: &mut At, end: usize) -> f64 {
+        let At { place, q, terms } = at;
+        let own = match self.is_uniform() {
+            true => 0.0,
+            false => blended(w, q.iter().copied())[end],
+        };
+        terms.clear();
         let nodes = place.nodes.iter().zip(&place.shares);
-        if self.is_uniform() {
-            return nodes.map(|(n, s)| s * sum(*n, Ask::End(end))).sum();
+        terms.extend(nodes.map(|(node, times)| Term {
+            node: *node,
+            times: *times,
+            q: own,
+        }));
+        let mut more = 0.0;
+        if !self.is_uniform() {
+            for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                if end == HIGH || s.is_sheet() {
+                    terms.push(Term {
+                        node: self.alone[i],
+                        times: -w[i],
+                        q: q[i][end],
+                    });
+                } else {
+                    more -= w[i] * s.low(0.0);
+                }
+            }
         }
-        let ask = Ask::Quantile(blended(w, q.iter().copied())[end]);
-        let mut out: f64 = nodes.map(|(n, s)| s * sum(*n, ask)).sum();
-        for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
-            out -= w[i]
-                * match end == HIGH || s.is_sheet() {
-                    true => sum(self.alone[i], Ask::Quantile(q[i][end])),
-                    false => s.low(0.0),
-                };
-        }
-        out
+        more
     }
 
     /// The same with its gradient (per mm); `dw` are those of the shares.
@@ -158,11 +197,11 @@ impl Levels {
     ) -> (f64, Vec3) {
         let corners = self.joint.corners(p);
         // What the neighbourhoods answer together, how that changes from place to place, and with the share.
-        let sum = |node: usize, ask: Ask| {
+        let sum = |node: usize, q: f64| {
             let (mut v, mut d, mut steep) = (0.0, [0.0; 3], 0.0);
             for (i, share, slope) in &corners {
                 if *share > 0.0 || *slope != [0.0; 3] {
-                    let of = ask.of(self.numbers(*i, strands, node));
+                    let of = self.ask(self.numbers(*i, strands, node), end, q);
                     v += share * of.0;
                     d = add(d, scale(*slope, of.0));
                     steep += share * of.1;
@@ -170,15 +209,13 @@ impl Levels {
             }
             (v, d, steep)
         };
-        let (ask, dq) = if self.is_uniform() {
-            (Ask::End(end), [0.0; 3])
-        } else {
-            let (q, dq) = blended_gradient(w, dw, ends, end);
-            (Ask::Quantile(q), dq)
+        let (q, dq) = match self.is_uniform() {
+            true => (0.0, [0.0; 3]),
+            false => blended_gradient(w, dw, ends, end),
         };
         let (mut out, mut gradient, mut before) = (0.0, [0.0; 3], 0.0);
         for (l, (node, share)) in place.nodes.iter().zip(&place.shares).enumerate() {
-            let (v, d, steep) = sum(*node, ask);
+            let (v, d, steep) = sum(*node, q);
             out += share * v;
             gradient = add(gradient, scale(add(d, scale(dq, steep)), *share));
             if l > 0 {
@@ -195,7 +232,7 @@ impl Levels {
         }
         for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
             let (v, d) = if end == HIGH || s.is_sheet() {
-                let (v, d, steep) = sum(self.alone[i], Ask::Quantile(ends[i].quantiles[end]));
+                let (v, d, steep) = sum(self.alone[i], ends[i].quantiles[end]);
                 (v, add(d, scale(ends[i].slopes[end], steep)))
             } else {
                 (s.low(0.0), [0.0; 3])

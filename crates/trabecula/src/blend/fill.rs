@@ -4,9 +4,9 @@
 //! evaluated; elsewhere shares are found node by node. A node's value depends on the node alone, whatever the block: a
 //! lattice that is alone by its bounds is alone by its shares too.
 
-use super::added::Row;
+use super::added::{At, Row};
 use super::strand;
-use super::{At, Blend};
+use super::Blend;
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
 
@@ -146,6 +146,9 @@ impl Blend {
             at,
             row: known,
         } = some;
+        if let Some(levels) = &self.levels {
+            known.enter(levels, line.at);
+        }
         w.resize(n * points.len(), 0.0);
         self.weights.values(points, w);
         highs.resize(n * points.len(), 0.0);
@@ -170,7 +173,7 @@ impl Blend {
                 }
             }
             let value = self.value_at(*p, f, (w, high), at, |levels, end, at| {
-                levels.added_in_row(&self.strands, *p, (w, &at.place), &at.q, end, known)
+                levels.added_in_row(&self.strands, p[0], w, at, end, known)
             });
             row[*node] = value as f32;
         }

@@ -43,7 +43,7 @@ pub(super) struct Joint {
     pub origin: Vec3,
     pub step: f64,
     pub shape: [usize; 3],
-    /// Where solved maps end; nothing else has an end.
+    /// Where solved maps end, and meshes of tetrahedra and beams may; nothing else has an end.
     bounds: Option<Aabb>,
 }
 
@@ -68,9 +68,9 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
-        let solved = of
-            .iter()
-            .any(|s| s.lattice().is_some_and(|l| matches!(l.map, Map::Phase(_))));
+        let ended = |s: &Constituent| {
+            s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)))
+        };
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
@@ -92,7 +92,7 @@ impl Joint {
             origin,
             step,
             shape,
-            bounds: solved.then_some(*bounds),
+            bounds: of.iter().any(ended).then_some(*bounds),
         }
     }
 
@@ -114,7 +114,7 @@ impl Joint {
         let some = &windows()[((z * APART + y) * APART + x) * NEARBY..][..NEARBY];
         let place = |s: &Vec3| -> Vec3 {
             core::array::from_fn(|a| {
-                // Solved maps end where the region does: what would lie beyond is mirrored.
+                // What ends where the region does is not looked at beyond: places there are mirrored.
                 let p = middle[a] + 2.0 * self.step * s[a];
                 let Some(b) = &self.bounds else { return p };
                 let (lo, hi) = (b.min[a], b.max[a]);

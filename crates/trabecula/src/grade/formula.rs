@@ -463,6 +463,24 @@ mod tests {
     }
 
     #[test]
+    fn many_points_are_each_what_they_are_alone() {
+        let text = "max(0, min(1, x/8 + 1)) * sqrt(abs(y)) - z^2 / sin(x + y) + smoothstep(-1, 1, z) - atan2(x, y)";
+        let f = Formula::parse(text).unwrap_or_else(|e| panic!("{e}"));
+        let points: Vec<Vec3> = (0..3 * LANES + 5)
+            .map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0))
+            .collect();
+        let (mut v, mut w) = (vec![0.0; points.len()], vec![0.0; points.len()]);
+        let mut g = vec![[0.0; 3]; points.len()];
+        f.values(&points, &mut v);
+        f.gradients(&points, &mut w, &mut g);
+        for (i, p) in points.iter().enumerate() {
+            let alone: f64 = f.run(*p, &mut Vec::new());
+            assert!(v[i] == alone && w[i] == alone, "{} {} {alone}", v[i], w[i]);
+            assert_eq!(f.gradient(*p), (w[i], g[i]));
+        }
+    }
+
+    #[test]
     fn operators_bind_as_in_mathematics() {
         let p = [3.0, 2.0, 0.5];
         for (text, want) in [
