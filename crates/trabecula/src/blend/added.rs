@@ -68,14 +68,7 @@ impl Row {
 
 impl Levels {
     /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at a place and have quantiles.
-    pub fn added(
-        &self,
-        strands: &[Strand],
-        p: Vec3,
-        w: &[f64],
-        at: &mut At,
-        end: usize,
-    ) -> f64 {
+    pub fn added(&self, strands: &[Strand], p: Vec3, w: &[f64], at: &mut At, end: usize) -> f64 {
         let mut sum = self.terms(strands, w, at, end);
         for (i, near, _) in self.joint.corners(p).iter().filter(|c| c.1 > 0.0) {
             for t in &at.terms {

@@ -4,9 +4,9 @@
 //! evaluated; elsewhere shares are found node by node. A node's value depends on the node alone, whatever the block: a
 //! lattice that is alone by its bounds is alone by its shares too.
 
+use super::Blend;
 use super::added::{At, Row};
 use super::strand;
-use super::Blend;
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
 

@@ -68,9 +68,7 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
-        let ended = |s: &Constituent| {
-            s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)))
-        };
+        let ended = |s: &Constituent| s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)));
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.

@@ -467,7 +467,9 @@ mod tests {
         let text = "max(0, min(1, x/8 + 1)) * sqrt(abs(y)) - z^2 / sin(x + y) + smoothstep(-1, 1, z) - atan2(x, y)";
         let f = Formula::parse(text).unwrap_or_else(|e| panic!("{e}"));
         let points: Vec<Vec3> = (0..3 * LANES + 5)
-            .map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0))
+            .map(|i| {
+                [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0)
+            })
             .collect();
         let (mut v, mut w) = (vec![0.0; points.len()], vec![0.0; points.len()]);
         let mut g = vec![[0.0; 3]; points.len()];

@@ -326,7 +326,13 @@ fn what_lies_beyond_the_region_is_not_counted() {
     let blend = built.blend.expect("blend").blend;
     for y in [-5.9, 0.0, 5.9] {
         let points: Vec<Vec3> = (0..400)
-            .map(|i| [-11.9 + 0.5 * f64::from(i % 20), y, -5.7 + 0.6 * f64::from(i / 20)])
+            .map(|i| {
+                [
+                    -11.9 + 0.5 * f64::from(i % 20),
+                    y,
+                    -5.7 + 0.6 * f64::from(i / 20),
+                ]
+            })
             .collect();
         let mut asked = vec![0.0; points.len()];
         blend.fractions(&points, &mut asked);
