@@ -24,9 +24,14 @@ pub enum Phases {
 
 /// Places looked at where one distribution serves all, and in each neighbourhood. A thousand even places tell a fraction
 /// to some thousandths; the sixty-four neighbourhoods in a window of two cells look at other ones each, so that what is
-/// left of their errors together is far below.
+/// left of their errors together is far below. Where phases drift slowly neighbourhoods are fewer, and twice as many serve.
 const EVERYWHERE: usize = 1 << 16;
 const NEARBY: usize = 1 << 10;
+const SLOWLY: usize = 2 * NEARBY;
+/// Beats longer than six of the longest cells are slow: linear between neighbourhoods a cell apart. Of those shorter than a
+/// cell and a ninth the window leaves less than a twentieth.
+const SLOW: f64 = 1.0 / 6.0;
+const GONE: f64 = 0.9;
 /// Neighbourhoods along an axis after which places are the same again.
 const APART: usize = 4;
 /// Most neighbourhoods.
@@ -43,6 +48,9 @@ pub(super) struct Joint {
     pub origin: Vec3,
     pub step: f64,
     pub shape: [usize; 3],
+    /// How far about its middle a neighbourhood is looked at, mm, and at how many places.
+    reach: f64,
+    count: usize,
     /// Where solved maps end, and meshes of tetrahedra and beams may; nothing else has an end.
     bounds: Option<Aabb>,
 }
@@ -60,7 +68,7 @@ impl Joint {
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
         let (phases, common) = match (found, &maps) {
             (Some(back), _) => (Phases::Locked, Some(back)),
-            (None, Some(maps)) if independent(of, maps, longest) => {
+            (None, Some(maps)) if beats(of, maps, longest, |k| k >= 1.0 - 1e-9) => {
                 let mut wide = [[0.0; 3]; 3];
                 // So far that what is met there has no memory.
                 (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
@@ -72,7 +80,9 @@ impl Joint {
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
-        let mut step = 0.5 * longest;
+        let slow = (maps.as_ref())
+            .is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= GONE));
+        let mut step = if slow { longest } else { 0.5 * longest };
         while fine(step).iter().product::<f64>() > MOST {
             step *= 1.1;
         }
@@ -90,6 +100,8 @@ impl Joint {
             origin,
             step,
             shape,
+            reach: if slow { step } else { 2.0 * step },
+            count: if slow { SLOWLY } else { NEARBY },
             bounds: of.iter().any(ended).then_some(*bounds),
         }
     }
@@ -100,7 +112,7 @@ impl Joint {
     }
 
     /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
-    /// ever fewer up to two steps away along each axis (a raised cosine, in which whole waves leave no trace).
+    /// ever fewer up to its reach along each axis (a raised cosine, in which whole waves leave no trace).
     pub fn places(&self, i: usize) -> Vec<Vec3> {
         if let Some(back) = &self.common {
             return (0..EVERYWHERE).map(even).map(|u| apply(back, u)).collect();
@@ -109,11 +121,11 @@ impl Joint {
         let at = [i % nx, i / nx % ny, i / nx / ny];
         let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
         let [x, y, z] = at.map(|n| n % APART);
-        let some = &windows()[((z * APART + y) * APART + x) * NEARBY..][..NEARBY];
+        let some = &windows()[((z * APART + y) * APART + x) * SLOWLY..][..self.count];
         let place = |s: &Vec3| -> Vec3 {
             core::array::from_fn(|a| {
                 // What ends where the region does is not looked at beyond: places there are mirrored.
-                let p = middle[a] + 2.0 * self.step * s[a];
+                let p = middle[a] + self.reach * s[a];
                 let Some(b) = &self.bounds else { return p };
                 let (lo, hi) = (b.min[a], b.max[a]);
                 let p = if p > hi { 2.0 * hi - p } else { p };
@@ -247,7 +259,7 @@ fn windows() -> &'static [Vec3] {
             let j = (x as usize).min(N - 1);
             table[j] + (table[j + 1] - table[j]) * (x - j as f64)
         };
-        (0..APART.pow(3) * NEARBY)
+        (0..APART.pow(3) * SLOWLY)
             .map(|k| even(k).map(warp))
             .collect()
     })
@@ -272,9 +284,9 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     None
 }
 
-/// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
-/// make count too, since what is solid is no linear matter.
-fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
+/// Whether every beat between waves of two of the lattices meets a condition on its wave number (per `longest`); the waves
+/// that products of two make count too, since what is solid is no linear matter. No, where there are too many.
+fn beats(of: &[Constituent], maps: &[Mat3], longest: f64, meets: impl Fn(f64) -> bool) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
     for (s, m) in of.iter().zip(maps) {
         let Some(l) = s.lattice() else { return false };
@@ -298,13 +310,8 @@ fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
                 .collect(),
         );
     }
-    let fast = |k: Vec3| norm(k) * longest >= 1.0 - 1e-9;
     // Each list has the opposite of every wave, so differences are all there is.
-    (0..waves.len()).all(|i| {
-        (0..i).all(|j| {
-            waves[i]
-                .iter()
-                .all(|a| waves[j].iter().all(|b| fast(sub(*a, *b))))
-        })
-    })
+    let meet = |a: &Vec3, b: &Vec3| meets(norm(sub(*a, *b)) * longest);
+    (0..waves.len())
+        .all(|i| (0..i).all(|j| waves[i].iter().all(|a| waves[j].iter().all(|b| meet(a, b)))))
 }
