@@ -43,8 +43,9 @@ const SHARP: f64 = 0.436;
 pub(super) struct Edges {
     /// For each row of cells: those that are filled by their rims.
     pub cells: Vec<u64>,
-    /// Those of them in which the face meets others.
+    /// Those of them in which the face meets others, and which face that is.
     fitted: Vec<u64>,
+    fitted_to: Option<usize>,
     /// The face that has the edges.
     pub face: HashMap<usize, usize>,
     /// The chords of sides, by the lowest node of the side and the axis normal to it.
@@ -81,6 +82,7 @@ impl Edges {
     pub fn clear(&mut self, shape: [usize; 3]) {
         self.cells.clear();
         self.cells.resize(shape[1] * shape[2], 0);
+        self.fitted_to = None;
         self.fitted.clear();
         self.fitted.resize(shape[1] * shape[2], 0);
         self.face.clear();
@@ -289,7 +291,13 @@ impl Edges {
             let near = pieces.iter().map(|s| nearest(*s, center));
             tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
         }
-        tried.extend(self.corners.get(&(face, cell)).into_iter().flatten().map(|c| c.0));
+        tried.extend(
+            self.corners
+                .get(&(face, cell))
+                .into_iter()
+                .flatten()
+                .map(|c| c.0),
+        );
         // An edge that runs through needs no other choice.
         let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
         if !through {

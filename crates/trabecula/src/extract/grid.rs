@@ -93,8 +93,11 @@ impl Grid {
             .iter()
             .filter_map(|&f| Some((f, faces[f].plane?)))
             .collect();
-        // Caps on planes of the grid know of knots alone, not of cells that are fitted to edges.
-        if faces.iter().any(|f| !f.creases.segments.is_empty()) {
+        // What is kept apart by a hair is too near for cells that are fitted to edges.
+        let fits =
+            faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.flush);
+        // Caps on planes of the grid know of knots alone, not of such cells.
+        if fits {
             planes.clear();
         }
         let mut axes: [Vec<f64>; 3] = Default::default();
@@ -197,7 +200,8 @@ impl Grid {
             .map(|f| crease::by_tile(&grid, &f.creases))
             .collect();
         // The region's come first.
-        grid.fitted = (0..grid.creases.len()).find(|f| !grid.creases[*f].is_empty());
+        let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
+        grid.fitted = creased.next().filter(|_| fits);
         grid.few_enough().map(|()| grid)
     }
 

@@ -72,7 +72,7 @@ pub fn angle() -> Mesh {
 }
 
 /// The boxes between planes along each axis of which `full` says that they are solid.
-fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
+pub fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
     let cells = at.map(|a| a.len() - 1);
     let holds = |c: [usize; 3]| (0..3).all(|a| c[a] < cells[a]) && full(c);
     let mut mesh = Mesh::default();
@@ -201,7 +201,7 @@ impl Shape for Rounded {
 }
 
 /// The share of the edges of a region that are farther from a mesh than a hundredth of a step.
-fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
+pub fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     let found = region(mesh.clone());
     let points = creases(truth.mesh(), 30.0, edge / 4.0);
     let far = points
@@ -210,7 +210,7 @@ fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     far.count() as f64 / points.len() as f64
 }
 
-fn of(region: Region, edge: f64) -> Surface {
+pub fn of(region: Region, edge: f64) -> Surface {
     surface(&Solid::new(region, None, 1.0), edge, &Silent).expect("surface")
 }
 

@@ -54,6 +54,7 @@ impl Fits {
 impl Edges {
     /// Takes the cells in which a face with edges meets others out of those to be cut as knots.
     pub fn fit(&mut self, local: &Local, signs: &mut Signs, nodes: &Nodes, face: usize) {
+        self.fitted_to = Some(face);
         let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| {
             !matches!(signs.corners(face, i, j, k), 0 | 0xff)
         };
@@ -91,7 +92,7 @@ impl Edges {
 
     /// The cells that place the vertices of a face on their grid edges by the values at the nodes.
     pub fn knots<'a>(&self, signs: &'a Signs, face: usize) -> Cow<'a, [u64]> {
-        if self.fitted.is_empty() || !self.has(face) {
+        if self.fitted_to != Some(face) {
             return Cow::Borrowed(&signs.knotted);
         }
         let rows = signs.knotted.iter().zip(&self.fitted);
@@ -242,6 +243,10 @@ impl Knots<'_> {
         if !ends.into_iter().all(on) {
             return None;
         }
+        let at_ends = [node, high].map(|n| self.signs.is_negative(face, n));
+        if at_ends[0] == at_ends[1] {
+            return Some(at_ends[0]);
+        }
         let fitted = self.grid.fitted?;
         let fitted = self.local.live.iter().position(|f| *f == fitted)?;
         let (_, order) = self.order_along(node, axis, fitted);
@@ -250,7 +255,7 @@ impl Knots<'_> {
             (Some(own), Some(at)) => own < at,
             _ => false,
         };
-        Some(self.signs.is_negative(face, if passed { high } else { node }))
+        Some(at_ends[usize::from(passed)])
     }
 
     /// Adds a point that is no node; gives its number.

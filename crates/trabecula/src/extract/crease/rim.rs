@@ -73,7 +73,14 @@ impl Knots<'_> {
             } else {
                 None
             };
-            let apex = edges.apex(grid, nodes, (node, beyond), (face, field), &places, &corners);
+            let apex = edges.apex(
+                grid,
+                nodes,
+                (node, beyond),
+                (face, field),
+                &places,
+                &corners,
+            );
             self.cone(Key::center(node, 7), apex, &names, cut);
         }
         // One cone cannot meet itself, but several may meet each other.

@@ -84,7 +84,10 @@ impl Knots<'_> {
         let of_solid = polygons.iter().filter(|p| p.0);
         let lines: Vec<(Key, Key)> = of_solid.flat_map(|p| around(&p.1)).collect();
         let known: HashSet<(Key, Key)> = lines.iter().copied().collect();
-        for (p, q) in lines.into_iter().filter(|(p, q)| !known.contains(&(*q, *p))) {
+        for (p, q) in lines
+            .into_iter()
+            .filter(|(p, q)| !known.contains(&(*q, *p)))
+        {
             let cut = self.is_cut(p, q);
             let [a, b] = [p, q].map(|k| self.vertex(k));
             let [c, d] = [p, q].map(|k| within(self, k));
@@ -103,8 +106,7 @@ impl Knots<'_> {
 
     /// Whether a line between two points lies on the region's surface: not if it is on a face that is not.
     fn is_cut(&self, p: Key, q: Key) -> bool {
-        let both = p.faces().filter(|f| q.faces().any(|g| g == *f));
-        both.into_iter()
-            .all(|f| self.grid.faces[self.local.live[f]].cut)
+        let mut both = p.faces().filter(|f| q.faces().any(|g| g == *f));
+        both.all(|f| self.grid.faces[self.local.live[f]].cut)
     }
 }
