@@ -12,7 +12,7 @@ mod spline;
 pub mod tet;
 mod thickness;
 
-pub use connect::{Connectivity, connectivity};
+pub use connect::{connected, necks};
 pub(crate) use cut::Cut;
 pub use distance::Distance;
 pub use named::{Named, catalogue, named};
@@ -43,7 +43,8 @@ pub struct Cell {
     truncation: Option<f64>,
     range: OnceLock<Interval>,
     table: OnceLock<quantile::Quantile>,
-    connect: [OnceLock<Connectivity>; 3],
+    connected: [OnceLock<Vec<[f64; 2]>>; 3],
+    necks: [OnceLock<Vec<(Vec3, f64)>>; 3],
 }
 
 impl Cell {
@@ -57,7 +58,8 @@ impl Cell {
             truncation: None,
             range: OnceLock::new(),
             table: OnceLock::new(),
-            connect: Default::default(),
+            connected: Default::default(),
+            necks: Default::default(),
         }
     }
 
@@ -162,20 +164,21 @@ impl Cell {
 
     /// The intervals of solid fraction in which the periodic solid is one piece in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
+        let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.plain.gradients(u, v, g);
+        let found = || self.connected[part as usize].get_or_init(|| connected(&f, part));
         // The table is asked for next: both at once.
-        let (found, _) = rayon::join(|| self.connectivity(part), || (self.range(), self.table()));
-        let intervals = &found.intervals;
+        let (intervals, _) = rayon::join(found, || (self.range(), self.table()));
         intervals
             .iter()
             .map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0)))
             .collect()
     }
 
-    /// How the part's connectivity changes with its level.
-    pub fn connectivity(&self, part: Part) -> &Connectivity {
-        self.connect[part as usize].get_or_init(|| {
-            let mut found = connectivity(&|u, v, g| self.plain.gradients(u, v, g), part);
-            for (at, _) in &mut found.necks {
+    /// [`necks`] of the part: phases (turns) and levels.
+    fn necks(&self, part: Part) -> &[(Vec3, f64)] {
+        self.necks[part as usize].get_or_init(|| {
+            let mut found = necks(&|u, v, g| self.plain.gradients(u, v, g), part);
+            for (at, _) in &mut found {
                 *at = [0, 1, 2].map(|a| at[a] / f64::from(self.repeats[a]));
             }
             found
@@ -188,7 +191,7 @@ impl Cell {
         let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.gradients(u, v, g);
         match part {
             Part::Sheet => thickness::wall(&f, iso, to_phase),
-            _ => thickness::neck(&f, part, iso, &self.connectivity(part).necks, to_phase),
+            _ => thickness::neck(&f, part, iso, self.necks(part), to_phase),
         }
     }
 

@@ -25,18 +25,6 @@ use sublattice::{Int3, Sublattice};
 /// The steps along the axes.
 const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
-/// How a part's connectivity changes with its level.
-#[derive(Clone, Debug, Default)]
-pub struct Connectivity {
-    /// Intervals of the level, as amounts of solid grow, in which the periodic solid is one piece in R³:
-    /// [from, to] in iso (for `Upper` from ≥ to). The last one runs to the level at which all is solid.
-    pub intervals: Vec<[f64; 2]>,
-    /// Saddles by which pieces that were separate in R³ join, a piece and its own lattice translate included: (phase
-    /// in turns, level of f). A line on which f is extreme (a strut that shrinks to a line) is given by points along
-    /// it. Empty for sheets.
-    pub necks: Vec<(Vec3, f64)>,
-}
-
 /// A piece as it appears.
 struct Birth {
     node: u32,
@@ -55,42 +43,35 @@ struct Event {
     exact: bool,
 }
 
-/// Analyses the part of the cell function `f` (values and gradients per turn at phases).
+/// The intervals of the level, as amounts of solid grow, in which the periodic solid of this part of the cell function
+/// `f` (values and gradients per turn at phases) is one piece in R³: [from, to] in iso (for `Upper` from ≥ to). The last
+/// one runs to the level at which all is solid.
 ///
 /// Levels are exact (to about 1e-9) where the critical points are found by Newton's method, else good to the sampling.
-pub fn connectivity(f: Function, part: Part) -> Connectivity {
-    let grid = Grid::sample(f);
-    let mut amounts: Vec<f64> = grid.values.iter().map(|v| amount(part, *v)).collect();
-    if amounts.iter().any(|v| !v.is_finite()) {
-        return Connectivity::default();
-    }
-    amounts.iter_mut().for_each(|v| *v += 0.0); // −0.0 and 0.0 are one level
-    let mut order: Vec<u32> = (0..amounts.len() as u32).collect();
-    order.sort_unstable_by(|a, b| {
-        amounts[*a as usize]
-            .total_cmp(&amounts[*b as usize])
-            .then(a.cmp(b))
+pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
+    let found = Sweep::prepared(f, part, |sweep| {
+        let (births, events) = sweep.events();
+        let last = sweep.order.last().map_or(0, |i| *i);
+        let full = sweep
+            .refine(last, &[], 3)
+            .unwrap_or(sweep.amounts[last as usize]);
+        replay(births, events, full, sweep.grid.error, sweep.grid.range())
     });
-    let sweep = Sweep {
-        f,
-        part,
-        grid: &grid,
-        amounts: &amounts,
-        order: &order,
-    };
-    let (births, events) = sweep.events();
-    let last = order.last().map_or(0, |i| *i);
-    let full = sweep.refine(last, &[], 3).unwrap_or(amounts[last as usize]);
-    let mut intervals = replay(births, events, full, grid.error, grid.range());
+    let mut intervals = found.unwrap_or_default();
     if part == Part::Upper {
         intervals.iter_mut().flatten().for_each(|v| *v = -*v + 0.0);
     }
-    let necks = if part == Part::Sheet {
-        Vec::new()
-    } else {
-        sweep.necks()
-    };
-    Connectivity { intervals, necks }
+    intervals
+}
+
+/// The saddles by which pieces that were separate in R³ join, a piece and its own lattice translate included: (phase
+/// in turns, level of f). A line on which f is extreme (a strut that shrinks to a line) is given by points along it.
+/// Empty for sheets.
+pub fn necks(f: Function, part: Part) -> Vec<(Vec3, f64)> {
+    if part == Part::Sheet {
+        return Vec::new();
+    }
+    Sweep::prepared(f, part, |sweep| sweep.necks()).unwrap_or_default()
 }
 
 /// How late a value becomes solid: the level at which it does (negated for the upper part).
@@ -112,6 +93,29 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
+    /// What `make` finds of a function's samples; `None` where one of them is no number.
+    fn prepared<T>(f: Function, part: Part, make: impl Fn(&Sweep) -> T) -> Option<T> {
+        let grid = Grid::sample(f);
+        let mut amounts: Vec<f64> = grid.values.iter().map(|v| amount(part, *v)).collect();
+        if amounts.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        amounts.iter_mut().for_each(|v| *v += 0.0); // −0.0 and 0.0 are one level
+        let mut order: Vec<u32> = (0..amounts.len() as u32).collect();
+        order.sort_unstable_by(|a, b| {
+            amounts[*a as usize]
+                .total_cmp(&amounts[*b as usize])
+                .then(a.cmp(b))
+        });
+        Some(make(&Sweep {
+            f,
+            part,
+            grid: &grid,
+            amounts: &amounts,
+            order: &order,
+        }))
+    }
+
     /// The amount at the critical point near a node from which at most `falling` directions lead to more solid;
     /// sought from the node and from the middles towards `others`.
     fn refine(&self, node: u32, others: &[u32], falling: usize) -> Option<f64> {

@@ -8,7 +8,7 @@
 use std::sync::OnceLock;
 
 use super::Part;
-use super::connect::{Connectivity, connectivity};
+use super::connect::connected;
 use super::curvature;
 use super::nearest::Search;
 use super::quantile::Quantile;
@@ -36,7 +36,7 @@ pub struct Distance {
     /// Largest distance found on the mid-surface itself, mm.
     error: f64,
     table: OnceLock<Quantile>,
-    connect: [OnceLock<Connectivity>; 3],
+    connected: [OnceLock<Vec<[f64; 2]>>; 3],
 }
 
 impl Distance {
@@ -70,7 +70,7 @@ impl Distance {
             radius,
             error,
             table: OnceLock::new(),
-            connect: Default::default(),
+            connected: Default::default(),
         }
     }
 
@@ -149,10 +149,10 @@ impl Distance {
 
     /// The intervals of solid fraction in which the periodic solid of this part is one piece in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
-        let found = self.connect[part as usize]
-            .get_or_init(|| connectivity(&|u, v, g| self.gradients(u, v, g), part));
+        let found = self.connected[part as usize]
+            .get_or_init(|| connected(&|u, v, g| self.gradients(u, v, g), part));
         let share = |t: f64| self.fraction(part, t).clamp(0.0, 1.0);
-        found.intervals.iter().map(|i| i.map(share)).collect()
+        found.iter().map(|i| i.map(share)).collect()
     }
 }
 

@@ -145,7 +145,7 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
 /// Narrowest neck diameter (mm) of the lower (f ≤ iso) or upper (f ≥ iso) part, where u = `to_phase` · x: twice the
 /// least distance from a neck's saddle to the surface f = iso.
 ///
-/// `necks` are those of [`connectivity`](super::connectivity): phases and levels. Where every neck is
+/// `necks` are those of [`necks`](super::necks): phases and levels. Where every neck is
 /// closed and the pieces are loose it is zero. `None` where the part is empty or full, and for sheets.
 pub fn neck(
     f: Function,
@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn necks_of_the_primitive() {
-        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        let necks = super::super::necks(&primitive, Part::Lower);
         assert_eq!(necks.len(), 3);
         for t in [-0.9, -0.5, 0.0] {
             let want = 2.0 * neck_radius(t);
@@ -364,7 +364,7 @@ mod tests {
             );
         }
         // The upper part is the lower one moved by half a period.
-        let upper = super::super::connectivity(&primitive, Part::Upper).necks;
+        let upper = super::super::necks(&primitive, Part::Upper);
         about(
             neck(&primitive, Part::Upper, 0.5, &upper, &cubic(1.0)),
             2.0 * neck_radius(-0.5),
@@ -374,7 +374,7 @@ mod tests {
 
     #[test]
     fn a_stretched_neck_is_as_thin_as_its_short_side() {
-        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        let necks = super::super::necks(&primitive, Part::Lower);
         let map = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]];
         let long = neck(&primitive, Part::Lower, -0.9, &necks, &map);
         // Necks along z keep their sections; the nearest point lies across, at cos a = 1 − (1 + t)…: solved on one axis.
@@ -387,7 +387,7 @@ mod tests {
 
     #[test]
     fn loose_pieces_have_no_neck() {
-        let necks = super::super::connectivity(&primitive, Part::Lower).necks;
+        let necks = super::super::necks(&primitive, Part::Lower);
         for t in [-3.0 + 1e-4, -1.001] {
             let found = neck(&primitive, Part::Lower, t, &necks, &cubic(2.0));
             assert_eq!(found, Some(0.0), "{t}");

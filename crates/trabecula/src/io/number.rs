@@ -18,7 +18,8 @@ static PAIRS: [u8; 200] = {
 #[inline]
 fn push_padded(out: &mut Vec<u8>, mut n: u64, width: usize) {
     let mut text = [b'0'; 20];
-    let mut at = text.len();
+    let digits = width.max(n.checked_ilog10().map_or(1, |d| d as usize + 1));
+    let mut at = digits;
     while n >= 100 {
         let pair = (n % 100) as usize * 2;
         n /= 100;
@@ -32,7 +33,10 @@ fn push_padded(out: &mut Vec<u8>, mut n: u64, width: usize) {
         at -= 1;
         text[at] = b'0' + n as u8;
     }
-    out.extend_from_slice(&text[at.min(text.len() - width)..]);
+    // A copy of known size costs less than one of as many bytes as are wanted.
+    let end = out.len() + digits;
+    out.extend_from_slice(&text);
+    out.truncate(end);
 }
 
 /// Appends the decimal text of `n`.

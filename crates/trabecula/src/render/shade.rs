@@ -1,5 +1,7 @@
 //! Light: a key, a sky and a rim, and the darkness of places that see little of the sky.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use super::raster::{NONE, Raster, weights};
@@ -27,7 +29,7 @@ pub(super) fn shade(
     raster: &Raster,
     tint: Option<&Tint>,
 ) -> Vec<[f32; 4]> {
-    let normals = normals(surface);
+    let normals = Normals::of(surface);
     let [w, h] = raster.size;
     let open = occlusion(camera, raster);
     let key = towards(camera, -0.55, 0.75, 0.60);
@@ -43,17 +45,13 @@ pub(super) fn shade(
             let p = camera.unproject(x as f64 + 0.5, y as f64 + 0.5, f64::from(raster.near[at]));
             let eye = camera.towards(p);
             let cut = surface.cut.get(id as usize).copied().unwrap_or(false);
-            let [a, b, c] = surface.mesh.corners(id as usize);
-            let flat = unit(cross(sub(b, a), sub(c, a)));
-            let mut n = flat;
+            let flat = unit(area(surface, id as usize));
             let t = surface.mesh.triangles[id as usize].map(|v| v as usize);
             let k = weights(surface, id, p);
-            if !cut {
-                n = (0..3).fold([0.0; 3], |n, i| {
-                    add(n, scale(normals[t[i]].map(f64::from), k[i]))
-                });
-                n = if norm(n) > 0.0 { unit(n) } else { flat };
-            }
+            let n = (0..3).fold([0.0; 3], |n, i| {
+                add(n, scale(normals.at(surface, t[i], flat), k[i]))
+            });
+            let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
             // An open mesh may show its inside.
             if dot(flat, eye) < 0.0 {
                 n = scale(n, -1.0);
@@ -182,23 +180,67 @@ fn lit(
     })
 }
 
-/// Normals at vertices from the lattice triangles about them, weighted by area.
-fn normals(surface: &Surface) -> Vec<[f32; 3]> {
-    let mesh = &surface.mesh;
-    let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        if surface.cut.get(i).copied().unwrap_or(false) {
-            continue;
+/// Normals at vertices, weighted by area: one for each vertex, but where faces meet in an edge, one for each side.
+struct Normals {
+    smooth: Vec<[f32; 3]>,
+    /// The triangles about a vertex on an edge.
+    edges: HashMap<usize, Vec<u32>>,
+}
+
+impl Normals {
+    /// Cosine of the angle from which on faces meet in an edge: 35°.
+    const EDGE: f64 = 0.82;
+
+    fn of(surface: &Surface) -> Normals {
+        let mesh = &surface.mesh;
+        let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
+        for (i, t) in mesh.triangles.iter().enumerate() {
+            let n = area(surface, i);
+            for v in t {
+                (0..3).for_each(|k| sums[*v as usize][k] += n[k] as f32);
+            }
         }
-        let [a, b, c] = mesh.corners(i);
-        let n = cross(sub(b, a), sub(c, a));
-        for v in t {
-            (0..3).for_each(|k| sums[*v as usize][k] += n[k] as f32);
+        sums.par_iter_mut()
+            .for_each(|n| *n = unit(n.map(f64::from)).map(|c| c as f32));
+        let apart = |i: usize, v: u32| {
+            dot(unit(area(surface, i)), sums[v as usize].map(f64::from)) < Self::EDGE
+        };
+        let mut edges = HashMap::new();
+        for (i, t) in mesh.triangles.iter().enumerate() {
+            for v in t.iter().filter(|v| apart(i, **v)) {
+                edges.entry(*v as usize).or_insert_with(Vec::new);
+            }
+        }
+        for (i, t) in mesh.triangles.iter().enumerate() {
+            for v in t {
+                if let Some(around) = edges.get_mut(&(*v as usize)) {
+                    around.push(i as u32);
+                }
+            }
+        }
+        Normals {
+            smooth: sums,
+            edges,
         }
     }
-    sums.par_iter_mut()
-        .for_each(|n| *n = unit(n.map(f64::from)).map(|c| c as f32));
-    sums
+
+    /// The normal at a vertex of a face whose own is `flat`.
+    fn at(&self, surface: &Surface, vertex: usize, flat: Vec3) -> Vec3 {
+        let Some(around) = self.edges.get(&vertex) else {
+            return self.smooth[vertex].map(f64::from);
+        };
+        let near = around.iter().map(|i| area(surface, *i as usize));
+        let sum = near
+            .filter(|n| dot(*n, flat) > Self::EDGE * norm(*n))
+            .fold([0.0; 3], add);
+        if norm(sum) > 0.0 { unit(sum) } else { flat }
+    }
+}
+
+/// Twice the area of a triangle, along its normal.
+fn area(surface: &Surface, triangle: usize) -> Vec3 {
+    let [a, b, c] = surface.mesh.corners(triangle);
+    cross(sub(b, a), sub(c, a))
 }
 
 /// How much of the sky each sample sees (1 all, 0 nothing), from the depths about it.

@@ -138,32 +138,20 @@ fn thresholds_of_the_named_surfaces() {
             (Part::Lower, lower, necks[0]),
             (Part::Upper, upper, necks[1]),
         ] {
-            let t = std::time::Instant::now();
-            let r = connectivity(&with_gradients(f), part);
-            println!(
-                "{name} {part:?} {:?} {} necks {:?} in {:?}",
-                r.intervals,
-                r.necks.len(),
-                r.necks.first(),
-                t.elapsed()
-            );
-            assert_eq!(
-                r.intervals.len(),
-                want.len(),
-                "{name} {part:?}: {:?}",
-                r.intervals
-            );
-            for (i, w) in r.intervals.iter().flatten().zip(want.iter().flatten()) {
+            let r = connected(&with_gradients(f), part);
+            assert_eq!(r.len(), want.len(), "{name} {part:?}: {:?}", r);
+            for (i, w) in r.iter().flatten().zip(want.iter().flatten()) {
                 assert!(
                     (i - w).abs() < 1e-4,
                     "{name} {part:?}: {:?} not {want:?}",
-                    r.intervals
+                    r
                 );
             }
+            let found = super::necks(&with_gradients(f), part);
             if necks > 0 {
-                assert_eq!(r.necks.len(), necks, "{name} {part:?}: {:?}", r.necks);
+                assert_eq!(found.len(), necks, "{name} {part:?}: {found:?}");
             }
-            for (at, level) in &r.necks {
+            for (at, level) in &found {
                 assert!((f(*at) - level).abs() < 1e-6);
             }
         }
@@ -181,38 +169,25 @@ fn sheets_are_one_piece_however_thin() {
         (lidinoid, 1.35),
     ];
     for (f, top) in all {
-        let r = connectivity(&with_gradients(f), Part::Sheet);
-        assert_eq!(r.intervals.len(), 1);
-        assert!(
-            r.intervals[0][0] == 0.0 && (r.intervals[0][1] - top).abs() < 1e-6,
-            "{:?}",
-            r.intervals
-        );
+        let r = connected(&with_gradients(f), Part::Sheet);
+        assert_eq!(r.len(), 1);
+        assert!(r[0][0] == 0.0 && (r[0][1] - top).abs() < 1e-6, "{:?}", r);
     }
     // Parallel plates never join; two sets of parallel plates do when their walls cross.
-    assert!(
-        connectivity(&with_gradients(|[x, _, _]| c(x)), Part::Sheet)
-            .intervals
-            .is_empty()
-    );
-    let crossed = connectivity(&with_gradients(|[x, y, z]| c(x) * c(y) * c(z)), Part::Sheet);
-    assert_eq!(crossed.intervals.len(), 1);
+    assert!(connected(&with_gradients(|[x, _, _]| c(x)), Part::Sheet).is_empty());
+    let crossed = connected(&with_gradients(|[x, y, z]| c(x) * c(y) * c(z)), Part::Sheet);
+    assert_eq!(crossed.len(), 1);
 }
 
 #[test]
 fn a_sublattice_of_translations_is_not_one_piece() {
     // Tubes along x alone, and two interpenetrating primitive networks (body-centred), are not one piece.
     let tubes: Plain = |[_, y, z]| c(y) + c(z);
-    let r = connectivity(&with_gradients(tubes), Part::Lower);
-    assert!(
-        r.intervals.len() == 1 && r.intervals[0][0].abs() < 1e-6,
-        "{:?}",
-        r.intervals
-    );
+    let r = connected(&with_gradients(tubes), Part::Lower);
+    assert!(r.len() == 1 && r[0][0].abs() < 1e-6, "{:?}", r);
     let slabs: Plain = |[x, _, _]| c(2.0 * x);
     assert!(
-        connectivity(&with_gradients(slabs), Part::Lower)
-            .intervals
+        connected(&with_gradients(slabs), Part::Lower)
             .iter()
             .all(|i| i[1] - i[0] < 1e-6)
     );

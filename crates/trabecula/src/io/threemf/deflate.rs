@@ -13,52 +13,73 @@ const LITERALS: usize = 286;
 const DISTANCES: usize = 30;
 const END: usize = 256;
 const LONGEST: usize = 258;
-/// Set in a token that is a match, with the length above bit 16 and the distance below it.
-const MATCH: u32 = 1 << 31;
-
 /// One block that ends at a byte and is not the last.
 pub fn rows(text: &[u8]) -> Vec<u8> {
     let tokens = Tokens::of(text);
     let literals = codes(&lengths(&tokens.literals));
     let distances = codes(&lengths(&tokens.distances));
-    let mut bits = Bits {
-        out: Vec::with_capacity(text.len() / 4 + 512),
-        held: 0,
-        count: 0,
-    };
+    let mut bits = Bits::new(text.len() / 4);
     // A dynamic block with all code lengths given plainly: four bits each for the numbers 0 to 15.
+    bits.room(LITERALS);
     bits.put(0b100, 3);
-    bits.put((LITERALS - 257) as u32, 5);
-    bits.put((DISTANCES - 1) as u32, 5);
+    bits.put((LITERALS - 257) as u64, 5);
+    bits.put((DISTANCES - 1) as u64, 5);
     bits.put(15, 4);
     (0..19).for_each(|i| bits.put(if i < 3 { 0 } else { 4 }, 3));
     for (_, length) in literals.iter().chain(&distances) {
-        bits.put(reversed(*length, 4), 4);
+        bits.put(reversed(*length, 4).into(), 4);
     }
-    for &t in &tokens.list {
-        if t & MATCH == 0 {
-            let (code, n) = literals[t as usize];
-            bits.put(code, n);
-        } else {
-            let (symbol, extra, n) = length_code(t >> 16 & 0x1ff);
-            let (code, width) = literals[symbol];
-            bits.put(code | extra << width, width + n);
-            let (symbol, extra, n) = distance_code(t & 0xffff);
+    let lengths = std::array::from_fn::<_, { LONGEST + 1 }, _>(|l| {
+        let (symbol, extra, n) = length_code(l.max(3) as u32);
+        let (code, width) = literals[symbol];
+        (u64::from(code | extra << width), width + n)
+    });
+    let mut rest = text;
+    for run in &tokens.runs {
+        let (plain, behind) = rest.split_at(run.plain as usize);
+        rest = &behind[usize::from(run.length)..];
+        // Codes have at most 15 bits.
+        bits.room(2 * plain.len() + 8);
+        for some in plain.chunks(3) {
+            let (mut v, mut n) = (0, 0);
+            for b in some {
+                let (code, width) = literals[usize::from(*b)];
+                v |= u64::from(code) << n;
+                n += width;
+            }
+            bits.put(v, n);
+        }
+        if run.length > 0 {
+            let (v, at) = lengths[usize::from(run.length)];
+            let (symbol, extra, n) = distance_code(run.back.into());
             let (code, width) = distances[symbol];
-            bits.put(code | extra << width, width + n);
+            bits.put(v | u64::from(code | extra << width) << at, at + width + n);
         }
     }
     let (code, n) = literals[END];
-    bits.put(code, n);
+    bits.room(16);
+    bits.put(code.into(), n);
     // An empty stored block begins at a byte and ends at one.
     bits.put(0, 3);
     bits.finish(&[0, 0, 0xff, 0xff])
 }
 
-/// Literals and matches in order, and how often each symbol occurs.
+/// Some bytes as they are, then a match.
+struct Run {
+    plain: u32,
+    /// Length of the match, or 0 where there is none.
+    length: u16,
+    /// Its distance less one.
+    back: u16,
+}
+
+/// Runs in order, and how often each symbol occurs.
 struct Tokens {
-    list: Vec<u32>,
+    runs: Vec<Run>,
+    /// Bytes since the last match.
+    plain: u32,
     literals: [u32; LITERALS],
+    lengths: [u32; LONGEST + 1],
     distances: [u32; DISTANCES],
 }
 
@@ -66,8 +87,10 @@ impl Tokens {
     /// The tokens of a text. `at` runs through it, `up` through the same places one row before.
     fn of(text: &[u8]) -> Tokens {
         let mut tokens = Tokens {
-            list: Vec::with_capacity(text.len() / 2),
+            runs: Vec::with_capacity(text.len() / 8),
+            plain: 0,
             literals: [0; LITERALS],
+            lengths: [0; LONGEST + 1],
             distances: [0; DISTANCES],
         };
         // Two symbols of each kind at least make a complete code.
@@ -103,6 +126,10 @@ impl Tokens {
                 at += 1;
             }
         }
+        tokens.end(0, 0);
+        for length in 3..=LONGEST {
+            tokens.literals[length_code(length as u32).0] += tokens.lengths[length];
+        }
         tokens
     }
 
@@ -110,15 +137,25 @@ impl Tokens {
     fn plain(&mut self, text: &[u8]) {
         for b in text {
             self.literals[usize::from(*b)] += 1;
-            self.list.push(u32::from(*b));
         }
+        self.plain += text.len() as u32;
     }
 
     #[inline]
     fn matched(&mut self, length: u32, distance: u32) {
-        self.literals[length_code(length).0] += 1;
+        self.lengths[length as usize] += 1;
         self.distances[distance_code(distance - 1).0] += 1;
-        self.list.push(MATCH | length << 16 | (distance - 1));
+        self.end(length as u16, (distance - 1) as u16);
+    }
+
+    #[inline]
+    fn end(&mut self, length: u16, back: u16) {
+        let plain = std::mem::take(&mut self.plain);
+        self.runs.push(Run {
+            plain,
+            length,
+            back,
+        });
     }
 }
 
@@ -238,29 +275,48 @@ fn codes(lengths: &[u32]) -> Vec<(u32, u32)> {
 
 /// Bits, lowest first.
 struct Bits {
+    /// Whole bytes up to `at`; room behind them.
     out: Vec<u8>,
+    at: usize,
     held: u64,
+    /// Fewer than eight.
     count: u32,
 }
 
 impl Bits {
-    /// Adds the low `n` ≤ 32 bits of `v`, whose higher bits are zero.
-    #[inline]
-    fn put(&mut self, v: u32, n: u32) {
-        self.held |= u64::from(v) << self.count;
-        self.count += n;
-        if self.count >= 32 {
-            self.out
-                .extend_from_slice(&(self.held as u32).to_le_bytes());
-            self.held >>= 32;
-            self.count -= 32;
+    fn new(room: usize) -> Bits {
+        Bits {
+            out: vec![0; room],
+            at: 0,
+            held: 0,
+            count: 0,
         }
+    }
+
+    /// Makes room for `bytes` more.
+    #[inline]
+    fn room(&mut self, bytes: usize) {
+        let need = self.at + bytes + 8;
+        if need > self.out.len() {
+            self.out.resize(need + need / 2, 0);
+        }
+    }
+
+    /// Adds the low `n` ≤ 56 bits of `v`, whose higher bits are zero, where there is room.
+    #[inline]
+    fn put(&mut self, v: u64, n: u32) {
+        self.held |= v << self.count;
+        self.count += n;
+        // All that is held goes out at each turn, without asking whether it fills bytes; what does not is written over.
+        self.out[self.at..self.at + 8].copy_from_slice(&self.held.to_le_bytes());
+        self.at += (self.count >> 3) as usize;
+        self.held >>= self.count & !7;
+        self.count &= 7;
     }
 
     /// Fills the last byte with zeros and adds `bytes`.
     fn finish(mut self, bytes: &[u8]) -> Vec<u8> {
-        let left = self.count.div_ceil(8) as usize;
-        self.out.extend_from_slice(&self.held.to_le_bytes()[..left]);
+        self.out.truncate(self.at + usize::from(self.count > 0));
         self.out.extend_from_slice(bytes);
         self.out
     }
