@@ -8,7 +8,7 @@ use trabecula::extract::{Silent, surface};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::math::{Vec3, add, apply, cross, norm, rotation, scale, sub, unit};
+use trabecula::math::{Vec3, add, apply, cross, rotation, scale, sub, unit};
 use trabecula::region::{
     Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
 };
@@ -117,11 +117,9 @@ struct Tally {
 
 #[test]
 fn combined_meshes_keep_every_guarantee_and_their_edges() {
-    let first = std::env::var("TRABECULA_FIRST").ok();
-    let first = first.and_then(|n| n.parse::<u64>().ok()).unwrap_or(0);
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
     let mut wrong = Vec::new();
-    for case in first..first + cases(6) {
+    for case in 0..cases(6) {
         let some = &mut Random(31 * case + 5);
         let mesh = polyhedron(some);
         let (mut kind, mut beside) = other(some);
@@ -200,19 +198,6 @@ fn combined_meshes_keep_every_guarantee_and_their_edges() {
                 tally.off[0] += usize::from(off > 0.05);
                 tally.off[1] += usize::from(off > 0.5);
                 tally.worst = tally.worst.max(off);
-                if off > 0.05 && std::env::var("TW").is_ok() {
-                    let m = truth.mesh();
-                    let corner = m
-                        .vertices
-                        .iter()
-                        .map(|v| norm(sub(*v, p)))
-                        .fold(9.0, f64::min);
-                    println!(
-                        "W {name} {verb} {kind} off {off:.3} corner {:.2} rel {:?}",
-                        corner / edge,
-                        p.map(|x| x / edge)
-                    );
-                }
             }
         }
     }
@@ -231,11 +216,11 @@ fn combined_meshes_keep_every_guarantee_and_their_edges() {
         all.samples += t.samples;
         all.off[0] += t.off[0];
     }
-    println!(
-        "all: {:.2} %",
-        100.0 * all.off[0] as f64 / all.samples as f64
-    );
+    let share = all.off[0] as f64 / all.samples as f64;
+    println!("all: {:.2} %", 100.0 * share);
     assert!(wrong.is_empty(), "{wrong:?}");
+    // Rounded, 40 % of them would be.
+    assert!(share < 0.05, "{share} of the edges are off");
 }
 
 /// Boxes of a grid, those of one and of another body: all that is made of both is known exactly.
@@ -291,17 +276,19 @@ fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
 }
 
 #[test]
-fn holes_cut_into_a_mesh_come_to_second_order() {
+fn edges_of_cylinders_cut_from_a_mesh_come_to_second_order() {
     let (turn, by) = ([17.0, 31.0, 47.0], [0.11, -0.07, 0.05]);
     let place = |p: Vec3| add(apply(&rotation(turn), p), by);
     let plate = moved(block(1.6, 1.6, 0.5), turn, by);
     let plate = Arc::new(MeshRegion::new(plate, Repair::Refuse).expect("clean"));
     let (middle, way, radius) = ([0.8, 0.8, 0.0], unit([0.3, 0.2, 1.0]), 0.4);
     let ends = [-1.0, 2.0].map(|s| place(add(middle, scale(way, s))));
-    let hole = Cylinder::new(ends[0], sub(ends[1], ends[0]), radius, 3.0).expect("cylinder");
-    let cut = Difference::new(vec![plate.clone() as Region, Arc::new(hole)]).expect("difference");
-    let cut = Arc::new(cut) as Region;
-    // The rim on the upper face: along the hole from points about its axis.
+    let bolt = Cylinder::new(ends[0], sub(ends[1], ends[0]), radius, 3.0).expect("cylinder");
+    let bolt = Arc::new(bolt) as Region;
+    let pair = || vec![plate.clone() as Region, bolt.clone()];
+    let hole = Arc::new(Difference::new(pair()).expect("difference")) as Region;
+    let disk = Arc::new(Intersection::new(pair()).expect("intersection")) as Region;
+    // The rim on the upper face: along the bolt from points about its axis.
     let u = unit(cross(way, [1.0, 0.0, 0.0]));
     let v = cross(way, u);
     let rim: Vec<Vec3> = (0..720)
@@ -312,15 +299,18 @@ fn holes_cut_into_a_mesh_come_to_second_order() {
         })
         .collect();
     let errors = [10.0, 20.0, 40.0].map(|n| {
-        let s = of(cut.clone(), 1.0 / n);
-        check("plate", &s);
+        let s = of(hole.clone(), 1.0 / n);
+        check("plate with a hole", &s);
         let share = far(&plate, &s.mesh, 1.0 / n);
         assert!(share < 0.05, "{share} of the plate's own edges are off");
+        // Chords of the rim lie in the disk, so that it is the disk that they are seen to cut.
+        let s = of(disk.clone(), 1.0 / n);
+        check("disk", &s);
         let found = MeshRegion::new(s.mesh, Repair::Refuse).expect("closed");
         rim.iter()
             .map(|p| found.value(*p).abs())
             .fold(0.0, f64::max)
     });
-    println!("rim of a hole in a mesh, at 10, 20, 40 steps: {errors:?}");
+    println!("rim of a disk cut from a mesh, at 10, 20, 40 steps: {errors:?}");
     assert!(errors[2] < errors[0] / 9.0, "{errors:?}");
 }
