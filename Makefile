@@ -109,6 +109,7 @@ smoke: $(VENV)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/python bench/peers.py --trabecula $(BIN)/trabecula --record
 	$(BIN)/python bench/beams.py --trabecula $(BIN)/trabecula
+	$(BIN)/python bench/tets.py --trabecula $(BIN)/trabecula
 
 docs: $(VENV)/.installed
 	$(BIN)/python scripts/figure_porosity.py

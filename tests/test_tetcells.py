@@ -125,6 +125,50 @@ def test_zones_pass_into_each_other_and_keep_the_fraction():
         design(lt.cell.tet(zones={0: "iwp"}), zones={1: half}).build()
 
 
+def test_zones_that_do_not_join_are_told_before_a_surface_is_made():
+    half = lt.region.halfspace(point=[0, 0, 0], normal=[1, 0, 0])
+
+    def built(one, other):
+        return design(lt.cell.tet(zones={0: one, 1: other}), level=lt.level.fraction(0.3), zones={1: half}).build()
+
+    solid = built("p43m", "f43m")
+    tets = solid.report()["lattices"]["a"]["tets"]
+    (join,) = tets["joins"]
+    assert join["zones"] == [0, 1] and join["joined"] and 0 < join["open"] <= join["faces"] and join["ports"] > 0
+    # As many steps as the pieces are told by.
+    assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 16).pieces == 1
+    with pytest.warns(lt.DesignWarning, match=r"zones 0 \(pn3m\) and 1 \(diamond\) do not join"):
+        solid = built("pn3m", "diamond")
+    tets = solid.report()["lattices"]["a"]["tets"]
+    assert not tets["joins"][0]["joined"] and tets["pieces"] > 1
+    assert tets["pieces"] == solid.mesh(edge=tets["edge"] / 16).pieces
+    # Without zones the pieces are told too.
+    assert design().build().report()["lattices"]["a"]["tets"]["pieces"] == 1
+
+
+def test_a_single_tetrahedron_sharp_or_smooth():
+    """Equation 9 of the paper with unit normals draws back from edges and corners, so it takes some of the volume."""
+    corners = [[5, 5, 5], [5, -5, -5], [-5, 5, -5], [-5, -5, 5]]
+
+    def volume(**keys):
+        region = lt.region.tetrahedron(corners, **keys)
+        return lt.TetMesh.of({"region": region, "lattice": {"a": {"map": lt.map.tets(size=0.8)}}}).volume
+
+    exact = 10**3 / 3
+    # What the mesh may miss at edges and corners, as it does with the angles of any region.
+    assert volume() == pytest.approx(exact, rel=5e-3)
+    assert 0.5 * exact < volume(sharpness=1.0) < volume(sharpness=4.0) < exact
+    cell = lt.Lattice(cell="gyroid", part="lower", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.5))
+    solid = lt.Design(region=lt.region.tetrahedron(corners, sharpness=4.0), lattice={"a": cell}).build()
+    # An edge's middle is on two planes, ln(2)/k outside the smooth one, and the other two are as good as nowhere.
+    assert solid.field([[5.0, 0.0, 0.0]])[0] == pytest.approx(np.log(2) / 4, rel=1e-9)
+    assert solid.mesh(edge=0.4).closed
+    with pytest.raises(lt.DesignError, match="nothing is left"):
+        volume(sharpness=0.1)
+    with pytest.raises(lt.DesignError, match="four corners"):
+        lt.Design(region=lt.region.tetrahedron(corners[:3]), lattice={"a": cell}).build()
+
+
 def test_the_boundary_may_be_left_open(tmp_path):
     mesh = design().build().mesh(edge=0.4)
     opened = mesh.uncapped()

@@ -1,8 +1,10 @@
 """Tetrahedral meshes: made, read, written, judged; other people's formats and meshers."""
 
 import json
+import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -72,18 +74,67 @@ def test_the_command_tells_and_writes(tmp_path):
     command("tets", design, "-o", tmp_path / "ball.stl", expected=2)
 
 
-def test_formats_of_finite_elements(tmp_path):
+@pytest.mark.parametrize("kind", ["vtu", "msh", "inp", "mesh", "med"])
+def test_formats_of_finite_elements(tmp_path, kind):
     meshio = pytest.importorskip("meshio")
+    if kind == "med":
+        pytest.importorskip("h5py")
     mesh = lt.TetMesh.of(BALL)
-    for kind in ("vtu", "msh", "inp", "mesh"):
-        path = tmp_path / f"ball.{kind}"
-        mesh.write(path)
-        other = meshio.read(path)
-        tets = np.concatenate([c.data for c in other.cells if c.type == "tetra"])
-        # The formats of text keep all digits but a few.
-        assert np.isclose(volumes(other.points, tets).sum(), mesh.volume, rtol=1e-9), kind
-        again = lt.TetMesh.read(path)
-        assert again.counts == mesh.counts and np.isclose(again.volume, mesh.volume, rtol=1e-9), kind
+    path = tmp_path / f"ball.{kind}"
+    mesh.write(path)
+    other = meshio.read(path)
+    tets = np.concatenate([c.data for c in other.cells if c.type == "tetra"])
+    # The formats of text keep all digits but a few.
+    assert np.isclose(volumes(other.points, tets).sum(), mesh.volume, rtol=1e-9)
+    again = lt.TetMesh.read(path)
+    assert again.counts == mesh.counts and np.isclose(again.volume, mesh.volume, rtol=1e-9)
+    assert (again.tets == mesh.tets).all() and np.allclose(again.nodes, mesh.nodes, atol=1e-9)
+
+
+#: Other formats of meshio that hold tetrahedra, and need no package beside it: extension, its name, keywords, digits kept.
+OTHERS = [
+    ("vtk", "vtk", {"binary": True}, 1e-12),
+    ("vtu", "vtu", {"binary": False}, 1e-9),
+    ("msh", "gmsh22", {"binary": False}, 1e-9),
+    ("msh", "gmsh", {"binary": True}, 1e-12),
+    ("meshb", "medit", {}, 1e-12),
+    ("bdf", "nastran", {}, 1e-3),
+    ("avs", "avsucd", {}, 1e-9),
+    ("su2", "su2", {}, 1e-9),
+    ("xdmf", "xdmf", {"data_format": "XML"}, 1e-9),
+]
+
+
+@pytest.mark.parametrize(("kind", "form", "keys", "digits"), OTHERS, ids=[f"{f}-{k}" for k, f, *_ in OTHERS])
+def test_formats_that_others_write(tmp_path, kind, form, keys, digits):
+    """Hand-made by meshio, as another program would: two zones where the format has them."""
+    meshio = pytest.importorskip("meshio")
+    corner = np.array([[x, y, z] for z in (0.0, 2.0) for y in (0.0, 2.0) for x in (0.0, 2.0)])
+    tets = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+    zones = np.array([1, 1, 1, 2, 2, 2], dtype=np.int32)
+    # meshio writes no zones to version 4 of gmsh's.
+    names = {"gmsh22": "gmsh:physical", "medit": "medit:ref", "vtk": "zone", "vtu": "zone"}
+    data = {names[form]: [zones]} if form in names else {}
+    if form == "gmsh22":
+        data["gmsh:geometrical"] = [zones]
+    path = tmp_path / f"cube.{kind}"
+    meshio.write(path, meshio.Mesh(corner, [("tetra", tets)], cell_data=data), file_format=form, **keys)
+    mesh = lt.TetMesh.read(path)
+    assert mesh.counts == (8, 6) and np.isclose(mesh.volume, 8, rtol=digits)
+    if form in names:
+        assert mesh.zones.tolist() == zones.tolist()
+
+
+def test_formats_without_their_package_are_named(tmp_path, monkeypatch):
+    """MED is HDF5: without h5py there is one sentence that says so."""
+    pytest.importorskip("meshio")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(ValueError, match=r"\.med files need h5py.*pip install h5py"):
+        lt.TetMesh.of(BALL).write(tmp_path / "ball.med")
+    assert not (tmp_path / "ball.med").exists()
+    (tmp_path / "some.med").write_bytes(b"\x89HDF")
+    with pytest.raises(ValueError, match=r"\.med files need h5py.*pip install h5py"):
+        lt.TetMesh.read(tmp_path / "some.med")
 
 
 def test_hexahedra_are_offered_a_split(tmp_path):
@@ -158,6 +209,58 @@ def test_a_mesher_that_hangs_or_falls_is_stopped(tmp_path):
     assert told("import time; time.sleep(60)", 0.5) == "did not finish within 0.5 s and was stopped"
     assert told("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", 60) == "was ended by signal 9"
     assert told("raise SystemExit('no inside')", 60) == "failed: no inside"
+
+
+STAND_IN = {
+    "answers": """
+import numpy as np
+def tetrahedralize(points, triangles, edge_length_abs, **keys):
+    assert edge_length_abs == 3 and keys["epsilon"] <= 1e-3, keys
+    box = np.array([[x, y, z] for z in (0., 10.) for y in (0., 10.) for x in (0., 10.)])
+    tets = [[0, 1, 3, 7], [3, 0, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
+    return box, np.array(tets)
+""",
+    "hangs": "import time\ndef tetrahedralize(*given, **keys):\n    time.sleep(600)\n",
+    "falls": "import os\ndef tetrahedralize(*given, **keys):\n    os.abort()\n",
+    "says no": "def tetrahedralize(*given, **keys):\n    raise RuntimeError('no inside to be found')\n",
+    "finds nothing": "import numpy as np\ndef tetrahedralize(*given, **keys):\n    return np.zeros((0, 3)), np.zeros((0, 4))\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("answers", None),
+        ("hangs", "did not finish within 2 s and was stopped; try a greater size"),
+        ("falls", "was ended by signal 6"),
+        ("says no", "failed: RuntimeError: no inside to be found"),
+        ("finds nothing", "found no inside: is the surface closed"),
+    ],
+)
+def test_the_road_of_soups(tmp_path, monkeypatch, how, words):
+    """The whole road, with a stand-in for the mesher's package in the child process."""
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    (packages / "pytetwild.py").write_text(STAND_IN[how])
+    (packages / "pyvista.py").write_text("")
+    monkeypatch.setenv("PYTHONPATH", str(packages), prepend=os.pathsep)
+    monkeypatch.syspath_prepend(str(packages))
+    soup = tmp_path / "soup.stl"
+    corners = "".join(f"vertex {x} {y} {z}\n" for x, y, z in [(0, 0, 0), (10, 0, 0), (0, 10, 10)])
+    # A triangle bounds nothing, so it is no region; the mesher gets it as it is.
+    soup.write_text(f"solid s\nfacet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\nendsolid s\n")
+    tets = lt.map.tets(size=3, mesher="ftetwild", limit=60 if how == "answers" else 2)
+    design = {"region": {"mesh": {"path": str(soup)}}, "lattice": {"core": {"map": tets}}}
+    if words is None:
+        with pytest.warns(lt.DesignWarning, match="no region, so how the mesh fits is not told"):
+            mesh = lt.TetMesh.of(design)
+        # One of them was numbered the other way round, and was turned.
+        assert np.isclose(mesh.volume, 1000) and (volumes(mesh.nodes, mesh.tets) > 0).all()
+        return
+    started = time.monotonic()
+    with pytest.raises(lt.DesignError, match=words):
+        lt.TetMesh.of(design)
+    assert time.monotonic() - started < 60
 
 
 def test_ftetwild_takes_a_soup(tmp_path):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -31,8 +33,12 @@ VOLUMES = {
 ZONES = ("zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "material", "zones")
 
 
-def needed():
-    """The package meshio; one clear error if it is missing."""
+#: Formats that are HDF5 inside, which meshio reads and writes by another package.
+HDF5 = ("med", "cgns")
+
+
+def needed(kind: str = ""):
+    """The package meshio; one clear error if it, or what it needs for files of this ``kind``, is missing."""
     try:
         import meshio
     except ImportError:
@@ -40,6 +46,11 @@ def needed():
             "files of this format are read and written by meshio, which is not installed: pip install 'trabecula[fe]' "
             "(vtu needs nothing more)"
         ) from None
+    if kind in HDF5:
+        try:
+            import h5py  # noqa: F401
+        except ImportError:
+            raise ValueError(f".{kind} files need h5py beside meshio, which is not installed: pip install h5py") from None
     return meshio
 
 
@@ -59,7 +70,7 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray, NDArray, NDArray, NDArr
         )
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
-    meshio = needed()
+    meshio = needed(kind)
     import numpy as np
 
     said = io.StringIO()
@@ -94,7 +105,7 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray, NDArray, NDArray, NDArr
 
 def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uint32], zones: NDArray[np.uint32]) -> None:
     """Writes tetrahedra as a file of the format that ``kind`` (an extension) names."""
-    meshio = needed()
+    meshio = needed(kind)
     import numpy as np
 
     names = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
@@ -106,4 +117,11 @@ def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uin
         fields = {"gmsh:physical": [whole], "gmsh:geometrical": [whole]}
     mesh = meshio.Mesh(nodes, [("tetra", tets.astype(np.int64))], cell_data=fields)
     more = {"file_format": "gmsh22", "binary": True} if form == "gmsh" else {"file_format": form}
-    meshio.write(path, mesh, **more)
+    if kind not in HDF5:
+        meshio.write(path, mesh, **more)
+        return
+    # HDF5 locks its files, and would not open one that is locked already.
+    with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
+        own = os.path.join(folder, f"mesh.{kind}")
+        meshio.write(own, mesh, **more)
+        shutil.copyfile(own, path)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from .given import settings
 
-__all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "union"]
+__all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "tetrahedron", "union"]
 
 Point = Sequence[float]
 
@@ -32,6 +32,15 @@ def cylinder(base: Point, radius: float, height: float, axis: Point | None = Non
 def sphere(radius: float, center: Point | None = None) -> dict:
     """A ball about ``center`` (the origin unless given)."""
     return {"sphere": settings(center=center, radius=radius)}
+
+
+def tetrahedron(corners: Sequence[Point], sharpness: float | None = None) -> dict:
+    """The tetrahedron of four ``corners`` (mm), in any order.
+
+    With a ``sharpness`` (per mm) its faces are joined by a smooth maximum (LogSumExp): edges draw back by ln 2 / sharpness,
+    corners by ln 3 / sharpness. Neighbours then leave gaps between them, so it is for a single one only.
+    """
+    return {"tetrahedron": settings(corners=corners, sharpness=sharpness)}
 
 
 def halfspace(point: Point, normal: Point) -> dict:

@@ -50,6 +50,13 @@ def tell_tiling(t: dict) -> None:
     print(f"  mesh       {t['count']} tetrahedra, edges {figure(t['edge'])} mm on average, {figure(t['volume'])} mm³")
     for zone, it in (t["zones"] or {}).items():
         print(f"  zone {zone}     {it['cell']} in {it['count']} tetrahedra; solid fraction {it['solid_fraction']:.4f}")
+    for join in t["joins"] or []:
+        a, b = join["zones"]
+        state = "join" if join["joined"] else "do not join"
+        passed = f"solid passes {join['open']} of {join['faces']} faces"
+        print(f"  zones {a}, {b} {state}: {passed}; their ports share {100 * join['ports']:.1f} % of a face")
+    if t["pieces"] is not None:
+        print(f"  pieces     {t['pieces']}, by ports")
     if t["ports"] is not None:
         ports = "1 port" if t["ports"] == 1 else f"{t['ports']} ports"
         print(f"  faces      {ports} on each; solid fraction of the part {t['solid_fraction']:.4f}")
@@ -162,7 +169,8 @@ def tell_tets(report: dict) -> None:
     print(f"aspect      {aspect['mean']:.2f} on average, {aspect['max']:.2f} at most (1 is regular)")
     print(f"slivers     {q['slivers']} below 10° or above 170°; {q['inverted']} inverted")
     if fit:
-        print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {fit['deviation']:.2g} mm at most")
+        off = f"95 % within {fit['deviation_p95']:.2g} mm, {fit['deviation']:.2g} mm at most"
+        print(f"fit         {fit['deviation_mean']:.2g} mm off the surface on average, {off}")
         print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
 
 

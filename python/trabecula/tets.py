@@ -115,7 +115,7 @@ class TetMesh(Picture):
 
     def report(self) -> dict[str, Any]:
         """The figures: ``quality`` (numbers, sizes, dihedral angles, aspect, slivers, inverted, pieces), ``fit`` to the region
-        (deviation, what is lost; None without one), ``mesher``, ``warnings``.
+        (deviation: mean, 95 % and greatest; what is lost; None without one), ``mesher``, ``warnings``.
         """
         return json.loads(self._core.report())
 
@@ -139,7 +139,7 @@ class TetMesh(Picture):
             return
         from . import elements
 
-        elements.needed()
+        elements.needed(kind)
         with whole_file(path) as temporary:
             elements.write(temporary, kind, self.nodes, self.tets, self.zones)
 

@@ -6,12 +6,14 @@
 //! rarely large together. By fraction (`levels`) both are moved so that the fraction stays what was asked for; the gᵢ
 //! are then in units of their own root mean square, so that none drowns the others.
 
+mod added;
 mod fill;
 mod joint;
 mod levels;
 mod quantile;
 mod simplex;
 mod strand;
+mod table;
 mod weights;
 
 use std::sync::Arc;
@@ -24,8 +26,9 @@ pub use joint::Phases;
 pub use strand::Constituent;
 pub use weights::Weights;
 
+use added::{At, End, HIGH, LOW};
 use joint::Joint;
-use levels::{End, Levels};
+use levels::Levels;
 use simplex::Place;
 use strand::Strand;
 
@@ -133,7 +136,7 @@ impl Blend {
                         .enumerate()
                         .filter(|(k, _)| w[k * n + i] > 0.0)
                     {
-                        *o = levels.share_found(&self.strands, points[k], i);
+                        *o = levels.share_found(&self.strands, points[k], i).0;
                     }
                 }
                 (None, None) => own.fill(f64::NAN),
@@ -146,46 +149,57 @@ impl Blend {
         }
     }
 
-    /// F, LO and HI at points.
-    fn ends(&self, points: &[Vec3]) -> Vec<[f64; 3]> {
-        let n = self.strands.len();
-        let mut w = vec![0.0; n * points.len()];
-        self.weights.values(points, &mut w);
-        let mut out = vec![[0.0; 3]; points.len()];
-        let mut ends = vec![End::default(); n * points.len()];
-        let graded = self.levels.as_ref().is_some_and(|l| !l.is_uniform());
-        for (i, s) in self.strands.iter().enumerate() {
-            let here: Vec<usize> = (0..points.len()).filter(|k| w[k * n + i] > 0.0).collect();
-            let at: Vec<Vec3> = here.iter().map(|k| points[*k]).collect();
-            let (mut g, mut high) = (vec![0.0; at.len()], vec![0.0; at.len()]);
-            s.values(&at, &mut g);
-            s.highs(&at, &mut high);
-            for (k, (g, high)) in here.into_iter().zip(g.into_iter().zip(high)) {
-                let w = w[k * n + i];
-                let o = &mut out[k];
-                let low = if w < 1.0 {
-                    s.low(high)
-                } else {
-                    s.low_alone(high)
-                };
-                *o = [o[0] + w * g, o[1] + w * low, o[2] + w * high];
-                if graded && w < 1.0 {
-                    ends[k * n + i].quantiles = s.quantiles(high);
-                }
+    /// The ends that count, of `LOW` and `HIGH`.
+    fn ends(&self) -> &'static [usize] {
+        match self.side {
+            Some(Side::High) => &[HIGH],
+            Some(Side::Low) => &[LOW],
+            None if self.two_sided => &[HIGH, LOW],
+            None => &[HIGH],
+        }
+    }
+
+    /// Whether levels vary from place to place with what the quantiles of the lattices are.
+    fn varied(&self) -> Option<&Levels> {
+        self.levels.as_deref().filter(|l| !l.is_uniform())
+    }
+
+    /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`. `added`
+    /// tells what the levels add to an end, from where the shares lie and the lattices' quantiles.
+    #[inline]
+    fn value_at(
+        &self,
+        p: Vec3,
+        f: f64,
+        (w, high): (&[f64], &[f64]),
+        at: &mut At,
+        mut added: impl FnMut(&Levels, usize, &mut At) -> f64,
+    ) -> f64 {
+        let alone = w.contains(&1.0);
+        let levels = self.levels.as_deref().filter(|_| !alone);
+        if let Some(levels) = levels {
+            levels.grid.place(w, &mut at.place);
+            at.q.clear();
+            if !levels.is_uniform() {
+                at.q.extend((0..w.len()).map(|i| match w[i] > 0.0 {
+                    true => levels.quantiles(&self.strands, p, i, high[i]),
+                    false => [0.0; 2],
+                }));
             }
         }
-        if let Some(levels) = &self.levels {
-            let mut place = Place::default();
-            for (k, o) in out.iter_mut().enumerate() {
-                let w = &w[k * n..][..n];
-                if !w.contains(&1.0) {
-                    let more =
-                        levels.added(&self.strands, points[k], w, &ends[k * n..][..n], &mut place);
-                    *o = [o[0], o[1] + more[0], o[2] + more[1]];
-                }
+        let mut value: Option<f64> = None;
+        for &end in self.ends() {
+            let mut level = 0.0;
+            for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                level += w[i] * s.end(end, high[i], alone);
             }
+            if let Some(levels) = levels {
+                level += added(levels, end, at);
+            }
+            let of = if end == HIGH { f - level } else { level - f };
+            value = Some(value.map_or(of, |v| v.max(of)));
         }
-        out
+        value.unwrap_or(f64::NAN)
     }
 
     /// The value where F, LO and HI are these.
@@ -238,79 +252,94 @@ fn looked(of: Vec<Constituent>, unit: bool, joint: &Joint, bounds: &Aabb) -> Vec
 impl Field for Blend {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         const BATCH: usize = 1024;
+        let n = self.strands.len();
+        let mut at = At::default();
         for (points, out) in points.chunks(BATCH).zip(out.chunks_mut(BATCH)) {
-            for (o, ends) in out.iter_mut().zip(self.ends(points)) {
-                *o = self.value_of(ends);
+            let all = || vec![0.0; n * points.len()];
+            let (mut w, mut high, mut f) = (all(), all(), vec![0.0; points.len()]);
+            self.weights.values(points, &mut w);
+            for (i, s) in self.strands.iter().enumerate() {
+                let here: Vec<usize> = (0..points.len()).filter(|k| w[k * n + i] > 0.0).collect();
+                let at: Vec<Vec3> = here.iter().map(|k| points[*k]).collect();
+                let (mut g, mut own) = (vec![0.0; at.len()], vec![0.0; at.len()]);
+                s.values(&at, &mut g);
+                s.highs(&at, &mut own);
+                for (k, (g, own)) in here.into_iter().zip(g.into_iter().zip(own)) {
+                    f[k] += w[k * n + i] * g;
+                    high[k * n + i] = own;
+                }
+            }
+            for (k, (o, p)) in out.iter_mut().zip(points).enumerate() {
+                let w = &w[k * n..][..n];
+                let own = (w, &high[k * n..][..n]);
+                *o = self.value_at(*p, f[k], own, &mut at, |levels, end, at| {
+                    levels.added(&self.strands, *p, w, at, end)
+                });
             }
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let n = self.strands.len();
-        let (mut w, mut dw) = (
-            vec![0.0; n * points.len()],
-            vec![[0.0; 3]; n * points.len()],
-        );
+        let zeros = |n: usize| (vec![0.0; n], vec![[0.0; 3]; n]);
+        let (mut w, mut dw) = zeros(n * points.len());
         self.weights.gradients(points, &mut w, &mut dw);
-        let mut out = vec![([0.0; 3], [[0.0; 3]; 3]); points.len()];
-        let mut ends = vec![End::default(); n * points.len()];
-        let graded = self.levels.as_ref().is_some_and(|l| !l.is_uniform());
+        // The sum F and the upper ends.
+        let (mut f, mut df) = zeros(points.len());
+        let (mut high, mut dhigh) = zeros(n * points.len());
         for (i, s) in self.strands.iter().enumerate() {
             let here: Vec<usize> = (0..points.len()).filter(|k| w[k * n + i] > 0.0).collect();
             let at: Vec<Vec3> = here.iter().map(|k| points[*k]).collect();
-            let zeros = || (vec![0.0; at.len()], vec![[0.0; 3]; at.len()]);
-            let ((mut g, mut dg), (mut high, mut dhigh)) = (zeros(), zeros());
+            let (mut g, mut dg) = zeros(at.len());
+            let (mut own, mut down) = zeros(at.len());
             s.gradients(&at, &mut g, &mut dg);
-            s.high_gradients(&at, &mut high, &mut dhigh);
-            // −HI for a sheet, nothing for a network.
-            let down = if s.is_sheet() { -1.0 } else { 0.0 };
+            s.high_gradients(&at, &mut own, &mut down);
             for (j, k) in here.into_iter().enumerate() {
                 let (w, dw) = (w[k * n + i], dw[k * n + i]);
-                let low = if w < 1.0 {
-                    s.low(high[j])
-                } else {
-                    s.low_alone(high[j])
-                };
-                let of = [
-                    (g[j], dg[j]),
-                    (low, scale(dhigh[j], down)),
-                    (high[j], dhigh[j]),
-                ];
-                let (v, d) = &mut out[k];
-                for (e, (value, slope)) in of.into_iter().enumerate() {
-                    v[e] += w * value;
-                    d[e] = add(d[e], add(scale(slope, w), scale(dw, value)));
-                }
-                if graded && w < 1.0 {
-                    ends[k * n + i] = End {
-                        quantiles: s.quantiles(high[j]),
-                        slope: dhigh[j],
-                    };
-                }
+                f[k] += w * g[j];
+                df[k] = add(df[k], add(scale(dg[j], w), scale(dw, g[j])));
+                (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
             }
         }
         let mut place = Place::default();
-        for (k, (mut v, mut d)) in out.into_iter().enumerate() {
-            let own = (&w[k * n..][..n], &dw[k * n..][..n]);
-            if let Some(levels) = self.levels.as_ref().filter(|_| !own.0.contains(&1.0)) {
-                let ends = &ends[k * n..][..n];
-                let (more, slope) =
-                    levels.added_gradients(&self.strands, points[k], own, ends, &mut place);
-                for e in 0..2 {
-                    v[e + 1] += more[e];
-                    d[e + 1] = add(d[e + 1], slope[e]);
+        let mut quantiles = vec![End::default(); n];
+        for (k, p) in points.iter().enumerate() {
+            let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
+            let (high, dhigh) = (&high[k * n..][..n], &dhigh[k * n..][..n]);
+            let alone = w.contains(&1.0);
+            let levels = self.levels.as_deref().filter(|_| !alone);
+            if let Some(levels) = levels {
+                levels.grid.place(w, &mut place);
+            }
+            if let Some(levels) = self.varied().filter(|_| !alone) {
+                for (i, q) in quantiles.iter_mut().enumerate() {
+                    *q = match w[i] > 0.0 {
+                        true => levels.end(&self.strands, *p, i, (high[i], dhigh[i])),
+                        false => End::default(),
+                    };
                 }
             }
-            values[k] = self.value_of(v);
-            let low = match self.side {
-                Some(side) => side == Side::Low,
-                None => self.two_sided && v[1] - v[0] > v[0] - v[2],
-            };
-            gradients[k] = if low {
-                sub(d[1], d[0])
-            } else {
-                sub(d[0], d[2])
-            };
+            for (n, &end) in self.ends().iter().enumerate() {
+                let (mut level, mut slope) = (0.0, [0.0; 3]);
+                for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                    let v = s.end(end, high[i], alone);
+                    level += w[i] * v;
+                    let own = scale(dhigh[i], w[i] * s.end_slope(end));
+                    slope = add(slope, add(own, scale(dw[i], v)));
+                }
+                if let Some(levels) = levels {
+                    let own = (w, dw, &place);
+                    let more = levels.added_gradients(&self.strands, *p, own, &quantiles, end);
+                    (level, slope) = (level + more.0, add(slope, more.1));
+                }
+                let (v, g) = match end == HIGH {
+                    true => (f[k] - level, sub(df[k], slope)),
+                    false => (level - f[k], sub(slope, df[k])),
+                };
+                if n == 0 || v > values[k] {
+                    (values[k], gradients[k]) = (v, g);
+                }
+            }
         }
     }
 

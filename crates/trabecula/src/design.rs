@@ -10,6 +10,7 @@ mod control;
 mod data;
 mod error;
 mod grade;
+mod joins;
 mod json;
 mod level;
 mod map;
@@ -49,6 +50,7 @@ use crate::truss::Beams;
 pub use blend::Blended;
 pub use data::*;
 pub use error::{DesignError, nearest};
+pub use joins::Joins;
 pub use node::{Lines, Node, Value};
 pub use schema::schema;
 pub use tets::{TetReport, Tets};
@@ -147,6 +149,10 @@ pub struct Tiled {
     pub zones: BTreeMap<String, String>,
     /// What is known of the mesh.
     pub mesh: TetReport,
+    /// Whether its surface is made without a grid.
+    pub explicit: bool,
+    /// Which zones join, where zones have cells of their own and that can be told.
+    pub joins: Option<Joins>,
 }
 
 /// A built design.

@@ -36,6 +36,7 @@ use grid::Grid;
 use islands::{ByName, Census, Found};
 pub use islands::{Island, Islands, Pieces};
 pub use sift::Store;
+pub use tets::{Foretold, Join, foretold};
 use tile::{Scratch, View};
 
 /// Told how far the work is; answers whether to go on.

@@ -9,7 +9,7 @@ mod intersect;
 #[cfg(test)]
 pub(crate) mod samples;
 
-pub(crate) use intersect::{Tree as BoxTree, near_pairs};
+pub(crate) use intersect::{Tree as BoxTree, meet, near_pairs};
 pub use intersect::{is_embedded, self_intersections};
 
 /// An indexed triangle mesh.

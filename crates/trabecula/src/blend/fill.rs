@@ -5,7 +5,8 @@
 //! lattice that is alone by its bounds is alone by its shares too.
 
 use super::Blend;
-use super::levels::{End, Row};
+use super::added::{At, Row};
+use super::strand;
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
 
@@ -62,7 +63,6 @@ impl Cubes {
 
 impl Blend {
     pub(super) fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
-        let n = self.strands.len();
         let cubes = Cubes::new(self, block);
         let all = cubes.here.iter().fold(0, |m, c| m | c);
         let [xs, ys, zs] = block.axes;
@@ -72,8 +72,8 @@ impl Blend {
             .enumerate()
             .map(|(i, s)| (all >> i & 1 == 1).then(|| s.rows(block, wanted)))
             .collect();
-        let mut cores = vec![vec![0f32; xs.len()]; n];
-        let mut mixed = Mixed::default();
+        let mut cores = vec![vec![0f32; xs.len()]; self.strands.len()];
+        let mut some = Nodes::default();
         for k in 0..zs.len() {
             rows.iter_mut().flatten().for_each(|r| r.enter_layer(k));
             for j in 0..ys.len() {
@@ -83,7 +83,7 @@ impl Blend {
                     row.fill(1.0);
                     continue;
                 }
-                let here = |i: usize| wanted.is_none() || word >> i & 1 == 1;
+                let here = |i: &usize| wanted.is_none() || word >> i & 1 == 1;
                 let of_row = cubes.row(j, k);
                 let needed = of_row.iter().fold(0, |m, c| m | c);
                 for (i, rows) in rows.iter_mut().enumerate() {
@@ -91,115 +91,129 @@ impl Blend {
                         rows.fill(j, k, word, &mut cores[i]);
                     }
                 }
-                mixed.nodes.clear();
-                for (c, cube) in of_row.iter().enumerate() {
-                    let nodes = c * CUBE..((c + 1) * CUBE).min(xs.len());
-                    if cube.count_ones() > 1 {
-                        mixed.nodes.extend(nodes.filter(|i| here(*i)));
-                        continue;
+                // Runs of cubes: those with one and the same lattice, and those with several.
+                let mut from = 0;
+                for run in of_row.chunk_by(|a, b| a == b || (several(*a) && several(*b))) {
+                    let to = from + run.len() * CUBE;
+                    let line = Line {
+                        rows: &rows,
+                        cores: &cores,
+                        at: [ys[j], zs[k]],
+                        xs,
+                    };
+                    some.nodes.clear();
+                    some.nodes.extend((from..to.min(xs.len())).filter(here));
+                    if several(run[0]) {
+                        self.fill_mixed(&mut some, &line, row);
+                    } else {
+                        self.fill_alone(run[0].trailing_zeros() as usize, &mut some, &line, row);
                     }
-                    let s = cube.trailing_zeros() as usize;
-                    let Some(rows) = &rows[s] else { continue };
-                    match self.strands[s].uniform() {
-                        Some(high) => {
-                            let low = self.strands[s].low_alone(high);
-                            for i in nodes {
-                                row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
-                            }
-                        }
-                        None => {
-                            let nodes: Vec<usize> = nodes.filter(|i| here(*i)).collect();
-                            let points: Vec<Vec3> =
-                                nodes.iter().map(|i| [xs[*i], ys[j], zs[k]]).collect();
-                            let mut high = vec![0.0; points.len()];
-                            self.strands[s].highs(&points, &mut high);
-                            for (i, high) in nodes.into_iter().zip(high) {
-                                let low = self.strands[s].low_alone(high);
-                                row[i] = self.value_of([rows.value(cores[s][i]), low, high]) as f32;
-                            }
-                        }
-                    }
-                }
-                if !mixed.nodes.is_empty() {
-                    let value =
-                        |s: usize, i: usize| rows[s].as_ref().map_or(0.0, |r| r.value(cores[s][i]));
-                    self.fill_mixed(&mut mixed, |i| [xs[i], ys[j], zs[k]], value, row);
+                    from = to;
                 }
             }
         }
     }
 
+    /// The nodes of a row where one lattice is alone.
+    fn fill_alone(&self, s: usize, some: &mut Nodes, line: &Line, row: &mut [f32]) {
+        let (Some(rows), strand) = (&line.rows[s], &self.strands[s]) else {
+            return;
+        };
+        some.high.resize(some.nodes.len(), 0.0);
+        match strand.uniform() {
+            Some(high) => some.high.fill(high),
+            None => {
+                some.place(line);
+                strand.highs(&some.points, &mut some.high);
+            }
+        }
+        for (i, high) in some.nodes.iter().zip(&some.high) {
+            let low = strand.low_alone(*high);
+            row[*i] = self.value_of([rows.value(line.cores[s][*i]), low, *high]) as f32;
+        }
+    }
+
     /// The nodes of a row where several lattices may be.
-    fn fill_mixed(
-        &self,
-        mixed: &mut Mixed,
-        point: impl Fn(usize) -> Vec3,
-        core: impl Fn(usize, usize) -> f64,
-        row: &mut [f32],
-    ) {
+    fn fill_mixed(&self, some: &mut Nodes, line: &Line, row: &mut [f32]) {
         let n = self.strands.len();
-        let Mixed {
+        some.place(line);
+        let Nodes {
             nodes,
             points,
             w,
             high,
-            ends,
+            highs,
+            at,
             row: known,
-        } = mixed;
-        points.clear();
-        points.extend(nodes.iter().map(|i| point(*i)));
-        w.clear();
+        } = some;
+        if let Some(levels) = &self.levels {
+            known.enter(levels, line.at);
+        }
         w.resize(n * points.len(), 0.0);
         self.weights.values(points, w);
-        high.clear();
-        high.resize(n * points.len(), 0.0);
+        highs.resize(n * points.len(), 0.0);
+        high.resize(points.len(), 0.0);
         for (s, strand) in self.strands.iter().enumerate() {
-            let high = &mut high[s * points.len()..][..points.len()];
             match strand.uniform() {
                 Some(v) => high.fill(v),
                 None if (0..points.len()).any(|i| w[i * n + s] > 0.0) => strand.highs(points, high),
                 None => {}
             }
+            for (all, high) in highs.chunks_exact_mut(n).zip(&*high) {
+                all[s] = *high;
+            }
         }
-        let graded = self.levels.as_ref().is_some_and(|l| !l.is_uniform());
-        ends.clear();
-        ends.resize(n, End::default());
-        for (p, node) in nodes.iter().enumerate() {
-            let w = &w[p * n..][..n];
-            let high = |s: usize| high[s * points.len() + p];
-            let mut sum = [0.0; 3];
-            if let Some(s) = w.iter().position(|w| *w == 1.0) {
-                let high = high(s);
-                sum = [core(s, *node), self.strands[s].low_alone(high), high];
-            } else {
-                for (s, strand) in self.strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
-                    let high = high(s);
-                    sum[0] += w[s] * core(s, *node);
-                    sum[1] += w[s] * strand.low(high);
-                    sum[2] += w[s] * high;
-                    if graded {
-                        ends[s].quantiles = strand.quantiles(high);
-                    }
-                }
-                if let Some(levels) = &self.levels {
-                    let more = levels.added_in_row(&self.strands, points[p], w, ends, known);
-                    sum = [sum[0], sum[1] + more[0], sum[2] + more[1]];
+        for ((node, p), (w, high)) in
+            (nodes.iter().zip(&*points)).zip(w.chunks_exact(n).zip(highs.chunks_exact(n)))
+        {
+            let mut f = 0.0;
+            for (s, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                if let Some(rows) = &line.rows[s] {
+                    f += w * rows.value(line.cores[s][*node]);
                 }
             }
-            row[*node] = self.value_of(sum) as f32;
+            let value = self.value_at(*p, f, (w, high), at, |levels, end, at| {
+                levels.added_in_row(&self.strands, p[0], w, at, end, known)
+            });
+            row[*node] = value as f32;
         }
     }
 }
 
-/// Buffers for the nodes where several lattices may be.
+/// Whether more than one bit is set.
+fn several(lattices: u64) -> bool {
+    lattices.count_ones() > 1
+}
+
+/// A row of nodes and what the lattices are there.
+struct Line<'a> {
+    rows: &'a [Option<strand::Rows<'a>>],
+    cores: &'a [Vec<f32>],
+    /// Its y and z.
+    at: [f64; 2],
+    xs: &'a [f64],
+}
+
+/// Some nodes of a row: buffers.
 #[derive(Default)]
-struct Mixed {
+struct Nodes {
     nodes: Vec<usize>,
     points: Vec<Vec3>,
     /// Shares, those of a node side by side.
     w: Vec<f64>,
-    /// Upper ends, those of a lattice side by side.
+    /// Upper ends of one lattice, and of all, those of a node side by side.
     high: Vec<f64>,
-    ends: Vec<End>,
+    highs: Vec<f64>,
+    at: At,
     row: Row,
+}
+
+impl Nodes {
+    /// Finds where the nodes are.
+    fn place(&mut self, line: &Line) {
+        let [y, z] = line.at;
+        self.points.clear();
+        self.points
+            .extend(self.nodes.iter().map(|i| [line.xs[*i], y, z]));
+    }
 }

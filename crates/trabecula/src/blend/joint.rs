@@ -22,9 +22,18 @@ pub enum Phases {
     Drifting,
 }
 
-/// Places looked at where one distribution serves all, and in each neighbourhood.
+/// Places looked at where one distribution serves all, and in each neighbourhood. A thousand even places tell a fraction
+/// to some thousandths; the sixty-four neighbourhoods in a window of two cells look at other ones each, so that what is
+/// left of their errors together is far below. Where phases drift slowly neighbourhoods are fewer, and twice as many serve.
 const EVERYWHERE: usize = 1 << 16;
-const NEARBY: usize = 1 << 12;
+const NEARBY: usize = 1 << 10;
+const SLOWLY: usize = 2 * NEARBY;
+/// Beats longer than six of the longest cells are slow: linear between neighbourhoods a cell apart. Of those shorter than a
+/// cell and a ninth the window leaves less than a twentieth.
+const SLOW: f64 = 1.0 / 6.0;
+const GONE: f64 = 0.9;
+/// Neighbourhoods along an axis after which places are the same again.
+const APART: usize = 4;
 /// Most neighbourhoods.
 const MOST: f64 = 100_000.0;
 /// Most waves of a series whose beats are looked at.
@@ -39,7 +48,10 @@ pub(super) struct Joint {
     pub origin: Vec3,
     pub step: f64,
     pub shape: [usize; 3],
-    /// Where solved maps end; nothing else has an end.
+    /// How far about its middle a neighbourhood is looked at, mm, and at how many places.
+    reach: f64,
+    count: usize,
+    /// Where solved maps end, and meshes of tetrahedra and beams may; nothing else has an end.
     bounds: Option<Aabb>,
 }
 
@@ -56,7 +68,7 @@ impl Joint {
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
         let (phases, common) = match (found, &maps) {
             (Some(back), _) => (Phases::Locked, Some(back)),
-            (None, Some(maps)) if independent(of, maps, longest) => {
+            (None, Some(maps)) if beats(of, maps, longest, |k| k >= 1.0 - 1e-9) => {
                 let mut wide = [[0.0; 3]; 3];
                 // So far that what is met there has no memory.
                 (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
@@ -64,13 +76,13 @@ impl Joint {
             }
             _ => (Phases::Drifting, None),
         };
-        let solved = of
-            .iter()
-            .any(|s| s.lattice().is_some_and(|l| matches!(l.map, Map::Phase(_))));
+        let ended = |s: &Constituent| s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)));
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
-        let mut step = 0.5 * longest;
+        let slow = (maps.as_ref())
+            .is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= GONE));
+        let mut step = if slow { longest } else { 0.5 * longest };
         while fine(step).iter().product::<f64>() > MOST {
             step *= 1.1;
         }
@@ -88,7 +100,9 @@ impl Joint {
             origin,
             step,
             shape,
-            bounds: solved.then_some(*bounds),
+            reach: if slow { step } else { 2.0 * step },
+            count: if slow { SLOWLY } else { NEARBY },
+            bounds: of.iter().any(ended).then_some(*bounds),
         }
     }
 
@@ -98,41 +112,28 @@ impl Joint {
     }
 
     /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
-    /// ever fewer up to two steps away along each axis (a raised cosine, in which whole waves leave no trace).
+    /// ever fewer up to its reach along each axis (a raised cosine, in which whole waves leave no trace).
     pub fn places(&self, i: usize) -> Vec<Vec3> {
-        // Multiples of the powers of the root of x⁴ = x + 1, the most even such sequence; each neighbourhood goes on in it.
-        let even = |k: usize| -> Vec3 {
-            [
-                0.819_172_513_396_164_4,
-                0.671_043_606_703_789_2,
-                0.549_700_477_901_970_3,
-            ]
-            .map(|a| (0.5 + a * (k + i * NEARBY) as f64).fract())
-        };
         if let Some(back) = &self.common {
             return (0..EVERYWHERE).map(even).map(|u| apply(back, u)).collect();
         }
         let [nx, ny, _] = self.shape;
         let at = [i % nx, i / nx % ny, i / nx / ny];
         let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
-        let table = raised_cosine();
-        (0..NEARBY)
-            .map(even)
-            .map(|u| {
-                core::array::from_fn(|a| {
-                    let x = u[a] * (table.len() - 1) as f64;
-                    let j = (x as usize).min(table.len() - 2);
-                    let s = table[j] + (table[j + 1] - table[j]) * (x - j as f64);
-                    // Solved maps end where the region does: what would lie beyond is mirrored.
-                    let p = middle[a] + 2.0 * self.step * s;
-                    let Some(b) = &self.bounds else { return p };
-                    let (lo, hi) = (b.min[a], b.max[a]);
-                    let p = if p > hi { 2.0 * hi - p } else { p };
-                    let p = if p < lo { 2.0 * lo - p } else { p };
-                    p.clamp(lo, hi)
-                })
+        let [x, y, z] = at.map(|n| n % APART);
+        let some = &windows()[((z * APART + y) * APART + x) * SLOWLY..][..self.count];
+        let place = |s: &Vec3| -> Vec3 {
+            core::array::from_fn(|a| {
+                // What ends where the region does is not looked at beyond: places there are mirrored.
+                let p = middle[a] + self.reach * s[a];
+                let Some(b) = &self.bounds else { return p };
+                let (lo, hi) = (b.min[a], b.max[a]);
+                let p = if p > hi { 2.0 * hi - p } else { p };
+                let p = if p < lo { 2.0 * lo - p } else { p };
+                p.clamp(lo, hi)
             })
-            .collect()
+        };
+        some.iter().map(place).collect()
     }
 
     /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
@@ -223,27 +224,43 @@ impl Joint {
     }
 }
 
-/// The inverse of the distribution with density (1 + cos πs)/2 on [−1, 1], at even shares.
-fn raised_cosine() -> &'static [f64] {
-    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
+/// The k-th place of an even sequence in the unit cube: multiples of the powers of the root of x⁴ = x + 1.
+fn even(k: usize) -> Vec3 {
+    [
+        0.819_172_513_396_164_4,
+        0.671_043_606_703_789_2,
+        0.549_700_477_901_970_3,
+    ]
+    .map(|a| (0.5 + a * k as f64).fract())
+}
+
+/// Places of neighbourhoods, one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³.
+fn windows() -> &'static [Vec3] {
+    static TABLE: OnceLock<Vec<Vec3>> = OnceLock::new();
     TABLE.get_or_init(|| {
         const N: usize = 512;
         let below =
             |s: f64| 0.5 * (1.0 + s + (std::f64::consts::PI * s).sin() / std::f64::consts::PI);
-        (0..=N)
-            .map(|i| {
-                let share = i as f64 / N as f64;
-                let (mut lo, mut hi) = (-1.0, 1.0);
-                for _ in 0..60 {
-                    let mid = 0.5 * (lo + hi);
-                    if below(mid) < share {
-                        lo = mid
-                    } else {
-                        hi = mid
-                    }
+        let inverse = |share: f64| {
+            let (mut lo, mut hi) = (-1.0, 1.0);
+            for _ in 0..60 {
+                let mid = 0.5 * (lo + hi);
+                if below(mid) < share {
+                    lo = mid
+                } else {
+                    hi = mid
                 }
-                0.5 * (lo + hi)
-            })
+            }
+            0.5 * (lo + hi)
+        };
+        let table: Vec<f64> = (0..=N).map(|i| inverse(i as f64 / N as f64)).collect();
+        let warp = |u: f64| {
+            let x = u * N as f64;
+            let j = (x as usize).min(N - 1);
+            table[j] + (table[j + 1] - table[j]) * (x - j as f64)
+        };
+        (0..APART.pow(3) * SLOWLY)
+            .map(|k| even(k).map(warp))
             .collect()
     })
 }
@@ -267,9 +284,9 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     None
 }
 
-/// Whether every beat between waves of two of the lattices is at most `longest` mm long; the waves that products of two
-/// make count too, since what is solid is no linear matter.
-fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
+/// Whether every beat between waves of two of the lattices meets a condition on its wave number (per `longest`); the waves
+/// that products of two make count too, since what is solid is no linear matter. No, where there are too many.
+fn beats(of: &[Constituent], maps: &[Mat3], longest: f64, meets: impl Fn(f64) -> bool) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
     for (s, m) in of.iter().zip(maps) {
         let Some(l) = s.lattice() else { return false };
@@ -293,13 +310,8 @@ fn independent(of: &[Constituent], maps: &[Mat3], longest: f64) -> bool {
                 .collect(),
         );
     }
-    let fast = |k: Vec3| norm(k) * longest >= 1.0 - 1e-9;
     // Each list has the opposite of every wave, so differences are all there is.
-    (0..waves.len()).all(|i| {
-        (0..i).all(|j| {
-            waves[i]
-                .iter()
-                .all(|a| waves[j].iter().all(|b| fast(sub(*a, *b))))
-        })
-    })
+    let meet = |a: &Vec3, b: &Vec3| meets(norm(sub(*a, *b)) * longest);
+    (0..waves.len())
+        .all(|i| (0..i).all(|j| waves[i].iter().all(|a| waves[j].iter().all(|b| meet(a, b)))))
 }

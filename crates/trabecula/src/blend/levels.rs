@@ -9,16 +9,18 @@
 
 use std::sync::OnceLock;
 
+use super::added::End;
 use super::joint::Joint;
-use super::quantile::{Counted, Curve, add_times};
-use super::simplex::{Grid, Place};
+use super::quantile::{Counted, KNOTS, add_times, quantile};
+use super::simplex::Grid;
 use super::strand::{BELOW, Strand};
+use super::table::Table;
 use super::weights::Weights;
-use crate::math::{Aabb, Interval, Vec3, add, scale, sub};
+use crate::math::{Aabb, Interval, Vec3, add, scale};
 
 /// The quantiles of lattices at a point, [a, b] each, and those of a blend of them: the lower end Σ wᵢ aᵢ, and the upper so
 /// far above it, or above none, as the fractions make.
-fn blended(w: &[f64], each: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+pub(super) fn blended(w: &[f64], each: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     let (mut a, mut p) = (0.0, 0.0);
     for (w, [lo, hi]) in w.iter().zip(each) {
         a += w * lo;
@@ -39,75 +41,34 @@ const MANY: usize = 64;
 
 /// What is known of one neighbourhood.
 struct Station {
-    /// Quantiles [a, b] of what has no table of its own, found by looking.
-    own: Vec<[f64; 2]>,
+    /// The solid share of each lattice, found by looking.
+    own: Vec<f64>,
     /// At the nodes that shares about here need.
     near: Table,
     /// At all nodes, once a point beyond needs them.
     whole: OnceLock<Table>,
 }
 
-/// Nodes that were not looked at have no numbers.
-enum Table {
-    /// For each node what is added to the lower and the upper end.
-    Ends(Vec<[f64; 2]>),
-    /// For each node the quantile function.
-    Curves(Vec<Curve>),
-}
-
-impl Table {
-    fn has(&self, node: usize) -> bool {
-        match self {
-            Table::Ends(ends) => !ends[node][0].is_nan(),
-            Table::Curves(curves) => curves[node].is_known(),
-        }
-    }
-}
-
-/// A lattice of the blend at a point.
-#[derive(Clone, Copy, Default)]
-pub(super) struct End {
-    /// Quantiles of the lower and the upper end; `None` if found by looking.
-    pub quantiles: Option<[(f64, f64); 2]>,
-    /// Gradient of the upper end, on which the quantiles depend.
-    pub slope: Vec3,
-}
-
-/// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
-#[derive(Default)]
-pub(super) struct Row {
-    place: Place,
-    at: [f64; 2],
-    /// For each neighbourhood along x, and each node that was asked for, what is added to the ends.
-    tables: Vec<Vec<[f64; 2]>>,
-}
-
 /// The levels of a blend by fraction.
 pub(super) struct Levels {
     pub joint: Joint,
     weights: Weights,
-    grid: Grid,
+    pub grid: Grid,
     /// The shares at each node.
     nodes: Vec<Vec<f64>>,
     /// Whether there is a lower end anywhere.
     two_sided: bool,
-    /// The quantiles, where none varies.
-    uniform: Option<Vec<End>>,
+    /// The quantiles of each lattice, where none varies; none of what is known by looking only. Then a table holds what is
+    /// added to the ends, else quantile functions.
+    uniform: Option<Vec<Option<[f64; 2]>>>,
     stations: Vec<OnceLock<Station>>,
     /// Numbers of the nodes at which one lattice is alone.
-    alone: Vec<usize>,
+    pub alone: Vec<usize>,
 }
 
 impl Levels {
     pub fn new(strands: &[Strand], joint: Joint, weights: &Weights) -> Levels {
         let n = strands.len();
-        let ends = |s: &Strand| {
-            let quantiles = s.quantiles(s.uniform()?);
-            Some(End {
-                quantiles,
-                slope: [0.0; 3],
-            })
-        };
         let grid = Grid::new(n);
         let (mut alone, mut nodes) = (vec![0; n], vec![Vec::new(); grid.len()]);
         grid.each(|node, w| {
@@ -116,9 +77,10 @@ impl Levels {
                 alone[i] = node;
             }
         });
+        let quantiles = |s: &Strand| Some(s.quantiles(s.uniform()?));
         Levels {
             two_sided: strands.iter().any(Strand::is_sheet),
-            uniform: strands.iter().map(ends).collect(),
+            uniform: strands.iter().map(quantiles).collect(),
             stations: (0..joint.len()).map(|_| OnceLock::new()).collect(),
             joint,
             weights: weights.clone(),
@@ -133,19 +95,29 @@ impl Levels {
         self.uniform.is_some()
     }
 
+    /// An empty table.
+    pub fn table(&self) -> Table {
+        let width = if self.is_uniform() { 2 } else { KNOTS + 1 };
+        Table::new(self.nodes.len(), width)
+    }
+
     /// The nodes whose tables are interpolated where shares are within `w`: those with no y a whole step beyond what there is.
-    fn about(&self, w: &[Interval]) -> Vec<bool> {
+    fn about(&self, w: &[Interval]) -> Vec<usize> {
         let step = (1.0 + 1e-9) / self.grid.steps() as f64;
-        let near = |node: &Vec<f64>| {
-            (1..w.len()).all(|k| {
-                let y: f64 = node[k..].iter().sum();
-                let [lo, hi] = w[k..]
-                    .iter()
-                    .fold([0.0; 2], |s, w| [s[0] + w.lo, s[1] + w.hi]);
-                y > lo - step && y < hi + step
+        let mut within = vec![Interval::new(0.0, 0.0); w.len()];
+        let mut sum = [-step, step];
+        for (r, w) in within.iter_mut().zip(w).rev() {
+            sum = [sum[0] + w.lo, sum[1] + w.hi];
+            *r = Interval::new(sum[0], sum[1]);
+        }
+        let near = |node: &usize| {
+            let mut y = 0.0;
+            (1..w.len()).rev().all(|k| {
+                y += self.nodes[*node][k];
+                y > within[k].lo && y < within[k].hi
             })
         };
-        self.nodes.iter().map(near).collect()
+        (0..self.nodes.len()).filter(near).collect()
     }
 
     /// The shares in the box in which points ask a neighbourhood.
@@ -162,9 +134,9 @@ impl Levels {
             let samples = self.samples(i, strands);
             let own = samples.iter().map(|s| {
                 let solid = s.iter().filter(|v| **v <= 0.0).count();
-                [-BELOW, solid as f64 / s.len() as f64]
+                solid as f64 / s.len() as f64
             });
-            let own: Vec<[f64; 2]> = own.collect();
+            let own: Vec<f64> = own.collect();
             Station {
                 near: self.look(strands, &samples, &own, &self.about(&self.shares(i))),
                 own,
@@ -178,17 +150,25 @@ impl Levels {
         strands.iter().map(|s| s.samples(&places)).collect()
     }
 
-    /// A neighbourhood, and its table with numbers at these nodes.
-    fn table(&self, i: usize, strands: &[Strand], nodes: &[usize]) -> (&Station, &Table) {
+    /// The numbers of a node in a neighbourhood.
+    #[inline]
+    pub fn numbers(&self, i: usize, strands: &[Strand], node: usize) -> &[f32] {
         let station = self.station(i, strands);
-        if nodes.iter().all(|n| station.near.has(*n)) {
-            return (station, &station.near);
-        }
+        station
+            .near
+            .get(node)
+            .unwrap_or_else(|| self.far(i, strands, node))
+    }
+
+    /// The same of a node that shares nearby do not need.
+    #[cold]
+    fn far(&self, i: usize, strands: &[Strand], node: usize) -> &[f32] {
+        let station = self.station(i, strands);
         let whole = station.whole.get_or_init(|| {
-            let all = vec![true; self.nodes.len()];
+            let all: Vec<usize> = (0..self.nodes.len()).collect();
             self.look(strands, &self.samples(i, strands), &station.own, &all)
         });
-        (station, whole)
+        whole.get(node).unwrap_or(&[0.0; KNOTS + 1])
     }
 
     /// The table, at some nodes and where each lattice is alone, from the values of the lattices at the same places.
@@ -196,148 +176,83 @@ impl Levels {
         &self,
         strands: &[Strand],
         samples: &[Vec<f32>],
-        own: &[[f64; 2]],
-        wanted: &[bool],
+        own: &[f64],
+        wanted: &[usize],
     ) -> Table {
-        let mut sum = vec![0f32; samples[0].len()];
-        let counted = self.nodes.iter().enumerate().map(|(node, w)| {
-            (wanted[node] || self.alone.contains(&node)).then(|| {
-                sum.fill(0.0);
-                for (w, s) in w.iter().zip(samples).filter(|(w, _)| **w > 0.0) {
-                    add_times(&mut sum, *w as f32, s);
-                }
-                Counted::of(&sum)
-            })
+        let mut table = self.table();
+        let exact: Option<Vec<[f64; 2]>> = self.uniform.as_ref().map(|uniform| {
+            let each = uniform.iter().zip(own);
+            each.map(|(q, own)| q.unwrap_or([-BELOW, *own])).collect()
         });
-        let Some(uniform) = &self.uniform else {
-            let curve = |c: Option<Counted>| c.map_or(Curve::UNKNOWN, |c| Curve::new(&c));
-            return Table::Curves(counted.map(curve).collect());
-        };
-        let exact = uniform.iter().zip(own);
-        let exact = exact.map(|(e, o)| e.quantiles.map_or(*o, |q| [q[0].0, q[1].0]));
-        let exact: Vec<[f64; 2]> = exact.collect();
-        let ends = counted.zip(&self.nodes).map(|(counted, w)| {
-            let Some(counted) = counted else {
-                return [f64::NAN; 2];
+        let mut ends: Vec<(usize, [f64; 2])> = Vec::new();
+        let mut sum = vec![0f32; samples[0].len()];
+        let others = wanted.iter().filter(|n| !self.alone.contains(n));
+        for &node in self.alone.iter().chain(others) {
+            let w = &self.nodes[node];
+            sum.fill(0.0);
+            for (w, s) in w.iter().zip(samples).filter(|(w, _)| **w > 0.0) {
+                add_times(&mut sum, *w as f32, s);
+            }
+            let counted = Counted::of(&sum);
+            let Some(exact) = &exact else {
+                counted.knots(table.add(node));
+                continue;
             };
             let [a, b] = blended(w, exact.iter().copied());
             let low = match self.two_sided {
                 true => counted.quantile(a) + a.min(0.0) * counted.whole(),
                 false => 0.0,
             };
-            [low, counted.quantile(b)]
-        });
-        let mut ends: Vec<[f64; 2]> = ends.collect();
+            ends.push((node, [low, counted.quantile(b)]));
+        }
         // Less what it is where each lattice is alone; less all that is added of a network's lower end, which no quantile is.
-        let alone = |i: usize| match ends[self.alone[i]] {
-            sheet if strands[i].is_sheet() => sheet,
-            [_, hi] => [strands[i].low(0.0), hi],
-        };
-        let base: Vec<[f64; 2]> = (0..strands.len()).map(alone).collect();
-        for (ends, w) in ends.iter_mut().zip(&self.nodes) {
-            for (w, base) in w.iter().zip(&base) {
-                (0..2).for_each(|e| ends[e] -= w * base[e]);
-            }
-        }
-        Table::Ends(ends)
-    }
-
-    /// The share of a field that is solid about a point, found by looking.
-    pub fn share_found(&self, strands: &[Strand], p: Vec3, i: usize) -> f64 {
-        let near = self.joint.corners(p);
-        near.iter()
-            .filter(|c| c.1 > 0.0)
-            .map(|c| c.1 * self.station(c.0, strands).own[i][1])
-            .sum()
-    }
-
-    /// What is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ at a point with shares `w`, its neighbours in a row having been asked before.
-    pub fn added_in_row(
-        &self,
-        strands: &[Strand],
-        p: Vec3,
-        w: &[f64],
-        ends: &[End],
-        row: &mut Row,
-    ) -> [f64; 2] {
-        if self.uniform.is_none() {
-            return self.added(strands, p, w, ends, &mut row.place);
-        }
-        if row.at != [p[1], p[2]] || row.tables.is_empty() {
-            row.at = [p[1], p[2]];
-            row.tables.resize(self.joint.shape[0], Vec::new());
-            row.tables.iter_mut().for_each(Vec::clear);
-        }
-        self.grid.place(w, &mut row.place);
-        let [x, y, z] = core::array::from_fn(|a| self.joint.along(a, p[a]));
-        let mut out = [0.0; 2];
-        for (i, near) in [(x.0, 1.0 - x.1), (x.0 + 1, x.1)] {
-            if near <= 0.0 {
-                continue;
-            }
-            let table = &mut row.tables[i];
-            if table.is_empty() {
-                table.resize(self.grid.len(), [f64::NAN; 2]);
-            }
-            for (n, share) in row.place.nodes.iter().zip(&row.place.shares) {
-                let v = &mut table[*n];
-                if v[0].is_nan() {
-                    *v = self.across(strands, i, *n, [(y.0, y.1), (z.0, z.1)]);
-                }
-                (0..2).for_each(|e| out[e] += near * share * v[e]);
-            }
-        }
-        out
-    }
-
-    /// A node's ends at the i-th neighbourhood along x, between those along y and z.
-    fn across(&self, strands: &[Strand], i: usize, node: usize, at: [(usize, f64); 2]) -> [f64; 2] {
-        let [nx, ny, _] = self.joint.shape;
-        let mut out = [0.0; 2];
-        let [y, z] = at.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
-        for (k, share_z) in z.into_iter().filter(|z| z.1 > 0.0) {
-            for (j, share_y) in y.into_iter().filter(|y| y.1 > 0.0) {
-                let (_, table) = self.table((k * ny + j) * nx + i, strands, &[node]);
-                if let Table::Ends(ends) = table {
-                    (0..2).for_each(|e| out[e] += share_y * share_z * ends[node][e]);
-                }
-            }
-        }
-        out
-    }
-
-    /// What is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ at a point with shares `w`.
-    pub fn added(
-        &self,
-        strands: &[Strand],
-        p: Vec3,
-        w: &[f64],
-        ends: &[End],
-        at: &mut Place,
-    ) -> [f64; 2] {
-        self.grid.place(w, at);
-        let mut out = [0.0; 2];
-        for (i, share, _) in self.joint.corners(p).iter().filter(|c| c.1 > 0.0) {
-            let (station, table) = self.table(*i, strands, &at.nodes);
-            let v = match table {
-                Table::Ends(ends) => at.nodes.iter().zip(&at.shares).fold([0.0; 2], |v, (n, s)| {
-                    [v[0] + s * ends[*n][0], v[1] + s * ends[*n][1]]
-                }),
-                Table::Curves(curves) => self.curved(strands, curves, &station.own, w, ends, at),
+        let base: Vec<[f64; 2]> = ends
+            .iter()
+            .zip(strands)
+            .map(|((_, [low, high]), s)| {
+                let low = if s.is_sheet() { *low } else { s.low(0.0) };
+                [low, *high]
+            })
+            .collect();
+        for (node, ends) in ends {
+            let more = |e: usize| {
+                let each = self.nodes[node].iter().zip(&base);
+                ends[e] - each.map(|(w, base)| w * base[e]).sum::<f64>()
             };
-            out = [out[0] + share * v[0], out[1] + share * v[1]];
+            table
+                .add(node)
+                .copy_from_slice(&[more(0) as f32, more(1) as f32]);
         }
-        out
+        table
     }
 
-    /// Where each lattice is alone: the value at its end's quantile, and how it changes with that.
-    fn base(&self, strands: &[Strand], curves: &[Curve], i: usize, q: [f64; 2]) -> [(f64, f64); 2] {
-        let curve = &curves[self.alone[i]];
-        let low = match strands[i].is_sheet() {
-            true => curve.at(q[0]),
-            false => (strands[i].low(0.0), 0.0),
-        };
-        [low, curve.at(q[1])]
+    /// The share of a field that is solid about a point, found by looking, and its gradient (per mm).
+    pub fn share_found(&self, strands: &[Strand], p: Vec3, i: usize) -> (f64, Vec3) {
+        let near = self.joint.corners(p);
+        let near = near.iter().filter(|c| c.1 > 0.0 || c.2 != [0.0; 3]);
+        near.fold((0.0, [0.0; 3]), |(v, g), (n, share, slope)| {
+            let own = self.station(*n, strands).own[i];
+            (v + share * own, add(g, scale(*slope, own)))
+        })
+    }
+
+    /// The quantiles of the i-th lattice at a point where its upper end is `high`.
+    pub fn quantiles(&self, strands: &[Strand], p: Vec3, i: usize, high: f64) -> [f64; 2] {
+        let found = || [-BELOW, self.share_found(strands, p, i).0];
+        strands[i].quantiles(high).unwrap_or_else(found)
+    }
+
+    /// The same with gradients (per mm), the upper end's being given.
+    pub fn end(&self, strands: &[Strand], p: Vec3, i: usize, (high, slope): (f64, Vec3)) -> End {
+        if let Some(quantiles) = strands[i].quantiles(high) {
+            let slopes = strands[i].quantile_slopes(high).map(|by| scale(slope, by));
+            return End { quantiles, slopes };
+        }
+        let (share, slope) = self.share_found(strands, p, i);
+        End {
+            quantiles: [-BELOW, share],
+            slopes: [[0.0; 3], slope],
+        }
     }
 
     /// Intervals that contain what is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ in a box, where shares are within `w` and upper ends
@@ -349,202 +264,80 @@ impl Levels {
         w: &[Interval],
         highs: &[Interval],
     ) -> [Interval; 2] {
-        let n = w.len();
         let all = [Interval::new(f64::NEG_INFINITY, f64::INFINITY); 2];
         // A box of several cells has everything in it.
         if self.joint.count_in(b).is_none_or(|c| c > MANY) {
             return all;
         }
-        let about = self.about(w);
-        let nodes: Vec<usize> = (0..about.len()).filter(|i| about[*i]).collect();
-        if nodes.is_empty() {
-            return all;
-        }
-        let mut out: Option<[Interval; 2]> = None;
+        let (mut near, mut out) = (Vec::new(), None);
         self.joint.each_in(b, |i| {
             if self.shares(i).iter().any(|w| w.lo == 1.0) {
                 // Nobody asks where one lattice is alone: nothing is added.
-                let none = Interval::new(0.0, 0.0);
-                out = Some(out.map_or([none; 2], |o| o.map(|o| o.union(none))));
-                return;
+                out = Some([Interval::new(0.0, 0.0); 2]);
+            } else {
+                near.push(self.station(i, strands));
             }
-            let station = self.station(i, strands);
-            let here = match &station.near {
-                Table::Ends(ends) => [0, 1].map(|e| hull(nodes.iter().map(|n| ends[*n][e]))),
-                Table::Curves(curves) => {
-                    let q = |i: usize| -> [Interval; 2] {
-                        let ends = [highs[i].lo, highs[i].hi].map(|h| {
-                            strands[i]
-                                .quantiles(h)
-                                .map_or(station.own[i], |q| [q[0].0, q[1].0])
-                        });
-                        [0, 1].map(|e| hull(ends.iter().map(|q| q[e])))
-                    };
-                    let of: Vec<[Interval; 2]> = (0..n).map(q).collect();
-                    let (mut a, mut p) = (Interval::new(0.0, 0.0), Interval::new(0.0, 0.0));
-                    for (w, [lo, hi]) in w.iter().zip(&of) {
-                        let from = lo.max(Interval::new(0.0, 0.0));
-                        let share = Interval::new((hi.lo - from.hi).max(0.0), hi.hi - from.lo);
-                        (a, p) = (a + w.times(*lo), p + w.times(share));
-                    }
-                    let top = a.max(Interval::new(0.0, 0.0)) + p;
-                    let mut found = [a, top].map(|q| {
-                        let lo = nodes.iter().map(|n| curves[*n].at(q.lo).0);
-                        Interval::new(
-                            lo.fold(f64::INFINITY, f64::min),
-                            hull(nodes.iter().map(|n| curves[*n].at(q.hi).0)).hi,
-                        )
-                    });
-                    for i in (0..n).filter(|i| w[*i].hi > 0.0) {
-                        let [lo, hi] = [of[i].map(|q| q.lo), of[i].map(|q| q.hi)]
-                            .map(|q| self.base(strands, curves, i, q));
-                        for e in 0..2 {
-                            found[e] = found[e] - w[i].times(Interval::new(lo[e].0, hi[e].0));
-                        }
-                    }
-                    found
-                }
-            };
-            out = Some(out.map_or(here, |o| [o[0].union(here[0]), o[1].union(here[1])]));
         });
+        let nodes = self.about(w);
+        let q: Vec<[Interval; 2]> = (0..w.len())
+            .map(
+                |i| match [highs[i].lo, highs[i].hi].map(|h| strands[i].quantiles(h)) {
+                    [Some(lo), Some(hi)] => [0, 1].map(|e| hull([lo[e], hi[e]].into_iter())),
+                    _ => [
+                        Interval::new(-BELOW, -BELOW),
+                        hull(near.iter().map(|s| s.own[i])),
+                    ],
+                },
+            )
+            .collect();
+        for station in near {
+            let known: Vec<&[f32]> = nodes.iter().filter_map(|n| station.near.get(*n)).collect();
+            if known.is_empty() {
+                continue;
+            }
+            let here = if self.is_uniform() {
+                [0, 1].map(|e| hull(known.iter().map(|v| f64::from(v[e]))))
+            } else {
+                self.curved_bound(strands, &station.near, &known, w, &q)
+            };
+            out = Some(out.map_or(here, |o: [Interval; 2]| {
+                [o[0].union(here[0]), o[1].union(here[1])]
+            }));
+        }
         out.unwrap_or(all)
     }
 
-    fn curved(
+    /// The same of one neighbourhood with quantile functions, those of the nodes about being `known`.
+    fn curved_bound(
         &self,
         strands: &[Strand],
-        curves: &[Curve],
-        own: &[[f64; 2]],
-        w: &[f64],
-        ends: &[End],
-        at: &Place,
-    ) -> [f64; 2] {
-        let q = |i: usize| ends[i].quantiles.map_or(own[i], |q| [q[0].0, q[1].0]);
-        let [a, b] = blended(w, (0..w.len()).map(q));
-        let sum = |q: f64| {
-            let each = at.nodes.iter().zip(&at.shares);
-            each.map(|(n, s)| s * curves[*n].at(q).0).sum::<f64>()
-        };
-        let mut v = [sum(a), sum(b)];
-        for (i, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            let base = self.base(strands, curves, i, q(i));
-            (0..2).for_each(|e| v[e] -= w * base[e].0);
+        table: &Table,
+        known: &[&[f32]],
+        w: &[Interval],
+        q: &[[Interval; 2]],
+    ) -> [Interval; 2] {
+        let (mut a, mut p) = (Interval::new(0.0, 0.0), Interval::new(0.0, 0.0));
+        for (w, [lo, hi]) in w.iter().zip(q) {
+            let from = lo.max(Interval::new(0.0, 0.0));
+            let share = Interval::new((hi.lo - from.hi).max(0.0), hi.hi - from.lo);
+            (a, p) = (a + w.times(*lo), p + w.times(share));
         }
-        v
-    }
-
-    /// The same with gradients (per mm); `dw` are those of the shares.
-    pub fn added_gradients(
-        &self,
-        strands: &[Strand],
-        p: Vec3,
-        (w, dw): (&[f64], &[Vec3]),
-        ends: &[End],
-        at: &mut Place,
-    ) -> ([f64; 2], [Vec3; 2]) {
-        self.grid.place(w, at);
-        let (mut out, mut slope) = ([0.0; 2], [[0.0; 3]; 2]);
-        // ∇y of each axis: m Σ ∇w from it on.
-        let mut dy = vec![[0.0; 3]; w.len() - 1];
-        let mut sum = [0.0; 3];
-        for k in (0..dy.len()).rev() {
-            sum = add(sum, dw[k + 1]);
-            dy[k] = scale(sum, self.grid.steps() as f64);
-        }
-        for (i, share, dshare) in self
-            .joint
-            .corners(p)
-            .iter()
-            .filter(|c| c.1 > 0.0 || c.2 != [0.0; 3])
-        {
-            let (station, table) = self.table(*i, strands, &at.nodes);
-            let (v, g) = match table {
-                Table::Ends(of) => {
-                    let side = |e: usize| {
-                        let node = |l: usize| of[at.nodes[l]][e];
-                        let v = at
-                            .shares
-                            .iter()
-                            .enumerate()
-                            .map(|(l, s)| s * node(l))
-                            .sum::<f64>();
-                        let g = at.axes.iter().enumerate().fold([0.0; 3], |g, (l, k)| {
-                            add(g, scale(dy[*k], node(l + 1) - node(l)))
-                        });
-                        (v, g)
-                    };
-                    let (lo, hi) = (side(0), side(1));
-                    ([lo.0, hi.0], [lo.1, hi.1])
-                }
-                Table::Curves(curves) => {
-                    self.curved_gradients(strands, (curves, &station.own), (w, dw), ends, at, &dy)
-                }
-            };
+        let top = a.max(Interval::new(0.0, 0.0)) + p;
+        let mut found = [a, top].map(|q| {
+            let [lo, hi] = [q.lo, q.hi].map(|q| hull(known.iter().map(|v| quantile(v, q).0)));
+            Interval::new(lo.lo, hi.hi)
+        });
+        for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i].hi > 0.0) {
             for e in 0..2 {
-                out[e] += share * v[e];
-                slope[e] = add(slope[e], add(scale(g[e], *share), scale(*dshare, v[e])));
+                let base = match table.get(self.alone[i]) {
+                    Some(v) if e == 1 || s.is_sheet() => {
+                        Interval::new(quantile(v, q[i][e].lo).0, quantile(v, q[i][e].hi).0)
+                    }
+                    _ => Interval::new(s.low(0.0), s.low(0.0)),
+                };
+                found[e] = found[e] - w[i].times(base);
             }
         }
-        (out, slope)
-    }
-
-    fn curved_gradients(
-        &self,
-        strands: &[Strand],
-        (curves, own): (&[Curve], &[[f64; 2]]),
-        (w, dw): (&[f64], &[Vec3]),
-        ends: &[End],
-        at: &Place,
-        dy: &[Vec3],
-    ) -> ([f64; 2], [Vec3; 2]) {
-        let q = |i: usize| ends[i].quantiles.map_or(own[i], |q| [q[0].0, q[1].0]);
-        let dq = |i: usize| {
-            let by = |e: usize| ends[i].quantiles.map_or(0.0, |q| q[e].1);
-            [scale(ends[i].slope, by(0)), scale(ends[i].slope, by(1))]
-        };
-        let [a, b] = blended(w, (0..w.len()).map(q));
-        let (mut da, mut dp) = ([0.0; 3], [0.0; 3]);
-        for i in 0..w.len() {
-            let ([lo, hi], [dlo, dhi]) = (q(i), dq(i));
-            let (from, dfrom) = if lo > 0.0 { (lo, dlo) } else { (0.0, [0.0; 3]) };
-            da = add(da, add(scale(dw[i], lo), scale(dlo, w[i])));
-            dp = add(
-                dp,
-                add(scale(dw[i], hi - from), scale(sub(dhi, dfrom), w[i])),
-            );
-        }
-        let db = if a > 0.0 { add(da, dp) } else { dp };
-        let side = |q: f64, dq: Vec3| {
-            let each: Vec<(f64, f64)> = at.nodes.iter().map(|n| curves[*n].at(q)).collect();
-            let v = each
-                .iter()
-                .zip(&at.shares)
-                .map(|(c, s)| s * c.0)
-                .sum::<f64>();
-            let steep = each
-                .iter()
-                .zip(&at.shares)
-                .map(|(c, s)| s * c.1)
-                .sum::<f64>();
-            let g = at
-                .axes
-                .iter()
-                .enumerate()
-                .fold(scale(dq, steep), |g, (l, k)| {
-                    add(g, scale(dy[*k], each[l + 1].0 - each[l].0))
-                });
-            (v, g)
-        };
-        let (lo, hi) = (side(a, da), side(b, db));
-        let (mut v, mut g) = ([lo.0, hi.0], [lo.1, hi.1]);
-        for i in 0..w.len() {
-            let base = self.base(strands, curves, i, q(i));
-            for e in 0..2 {
-                let (c, steep) = base[e];
-                v[e] -= w[i] * c;
-                g[e] = sub(g[e], add(scale(dw[i], c), scale(dq(i)[e], w[i] * steep)));
-            }
-        }
-        (v, g)
+        found
     }
 }

@@ -90,6 +90,18 @@ impl Grid {
     /// Finds where shares lie.
     pub fn place(&self, w: &[f64], at: &mut Place) {
         let (d, m) = (self.n - 1, self.steps as f64);
+        if d == 1 {
+            // The nodes of two lattices stand in a row.
+            let y = (m * w[1]).clamp(0.0, m);
+            let low = (y as usize).min(self.steps - 1);
+            let share = y - low as f64;
+            at.nodes.clear();
+            at.nodes.extend([low, low + 1]);
+            at.shares.clear();
+            at.shares.extend([1.0 - share, share]);
+            at.axes.clear();
+            return at.axes.push(0);
+        }
         at.floor.clear();
         at.floor.resize(d, 0);
         at.order.clear();

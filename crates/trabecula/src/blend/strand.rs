@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::added::HIGH;
 use crate::cell::Part;
 use crate::field::{Block, Field};
 use crate::lattice::{self, Lattice};
@@ -225,33 +226,56 @@ impl Strand {
         if self.is_sheet() { -high } else { self.floor }
     }
 
-    /// The shares of the cell in which g is below the lower and the upper end, the latter being `high`, and how they
-    /// change with it; `None` where that is known by looking only.
-    pub fn quantiles(&self, high: f64) -> Option<[(f64, f64); 2]> {
+    /// The lower or the upper end (`added::LOW`, `HIGH`), the latter being `high`.
+    #[inline]
+    pub fn end(&self, end: usize, high: f64, alone: bool) -> f64 {
+        match (end, alone) {
+            (HIGH, _) => high,
+            (_, true) => self.low_alone(high),
+            (_, false) => self.low(high),
+        }
+    }
+
+    /// How that changes with the upper end.
+    pub fn end_slope(&self, end: usize) -> f64 {
+        match end {
+            HIGH => 1.0,
+            _ if self.is_sheet() => -1.0,
+            _ => 0.0,
+        }
+    }
+
+    /// The shares of the cell in which g is below the lower and the upper end, the latter being `high`; `None` where that is
+    /// known by looking only.
+    pub fn quantiles(&self, high: f64) -> Option<[f64; 2]> {
         let l = self.lattice()?;
         let t = high / self.factor;
+        Some(match l.part {
+            Part::Lower => [-BELOW, l.below(t)],
+            // g = −f: what is below the end is above t.
+            Part::Upper => [-BELOW, 1.0 - l.below(t)],
+            Part::Sheet => [l.below(-t), l.below(t)],
+        })
+    }
+
+    /// How the quantiles change with `high`.
+    pub fn quantile_slopes(&self, high: f64) -> [f64; 2] {
+        let Some(l) = self.lattice() else {
+            return [0.0; 2];
+        };
         // Some steps of the table.
         let h = 2e-4
             * l.cell
                 .series()
                 .amplitude()
                 .min(l.distance().map_or(f64::INFINITY, |d| d.range().abs().hi));
-        let at = |t: f64| {
-            (
-                l.below(t),
-                (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor,
-            )
-        };
-        let (b, slope) = at(t);
-        Some(match l.part {
-            Part::Lower => [(-BELOW, 0.0), (b, slope)],
-            // g = −f: what is below the end is above t.
-            Part::Upper => [(-BELOW, 0.0), (1.0 - b, -slope)],
-            Part::Sheet => {
-                let (a, down) = at(-t);
-                [(a, -down), (b, slope)]
-            }
-        })
+        let t = high / self.factor;
+        let slope = |t: f64| (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor;
+        match l.part {
+            Part::Lower => [0.0, slope(t)],
+            Part::Upper => [0.0, -slope(t)],
+            Part::Sheet => [-slope(-t), slope(t)],
+        }
     }
 
     /// g on the rows of a block; `wanted` says where.
@@ -304,6 +328,7 @@ impl Rows<'_> {
     }
 
     /// g where the core is `core`.
+    #[inline]
     pub fn value(&self, core: f32) -> f64 {
         self.factor * f64::from(core)
     }

@@ -60,7 +60,15 @@ impl Weights {
                 }
             }
         }
-        out.chunks_exact_mut(n).for_each(normalise);
+        // The same each time; of two it is told how many they are.
+        match n {
+            2 => out
+                .as_chunks_mut::<2>()
+                .0
+                .iter_mut()
+                .for_each(|w| normalise(w)),
+            _ => out.chunks_exact_mut(n).for_each(normalise),
+        }
     }
 
     /// Fills shares and their gradients (per mm).
@@ -141,6 +149,7 @@ impl Weights {
 }
 
 /// Makes shares of numbers.
+#[inline(always)]
 fn normalise(w: &mut [f64]) {
     let sum: f64 = w.iter().sum();
     if !(sum > 0.0 && sum.is_finite()) {

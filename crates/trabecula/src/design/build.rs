@@ -129,12 +129,18 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
-        let (tiling, explicit) = tiling::lattice(&domain, &place, &mut warnings)?;
+        let tiling::Made {
+            tiling,
+            explicit,
+            joins,
+        } = tiling::lattice(&domain, &place, &mut warnings)?;
         tilings.push(Tiled {
             name: domain.name.to_string(),
             tiling: tiling.clone(),
             zones: domain.zones(),
             mesh: domain.report,
+            explicit,
+            joins,
         });
         if d.blend.is_none() {
             let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());

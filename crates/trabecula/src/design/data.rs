@@ -47,6 +47,8 @@ pub enum RegionSpec {
     Cylinder(CylinderSpec),
     /// A ball.
     Sphere(SphereSpec),
+    /// A tetrahedron.
+    Tetrahedron(TetrahedronSpec),
     /// One side of a plane; it bounds nothing alone, so combine it.
     HalfSpace(HalfSpaceSpec),
     /// A triangle mesh from a file (stl, obj, ply, off, 3mf).
@@ -116,6 +118,18 @@ pub struct SphereSpec {
     pub center: [f64; 3],
     /// Radius (mm).
     pub radius: f64,
+}
+
+/// A tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TetrahedronSpec {
+    /// Its four corners (mm), in any order.
+    pub corners: [[f64; 3]; 4],
+    /// With it faces are joined by a smooth maximum (LogSumExp) of this sharpness (per mm), which draws edges back by ln 2
+    /// over it and corners by ln 3: smooth, but with gaps between neighbours, so for a single tetrahedron only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sharpness: Option<f64>,
 }
 
 /// One side of a plane.

@@ -22,10 +22,11 @@ type Read<T> = Result<T, DesignError>;
 
 const THREE: &str = "three numbers [x, y, z]";
 const AMOUNTS: &str = "exactly one of iso, fraction, porosity, thickness";
-const REGIONS: [&str; 9] = [
+const REGIONS: [&str; 10] = [
     "box",
     "cylinder",
     "sphere",
+    "tetrahedron",
     "halfspace",
     "mesh",
     "union",
@@ -190,6 +191,19 @@ fn region(at: &At) -> Read<RegionSpec> {
             RegionSpec::Sphere(SphereSpec {
                 center: f.read("center", [0.0; 3], three)?,
                 radius: f.need("radius", "mm")?.number()?,
+            })
+        }
+        "tetrahedron" => {
+            let f = at.fields("a tetrahedron", &["corners", "sharpness"])?;
+            let corners = f.need("corners", "four corners, [[x, y, z], …] in mm")?;
+            let found = corners.list("four corners")?;
+            let [a, b, c, d] = &found[..] else {
+                let message = format!("a tetrahedron has four corners, found {}", found.len());
+                return Err(corners.error(message));
+            };
+            RegionSpec::Tetrahedron(TetrahedronSpec {
+                corners: [three(a)?, three(b)?, three(c)?, three(d)?],
+                sharpness: f.read("sharpness", None, |at| at.number().map(Some))?,
             })
         }
         "halfspace" => RegionSpec::HalfSpace(halfspace(at)?),

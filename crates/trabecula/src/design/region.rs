@@ -11,7 +11,7 @@ use crate::io;
 use crate::math::{add, scale, sub};
 use crate::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair,
-    Repaired, Shape, Sphere, Union,
+    Repaired, Shape, Sphere, Tetrahedron, Union,
 };
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
@@ -50,6 +50,10 @@ pub(super) fn region(
             three(&path, "center", s.center)?;
             positive(&path, "radius", s.radius)?;
             shared(&path, Sphere::new(s.center, s.radius))
+        }
+        RegionSpec::Tetrahedron(t) => {
+            let path = format!("{path}.tetrahedron");
+            shared(&path, Tetrahedron::new(t.corners, t.sharpness))
         }
         RegionSpec::HalfSpace(h) => {
             let path = format!("{path}.halfspace");

@@ -2,9 +2,10 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Blended, Built, Tiled, beams, build::LOOKS, sample};
+use super::{Blended, Built, Joins, Tiled, beams, build::LOOKS, sample};
 use crate::blend::Phases;
 use crate::cell::Part;
+use crate::extract;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
@@ -213,6 +214,8 @@ fn tiled(it: &Tiled) -> Json {
                 "volume": volume,
                 "solid_fraction": solid / volume,
                 "zones": zones.collect::<serde_json::Map<String, Json>>(),
+                "pieces": it.joins.as_ref().map(Joins::pieces),
+                "joins": it.joins.as_ref().map(Joins::json),
                 "overlap": tiling.map.overlap(),
                 "thickness": Json::Null,
                 "ports": Json::Null,
@@ -238,6 +241,8 @@ fn tiled(it: &Tiled) -> Json {
             "volume": volume,
             "solid_fraction": solid / volume,
             "zones": Json::Null,
+            "pieces": it.explicit.then(|| extract::foretold(tiling)).flatten().map(|f| f.pieces),
+            "joins": Json::Null,
             "overlap": tiling.map.overlap(),
             "thickness": spread.map(|s| json!({ "min": s.min, "low": s.low, "mean": s.mean, "high": s.high, "max": s.max })),
             "ports": stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports,

@@ -333,6 +333,7 @@ fn the_schema_and_the_reader_agree() {
         ("cylinder", "CylinderSpec"),
         ("sphere", "SphereSpec"),
         ("halfspace", "HalfSpaceSpec"),
+        ("tetrahedron", "TetrahedronSpec"),
         ("mesh", "MeshSpec"),
         ("offset", "OffsetSpec"),
     ] {

@@ -7,6 +7,7 @@ use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::joins::{Joins, joins};
 use super::report::Varied;
 use super::tets::{self, TetReport};
 use super::{Design, Loader, Warning, sample};
@@ -159,12 +160,24 @@ pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignE
     Stencil::new(series, site, spec.edge.unwrap_or(1.0), spec.dual).map_err(|f| wrong("", f))
 }
 
-/// The lattice, and whether its surface is made without a grid.
+/// A lattice over a mesh.
+pub(super) struct Made {
+    pub tiling: Arc<Tiling>,
+    /// Whether its surface is made without a grid.
+    pub explicit: bool,
+    /// Which zones join, if there are any and that can be told.
+    pub joins: Option<Joins>,
+}
+
+/// The cell of each zone.
+pub(super) type Zoned = BTreeMap<u32, Arc<Stencil>>;
+
+/// The lattice.
 pub(super) fn lattice(
     domain: &Domain,
     place: &Place,
     warnings: &mut Vec<Warning>,
-) -> Result<(Arc<Tiling>, bool), DesignError> {
+) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     if !domain.cell.zones.is_empty() {
         return zoned(domain, place, warnings);
@@ -210,7 +223,11 @@ pub(super) fn lattice(
     let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    Ok((Arc::new(tiling), explicit(domain, place)))
+    Ok(Made {
+        tiling: Arc::new(tiling),
+        explicit: explicit(domain, place),
+        joins: None,
+    })
 }
 
 /// Whether the surface is made without a grid.
@@ -221,11 +238,7 @@ fn explicit(domain: &Domain, place: &Place) -> bool {
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
 /// zone, so that one passes into the other in the tetrahedra between.
-fn zoned(
-    domain: &Domain,
-    place: &Place,
-    warnings: &mut Vec<Warning>,
-) -> Result<(Arc<Tiling>, bool), DesignError> {
+fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let at = below("cell.tet.zones");
     let map = &domain.map;
@@ -270,25 +283,37 @@ fn zoned(
     let (lo, hi) = values
         .iter()
         .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
-    let mut cells = Vec::new();
+    let (mut cells, mut zoned) = (Vec::new(), Zoned::new());
     for name in names {
         let spec = TetCellSpec {
             name: Some(name.clone()),
             ..TetCellSpec::default()
         };
-        let stencil = stencil(&spec, &at)?;
+        let stencil = Arc::new(stencil(&spec, &at)?);
         let range = stencil.range();
+        let of = found.iter().filter(|z| zones[&z.to_string()] == **name);
+        zoned.extend(of.map(|z| (*z, stencil.clone())));
         apart(&stencil, part, [lo, hi], &path, warnings);
         let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
         cells.push(Share {
-            stencil: Arc::new(stencil),
+            stencil,
             scale: 0.5 * (range.hi - range.lo),
             weights: Some(Arc::new(weights)),
         });
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level);
-    Ok((Arc::new(tiling), explicit(domain, place)))
+    let explicit = explicit(domain, place);
+    let joins = explicit.then(|| joins(&tiling, &zoned, 0.5 * (lo + hi)));
+    let joins = joins.flatten();
+    if let Some(joins) = &joins {
+        joins.warn(zones, &at, warnings);
+    }
+    Ok(Made {
+        tiling: Arc::new(tiling),
+        explicit,
+        joins,
+    })
 }
 
 /// The cell about another mid-surface.

@@ -12,6 +12,7 @@
 //! meet are apart by that much of a small tetrahedron's height. It is refused where rounding is not well below.
 
 mod census;
+mod foretold;
 mod piece;
 mod root;
 mod shared;
@@ -36,6 +37,7 @@ use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::tets::TetMesh;
 use crate::tiling::{Level, Tiling};
 use census::Links;
+pub use foretold::{Foretold, Join, foretold};
 use piece::{Core, Levels, MARGIN, Piece, Scratch};
 use shared::Shared;
 use template::Template;
@@ -119,9 +121,12 @@ fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
 
 impl<'a> Work<'a> {
     fn new(tiling: &'a Tiling, edge: f64) -> Result<Work<'a>, Fault> {
-        let grid = Grid {
-            n: steps(&tiling.map, edge)?,
-        };
+        Work::in_steps(tiling, steps(&tiling.map, edge)?)
+    }
+
+    /// With so many steps along the edge of a tetrahedron.
+    fn in_steps(tiling: &'a Tiling, n: usize) -> Result<Work<'a>, Fault> {
+        let grid = Grid { n };
         census::manifold(&tiling.map)?;
         let template = Template::new(grid);
         let cells = tiling.cells.iter().map(|c| {

@@ -170,7 +170,7 @@ impl Tree {
 }
 
 /// Whether triangles `i` and `j` meet elsewhere than in their common vertices or edge. Both have area.
-fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
+pub(crate) fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
     let (s, t) = (mesh.triangles[i], mesh.triangles[j]);
     let at = |v: u32| mesh.vertices[v as usize];
     let (p, q) = (s.map(at), t.map(at));

@@ -1,6 +1,7 @@
-//! Box, ball, half-space and cylinder, as exact signed distances.
+//! Box, ball, half-space and cylinder, as exact signed distances; and the tetrahedron.
 
 mod cylinder;
+mod tetrahedron;
 
 use core::f64::consts::PI;
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
 
 use cylinder::Barrel;
 pub use cylinder::Cylinder;
+pub use tetrahedron::Tetrahedron;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -411,7 +413,7 @@ macro_rules! field {
         }
     )*};
 }
-field!(Cuboid, Cylinder, Sphere, HalfSpace, Barrel);
+field!(Cuboid, Cylinder, Sphere, HalfSpace, Barrel, Tetrahedron);
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::{TetMesh, volume};
 use crate::fault::{Fault, counted, number};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::{Mesh, near_pairs, self_intersections};
+use crate::mesh::{Mesh, meet, near_pairs, self_intersections};
 
 /// A volume below this share of the cube of the longest edge is none: coordinates in single precision leave no more.
 const FLAT: f64 = 1e-9;
@@ -195,18 +195,8 @@ impl TetMesh {
 
 /// Refuses nodes of the boundary that lie on boundary faces or edges which do not have them.
 fn hanging(boundary: &Mesh) -> Result<(), Fault> {
-    let longest = (0..boundary.triangles.len())
-        .map(|i| {
-            let [a, b, c] = boundary.corners(i);
-            norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)))
-        })
-        .fold(0.0, f64::max);
-    let on = |i: usize, j: usize| {
-        let (t, corners) = (boundary.triangles[i], boundary.corners(i));
-        let mut others = boundary.triangles[j].into_iter();
-        others.find(|v| !t.contains(v) && lies_on(boundary.vertices[*v as usize], corners))
-    };
-    let found = near_pairs(boundary, ON * longest, |i, j| on(i, j).or_else(|| on(j, i)));
+    let longest = longest_edge(boundary);
+    let found = near_pairs(boundary, ON * longest, |i, j| hung(boundary, i, j));
     let mut nodes: Vec<u32> = found;
     nodes.sort_unstable();
     nodes.dedup();
@@ -225,6 +215,38 @@ fn hanging(boundary: &Mesh) -> Result<(), Fault> {
             place(boundary.vertices[*first as usize])
         ),
     ))
+}
+
+/// A node of one of two triangles that lies on the other, which does not have it.
+fn hung(boundary: &Mesh, i: usize, j: usize) -> Option<u32> {
+    let on = |i: usize, j: usize| {
+        let (t, corners) = (boundary.triangles[i], boundary.corners(i));
+        let mut others = boundary.triangles[j].into_iter();
+        others.find(|v| !t.contains(v) && lies_on(boundary.vertices[*v as usize], corners))
+    };
+    on(i, j).or_else(|| on(j, i))
+}
+
+fn longest_edge(boundary: &Mesh) -> f64 {
+    let sides = (0..boundary.triangles.len()).map(|i| {
+        let [a, b, c] = boundary.corners(i);
+        norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)))
+    });
+    sides.fold(0.0, f64::max)
+}
+
+/// Balls about the triangles of a boundary that meet others, or have nodes of others on them.
+pub(super) fn clashes(boundary: &Mesh) -> Vec<(Vec3, f64)> {
+    let found = near_pairs(boundary, ON * longest_edge(boundary), |i, j| {
+        (meet(boundary, i, j) || hung(boundary, i, j).is_some()).then_some([i, j])
+    });
+    let ball = |i: usize| {
+        let corners = boundary.corners(i);
+        let center = middle(&corners);
+        let reach = corners.iter().map(|p| norm(sub(*p, center)));
+        (center, 2.0 * reach.fold(0.0, f64::max))
+    };
+    found.into_iter().flatten().map(ball).collect()
 }
 
 /// Whether a place is on a triangle, its edges included, to within a small share of its longest edge.

@@ -305,6 +305,44 @@ fn lattices_pass_into_beams_with_their_fractions() {
     }
 }
 
+/// A lattice over tetrahedra ends with the region, and nothing beyond counts: what is asked for beside the surface is the
+/// fraction that its tetrahedra have, all the same one.
+#[test]
+fn what_lies_beyond_the_region_is_not_counted() {
+    struct Nothing;
+    impl Loader for Nothing {
+        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+            Err(path.to_string())
+        }
+    }
+    let text = "schema = 1\n[region.box]\nsize = [24, 12, 12]\n\
+        [lattice.a]\ncell.tet.name = \"diamond\"\npart = \"lower\"\nmap.tets.size = 3\nlevel.fraction = 0.3\n\
+        [lattice.b]\ncell = \"gyroid\"\npart = \"upper\"\nmap.affine.wavelength = 4\nlevel.fraction = 0.3\n\
+        [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[-12, 0.0], [12, 1]] }";
+    let built = Design::from_toml(text)
+        .expect("text")
+        .build(&Nothing)
+        .expect("built");
+    let blend = built.blend.expect("blend").blend;
+    for y in [-5.9, 0.0, 5.9] {
+        let points: Vec<Vec3> = (0..400)
+            .map(|i| {
+                [
+                    -11.9 + 0.5 * f64::from(i % 20),
+                    y,
+                    -5.7 + 0.6 * f64::from(i / 20),
+                ]
+            })
+            .collect();
+        let mut asked = vec![0.0; points.len()];
+        blend.fractions(&points, &mut asked);
+        let mean = asked.iter().sum::<f64>() / points.len() as f64;
+        println!("{y}: {mean:.4}");
+        // Windows over a handful of tetrahedra that they cut, at some neighbourhoods in a layer.
+        assert!((mean - 0.3).abs() < 0.01, "{y}: {mean:.4}");
+    }
+}
+
 /// Where one lattice counts alone its surface is there, to the last bit; and a lattice blended with itself is itself.
 #[test]
 fn alone_and_with_itself_a_lattice_is_itself() {

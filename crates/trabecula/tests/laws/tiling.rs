@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::io::Cursor;
 use std::sync::Arc;
 
-use crate::common::{Random, ball, check, fault};
+use crate::common::{Random, ball, cases, check, fault};
 use trabecula::cell::tet::{Grid, Nodes, Stencil, ready, ready_cells};
 use trabecula::cell::{Part, Series, Term};
 use trabecula::extract::{self, Islands, Silent, Stopped, Surface};
@@ -156,6 +156,8 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
     ] {
         assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+        let foretold = extract::foretold(&tiling).expect("few tetrahedra");
+        assert_eq!((foretold.pieces, foretold.joins.len()), (pieces, 0));
         let solid = solid(tiling, true);
         let edge = 0.75;
         let (all, told) =
@@ -479,6 +481,80 @@ fn meshes_that_are_none_are_refused() {
     match extract::surface(&solid, 0.5, &Silent) {
         Err(Stopped::Refused(f)) => assert!(f.message.contains("an edge alone"), "{}", f.message),
         other => panic!("{:?}", other.map(|s| s.mesh.triangles.len())),
+    }
+}
+
+/// Two zones along x with a cell each at one fraction.
+fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling {
+    let mut mesh = mesh.clone();
+    let sides = mesh.tets.iter().map(|t| {
+        let middle = t.iter().map(|n| mesh.nodes[*n as usize][0]).sum::<f64>() / 4.0;
+        u32::from(middle > 9.0)
+    });
+    mesh.zones = sides.collect();
+    let map = map(&mesh);
+    let of = |zone: u32| {
+        let s = cell(names[zone as usize]).0;
+        let range = s.range();
+        Share {
+            stencil: s,
+            scale: 0.5 * (range.hi - range.lo),
+            weights: Some(Arc::new(map.shares(|z| z == zone))),
+        }
+    };
+    let cells = vec![of(0), of(1)];
+    let level = Level::mixed(&map, &cells, part, &[fraction]);
+    Tiling::of(map, cells, part, level)
+}
+
+#[test]
+fn pieces_and_joins_are_foretold_without_a_surface() {
+    let mut some = Random(13);
+    let mesh = shaken(3, 0.1, 6.0, &mut some);
+    let lower: Vec<&str> = ready_cells()
+        .iter()
+        .filter(|r| r.part == Part::Lower)
+        .map(|r| r.name)
+        .collect();
+    let drawn = (0..cases(2)).map(|_| {
+        let mut any = || lower[some.below(lower.len())];
+        ([any(), any()], some.between(0.15, 0.5), None)
+    });
+    let known = [
+        (["p43m", "f43m"], 0.3, Some(true)),
+        (["pn3m", "diamond"], 0.3, Some(false)),
+    ];
+    for (names, fraction, joined) in known.into_iter().chain(drawn.collect::<Vec<_>>()) {
+        let tiling = zoned(&mesh, names, Part::Lower, fraction);
+        let told = extract::foretold(&tiling).expect("few tetrahedra");
+        let [join] = &told.joins[..] else {
+            panic!("{names:?}: {told:?}")
+        };
+        let map = &tiling.map;
+        let others = |t: usize| {
+            let across = map
+                .across(t)
+                .into_iter()
+                .filter(|o| (*o as usize) < map.len());
+            across
+                .filter(|o| map.zone(*o as usize) != map.zone(t))
+                .count()
+        };
+        let faces = (0..map.len()).map(others).sum::<usize>() / 2;
+        assert_eq!((join.zones, join.faces), ([0, 1], faces), "{names:?}");
+        // The same small steps: the surface's own pieces, by its bodies and by a look at the mesh.
+        let (surface, found) = made(tiling.clone(), 16.0, true);
+        let pieces = size(&surface.mesh).pieces;
+        println!("{names:?} {fraction:.2}: {pieces} pieces, {join:?}");
+        assert_eq!(
+            (told.pieces, found.pieces as usize),
+            (pieces, pieces),
+            "{names:?} {fraction}"
+        );
+        assert!(pieces > 1 || join.joined, "{names:?}");
+        if let Some(joined) = joined {
+            assert_eq!(join.joined, joined, "{names:?}");
+        }
     }
 }
 

@@ -152,6 +152,16 @@ impl Links {
         debug_assert!(x.is_none() && y.is_none(), "faces have the same points");
     }
 
+    /// For each piece of solid of each tetrahedron so far, in their order, what names the piece of the whole that it is of.
+    pub fn wholes(&mut self, first: &[u32]) -> Vec<u32> {
+        first.iter().map(|i| find(&mut self.solid, *i)).collect()
+    }
+
+    /// Where the pieces of solid of the next tetrahedron will begin, if it has so many bodies.
+    pub fn next(&self, bodies: usize) -> u32 {
+        (self.sums.len() + bodies) as u32
+    }
+
     /// All bodies, joined.
     pub fn census(self) -> Census {
         Census::joined(self.sums, self.body, self.solid)

@@ -42,7 +42,7 @@ fn push(runs: &mut Vec<Run>, surface: u32, solid: u32) {
 }
 
 /// A surface in a tetrahedron, with the caps of those faces that lie on the mesh's boundary.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Piece {
     /// Barycentric coordinates of the vertices: corners on edges in the order of the edges, then nodes of caps in theirs.
     pub places: Vec<Bary>,

@@ -90,6 +90,7 @@ impl Operation {
     }
 
     /// The value; NaN where undefined, and wherever an argument is NaN. Unused arguments are zero.
+    #[inline(always)]
     pub(super) fn value(self, [a, b, c]: [f64; 3]) -> f64 {
         match self {
             Negate => -a,
@@ -141,6 +142,7 @@ impl Operation {
     }
 
     /// The partial derivatives by the arguments; one-sided at a crease, zero at a jump.
+    #[inline(always)]
     pub(super) fn partials(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
         let one = |d: f64| [d, 0.0, 0.0];
         let two = |d: f64, e: f64| [d, e, 0.0];

@@ -25,12 +25,16 @@ pub(super) fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3], mended: f
         looks.extend([(a, b), (b, c), (c, a)].map(|(p, q)| scale(add(p, q), 0.5)));
     }
     let off = values(region, &looks);
+    let mut sorted: Vec<f64> = off.iter().map(|v| v.abs()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let p95 = (sorted.len().saturating_sub(1) as f64 * 0.95).round() as usize;
     let far = (0..off.len()).fold(0, |m, i| if off[i].abs() > off[m].abs() { i } else { m });
     let left = uncovered(mesh, inside);
     let depths = values(region, &left);
     let deep = (0..left.len()).fold(0, |m, i| if depths[i] < depths[m] { i } else { m });
     Fit {
         deviation_mean: off.iter().map(|v| v.abs()).sum::<f64>() / off.len().max(1) as f64,
+        deviation_p95: sorted.get(p95).copied().unwrap_or_default(),
         deviation: off.get(far).map_or(0.0, |v| v.abs()),
         deviation_at: looks.get(far).copied().unwrap_or_default(),
         lost: left.len() as f64 / inside.len().max(1) as f64,

@@ -5,8 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::super::TetMesh;
-use super::shape::{Around, shape};
+use super::work::Work;
 use crate::field::Field;
 use crate::math::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 
@@ -17,18 +16,13 @@ const REACH: f64 = 0.9;
 /// The second look is so many times closer: what is a bend and not an edge is flat there.
 const CLOSER: f64 = 0.1;
 
-/// A plane that touches the region.
-type Plane = (Vec3, Vec3);
+/// A plane that touches the region: a point of it and its normal.
+pub(super) type Plane = (Vec3, Vec3);
 
 /// Moves nodes of the boundary onto edges and corners of the region, as far as no tetrahedron gets worse than `least` or
-/// than the worst beside it was; sets `fixed` for those that were.
-pub(super) fn features(
-    mesh: &mut TetMesh,
-    region: &dyn Field,
-    around: &Around,
-    fixed: &mut [bool],
-    least: f64,
-) {
+/// than the worst beside it was.
+pub(super) fn features(work: &mut Work, least: f64) {
+    let (region, mesh) = (work.region, &work.mesh);
     let faces = mesh.boundary_faces();
     let points: Vec<Vec3> = faces
         .iter()
@@ -46,20 +40,14 @@ pub(super) fn features(
         f.iter().for_each(|n| at[*n as usize].push(i as u32));
     }
     let nodes: Vec<usize> = (0..mesh.nodes.len())
-        .filter(|n| !at[*n].is_empty() && !fixed[*n])
+        .filter(|n| !at[*n].is_empty() && work.held[*n] == 0 && !work.bars(mesh.nodes[*n]))
         .collect();
     let mut moves: Vec<(usize, f64, usize, Vec3)> = nodes
         .into_par_iter()
         .filter_map(|n| {
             let p = mesh.nodes[n];
             let near: Vec<Plane> = at[n].iter().map(|f| planes[*f as usize]).collect();
-            let near = distinct(&near)?;
-            let (first, _) = nearest(p, &near);
-            let closer: Vec<Vec3> = near
-                .iter()
-                .map(|(q, _)| add(first, scale(sub(*q, first), CLOSER)))
-                .collect();
-            let (place, rank) = nearest(first, &distinct(&touching(region, &closer))?);
+            let (place, rank) = meeting(region, p, &near)?;
             let others = at[n]
                 .iter()
                 .flat_map(|f| faces[*f as usize])
@@ -69,25 +57,35 @@ pub(super) fn features(
                 .fold(f64::INFINITY, f64::min);
             let way = norm(sub(place, p));
             let near = way < REACH * shortest && region.value(place).abs() < 0.02 * shortest;
-            near.then_some((3 - rank, way / shortest, n, place))
+            near.then_some((rank, way / shortest, n, place))
         })
         .collect();
-    moves.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    for (_, _, n, place) in moves {
-        let (before, _) = around.worst(mesh, n);
-        let old = mesh.nodes[n];
-        mesh.nodes[n] = place;
-        let worse = |t: &u32| shape(mesh.corners(*t as usize)) < least.min(before);
-        if around.of(n).iter().any(worse) {
-            mesh.nodes[n] = old;
+    moves.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    for (rank, _, n, place) in moves {
+        let bar = least.min(work.worst(n).0);
+        let old = core::mem::replace(&mut work.mesh.nodes[n], place);
+        if work.worst(n).0 < bar {
+            work.mesh.nodes[n] = old;
         } else {
-            fixed[n] = true;
+            work.held[n] = rank;
         }
     }
 }
 
+/// The place nearest to `p` where planes that touch the region near it meet, and in how many directions they hold it; `None` if
+/// they are of one smooth face.
+pub(super) fn meeting(region: &dyn Field, p: Vec3, near: &[Plane]) -> Option<(Vec3, usize)> {
+    let near = distinct(near)?;
+    let (first, _) = nearest(p, &near);
+    let closer: Vec<Vec3> = near
+        .iter()
+        .map(|(q, _)| add(first, scale(sub(*q, first), CLOSER)))
+        .collect();
+    Some(nearest(first, &distinct(&touching(region, &closer))?))
+}
+
 /// The planes that touch the region nearest to points.
-fn touching(region: &dyn Field, points: &[Vec3]) -> Vec<Plane> {
+pub(super) fn touching(region: &dyn Field, points: &[Vec3]) -> Vec<Plane> {
     const BATCH: usize = 256;
     let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
     v.par_chunks_mut(BATCH)

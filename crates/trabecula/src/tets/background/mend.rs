@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::super::{FACES, TetMesh, volume};
-use super::shape::Around;
+use super::work::Around;
 
 /// A piece is a crumb if it has less than this share of the largest one's volume,
 const CRUMB: f64 = 0.01;

@@ -1,6 +1,6 @@
 //! How good a tetrahedron is, while nodes are moved.
 
-use super::super::{TetMesh, quality::dihedral_cosines, volume};
+use super::super::{quality::dihedral_cosines, volume};
 use crate::math::Vec3;
 
 /// The least and the greatest dihedral angle (degrees) that cutting leaves in a lattice that is not bisected.
@@ -23,45 +23,4 @@ pub(super) fn shape(p: [Vec3; 4]) -> f64 {
         let worst = ((1.0 - c) / SMALL).min((1.0 + c) / LARGE);
         if worst.is_nan() { -1.0 } else { m.min(worst) }
     })
-}
-
-/// The tetrahedra at each node.
-pub(super) struct Around {
-    start: Vec<u32>,
-    tets: Vec<u32>,
-}
-
-impl Around {
-    pub fn new(mesh: &TetMesh) -> Around {
-        let mut start = vec![0u32; mesh.nodes.len() + 1];
-        mesh.tets
-            .iter()
-            .flatten()
-            .for_each(|n| start[*n as usize + 1] += 1);
-        for i in 1..start.len() {
-            start[i] += start[i - 1];
-        }
-        let mut next = start.clone();
-        let mut tets = vec![0; 4 * mesh.tets.len()];
-        for (i, t) in mesh.tets.iter().enumerate() {
-            for n in t {
-                tets[next[*n as usize] as usize] = i as u32;
-                next[*n as usize] += 1;
-            }
-        }
-        Around { start, tets }
-    }
-
-    /// The tetrahedra at node `n`, in ascending order.
-    pub fn of(&self, n: usize) -> &[u32] {
-        &self.tets[self.start[n] as usize..self.start[n + 1] as usize]
-    }
-
-    /// The worst shape at node `n`, and the tetrahedron that has it.
-    pub fn worst(&self, mesh: &TetMesh, n: usize) -> (f64, u32) {
-        self.of(n).iter().fold((f64::INFINITY, u32::MAX), |m, t| {
-            let q = shape(mesh.corners(*t as usize));
-            if q < m.0 { (q, *t) } else { m }
-        })
-    }
 }

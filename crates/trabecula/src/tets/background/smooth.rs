@@ -1,7 +1,8 @@
 //! Nodes of badly shaped tetrahedra are moved to where the worst of theirs is better.
 
-use super::super::{FACES, TetMesh};
-use super::shape::{Around, shape};
+use super::super::FACES;
+use super::shape::shape;
+use super::work::Work;
 use crate::field::Field;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -12,20 +13,14 @@ const ROUNDS: usize = 4;
 /// Steps that are tried, in parts of the mean edge at the node.
 const STEPS: [f64; 4] = [0.3, 0.15, 0.07, 0.03];
 
-/// Moves nodes, those that are `on` the surface along it, those that are `fixed` not at all. No tetrahedron gets worse
-/// than the worst of its node's was.
-pub(super) fn smooth(
-    mesh: &mut TetMesh,
-    region: &dyn Field,
-    around: &Around,
-    on: &[bool],
-    fixed: &[bool],
-) {
+/// Moves nodes, those on the surface along it, those that edges of the region hold not at all. No tetrahedron gets worse than
+/// the worst of its node's was.
+pub(super) fn smooth(work: &mut Work) {
     for _ in 0..ROUNDS {
         let mut moved = false;
-        for n in 0..mesh.nodes.len() {
-            if !fixed[n] && !around.of(n).is_empty() {
-                moved |= improve(mesh, region, around, n, on[n]);
+        for n in 0..work.mesh.nodes.len() {
+            if work.held[n] == 0 && !work.around.of(n).is_empty() {
+                moved |= improve(work, n);
             }
         }
         if !moved {
@@ -34,11 +29,13 @@ pub(super) fn smooth(
     }
 }
 
-fn improve(mesh: &mut TetMesh, region: &dyn Field, around: &Around, n: usize, on: bool) -> bool {
-    let (mut best, tet) = around.worst(mesh, n);
-    if best >= GOOD {
+/// Moves one node, if that makes the worst of its tetrahedra better.
+pub(super) fn improve(work: &mut Work, n: usize) -> bool {
+    let (mut best, tet) = work.worst(n);
+    if best >= GOOD || work.bars(work.mesh.nodes[n]) {
         return false;
     }
+    let (region, on, around, mesh) = (work.region, work.on[n], &work.around, &mut work.mesh);
     let start = mesh.nodes[n];
     let (mut sum, mut length, mut count) = ([0.0; 3], 0.0, 0.0);
     for t in around.of(n) {

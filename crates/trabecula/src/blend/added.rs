@@ -1,0 +1,255 @@
+//! What is added to the ends of a blend at a point: levels between neighbourhoods and between shares.
+//!
+//! Everything is linear between the tables (`levels`) of the neighbourhoods about a point, and between their nodes.
+
+use super::levels::{Levels, blended};
+use super::quantile::quantile;
+use super::simplex::Place;
+use super::strand::Strand;
+use super::table::Table;
+use crate::math::{Vec3, add, scale, sub};
+
+/// The ends of what is solid: the lower, the upper.
+pub(super) const LOW: usize = 0;
+pub(super) const HIGH: usize = 1;
+
+/// The quantiles of a lattice's ends at a point, and their gradients (per mm).
+#[derive(Clone, Copy, Default)]
+pub(super) struct End {
+    pub quantiles: [f64; 2],
+    pub slopes: [Vec3; 2],
+}
+
+/// What is found at a point on the way to its value.
+#[derive(Default)]
+pub(super) struct At {
+    /// Where the shares lie.
+    pub place: Place,
+    /// The quantiles of the lattices, where they vary.
+    pub q: Vec<[f64; 2]>,
+    terms: Vec<Term>,
+}
+
+/// A node's part in what is added: how often its number counts and, of a quantile function, at which share. (No enum: read
+/// ahead of its tag, a small whole number would be taken for a subnormal one, and those are slow.)
+#[derive(Clone, Copy)]
+struct Term {
+    node: usize,
+    times: f64,
+    q: f64,
+}
+
+/// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
+#[derive(Default)]
+pub(super) struct Row {
+    /// Between which neighbourhoods along y and z it lies.
+    across: [(usize, f64); 2],
+    /// How many rows have been.
+    count: u64,
+    /// For each neighbourhood along x the numbers there, and in which row.
+    columns: Vec<(u64, Table)>,
+}
+
+impl Row {
+    /// Begins the row at this y and z.
+    pub fn enter(&mut self, levels: &Levels, at: [f64; 2]) {
+        let along = |a: usize| {
+            let (n, share, _) = levels.joint.along(a + 1, at[a]);
+            (n, share)
+        };
+        self.across = [along(0), along(1)];
+        self.count += 1;
+        if self.columns.is_empty() {
+            let column = |_| (0, levels.table());
+            self.columns = (0..levels.joint.shape[0]).map(column).collect();
+        }
+    }
+}
+
+impl Levels {
+    /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at a place and have quantiles.
+    pub fn added(&self, strands: &[Strand], p: Vec3, w: &[f64], at: &mut At, end: usize) -> f64 {
+        let mut sum = self.terms(strands, w, at, end);
+        for (i, near, _) in self.joint.corners(p).iter().filter(|c| c.1 > 0.0) {
+            for t in &at.terms {
+                let numbers = self.numbers(*i, strands, t.node);
+                sum += near * t.times * self.ask(numbers, end, t.q).0;
+            }
+        }
+        sum
+    }
+
+    /// The same at x in a row that has been entered.
+    pub fn added_in_row(
+        &self,
+        strands: &[Strand],
+        x: f64,
+        w: &[f64],
+        at: &mut At,
+        end: usize,
+        row: &mut Row,
+    ) -> f64 {
+        let mut sum = self.terms(strands, w, at, end);
+        let (first, share, _) = self.joint.along(0, x);
+        for (i, near) in [(first, 1.0 - share), (first + 1, share)] {
+            if near <= 0.0 {
+                continue;
+            }
+            let (count, column) = &mut row.columns[i];
+            if *count != row.count {
+                *count = row.count;
+                column.clear();
+            }
+            let mut here = 0.0;
+            for t in &at.terms {
+                let found = match column.get(t.node) {
+                    Some(numbers) => self.ask(numbers, end, t.q),
+                    None => {
+                        let numbers = column.add(t.node);
+                        self.between(strands, i, t.node, row.across, numbers);
+                        self.ask(numbers, end, t.q)
+                    }
+                };
+                here += t.times * found.0;
+            }
+            sum += near * here;
+        }
+        sum
+    }
+
+    /// Adds a node's numbers at the i-th neighbourhood along x, between those along y and z.
+    fn between(
+        &self,
+        strands: &[Strand],
+        i: usize,
+        node: usize,
+        across: [(usize, f64); 2],
+        out: &mut [f32],
+    ) {
+        let [nx, ny, _] = self.joint.shape;
+        let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
+        for (k, share_z) in z.into_iter().filter(|z| z.1 > 0.0) {
+            for (j, share_y) in y.into_iter().filter(|y| y.1 > 0.0) {
+                let numbers = self.numbers((k * ny + j) * nx + i, strands, node);
+                let share = (share_y * share_z) as f32;
+                out.iter_mut()
+                    .zip(numbers)
+                    .for_each(|(o, v)| *o += share * v);
+            }
+        }
+    }
+
+    /// What is added to an end by the numbers of a node (at the share q), and how it changes with that.
+    #[inline(always)]
+    fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
+        match self.is_uniform() {
+            true => (f64::from(numbers[end]), 0.0),
+            false => quantile(numbers, q),
+        }
+    }
+
+    /// Finds which nodes have a part in what is added to an end; what is added besides.
+    fn terms(&self, strands: &[Strand], w: &[f64], at: &mut At, end: usize) -> f64 {
+        let At { place, q, terms } = at;
+        let own = match self.is_uniform() {
+            true => 0.0,
+            false => blended(w, q.iter().copied())[end],
+        };
+        terms.clear();
+        let nodes = place.nodes.iter().zip(&place.shares);
+        terms.extend(nodes.map(|(node, times)| Term {
+            node: *node,
+            times: *times,
+            q: own,
+        }));
+        let mut more = 0.0;
+        if !self.is_uniform() {
+            for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                if end == HIGH || s.is_sheet() {
+                    terms.push(Term {
+                        node: self.alone[i],
+                        times: -w[i],
+                        q: q[i][end],
+                    });
+                } else {
+                    more -= w[i] * s.low(0.0);
+                }
+            }
+        }
+        more
+    }
+
+    /// The same with its gradient (per mm); `dw` are those of the shares.
+    pub fn added_gradients(
+        &self,
+        strands: &[Strand],
+        p: Vec3,
+        (w, dw, place): (&[f64], &[Vec3], &Place),
+        ends: &[End],
+        end: usize,
+    ) -> (f64, Vec3) {
+        let corners = self.joint.corners(p);
+        // What the neighbourhoods answer together, how that changes from place to place, and with the share.
+        let sum = |node: usize, q: f64| {
+            let (mut v, mut d, mut steep) = (0.0, [0.0; 3], 0.0);
+            for (i, share, slope) in &corners {
+                if *share > 0.0 || *slope != [0.0; 3] {
+                    let of = self.ask(self.numbers(*i, strands, node), end, q);
+                    v += share * of.0;
+                    d = add(d, scale(*slope, of.0));
+                    steep += share * of.1;
+                }
+            }
+            (v, d, steep)
+        };
+        let (q, dq) = match self.is_uniform() {
+            true => (0.0, [0.0; 3]),
+            false => blended_gradient(w, dw, ends, end),
+        };
+        let (mut out, mut gradient, mut before) = (0.0, [0.0; 3], 0.0);
+        for (l, (node, share)) in place.nodes.iter().zip(&place.shares).enumerate() {
+            let (v, d, steep) = sum(*node, q);
+            out += share * v;
+            gradient = add(gradient, scale(add(d, scale(dq, steep)), *share));
+            if l > 0 {
+                // ∇y of the axis on which this node follows the last: m Σ ∇w from it on.
+                let from = place.axes[l - 1] + 1;
+                let dy = dw[from..].iter().fold([0.0; 3], |a, b| add(a, *b));
+                let rise = self.grid.steps() as f64 * (v - before);
+                gradient = add(gradient, scale(dy, rise));
+            }
+            before = v;
+        }
+        if self.is_uniform() {
+            return (out, gradient);
+        }
+        for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+            let (v, d) = if end == HIGH || s.is_sheet() {
+                let (v, d, steep) = sum(self.alone[i], ends[i].quantiles[end]);
+                (v, add(d, scale(ends[i].slopes[end], steep)))
+            } else {
+                (s.low(0.0), [0.0; 3])
+            };
+            out -= w[i] * v;
+            gradient = sub(gradient, add(scale(dw[i], v), scale(d, w[i])));
+        }
+        (out, gradient)
+    }
+}
+
+/// One end of `blended` and its gradient (per mm).
+fn blended_gradient(w: &[f64], dw: &[Vec3], ends: &[End], end: usize) -> (f64, Vec3) {
+    let q = blended(w, ends.iter().map(|e| e.quantiles));
+    let (mut da, mut dp) = ([0.0; 3], [0.0; 3]);
+    for ((w, dw), e) in w.iter().zip(dw).zip(ends) {
+        let ([lo, hi], [dlo, dhi]) = (e.quantiles, e.slopes);
+        let (from, dfrom) = if lo > 0.0 { (lo, dlo) } else { (0.0, [0.0; 3]) };
+        da = add(da, add(scale(*dw, lo), scale(dlo, *w)));
+        dp = add(dp, add(scale(*dw, hi - from), scale(sub(dhi, dfrom), *w)));
+    }
+    match end {
+        LOW => (q[LOW], da),
+        _ if q[LOW] > 0.0 => (q[HIGH], add(da, dp)),
+        _ => (q[HIGH], dp),
+    }
+}

@@ -1,0 +1,125 @@
+//! Whether the cells of different zones join, told before a surface is made.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value as Json, json};
+
+use super::{Warning, tiling::Zoned};
+use crate::cell::Part;
+use crate::cell::tet::{Bary, Stencil};
+use crate::extract::{self, Foretold};
+use crate::tiling::Tiling;
+
+/// Steps along the edge of a face on which ports are looked at.
+const STEPS: usize = 96;
+
+/// What hangs together, and for every two zones with faces in common the share of a face that is solid in both cells.
+#[derive(Clone, Debug)]
+pub struct Joins {
+    foretold: Foretold,
+    shares: Vec<f64>,
+}
+
+/// What hangs together in a lattice of zones whose cells are made at this fraction.
+pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joins> {
+    let foretold = extract::foretold(tiling)?;
+    let share = |zones: [u32; 2]| {
+        let [a, b] = zones.map(|z| cells.get(&z));
+        common(a?, b?, tiling.part, fraction)
+    };
+    let shares = foretold.joins.iter().map(|j| share(j.zones).unwrap_or(0.0));
+    Some(Joins {
+        shares: shares.collect(),
+        foretold,
+    })
+}
+
+/// The share of a face that is solid in both of two cells at the same fraction, by points evenly on it.
+fn common(a: &Stencil, b: &Stencil, part: Part, fraction: f64) -> Option<f64> {
+    let n = STEPS as f64;
+    // The middles of small triangles that point one way, and the others.
+    let at = |i: usize, j: usize, third: f64| -> Bary {
+        let [x, y] = [i, j].map(|v| (v as f64 + third) / n);
+        [x, y, 1.0 - x - y, 0.0]
+    };
+    let mut points = Vec::with_capacity(STEPS * STEPS);
+    for i in 0..STEPS {
+        points.extend((0..STEPS - i).map(|j| at(i, j, 1.0 / 3.0)));
+        points.extend((0..STEPS - i - 1).map(|j| at(i, j, 2.0 / 3.0)));
+    }
+    let solid = |s: &Stencil| -> Vec<bool> {
+        let t = s.iso(part, fraction);
+        let inside = |f: f64| match part {
+            Part::Lower => f < t,
+            Part::Upper => f > t,
+            Part::Sheet => f.abs() < t,
+        };
+        s.values(&points).into_iter().map(inside).collect()
+    };
+    let both = solid(a)
+        .into_iter()
+        .zip(solid(b))
+        .filter(|s| s.0 && s.1)
+        .count();
+    Some(both as f64 / points.len() as f64)
+}
+
+impl Joins {
+    /// Warns of zones that do not join, or of a lattice in pieces although they do.
+    pub(super) fn warn(
+        &self,
+        names: &BTreeMap<String, String>,
+        path: &str,
+        warnings: &mut Vec<Warning>,
+    ) {
+        let mut say = |message: String| {
+            warnings.push(Warning {
+                path: path.to_string(),
+                message,
+            });
+        };
+        let name = |zone: u32| names.get(&zone.to_string()).map_or("", String::as_str);
+        let apart = self
+            .foretold
+            .joins
+            .iter()
+            .zip(&self.shares)
+            .filter(|(j, _)| !j.joined);
+        let mut any = false;
+        for (join, share) in apart {
+            any = true;
+            let [a, b] = join.zones;
+            say(format!(
+                "zones {a} ({}) and {b} ({}) do not join: solid passes through {} of the {} faces between them, but the two stay \
+                 apart, as their ports share {:.1} % of a face; take cells with ports in the same places, or a higher fraction",
+                name(a),
+                name(b),
+                join.open,
+                join.faces,
+                100.0 * share
+            ));
+        }
+        if !any && self.foretold.pieces > 1 {
+            say(format!(
+                "the lattice is in {} pieces, told by its ports",
+                self.foretold.pieces
+            ));
+        }
+    }
+
+    /// Pieces of the whole.
+    pub(super) fn pieces(&self) -> usize {
+        self.foretold.pieces
+    }
+
+    /// For the report.
+    pub(super) fn json(&self) -> Json {
+        let one = |(j, share): (&extract::Join, &f64)| json!({ "zones": j.zones, "faces": j.faces, "open": j.open, "ports": share, "joined": j.joined });
+        self.foretold
+            .joins
+            .iter()
+            .zip(&self.shares)
+            .map(one)
+            .collect()
+    }
+}
