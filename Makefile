@@ -85,6 +85,7 @@ CASES ?= 2000
 campaign: $(VENV)/.test-tools
 	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test laws surface::random
 	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test laws -- damage flush --nocapture
+	TRABECULA_CASES=$$(($(CASES) / 5)) cargo test --release --locked -p trabecula --test laws -- combined --nocapture
 	TRABECULA_CAMPAIGN=1 $(BIN)/python -m pytest -q tests/test_parts.py
 
 python-test: $(VENV)/.test-tools

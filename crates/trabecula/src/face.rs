@@ -24,6 +24,8 @@ pub struct Face {
     pub edged: bool,
     /// Where it has edges, as far as that is known.
     pub creases: Arc<Creases>,
+    /// Whether it runs along another face of the solid, from which it is kept apart by a hair.
+    pub flush: bool,
 }
 
 /// A straight piece of an edge.
@@ -252,6 +254,7 @@ impl Face {
             cut: true,
             edged: true,
             creases: Arc::default(),
+            flush: false,
         }
     }
 

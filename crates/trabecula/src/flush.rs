@@ -33,6 +33,7 @@ pub(crate) fn apart(body: &mut Body, others: &[Face], bounds: &Aabb, moved: &mut
         {
             *moved += 1;
             *face = outwards(face.clone(), *moved as f64 * APART * size);
+            face.flush = true;
         }
     }
 }
@@ -72,6 +73,7 @@ pub(crate) fn parted(body: &mut Body, bounds: &Aabb, moved: &mut usize) {
             1.0
         };
         body.faces[j] = outwards(given[j].clone(), way * *moved as f64 * APART * size);
+        body.faces[j].flush = true;
     }
     // Faces that are others leave the list.
     let mut number = vec![0; given.len()];

@@ -8,6 +8,7 @@ use crate::math::Aabb;
 
 mod csg;
 mod mesh;
+mod meshes;
 mod primitive;
 
 pub use csg::{Difference, Intersection, Offset, Union};
@@ -55,6 +56,11 @@ pub trait Shape: Field {
     /// Adds to `out` the smooth faces of the solid within distance `by` (mm) of the shape, or deeper than −`by` in it;
     /// returns how they make it. The faces' numbers are their places in `out`.
     fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree;
+
+    /// The mesh that the shape is, if it is one: meshes that are combined make one.
+    fn as_mesh(&self) -> Option<&MeshRegion> {
+        None
+    }
 
     /// The same region seen without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;

@@ -87,6 +87,7 @@ impl Solid {
                     plane: None,
                     cut: false,
                     creases: Arc::default(),
+                    flush: false,
                 });
             }
             if any.is_empty() {

@@ -16,6 +16,7 @@ mod fit;
 mod rim;
 mod side;
 mod twice;
+mod wall;
 
 use std::collections::HashMap;
 
@@ -42,22 +43,23 @@ const SHARP: f64 = 0.436;
 pub(super) struct Edges {
     /// For each row of cells: those that are filled by their rims.
     pub cells: Vec<u64>,
-    /// Those of them in which the face meets others.
+    /// Those of them in which the face meets others, and which face that is.
     fitted: Vec<u64>,
+    fitted_to: Option<usize>,
     /// The face that has the edges.
     pub face: HashMap<usize, usize>,
     /// The chords of sides, by the lowest node of the side and the axis normal to it.
     sides: HashMap<(usize, usize), Vec<Chord>>,
-    /// Grid edges that are crossed twice, by their lower nodes and axes: the lower point first.
-    twice: HashMap<(usize, usize), [Vec3; 2]>,
+    /// Grid edges that a face crosses twice, by the face, their lower nodes and axes: the lower point first.
+    twice: HashMap<(usize, usize, usize), [Vec3; 2]>,
     /// The places of points that nothing else has.
     points: HashMap<Key, Vec3>,
     /// Where edges of live faces pierce sides.
     pierced: Vec<(usize, (usize, usize), Vec3)>,
-    /// Pieces of edges in cells, by the cells' lowest nodes.
-    pieces: HashMap<usize, Vec<[Vec3; 2]>>,
+    /// Pieces of edges in cells, by the face and the cells' lowest nodes.
+    pieces: HashMap<(usize, usize), Vec<[Vec3; 2]>>,
     /// Places where edges end, meet or bend, and how many are there, likewise.
-    corners: HashMap<usize, Vec<(Vec3, usize)>>,
+    corners: HashMap<(usize, usize), Vec<(Vec3, usize)>>,
     /// The corner that the patch of a cell has in a cell beside it, likewise.
     beyond: HashMap<usize, Vec3>,
 }
@@ -80,6 +82,7 @@ impl Edges {
     pub fn clear(&mut self, shape: [usize; 3]) {
         self.cells.clear();
         self.cells.resize(shape[1] * shape[2], 0);
+        self.fitted_to = None;
         self.fitted.clear();
         self.fitted.resize(shape[1] * shape[2], 0);
         self.face.clear();
@@ -131,12 +134,13 @@ impl Edges {
         }
     }
 
-    /// Adds the edges of a face that were followed. `all`: whether grid edges may be crossed twice.
-    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>, all: bool) {
+    /// Adds the edges of a face that were followed.
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>) {
         let nodes = seen.nodes;
         let of = &seen.grid.faces[seen.local.live[seen.face]].creases;
-        if all {
-            let cells: Vec<usize> = self.pieces.keys().copied().collect();
+        if seen.is_fitted() {
+            let own = self.pieces.keys().filter(|p| p.0 == seen.face);
+            let cells: Vec<usize> = own.map(|p| p.1).collect();
             self.find_twice(seen, cells);
         }
         // In the order of the segments where they pierce one side.
@@ -151,7 +155,7 @@ impl Edges {
                 at.entry((node + nodes.stride[axis], axis)).or_default();
             }
         }
-        for &(node, axis) in self.twice.keys() {
+        for &(_, node, axis) in self.twice.keys().filter(|t| t.0 == seen.face) {
             for other in (0..3).filter(|a| *a != axis) {
                 // The side is normal to the third axis.
                 let normal = 3 - axis - other;
@@ -179,8 +183,8 @@ impl Edges {
         if self.any() {
             for p in &of.corners {
                 if let Some(cell) = cell_of(nodes, p.0) {
-                    let here = self.corners.entry(nodes.index(cell)).or_default();
-                    here.push(*p);
+                    let here = (seen.face, nodes.index(cell));
+                    self.corners.entry(here).or_default().push(*p);
                 }
             }
             self.find_beyond(seen, &at);
@@ -196,7 +200,7 @@ impl Edges {
     ) {
         let nodes = seen.nodes;
         let mut found: Vec<(usize, Vec3)> = Vec::new();
-        for (&node, corners) in &self.corners {
+        for (&(_, node), corners) in self.corners.iter().filter(|c| c.0.0 == seen.face) {
             let cell = nodes.at(node);
             let [(place, count)] = corners[..] else {
                 continue;
@@ -262,7 +266,8 @@ impl Edges {
         for w in stops.windows(2).filter(|w| w[0] < w[1]) {
             let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
             if let Some(cell) = cell_of(nodes, scale(add(ends[0], ends[1]), 0.5)) {
-                self.pieces.entry(nodes.index(cell)).or_default().push(ends);
+                let here = (face, nodes.index(cell));
+                self.pieces.entry(here).or_default().push(ends);
             }
         }
     }
@@ -275,18 +280,24 @@ impl Edges {
         grid: &Grid,
         nodes: &Nodes,
         (cell, beyond): (usize, Option<Vec3>),
-        field: &dyn Field,
+        (face, field): (usize, &dyn Field),
         rim: &[Vec3],
         corners: &[Vec3],
     ) -> Vec3 {
         let center = middle(if corners.is_empty() { rim } else { corners });
         let far = |p: &Vec3| norm(sub(*p, center));
         let mut tried = Vec::with_capacity(4);
-        if let Some(pieces) = self.pieces.get(&cell) {
+        if let Some(pieces) = self.pieces.get(&(face, cell)) {
             let near = pieces.iter().map(|s| nearest(*s, center));
             tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
         }
-        tried.extend(self.corners.get(&cell).into_iter().flatten().map(|c| c.0));
+        tried.extend(
+            self.corners
+                .get(&(face, cell))
+                .into_iter()
+                .flatten()
+                .map(|c| c.0),
+        );
         // An edge that runs through needs no other choice.
         let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
         if !through {
@@ -318,6 +329,11 @@ impl Edges {
 }
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
+    /// Whether cells are fitted to the face.
+    fn is_fitted(&self) -> bool {
+        self.grid.fitted == Some(self.local.live[self.face])
+    }
+
     /// Whether the face alone makes the surface in a cell of the block, or would if it crossed it.
     fn alone(&self, cell: [usize; 3]) -> bool {
         let (signs, [i, j, k]) = (self.signs, cell);

@@ -14,9 +14,6 @@ use super::crease;
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
 pub(super) const TILE: usize = 61;
 
-/// Most faces beside the one that cells are fitted to: the two sides of a sheet, and a skin's.
-const MOST_BESIDE: usize = 3;
-
 /// Most node planes along an axis.
 const MOST: f64 = 4e6;
 
@@ -36,9 +33,7 @@ pub(super) struct Grid {
     laid: Vec<Option<usize>>,
     /// For each face, the edges that it has of its own in each tile.
     creases: Vec<HashMap<usize, Vec<u32>>>,
-    /// Whether one face at most has edges of its own.
-    pub one_creased: bool,
-    /// The one face with edges of its own to which cells are fitted where it meets others.
+    /// The face with edges of its own to which cells are fitted where it meets others.
     pub fitted: Option<usize>,
 }
 
@@ -94,8 +89,17 @@ impl Grid {
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
         tree.each_required(&mut |f| required.push(f));
-        let planes = required.iter().filter_map(|&f| Some((f, faces[f].plane?)));
-        let planes: Vec<_> = planes.collect();
+        let mut planes: Vec<_> = required
+            .iter()
+            .filter_map(|&f| Some((f, faces[f].plane?)))
+            .collect();
+        // What is kept apart by a hair is too near for cells that are fitted to edges.
+        let fits =
+            faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.flush);
+        // Caps on planes of the grid know of knots alone, not of such cells.
+        if fits {
+            planes.clear();
+        }
         let mut axes: [Vec<f64>; 3] = Default::default();
         for (a, nodes) in axes.iter_mut().enumerate() {
             let (lo, hi) = (bounds.min[a], bounds.max[a]);
@@ -134,8 +138,9 @@ impl Grid {
             flats.extend(others.filter_map(|f| f.plane.filter(|p| p.axis == a).map(|p| p.at)));
             flats.retain(|s| (lo..=hi).contains(s));
             for at in flats {
-                // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes.
-                let share = [0.4, 0.5, 0.6][a];
+                // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes. No
+                // two shares are the same, nor make one together.
+                let share = [0.4, 0.5, 0.3][a];
                 if stops.iter().all(|s| (s - at).abs() > 0.75 * edge) {
                     stops.extend([at - share * edge, at + (1.0 - share) * edge]);
                 }
@@ -189,21 +194,14 @@ impl Grid {
             tree,
             laid,
             creases: Vec::new(),
-            one_creased: true,
             fitted: None,
         };
         grid.creases = (grid.faces.iter())
             .map(|f| crease::by_tile(&grid, &f.creases))
             .collect();
+        // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
-        let (first, second) = (creased.next(), creased.next());
-        grid.one_creased = second.is_none();
-        // Where many faces meet in a fitted cell single precision muddles more than dividing it anew mends.
-        let cuts = grid.faces.iter().filter(|f| f.cut).count();
-        let few = cuts == 1 && grid.faces.len() <= 1 + MOST_BESIDE;
-        // Caps on planes of the grid know of knots alone.
-        let fits = few && grid.one_creased && grid.laid.iter().all(Option::is_none);
-        grid.fitted = first.filter(|_| fits);
+        grid.fitted = creased.next().filter(|_| fits);
         grid.few_enough().map(|()| grid)
     }
 

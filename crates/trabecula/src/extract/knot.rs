@@ -318,7 +318,12 @@ impl Knots<'_> {
 
     /// The side of a cell along an axis, divided by the faces that cross it: the pieces of its two triangles with the
     /// faces that are negative there, counter-clockwise seen from outside the cell.
-    fn side_pieces(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<Key>)> {
+    pub(super) fn side_pieces(
+        &self,
+        cell: [usize; 3],
+        axis: usize,
+        upper: bool,
+    ) -> Vec<(u64, Vec<Key>)> {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
         let mut all = Vec::new();

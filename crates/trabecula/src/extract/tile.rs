@@ -328,6 +328,8 @@ fn take(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
         if grid.has_creases(id) {
             s.edges.take(local, &mut s.signs, nodes, face);
         }
+    }
+    for (face, &id) in local.live.iter().enumerate() {
         if grid.fitted == Some(id) {
             s.edges.fit(local, &mut s.signs, nodes, face);
         }
@@ -360,7 +362,7 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
                     Some(places[v as usize])
                 },
             };
-            edges.find(&seen, grid.one_creased);
+            edges.find(&seen);
         }
     }
 }

@@ -2,20 +2,21 @@
 
 use std::sync::Arc;
 
-use super::{HalfSpace, Region, Shape};
+use super::meshes::{List, Meshes};
+use super::{HalfSpace, MeshRegion, Region, Shape};
 use crate::face::{Face, Tree};
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3};
 
 /// What lies in any of the regions: the least of their distances.
-pub struct Union(Vec<Region>);
+pub struct Union(List);
 
 /// What lies in all of the regions: the greatest of their distances.
-pub struct Intersection(Vec<Region>);
+pub struct Intersection(List);
 
 /// What lies in the first region and in none of the others: max(d₀, −d₁, −d₂ …).
-pub struct Difference(Vec<Region>);
+pub struct Difference(List);
 
 /// A region grown (positive) or shrunk (negative): d − by.
 pub struct Offset {
@@ -25,14 +26,14 @@ pub struct Offset {
     snap: f64,
 }
 
-fn some(verb: &str, of: Vec<Region>) -> Result<Vec<Region>, Fault> {
+fn some(verb: &str, of: Vec<Region>) -> Result<List, Fault> {
     if of.is_empty() {
         return Err(Fault::new(
             "",
             format!("{verb} of no regions: list at least one"),
         ));
     }
-    Ok(of)
+    Ok(List::new(of))
 }
 
 impl Union {
@@ -81,7 +82,14 @@ impl Offset {
 
 /// How the regions of a list join: the signs they enter with and whether the greatest or the least counts.
 trait Join: Send + Sync {
-    fn regions(&self) -> &[Region];
+    fn list(&self) -> &List;
+    fn regions(&self) -> &[Region] {
+        &self.list().of
+    }
+    /// The meshes among the regions as one.
+    fn meshes(&self) -> Option<&Meshes> {
+        self.list().meshes(!Self::ALL, |i| self.negated(i))
+    }
     /// Whether region `i` enters by its complement.
     fn negated(&self, i: usize) -> bool;
     /// Whether a later value takes the place of the one held.
@@ -93,7 +101,7 @@ trait Join: Send + Sync {
 }
 
 impl Join for Union {
-    fn regions(&self) -> &[Region] {
+    fn list(&self) -> &List {
         &self.0
     }
     fn negated(&self, _: usize) -> bool {
@@ -107,13 +115,17 @@ impl Join for Union {
         a.min(b)
     }
     fn extent(&self) -> Aabb {
-        let full = self.0.iter().map(|r| r.bounds()).filter(|b| !b.is_empty());
+        let full = self
+            .regions()
+            .iter()
+            .map(|r| r.bounds())
+            .filter(|b| !b.is_empty());
         full.reduce(Aabb::union).unwrap_or(Aabb::EMPTY)
     }
 }
 
 impl Join for Intersection {
-    fn regions(&self) -> &[Region] {
+    fn list(&self) -> &List {
         &self.0
     }
     fn negated(&self, _: usize) -> bool {
@@ -127,7 +139,7 @@ impl Join for Intersection {
         a.max(b)
     }
     fn extent(&self) -> Aabb {
-        self.0
+        self.regions()
             .iter()
             .map(|r| r.bounds())
             .fold(Aabb::ALL, Aabb::intersection)
@@ -135,7 +147,7 @@ impl Join for Intersection {
 }
 
 impl Join for Difference {
-    fn regions(&self) -> &[Region] {
+    fn list(&self) -> &List {
         &self.0
     }
     fn negated(&self, i: usize) -> bool {
@@ -149,7 +161,7 @@ impl Join for Difference {
         a.max(b)
     }
     fn extent(&self) -> Aabb {
-        self.0[0].bounds()
+        self.regions()[0].bounds()
     }
 }
 
@@ -226,12 +238,18 @@ macro_rules! joined {
             }
 
             fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
-                let each = self.regions().iter().enumerate().map(|(i, r)| {
+                let meshes = self.meshes();
+                let regions = self.regions().iter().enumerate().filter_map(|(i, r)| match meshes {
+                    Some(m) if m.which[0] == i => Some((i, m.one.clone() as Region)),
+                    Some(m) if m.which.contains(&i) => None,
+                    _ => Some((i, r.clone())),
+                });
+                let each = regions.map(|(i, r)| {
                     if !self.negated(i) {
-                        return r.clone().faces(by, out);
+                        return r.faces(by, out);
                     }
                     let first = out.len();
-                    let tree = r.clone().faces(-by, out).complement();
+                    let tree = r.faces(-by, out).complement();
                     let turned = out.split_off(first);
                     out.extend(turned.into_iter().map(Face::turned));
                     tree
@@ -243,6 +261,14 @@ macro_rules! joined {
                 }
             }
 
+            fn as_mesh(&self) -> Option<&MeshRegion> {
+                if let [only] = self.regions() {
+                    return only.as_mesh();
+                }
+                let meshes = self.meshes()?;
+                (meshes.which.len() == self.regions().len()).then(|| &*meshes.one)
+            }
+
             // What is taken away keeps its surface: grown, it has no flat faces of its own.
             fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
                 let mut any = false;
@@ -252,7 +278,7 @@ macro_rules! joined {
                     opened.unwrap_or_else(|| r.clone())
                 };
                 let regions = self.regions().iter().enumerate().map(&mut open).collect();
-                any.then(|| Arc::new(Self(regions)) as Region)
+                any.then(|| Arc::new(Self(List::new(regions))) as Region)
             }
 
             fn volume(&self) -> Option<f64> {

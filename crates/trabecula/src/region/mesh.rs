@@ -63,7 +63,19 @@ impl MeshRegion {
     /// **Errors**: numbers that are not finite; no volume; holes whose caps would be a tenth of the surface or more
     /// ([`CAPPED`]); with [`Repair::Refuse`] all that [`Repaired`] counts, in numbers.
     pub fn new(mesh: Mesh, repair: Repair) -> Result<Self, Fault> {
-        let Boundary { mesh, pairs, done } = repair::boundary(mesh, repair)?;
+        repair::boundary(mesh, repair).map(MeshRegion::within)
+    }
+
+    /// What is in all of some regions, or in any; less what is in the others.
+    ///
+    /// None where that holds nothing.
+    pub(super) fn combined(of: &[&MeshRegion], any: bool, less: &[&MeshRegion]) -> Option<Self> {
+        let least = if any { 1 } else { of.len() };
+        let [of, less] = [of, less].map(|all| all.iter().map(|r| &r.mesh).collect::<Vec<_>>());
+        repair::combined(&of, &less, least).map(MeshRegion::within)
+    }
+
+    fn within(Boundary { mesh, pairs, done }: Boundary) -> Self {
         let faces: Vec<Face> = (0..mesh.triangles.len())
             .map(|i| Face::new(mesh.corners(i)))
             .collect();
@@ -75,7 +87,7 @@ impl MeshRegion {
                 Some(Winding::new(&tree)),
             ),
         };
-        Ok(MeshRegion {
+        MeshRegion {
             normals,
             winding,
             bounds: mesh.bounds(),
@@ -85,7 +97,7 @@ impl MeshRegion {
             mesh,
             repaired: done,
             creases: OnceLock::new(),
-        })
+        }
     }
 
     /// The boundary that everything is taken from: the mesh given if it was clean, else the repaired one.
@@ -236,6 +248,10 @@ impl Shape for MeshRegion {
                 face::Tree::Face(out.len() - 1)
             }
         }
+    }
+
+    fn as_mesh(&self) -> Option<&MeshRegion> {
+        Some(self)
     }
 
     fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {

@@ -23,7 +23,7 @@ fn region(mesh: Mesh) -> Arc<MeshRegion> {
     Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("clean"))
 }
 
-fn moved(mut mesh: Mesh, degrees: Vec3, by: Vec3) -> Mesh {
+pub fn moved(mut mesh: Mesh, degrees: Vec3, by: Vec3) -> Mesh {
     let turn = rotation(degrees);
     for v in &mut mesh.vertices {
         *v = add(apply(&turn, *v), by);
@@ -54,12 +54,12 @@ fn fan(n: usize) -> Vec<[usize; 3]> {
     (1..n - 1).map(|i| [0, i, i + 1]).collect()
 }
 
-fn block(x: f64, y: f64, z: f64) -> Mesh {
+pub fn block(x: f64, y: f64, z: f64) -> Mesh {
     prism(&[[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]], &fan(4), z)
 }
 
 /// An L; its inner edge is concave, and so is one of the three edges at that edge's ends.
-fn angle() -> Mesh {
+pub fn angle() -> Mesh {
     let polygon = [
         [0.0, 0.0],
         [2.0, 0.0],
@@ -72,7 +72,7 @@ fn angle() -> Mesh {
 }
 
 /// The boxes between planes along each axis of which `full` says that they are solid.
-fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
+pub fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
     let cells = at.map(|a| a.len() - 1);
     let holds = |c: [usize; 3]| (0..3).all(|a| c[a] < cells[a]) && full(c);
     let mut mesh = Mesh::default();
@@ -113,12 +113,12 @@ fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
 }
 
 /// A block without one of its corners: where its edges end, convex and concave ones meet.
-fn notched() -> Mesh {
+pub fn notched() -> Mesh {
     boxes([&[0.0, 0.7, 1.6]; 3], |c| c != [1; 3])
 }
 
 /// Points on the edges of a mesh that turn by more than some angle, no farther from each other than a length.
-fn creases(mesh: &Mesh, degrees: f64, apart: f64) -> Vec<Vec3> {
+pub fn creases(mesh: &Mesh, degrees: f64, apart: f64) -> Vec<Vec3> {
     let normal = |i: usize| {
         let [a, b, c] = mesh.corners(i);
         unit(cross(sub(b, a), sub(c, a)))
@@ -201,7 +201,7 @@ impl Shape for Rounded {
 }
 
 /// The share of the edges of a region that are farther from a mesh than a hundredth of a step.
-fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
+pub fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     let found = region(mesh.clone());
     let points = creases(truth.mesh(), 30.0, edge / 4.0);
     let far = points
@@ -210,12 +210,12 @@ fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     far.count() as f64 / points.len() as f64
 }
 
-fn of(region: Region, edge: f64) -> Surface {
+pub fn of(region: Region, edge: f64) -> Surface {
     surface(&Solid::new(region, None, 1.0), edge, &Silent).expect("surface")
 }
 
 /// A cylinder about z as a mesh of many facets.
-fn cylinder(n: u32, radius: f64, height: f64) -> Mesh {
+pub fn cylinder(n: u32, radius: f64, height: f64) -> Mesh {
     let polygon: Vec<[f64; 2]> = (0..n)
         .map(|i| (2.0 * PI * f64::from(i) / f64::from(n)).sin_cos())
         .map(|(s, c)| [radius * c, radius * s])
@@ -224,7 +224,7 @@ fn cylinder(n: u32, radius: f64, height: f64) -> Mesh {
 }
 
 /// A star of n points: every other edge is concave.
-fn star(n: u32) -> Mesh {
+pub fn star(n: u32) -> Mesh {
     let corner = |i: u32| {
         let (s, c) = (PI * f64::from(i) / f64::from(n)).sin_cos();
         let r = if i.is_multiple_of(2) { 1.0 } else { 0.5 };
@@ -428,7 +428,7 @@ fn both(what: &str, truth: Arc<MeshRegion>, edge: f64, some: &mut Random) -> f64
 }
 
 /// A ball of 20·4ⁿ triangles.
-fn ball(n: usize) -> Mesh {
+pub fn ball(n: usize) -> Mesh {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut mesh = Mesh::default();
     for (a, b) in [(1.0, g), (1.0, -g), (-1.0, g), (-1.0, -g)] {

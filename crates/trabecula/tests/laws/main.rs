@@ -1,6 +1,7 @@
 //! Laws of the whole: random designs, rates of convergence, bodies known exactly.
 
 mod blend;
+mod combined;
 mod common;
 mod crease;
 mod damage;

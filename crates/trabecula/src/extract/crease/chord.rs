@@ -130,7 +130,7 @@ impl Edges {
                     enters: solid,
                 });
             };
-            if let Some(twice) = self.twice.get(&(node, along)) {
+            if let Some(twice) = self.twice.get(&(seen.face, node, along)) {
                 for i in if forward { [0, 1] } else { [1, 0] } {
                     add(Key::crossing(node, along, seen.face, i), twice[i]);
                 }

@@ -58,7 +58,7 @@ impl Knots<'_> {
             .filter(|k| k.spans().count_ones() == 2);
         let corners: Vec<Vec3> = in_sides.filter_map(|k| self.edges.place(*k)).collect();
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
-        let center = scale(add(ends[0], ends[1]), 0.5);
+        let center = self.center_of(cell);
         let field = self.grid.faces[self.local.live[face]].field.clone();
         let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
         let solid = field.value(center) <= 0.0;
@@ -74,7 +74,7 @@ impl Knots<'_> {
             } else {
                 let apex = match attempt {
                     0 if rim.is_empty() => center,
-                    0 => edges.apex(grid, nodes, (node, None), &*field, &rim, &corners),
+                    0 => edges.apex(grid, nodes, (node, None), (face, &*field), &rim, &corners),
                     1 if !rim.is_empty() => scale(add(middle(&rim), center), 0.5),
                     _ => {
                         let by = [0, 1, 2].map(|a| self.chance(3 * attempt + a, node));
@@ -87,9 +87,11 @@ impl Knots<'_> {
             self.extra.triangles.truncate(first);
             self.fill(cell, face, &tets);
             if !self.muddled(first) {
-                break;
+                return;
             }
         }
+        self.extra.triangles.truncate(first);
+        self.walled(cell, &INNER);
     }
 
     /// The triangles of the sides of a cell.
@@ -130,7 +132,7 @@ impl Knots<'_> {
         let node = self.nodes.index(cell);
         let around = [0, 1, 2, 3, 4, 5, 6, 7].map(|c| node + self.offset(c));
         let values = self.values_between(place, &around);
-        self.add_point(place, values)
+        self.add_point(place, None, values)
     }
 
     /// The tetrahedra from a point to all sides of a cell.

@@ -30,6 +30,8 @@ pub(in crate::extract) struct Fits {
     values: Vec<Vec<f64>>,
     /// The first of those that are the same point, with other values.
     first: Vec<usize>,
+    /// The grid edge that each lies on, if it does: by its lower node and its axis.
+    lines: Vec<Option<(usize, usize)>>,
     pub(super) numbers: HashMap<Key, usize>,
     /// By the lowest node and the axis normal to the side.
     pub sides: HashMap<(usize, usize), Rc<Side>>,
@@ -43,17 +45,22 @@ impl Fits {
     pub fn value(&self, point: usize, face: usize) -> f64 {
         self.values[point][face]
     }
+
+    pub fn line(&self, point: usize) -> Option<(usize, usize)> {
+        self.lines[point]
+    }
 }
 
 impl Edges {
     /// Takes the cells in which a face with edges meets others out of those to be cut as knots.
     pub fn fit(&mut self, local: &Local, signs: &mut Signs, nodes: &Nodes, face: usize) {
+        self.fitted_to = Some(face);
         let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| {
             !matches!(signs.corners(face, i, j, k), 0 | 0xff)
         };
         let mut found: Vec<[usize; 3]> = signs.knotted_cells().collect();
         found.retain(|c| mixed(signs, *c));
-        for &node in self.pieces.keys() {
+        for &(_, node) in self.pieces.keys().filter(|p| p.0 == face) {
             let cell = nodes.at(node);
             let others = Others::of(local, signs, face, cell);
             if !mixed(signs, cell)
@@ -85,7 +92,7 @@ impl Edges {
 
     /// The cells that place the vertices of a face on their grid edges by the values at the nodes.
     pub fn knots<'a>(&self, signs: &'a Signs, face: usize) -> Cow<'a, [u64]> {
-        if self.fitted.is_empty() || !self.has(face) {
+        if self.fitted_to != Some(face) {
             return Cow::Borrowed(&signs.knotted);
         }
         let rows = signs.knotted.iter().zip(&self.fitted);
@@ -94,7 +101,7 @@ impl Edges {
 
     /// Adds to the nodes at which the other faces are asked for those about pieces of edges.
     pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
-        for &node in self.pieces.keys() {
+        for &(_, node) in self.pieces.keys() {
             let [i, j, k] = nodes.at(node);
             let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);
             let row = around(i, 0).fold(0, |w, i| w | 1u64 << i);
@@ -115,9 +122,8 @@ impl Edges {
         if seen.alone(cell) {
             return true;
         }
-        let fits = seen.grid.fitted == Some(seen.local.live[seen.face]);
         let dead = || Others::of(seen.local, seen.signs, seen.face, cell).is_dead();
-        fits && (self.is_fitted(seen.nodes, cell) || dead())
+        seen.is_fitted() && (self.is_fitted(seen.nodes, cell) || dead())
     }
 }
 
@@ -147,7 +153,7 @@ impl Knots<'_> {
 
     /// The points in which the face with edges crosses a grid edge, the lower one first.
     pub(super) fn points_of(&self, node: usize, axis: usize, face: usize) -> Vec<(Key, Vec3)> {
-        if let Some(points) = self.edges.twice.get(&(node, axis)) {
+        if let Some(points) = self.edges.twice.get(&(face, node, axis)) {
             return (0..2)
                 .map(|i| (Key::crossing(node, axis, face, i), points[i]))
                 .collect();
@@ -172,26 +178,13 @@ impl Knots<'_> {
         if face == fitted {
             return None;
         }
-        let points = self.points_of(node, axis, fitted);
-        if points.is_empty() {
+        let (at, order) = self.order_along(node, axis, fitted);
+        if at.is_empty() {
             return None;
         }
-        let at: Vec<f64> = points
-            .iter()
-            .map(|p| self.share_of(node, axis, p.1))
-            .collect();
-        let stretch = |f: usize| {
-            let same = |s: &&f64| {
-                (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0)
-            };
-            at.iter().take_while(same).count()
-        };
-        let here = stretch(face);
-        let edge = self.simplex(node, &[1 << axis]);
-        let others = self.crossings(&edge).into_iter();
-        let mut all: Vec<(f64, usize)> = others
-            .filter(|(_, f)| *f != fitted && stretch(*f) == here)
-            .collect();
+        let here = order.iter().find(|o| o.2 == face)?.0;
+        let stretch = order.iter().filter(|o| o.0 == here);
+        let mut all: Vec<(f64, usize)> = stretch.map(|o| (o.1, o.2)).collect();
         let low = if here == 0 { 0.0 } else { at[here - 1] };
         let high = at.get(here).copied().unwrap_or(1.0);
         let count = all.len();
@@ -213,9 +206,67 @@ impl Knots<'_> {
         Some(place)
     }
 
+    /// The points in which the fitted face crosses a grid edge, as shares of it; and the other faces that cross it, in
+    /// order: after how many of these points each does, the share by its values at the nodes, and its number.
+    fn order_along(
+        &self,
+        node: usize,
+        axis: usize,
+        fitted: usize,
+    ) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
+        let points = self.points_of(node, axis, fitted);
+        let at: Vec<f64> = points
+            .iter()
+            .map(|p| self.share_of(node, axis, p.1))
+            .collect();
+        let stretch = |f: usize| {
+            let same = |s: &&f64| {
+                (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0)
+            };
+            at.iter().take_while(same).count()
+        };
+        let others = self.crossings(&self.simplex(node, &[1 << axis]));
+        let others = others.into_iter().filter(|(_, f)| *f != fitted);
+        let mut order: Vec<_> = others.map(|(s, f)| (stretch(f), s, f)).collect();
+        order.sort_by_key(|o| o.0);
+        (at, order)
+    }
+
+    /// Whether a face is negative where another one crosses a part of a grid edge that the fitted face crosses too: by their
+    /// order along the whole of it, which all sides and cells around it share. None if the part is of no such edge.
+    pub fn beside_on_line(&self, ends: [usize; 2], other: usize, face: usize) -> Option<bool> {
+        let count = self.nodes.count();
+        let line = |n: usize| self.fits.line(n.checked_sub(count)?);
+        let (node, axis) = line(ends[0]).or_else(|| line(ends[1]))?;
+        let high = node + self.offset(1 << axis);
+        let on = |n: usize| n == node || n == high || line(n) == Some((node, axis));
+        if !ends.into_iter().all(on) {
+            return None;
+        }
+        let at_ends = [node, high].map(|n| self.signs.is_negative(face, n));
+        if at_ends[0] == at_ends[1] {
+            return Some(at_ends[0]);
+        }
+        let fitted = self.grid.fitted?;
+        let fitted = self.local.live.iter().position(|f| *f == fitted)?;
+        let (_, order) = self.order_along(node, axis, fitted);
+        let place = |f: usize| order.iter().position(|o| o.2 == f);
+        let passed = match (place(face), place(other)) {
+            (Some(own), Some(at)) => own < at,
+            _ => false,
+        };
+        Some(at_ends[usize::from(passed)])
+    }
+
     /// Adds a point that is no node; gives its number.
-    pub(super) fn add_point(&mut self, place: Vec3, values: Vec<f64>) -> usize {
+    pub(super) fn add_point(
+        &mut self,
+        place: Vec3,
+        line: Option<(usize, usize)>,
+        values: Vec<f64>,
+    ) -> usize {
         self.fits.places.push(place);
+        self.fits.lines.push(line);
         self.fits.values.push(values);
         let id = self.nodes.count() + self.fits.places.len() - 1;
         self.fits.first.push(id);
@@ -242,7 +293,7 @@ impl Knots<'_> {
             )
         });
         let values = shaken.collect();
-        let id = self.add_point(self.fits.places[point], values);
+        let id = self.add_point(self.fits.places[point], self.fits.lines[point], values);
         let first = self.fits.first[point];
         self.fits.first[id - self.nodes.count()] = first;
         id

@@ -73,7 +73,14 @@ impl Knots<'_> {
             } else {
                 None
             };
-            let apex = edges.apex(grid, nodes, (node, beyond), field, &places, &corners);
+            let apex = edges.apex(
+                grid,
+                nodes,
+                (node, beyond),
+                (face, field),
+                &places,
+                &corners,
+            );
             self.cone(Key::center(node, 7), apex, &names, cut);
         }
         // One cone cannot meet itself, but several may meet each other.
@@ -203,7 +210,7 @@ impl Knots<'_> {
                 .iter()
                 .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
                 .collect();
-            for t in ears(&flat) {
+            for t in ears(&flat, 0) {
                 self.extra.triangles.push((t.map(|i| names[i]), cut));
             }
         }
@@ -232,7 +239,7 @@ impl Knots<'_> {
                 let [p, q] = [a, b].map(|n| self.signs.is_negative(face, n));
                 if p != q {
                     boundary.push(Key::new(a.min(b), &[1 << along], &[face]));
-                } else if self.edges.twice.contains_key(&(a.min(b), along)) {
+                } else if self.edges.twice.contains_key(&(face, a.min(b), along)) {
                     let order = if i < 2 { [0, 1] } else { [1, 0] };
                     let key = |n| Key::crossing(a.min(b), along, face, n);
                     boundary.extend(order.map(key));
@@ -289,8 +296,9 @@ impl Knots<'_> {
     }
 }
 
-/// The triangles of a simple polygon, by clipping its best ear again and again.
-pub(super) fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
+/// The triangles of a simple polygon, by clipping its best ear again and again; the first one is not the best but one of
+/// those after it, as `other` says, if there are as many.
+pub(super) fn ears(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let area: f64 = (0..ring.len())
         .map(|i| {
@@ -313,11 +321,13 @@ pub(super) fn ears(ring: &[[f64; 2]]) -> Vec<[usize; 3]> {
             let (a, b, c) = corner(*i);
             lowest([a, b, c].map(|i| ring[i]))
         };
-        let ears = (0..n).filter(is_ear);
-        let best = ears.max_by(|i, j| height(i).total_cmp(&height(j)));
-        let (a, b, c) = corner(best.unwrap_or(0));
+        let mut ears: Vec<usize> = (0..n).filter(is_ear).collect();
+        ears.sort_by(|i, j| height(j).total_cmp(&height(i)));
+        let skip = if found.is_empty() { other } else { 0 };
+        let best = ears.get(skip % ears.len().max(1)).copied().unwrap_or(0);
+        let (a, b, c) = corner(best);
         found.push([a, b, c]);
-        left.remove(best.unwrap_or(0));
+        left.remove(best);
     }
     found.push([left[0], left[1], left[2]]);
     found

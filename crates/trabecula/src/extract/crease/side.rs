@@ -1,8 +1,8 @@
 //! The sides of cells that are fitted to a face: cut along its chords and into triangles.
 //!
 //! What becomes of a side follows from the side alone, so that the cells beside it, in whichever tiles, agree. Where single
-//! precision muddles it, it is divided again with other values at its points, by chance, but of the same signs: then its grid
-//! edges stay what they are.
+//! precision muddles it, it is divided again into other triangles, with other values at its points, by chance, but of the same
+//! signs: then its grid edges stay what they are.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -52,7 +52,7 @@ const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// The faces that are negative in a polygon, and the names and places of its corners.
 type Polygon = (u64, Vec<(Key, Vec3)>);
 
-/// How often a side is divided anew with other values at its points, if single precision muddles it.
+/// How often a side is divided anew if single precision muddles it.
 const TRIES: usize = 8;
 
 /// The grid edges of a side that a corner lies on, as bits.
@@ -136,16 +136,10 @@ impl Knots<'_> {
             return None;
         }
         let chords = self.chords_of((low, axis), &ring, &mut corners, &boundary);
-        let parts = self.parts(
-            axis,
-            &corners,
-            &boundary,
-            &chords,
-            self.signs.is_negative(face, low),
-        );
+        let solid = self.signs.is_negative(face, low);
         let mut side = Side {
+            parts: self.parts(axis, &corners, &boundary, &chords, (solid, 0)),
             corners,
-            parts,
             pieces: Vec::new(),
             chords: Vec::new(),
             tries: 0,
@@ -157,6 +151,8 @@ impl Knots<'_> {
             for i in 0..side.corners.len() {
                 side.corners[i].id = self.shaken(low, &side.corners[i], side.tries);
             }
+            let again = (solid, side.tries);
+            side.parts = self.parts(axis, &side.corners, &boundary, &chords, again);
             pieces = self.cut_parts(at, face, &side);
         }
         for (negative, ring) in pieces {
@@ -178,7 +174,8 @@ impl Knots<'_> {
             return *id;
         }
         let values = values(self);
-        let id = self.add_point(place, values);
+        let line = (0..3).find(|a| key.is_along(*a)).map(|a| (key.node(), a));
+        let id = self.add_point(place, line, values);
         self.fits.numbers.insert(key, id);
         id
     }
@@ -218,14 +215,15 @@ impl Knots<'_> {
         (0..ends.len()).filter(|i| ends[*i].1).map(next).collect()
     }
 
-    /// The triangles between the boundary of a side and its chords.
+    /// The triangles between the boundary of a side and its chords; other ones each time it is divided anew, where there are
+    /// others. `solid`: whether the face is negative at the side's first node.
     fn parts(
         &self,
         axis: usize,
         corners: &[Corner],
         boundary: &[(usize, Option<bool>)],
         chords: &[Vec<usize>],
-        solid: bool,
+        (solid, tries): (bool, usize),
     ) -> Vec<Part> {
         let flat: Vec<[f64; 2]> = corners
             .iter()
@@ -240,7 +238,7 @@ impl Knots<'_> {
         let mut parts = Vec::new();
         let mut add = |polygon: &[usize], inside: bool| {
             let places: Vec<[f64; 2]> = polygon.iter().map(|c| flat[*c]).collect();
-            for t in super::rim::ears(&places) {
+            for t in super::rim::ears(&places, tries) {
                 let t = t.map(|i| polygon[i]);
                 let mut sorted = t;
                 sorted.sort_by_key(|c| corners[*c].code);

@@ -28,13 +28,13 @@ impl Edges {
         edges.dedup();
         for (node, axis) in edges {
             if let Some(points) = seen.twice(self, node, axis) {
-                self.twice.insert((node, axis), points);
+                self.twice.insert((seen.face, node, axis), points);
             }
         }
-        for ((node, axis), points) in &self.twice {
+        for ((face, node, axis), points) in &self.twice {
             for (i, p) in points.iter().enumerate() {
                 self.points
-                    .insert(super::Key::crossing(*node, *axis, seen.face, i), *p);
+                    .insert(super::Key::crossing(*node, *axis, *face, i), *p);
             }
         }
     }

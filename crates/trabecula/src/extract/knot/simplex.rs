@@ -180,13 +180,17 @@ impl Knots<'_> {
         (part, faces, met)
     }
 
-    /// The value of a face at a spot.
-    pub(super) fn at(&self, simplex: &Simplex, spot: Spot, face: usize) -> f64 {
+    /// Whether a face is negative at a spot.
+    fn is_negative_at(&self, simplex: &Simplex, spot: Spot, face: usize) -> bool {
         let (part, faces, met) = self.part(simplex, spot);
+        if part.count == 2
+            && let Some(is) = self.beside_on_line([part.nodes[0], part.nodes[1]], faces[0], face)
+        {
+            return is;
+        }
         let shares = self.shares(&part, &faces[..met]);
-        (0..part.count)
-            .map(|c| shares[c] * self.value(face, part.nodes[c]))
-            .sum()
+        let value = (0..part.count).map(|c| shares[c] * self.value(face, part.nodes[c]));
+        value.sum::<f64>() <= 0.0
     }
 
     /// The place of a node or a point.
@@ -396,7 +400,7 @@ impl Knots<'_> {
     pub(super) fn split(&self, simplex: &Simplex, ring: &[Spot], f: usize) -> Halves {
         let signs: Vec<bool> = ring
             .iter()
-            .map(|s| self.at(simplex, *s, f) <= 0.0)
+            .map(|s| self.is_negative_at(simplex, *s, f))
             .collect();
         let (mut inside, mut outside) = (Vec::with_capacity(6), Vec::with_capacity(6));
         let (mut leave, mut enter) = (None, None);

@@ -6,6 +6,12 @@ use super::{Nodes, Scratch};
 use crate::extract::grid::{Grid, Local};
 use crate::math::Vec3;
 
+/// A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature; the cosine.
+const EDGE: f32 = 0.7;
+/// Where edges are known, one of more than 25 degrees is: as many are shown in any case, and points beside them stay on
+/// the face.
+const CREASE: f32 = 0.906;
+
 /// Moves vertices along their edges so that each triangle's chord error in volume cancels.
 ///
 /// A surface that is locally quadratic, through the corners of a triangle, lies on average Σ II(e)/24 above it, e the
@@ -21,11 +27,18 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
         rest = others;
         // The face's vertices on edges along x come first, then y, then z.
         let starts = [numbers.offset[1][0], numbers.offset[2][0]];
-        let edged = grid.faces[local.live[face]].edged;
+        let id = local.live[face];
+        let least = if grid.has_creases(id) {
+            CREASE
+        } else if grid.faces[id].edged {
+            EDGE
+        } else {
+            f32::NEG_INFINITY
+        };
         share_out(
             triangles,
             starts,
-            edged,
+            least,
             &s.places,
             &s.normals,
             &mut s.moments,
@@ -43,7 +56,8 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
     }
 }
 
-/// Gives the corners of a face's triangles their shares. `edged`: the face may have edges of its own.
+/// Gives the corners of a face's triangles their shares, but for triangles within which normals turn so that their product
+/// is below `least`.
 ///
 /// Single precision is ample for a move that is a small share of an edge, and neighbouring tiles still agree: it is used
 /// on differences of places that they have in common.
@@ -51,7 +65,7 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
 fn share_out(
     triangles: &[[u32; 3]],
     starts: [u32; 2],
-    edged: bool,
+    least: f32,
     places: &[Vec3],
     normals: &[[f32; 3]],
     moments: &mut [(f32, f32)],
@@ -64,8 +78,7 @@ fn share_out(
         let [na, nb, nc] = t.map(|v| normals[v as usize]);
         let edge = |p: Vec3, q: Vec3| -> Short { core::array::from_fn(|i| (q[i] - p[i]) as f32) };
         let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
-        // A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature.
-        if edged && dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < 0.7 {
+        if dot(na, nb).min(dot(nb, nc)).min(dot(nc, na)) < least {
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;

@@ -1,8 +1,9 @@
 //! Triangles cut where others cross or cover them, and the pieces that bound the solid.
 //!
 //! The triangles come closed and oriented, so the winding number is whole everywhere off them; the solid is where it
-//! is one or more. No piece of a triangle, cut along all that meets it, has that boundary crossing it, so one look
-//! at its middle decides it: it is kept where the number is below one in front of it and one or more behind. This is the
+//! is one or more (or another number: that of the meshes, for what all of them hold). No piece of a triangle, cut along all
+//! that meets it, has that boundary crossing it, so one look at its middle decides it: it is kept where the number is
+//! below that one in front of it and not behind. This is the
 //! idea of Q. Zhou, E. Grinspun, D. Zorin and A. Jacobson, Mesh arrangements for solid geometry, ACM Trans. Graph. 35
 //! (2016) 39; the arithmetic differs. Whether triangles meet is decided exactly, places are rounded. A piece that
 //! rounding puts on the wrong side of a cut is as thin as the rounding, and no decision spreads from piece to piece,
@@ -57,8 +58,8 @@ pub fn tolerance(mesh: &Mesh) -> f64 {
     1e-11 * norm(b.size()) + 64.0 * f64::EPSILON * largest
 }
 
-/// The boundary of where closed, oriented triangles wind at least once. Pieces without area are left out.
-pub fn boundary(mesh: &Mesh) -> Cut {
+/// The boundary of where closed, oriented triangles wind at least `least` times. Pieces without area are left out.
+pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
     let eta = tolerance(mesh);
     let n = mesh.triangles.len();
     let faces: Vec<Face> = (0..n).map(|i| Face::new(mesh.corners(i))).collect();
@@ -92,6 +93,7 @@ pub fn boundary(mesh: &Mesh) -> Cut {
         tree: &tree,
         winding: &winding,
         place: &place,
+        level: least as f64 - 0.5,
     };
     let whole = |i: usize| segments[i].is_empty() && covers[i].is_empty();
     let kept_whole = looker.patches(mesh, &whole);
@@ -406,6 +408,8 @@ struct Looker<'a> {
     winding: &'a Winding,
     /// Where each triangle stands in the tree.
     place: &'a [u32],
+    /// Half-way up to the least number of the solid.
+    level: f64,
 }
 
 impl Looker<'_> {
@@ -456,7 +460,7 @@ impl Looker<'_> {
         }
         let others = self.winding.at(self.tree, p, REACH, |k| here.contains(&k));
         let (front, back) = (others - net / 2.0, others + net / 2.0);
-        let kept = first && front < 0.5 && back > 0.5;
+        let kept = first && front < self.level && back > self.level;
         (kept, (front - front.round()).abs())
     }
 

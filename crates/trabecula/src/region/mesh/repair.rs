@@ -220,17 +220,12 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     let crosses = clean.is_none() || found.is_some() && self_intersections(&mesh, 1) > 0;
     let mut pairs = clean.filter(|_| !crosses);
     let plain = pairs.as_ref().is_some_and(|p| check::plain(&mesh, p));
-    let cut = (!plain).then(|| cut::boundary(&mesh));
+    let cut = (!plain).then(|| cut::boundary(&mesh, 1));
     if let Some(cut) = cut.filter(|c| !c.untouched) {
         let eta = cut::tolerance(&mesh);
         done.crossings = cut.pairs;
         done.inner = cut.inner;
-        mesh = cut.mesh.joined(4.0 * eta);
-        clean::drop_degenerate(&mut mesh);
-        clean::drop_duplicates(&mut mesh);
-        clean::split_at_corners(&mut mesh, 4.0 * eta);
-        clean::drop_degenerate(&mut mesh);
-        closed(&mesh)?;
+        mesh = settled(cut.mesh, eta)?;
         // Only whole bodies were left out: what remains is as clean as it was.
         pairs = match pairs {
             Some(_) => check::edges(&mesh).ok(),
@@ -253,6 +248,49 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         )));
     }
     Ok(Boundary { mesh, pairs, done })
+}
+
+/// What cutting left, its pieces joined as far as they match.
+fn settled(cut: Mesh, eta: f64) -> Result<Mesh, Fault> {
+    let mut mesh = cut.joined(4.0 * eta);
+    clean::drop_degenerate(&mut mesh);
+    clean::drop_duplicates(&mut mesh);
+    clean::split_at_corners(&mut mesh, 4.0 * eta);
+    clean::drop_degenerate(&mut mesh);
+    closed(&mesh)?;
+    Ok(mesh)
+}
+
+/// The boundary of where boundaries, those in `turned` from their other sides, wind at least `least` times in all; none
+/// where that holds nothing, or is not closed but for rounding.
+pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary> {
+    let mut all = Mesh::default();
+    let sides = of.iter().map(|m| (m, false));
+    for (mesh, turned) in sides.chain(turned.iter().map(|m| (m, true))) {
+        let first = u32::try_from(all.vertices.len()).ok()?;
+        all.vertices.extend(&mesh.vertices);
+        let side = |t: &[u32; 3]| if turned { [t[0], t[2], t[1]] } else { *t };
+        let moved = mesh.triangles.iter().map(|t| side(t).map(|v| first + v));
+        all.triangles.extend(moved);
+    }
+    check::numbers(&all).ok()?;
+    let eta = cut::tolerance(&all);
+    let cut = cut::boundary(&all, least);
+    let mesh = if cut.untouched {
+        cut.mesh
+    } else {
+        settled(cut.mesh, eta).ok()?
+    };
+    if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
+        return None;
+    }
+    let pairs = check::edges(&mesh).ok();
+    let pairs = pairs.filter(|_| self_intersections(&mesh, 1) == 0);
+    Some(Boundary {
+        mesh,
+        pairs,
+        done: Repaired::default(),
+    })
 }
 
 /// Refuses pieces that leave more open than rounding does: over a closed surface ∫ n dA is zero and ∫ x nᵀ dA is the

@@ -1,0 +1,296 @@
+//! Meshes united with other shapes and cut by them: every guarantee, and edges kept wherever the mesh makes the surface.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use trabecula::cell::Part;
+use trabecula::extract::{Silent, surface};
+use trabecula::face::Body;
+use trabecula::field::Field;
+use trabecula::grade::Grade;
+use trabecula::math::{Vec3, add, apply, rotation, scale, sub, unit};
+use trabecula::region::{
+    Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
+};
+use trabecula::skin::skin;
+use trabecula::solid::Solid;
+
+use super::common::{Random, cases, check, cuboid, fault, lattice};
+use super::crease::{angle, ball, block, boxes, creases, cylinder, far, moved, notched, of, star};
+
+/// A random polyhedron about the origin.
+fn polyhedron(some: &mut Random) -> Arc<MeshRegion> {
+    let mut mesh = match some.below(7) {
+        0 => block(
+            some.between(0.6, 1.4),
+            some.between(0.6, 1.4),
+            some.between(0.4, 1.2),
+        ),
+        1 => angle(),
+        2 => notched(),
+        3 => star(3 + some.below(4) as u32),
+        4 => cylinder(
+            3 + some.below(10) as u32,
+            some.between(0.5, 0.9),
+            some.between(0.5, 1.2),
+        ),
+        5 => cylinder(200, some.between(0.5, 0.9), some.between(0.5, 1.2)),
+        _ => {
+            let mut rough = ball(1);
+            for v in &mut rough.vertices {
+                let by = 0.9 + 0.2 * some.share();
+                *v = v.map(|x| 0.8 * by * x);
+            }
+            rough
+        }
+    };
+    let center = mesh.bounds().center();
+    for v in &mut mesh.vertices {
+        *v = [0, 1, 2].map(|a| v[a] - center[a]);
+    }
+    let turn = if some.share() < 0.2 {
+        [0.0; 3]
+    } else {
+        some.point(180.0)
+    };
+    let mesh = moved(mesh, turn, some.point(0.2));
+    Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("clean"))
+}
+
+/// A shape of another kind that reaches into such a polyhedron.
+fn other(some: &mut Random) -> (&'static str, Region) {
+    let p = some.point(0.5);
+    match some.below(6) {
+        0 => {
+            let size = [0; 3].map(|_| some.between(0.4, 1.3));
+            ("box", cuboid(p, add(p, size)))
+        }
+        1 | 2 => {
+            let axis = if some.share() < 0.3 {
+                [0.0, 0.0, 1.0]
+            } else {
+                some.point(1.0)
+            };
+            let hole = Cylinder::new(
+                add(p, axis.map(|x| -2.0 * x)),
+                axis,
+                some.between(0.08, 0.4),
+                4.0,
+            );
+            ("cylinder", Arc::new(hole.expect("cylinder")))
+        }
+        3 => (
+            "ball",
+            Arc::new(Sphere::new(p, some.between(0.3, 0.8)).expect("ball")),
+        ),
+        4 => {
+            let normal = if some.share() < 0.3 {
+                [0.0, 0.0, 1.0]
+            } else {
+                some.point(1.0)
+            };
+            (
+                "half",
+                Arc::new(HalfSpace::new(p.map(|x| 0.5 * x), normal).expect("half-space")),
+            )
+        }
+        _ => {
+            let mut mesh = polyhedron(some);
+            if some.share() < 0.5 {
+                let turned = moved(mesh.mesh().clone(), some.point(30.0), p);
+                mesh = Arc::new(MeshRegion::new(turned, Repair::Refuse).expect("clean"));
+            }
+            ("mesh", mesh)
+        }
+    }
+}
+
+/// The shares of samples of edges that are farther from the surface than a twentieth and a half of a step.
+#[derive(Default)]
+struct Tally {
+    parts: usize,
+    faults: usize,
+    samples: usize,
+    off: [usize; 2],
+    worst: f64,
+}
+
+#[test]
+fn combined_meshes_keep_every_guarantee_and_their_edges() {
+    let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for case in 0..cases(6) {
+        let some = &mut Random(31 * case + 5);
+        let mesh = polyhedron(some);
+        let (mut kind, mut beside) = other(some);
+        let way = some.below(5);
+        if way == 0 && kind == "half" {
+            (kind, beside) = ("box", cuboid([0.0; 3], [0.7, 0.9, 0.6]));
+        }
+        let way = if way > 2 && kind == "half" { 1 } else { way };
+        let pair = |a: &Region, b: &Region| vec![a.clone(), b.clone()];
+        let own = mesh.clone() as Region;
+        let (verb, region): (_, Region) = match way {
+            0 => (
+                "union",
+                Arc::new(Union::new(pair(&own, &beside)).expect("union")),
+            ),
+            1 => (
+                "difference",
+                Arc::new(Difference::new(pair(&own, &beside)).expect("cut")),
+            ),
+            2 => (
+                "intersection",
+                Arc::new(Intersection::new(pair(&own, &beside)).expect("cut")),
+            ),
+            3 => (
+                "taken from",
+                Arc::new(Difference::new(pair(&beside, &own)).expect("cut")),
+            ),
+            _ => ("kept in it", own),
+        };
+        // Where the mesh makes the surface.
+        let shows = |p: Vec3, by: f64| match way {
+            0 => beside.value(p) > by,
+            1 => beside.value(p) > by,
+            4 => true,
+            _ => beside.value(p) < -by,
+        };
+        let edge = some.between(0.03, 0.07);
+        let inside = some.below(4);
+        let gyroid = lattice("gyroid", Part::Sheet, 0.4, [0.5; 3], some.point(90.0));
+        let diamond = lattice("diamond", Part::Lower, 0.4, [0.5; 3], some.point(90.0));
+        let field = [None, Some(gyroid.clone()), Some(diamond), Some(gyroid)][inside].clone();
+        let mut solid = Solid::new(region.clone(), field.clone(), 0.5);
+        if inside == 3 {
+            let thickness = Grade::Constant(edge * some.between(0.6, 3.0));
+            let Ok(skin) = skin(&solid.region, &thickness, &[]) else {
+                continue;
+            };
+            solid = solid.with(skin);
+        }
+        if way == 4 {
+            let mut faces = Vec::new();
+            let tree = beside.clone().faces(0.0, &mut faces);
+            solid = solid.with(Body { faces, tree });
+        }
+        let Ok(s) = surface(&solid, edge, &Silent) else {
+            continue;
+        };
+        let name = ["full", "gyroid", "diamond", "gyroid, skin"][inside];
+        let tally = tallies.entry(format!("{verb} {kind}")).or_default();
+        tally.parts += 1;
+        if let Some(why) = fault(&s.mesh) {
+            println!("case {case}: {verb} {kind}, {name}, {edge:.4}: {why}");
+            wrong.push(case);
+            tally.faults += 1;
+            continue;
+        }
+        let found = MeshRegion::new(s.mesh, Repair::Auto).expect("a surface");
+        // Meshes alone make one, with the curves in which they meet.
+        let truth = region.as_mesh().unwrap_or(&mesh);
+        let whole = region.as_mesh().is_some();
+        for p in creases(truth.mesh(), 30.0, edge / 4.0) {
+            let within = field.as_ref().is_none_or(|f| f.value(p) <= -1e-9) || inside == 3;
+            if within && (whole || shows(p, edge / 2.0)) {
+                let off = found.value(p).abs() / edge;
+                tally.samples += 1;
+                tally.off[0] += usize::from(off > 0.05);
+                tally.off[1] += usize::from(off > 0.5);
+                tally.worst = tally.worst.max(off);
+            }
+        }
+    }
+    let mut all = Tally::default();
+    for (name, t) in &tallies {
+        let share = |n: usize| 100.0 * n as f64 / t.samples.max(1) as f64;
+        println!(
+            "{name:22} {:4} parts, {} faults, {:7} samples, {:6.2} % off by 0.05, {:5.2} % by 0.5, worst {:.2}",
+            t.parts,
+            t.faults,
+            t.samples,
+            share(t.off[0]),
+            share(t.off[1]),
+            t.worst
+        );
+        all.samples += t.samples;
+        all.off[0] += t.off[0];
+    }
+    let share = all.off[0] as f64 / all.samples as f64;
+    println!("all: {:.2} %", 100.0 * share);
+    assert!(wrong.is_empty(), "{wrong:?}");
+    // Rounded, 40 % of them would be.
+    assert!(share < 0.05, "{share} of the edges are off");
+}
+
+/// Boxes of a grid, those of one and of another body: all that is made of both is known exactly.
+#[test]
+fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
+    let at: [&[f64]; 3] = [
+        &[0.0, 0.5, 1.0, 1.6],
+        &[0.0, 0.3, 0.75, 1.0],
+        &[0.0, 0.35, 0.8, 1.3],
+    ];
+    let in_one = |c: [usize; 3]| c[0] < 2 && c[2] < 2;
+    let in_other = |c: [usize; 3]| c[0] > 0 && c[1] == 1 && c[2] > 0;
+    for turn in [[0.0; 3], [17.0, 31.0, 47.0]] {
+        let placed = |mesh| moved(mesh, turn, [0.11, -0.07, 0.05]);
+        let region = |mesh, repair| Arc::new(MeshRegion::new(placed(mesh), repair).expect("mesh"));
+        let one = boxes(at, in_one);
+        let other = boxes(at, in_other);
+        let mut both = one.clone();
+        let first = both.vertices.len() as u32;
+        both.vertices.extend(&other.vertices);
+        both.triangles
+            .extend(other.triangles.iter().map(|t| t.map(|v| first + v)));
+        let pair = || -> Vec<Region> {
+            let all = [one.clone(), other.clone()];
+            all.map(|m| region(m, Repair::Refuse) as Region).to_vec()
+        };
+        let united = Arc::new(Union::new(pair()).expect("union")) as Region;
+        let cut = Arc::new(Difference::new(pair()).expect("difference"));
+        let common = Arc::new(Intersection::new(pair()).expect("intersection"));
+        let in_any = |c| in_one(c) || in_other(c);
+        for (name, made, exact) in [
+            ("united", united, boxes(at, in_any)),
+            ("in one file", region(both, Repair::Auto), boxes(at, in_any)),
+            ("cut", cut, boxes(at, |c| in_one(c) && !in_other(c))),
+            ("common", common, boxes(at, |c| in_one(c) && in_other(c))),
+        ] {
+            let truth = region(exact, Repair::Refuse);
+            let mesh = made.as_mesh().expect("one mesh");
+            // Cut exactly but for the rounding of places, of 1e-16 each.
+            let volume = mesh.mesh().volume() / truth.mesh().volume() - 1.0;
+            assert!(volume.abs() < 1e-12, "{name}: {volume:e}");
+            let edge = 0.04;
+            let [found, direct] = [made.clone(), truth.clone()].map(|r| of(r, edge));
+            check(name, &found);
+            let [share, least] = [&found, &direct].map(|s| far(&truth, &s.mesh, edge));
+            println!(
+                "{name} {turn:?}: {share:.4} of the edges are off, {least:.4} of the exact boundary's"
+            );
+            // The triangles differ, and with them what rounding does to a few cells.
+            assert!(share < least + 0.01, "{name}: {share}, {least}");
+        }
+    }
+}
+
+#[test]
+fn a_hole_leaves_the_edges_of_a_mesh_sharp() {
+    let (turn, by) = ([17.0, 31.0, 47.0], [0.11, -0.07, 0.05]);
+    let place = |p: Vec3| add(apply(&rotation(turn), p), by);
+    let plate = moved(block(1.6, 1.6, 0.5), turn, by);
+    let plate = Arc::new(MeshRegion::new(plate, Repair::Refuse).expect("clean"));
+    let (middle, way) = ([0.8, 0.8, 0.0], unit([0.3, 0.2, 1.0]));
+    let ends = [-1.0, 2.0].map(|s| place(add(middle, scale(way, s))));
+    let bolt = Cylinder::new(ends[0], sub(ends[1], ends[0]), 0.4, 3.0).expect("cylinder");
+    let pair = vec![plate.clone() as Region, Arc::new(bolt)];
+    let hole = Arc::new(Difference::new(pair).expect("difference")) as Region;
+    for n in [10.0, 20.0, 40.0] {
+        let s = of(hole.clone(), 1.0 / n);
+        check("plate with a hole", &s);
+        let share = far(&plate, &s.mesh, 1.0 / n);
+        println!("{n} steps: {share:.4} of the plate's own edges are off");
+        assert!(share < 0.05, "{share} of the plate's own edges are off");
+    }
+}
