@@ -46,11 +46,9 @@ fn rows<'py, const D: usize>(
 }
 
 /// Control points (n, 3, D) and weights (n,).
-#[allow(clippy::type_complexity)]
-fn curves<'py, const D: usize>(
-    py: Python<'py>,
-    of: &[Bezier<D>],
-) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>)> {
+type Curves<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>);
+
+fn curves<'py, const D: usize>(py: Python<'py>, of: &[Bezier<D>]) -> PyResult<Curves<'py>> {
     let flat: Vec<f64> = of.iter().flat_map(|b| b.points).flatten().collect();
     let weights: Vec<f64> = of.iter().map(|b| b.weight).collect();
     Ok((
