@@ -76,7 +76,7 @@ pub struct Complex {
 }
 
 /// What is shorter is one place, in radii of the hub: far above the shift, far below what anything is made of.
-const MERGE: f64 = 1e-7;
+pub(super) const MERGE: f64 = 1e-7;
 
 const NONE: u32 = u32::MAX;
 

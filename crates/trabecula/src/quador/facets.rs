@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::complex::{Complex, Face};
+use super::complex::{Complex, Face, MERGE};
 use super::hub::Hub;
 
 /// What a side of a triangle lies on.
@@ -20,6 +20,16 @@ enum Side {
     Arc(u32, f64, f64),
     /// A rim, which is not divided.
     Rim,
+}
+
+/// An arc that lies where an earlier one does.
+#[derive(Clone, Copy, Debug)]
+struct Twin {
+    of: u32,
+    /// Whether both have the same direction.
+    same: bool,
+    /// The face between them.
+    face: usize,
 }
 
 /// Triangles on the surface of a hub.
@@ -93,8 +103,12 @@ impl<'a> Facets<'a> {
             }
             first += n;
         }
-        let chains = out.chains(turns);
+        let twins = out.twins();
+        let chains = out.chains(turns, &twins);
         for (number, face) in complex.faces.iter().enumerate() {
+            if twins.iter().flatten().any(|t| t.face == number) {
+                continue;
+            }
             let made = match face.rim {
                 Some(stub) => {
                     let (stub, first) = (stub as usize, firsts[stub as usize]);
@@ -159,16 +173,89 @@ impl<'a> Facets<'a> {
         }
     }
 
+    /// For each arc an earlier one in the same place, if there is: both bound a face without width, such as the fillet between
+    /// equal cylinders that run straight on, whose other side has none.
+    fn twins(&self) -> Vec<Option<Twin>> {
+        let arcs = &self.complex.arcs;
+        let mut twins = vec![None; arcs.len()];
+        for (number, face) in self.complex.faces.iter().enumerate() {
+            let walked = face.loops.concat();
+            let (&[(a, there), (b, back)], None) = (&walked[..], face.rim) else {
+                continue;
+            };
+            let (earlier, later) = (a.min(b), a.max(b));
+            let place = |arc: u32, t: f64| {
+                let conic = &arcs[arc as usize].conic;
+                conic.at(t * conic.end)
+            };
+            // Walked there and back: if both have the same direction, one of them is walked against it.
+            let same = there != back;
+            let near = |p: Vec3, q: Vec3| norm(sub(p, q)) < MERGE * self.hub.radius;
+            let closed = face.loops.len() == 2;
+            let twin = [0.0, 0.25, 0.5].into_iter().all(|t| {
+                let both = [earlier, later].map(|arc| [t, 1.0 - t].map(|t| place(arc, t)));
+                let [[p, q], [r, s]] = both;
+                if closed {
+                    // Those begin anywhere: on one quadric, about one centre, in one plane.
+                    let center = |arc: u32| add(place(arc, 0.0), place(arc, 0.5));
+                    let plane = &arcs[earlier as usize].plane;
+                    let off = (dot(plane.a, r) + plane.b).abs() / norm(plane.a);
+                    near(scale(center(earlier), 0.5), scale(center(later), 0.5))
+                        && off < MERGE * self.hub.radius
+                } else if same {
+                    near(p, r) && near(q, s)
+                } else {
+                    near(p, s) && near(q, r)
+                }
+            });
+            if a != b && twin {
+                twins[later as usize] = Some(Twin {
+                    of: earlier,
+                    same,
+                    face: number,
+                });
+            }
+        }
+        twins
+    }
+
     /// Points along each arc, both ends included.
-    fn chains(&mut self, turns: f64) -> Vec<Vec<u32>> {
-        let first = self.points.len() as u32;
-        self.points
-            .extend(self.complex.vertices.iter().map(|v| v.at));
+    fn chains(&mut self, turns: f64, twins: &[Option<Twin>]) -> Vec<Vec<u32>> {
+        let arcs = &self.complex.arcs;
+        let mut stands: Vec<u32> = (0..self.complex.vertices.len() as u32).collect();
+        for (arc, twin) in arcs.iter().zip(twins) {
+            let Some(twin) = twin else { continue };
+            let of = arcs[twin.of as usize].ends;
+            for k in 0..2 {
+                let both = [arc.ends[k], of[if twin.same { k } else { 1 - k }]];
+                let [p, q] = both.map(|v| stands[v as usize]);
+                let all = stands.iter_mut().filter(|s| **s == p.max(q));
+                all.for_each(|s| *s = p.min(q));
+            }
+        }
+        let mut vertices: Vec<u32> = Vec::with_capacity(stands.len());
+        for (v, of) in self.complex.vertices.iter().zip(&stands) {
+            vertices.push(match vertices.get(*of as usize) {
+                Some(point) => *point,
+                None => {
+                    self.points.push(v.at);
+                    self.points.len() as u32 - 1
+                }
+            });
+        }
         let least = turns.cos();
-        let mut chains = Vec::with_capacity(self.complex.arcs.len());
+        let mut chains: Vec<Vec<u32>> = Vec::with_capacity(self.complex.arcs.len());
         for (number, a) in self.complex.arcs.iter().enumerate() {
+            if let Some(twin) = twins[number] {
+                let mut chain = chains[twin.of as usize].clone();
+                if !twin.same {
+                    chain.reverse();
+                }
+                chains.push(chain);
+                continue;
+            }
             let direction = |t: f64| unit(a.conic.with_slope(t).1);
-            let mut chain = vec![(first + a.ends[0], 0.0)];
+            let mut chain = vec![(vertices[a.ends[0] as usize], 0.0)];
             // Halved from the left: the pieces still to be looked at, nearest last.
             let mut todo = vec![a.conic.end];
             let mut from = (0.0, direction(0.0));
@@ -183,7 +270,7 @@ impl<'a> Facets<'a> {
                 }
                 todo.pop();
                 let point = if todo.is_empty() {
-                    first + a.ends[1]
+                    vertices[a.ends[1] as usize]
                 } else {
                     self.points.push(a.conic.at(to));
                     self.points.len() as u32 - 1
@@ -371,7 +458,7 @@ impl<'a> Facets<'a> {
     }
 
     /// Halves sides, the longest first, until the middle of none and of no triangle is further than `chord` from the surface.
-    /// `None` if that does not come to an end. Returns the greatest distance left.
+    /// `None` if that does not come to an end. Returns the greatest distance left, but for the rims, which stay.
     pub fn refine(&mut self, chord: f64) -> Option<f64> {
         for _ in 0..60 {
             let mut todo: Vec<(f64, [u32; 2])> = Vec::new();
@@ -384,15 +471,14 @@ impl<'a> Facets<'a> {
                     let (i, j) = (t[k], t[(k + 1) % 3]);
                     let (p, q) = (self.points[i as usize], self.points[j as usize]);
                     let length = norm(sub(p, q));
-                    let rim = self.sides.get(&key(i, j)) == Some(&Side::Rim);
+                    if self.sides.get(&key(i, j)) == Some(&Side::Rim) {
+                        continue;
+                    }
                     let off = [0.25, 0.5, 0.75]
                         .map(|s| self.off(add(scale(p, 1.0 - s), scale(q, s))))
                         .into_iter()
                         .fold(0.0, f64::max);
                     error = error.max(off);
-                    if rim {
-                        continue;
-                    }
                     if length > longest.0 {
                         longest = (length, key(i, j));
                     }
@@ -403,7 +489,7 @@ impl<'a> Facets<'a> {
                 }
                 let off = self.off(scale(add(a, add(b, c)), 1.0 / 3.0));
                 error = error.max(off);
-                if !far && off > 1.2 * chord && longest.0 > 0.0 {
+                if !far && off > chord && longest.0 > 0.0 {
                     todo.push(longest);
                 }
             }

@@ -101,7 +101,8 @@ impl Quadors {
         Ok(sum(0) / sum(1) * self.len() as f64 * coarse / chord)
     }
 
-    /// The surface as triangles that stay within `chord` (mm) of it where they were asked to, and how far they do stay, mm.
+    /// The surface as triangles that stay within `chord` (mm) of it, and how far they do: as found at the quarters of sides and the
+    /// middles of triangles, mm.
     ///
     /// # Errors
     /// A chord error that is no length, beams that overlap too far, and more points than 32 bits can number.
@@ -284,7 +285,12 @@ impl Part {
             })
             .collect();
         let mut facets = Facets::new(hub, complex, &rims)?;
-        let error = facets.refine(chord)?;
+        // Points of a rim are on its circle.
+        let sagitta = |(s, n): (&Stub, &usize)| {
+            s.squared(s.split).max(0.0).sqrt() * (1.0 - (PI / *n as f64).cos())
+        };
+        let rims_off = hub.stubs.iter().zip(rings).map(sagitta).fold(0.0, f64::max);
+        let error = facets.refine(chord)?.max(rims_off);
         Some(Part {
             rims: rings.iter().sum(),
             bounds: facets.points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)),
