@@ -37,6 +37,8 @@ def tell_beams(name: str, it: dict) -> None:
         x, y, z = map(figure, it["smallest_angle_at"])
         print(f"  angle      {it['smallest_angle']:.1f}° at least, at ({x}, {y}, {z}) mm")
     print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+    if it["volume"] is not None:
+        print(f"  exactly    {figure(it['volume'])} mm³, {figure(it['area'])} mm² of surface")
     done = {"cleaned": it["cleaned"], "trimmed": it["trimmed"]}
     for what, counts in done.items():
         told = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
