@@ -10,6 +10,7 @@ mod added;
 mod fill;
 mod joint;
 mod levels;
+mod mixed;
 mod quantile;
 mod simplex;
 mod strand;
@@ -26,7 +27,7 @@ pub use joint::Phases;
 pub use strand::Constituent;
 pub use weights::Weights;
 
-use added::{At, End, HIGH, LOW};
+use added::{At, End, HIGH, LOW, Near};
 use joint::Joint;
 use levels::Levels;
 use simplex::Place;
@@ -164,17 +165,8 @@ impl Blend {
         self.levels.as_deref().filter(|l| !l.is_uniform())
     }
 
-    /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`. `added`
-    /// tells what the levels add to an end, from where the shares lie and the lattices' quantiles.
-    #[inline]
-    fn value_at(
-        &self,
-        p: Vec3,
-        f: f64,
-        (w, high): (&[f64], &[f64]),
-        at: &mut At,
-        mut added: impl FnMut(&Levels, usize, &mut At) -> f64,
-    ) -> f64 {
+    /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`.
+    fn value_at(&self, p: Vec3, f: f64, (w, high): (&[f64], &[f64]), at: &mut At) -> f64 {
         let alone = w.contains(&1.0);
         let levels = self.levels.as_deref().filter(|_| !alone);
         if let Some(levels) = levels {
@@ -187,19 +179,16 @@ impl Blend {
                 }));
             }
         }
-        let mut value: Option<f64> = None;
+        let mut ends = [0.0; 2];
         for &end in self.ends() {
-            let mut level = 0.0;
             for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
-                level += w[i] * s.end(end, high[i], alone);
+                ends[end] += w[i] * s.end(end, high[i], alone);
             }
             if let Some(levels) = levels {
-                level += added(levels, end, at);
+                ends[end] += levels.added(&self.strands, p, w, at, end);
             }
-            let of = if end == HIGH { f - level } else { level - f };
-            value = Some(value.map_or(of, |v| v.max(of)));
         }
-        value.unwrap_or(f64::NAN)
+        self.value_of([f, ends[LOW], ends[HIGH]])
     }
 
     /// The value where F, LO and HI are these.
@@ -272,9 +261,7 @@ impl Field for Blend {
             for (k, (o, p)) in out.iter_mut().zip(points).enumerate() {
                 let w = &w[k * n..][..n];
                 let own = (w, &high[k * n..][..n]);
-                *o = self.value_at(*p, f[k], own, &mut at, |levels, end, at| {
-                    levels.added(&self.strands, *p, w, at, end)
-                });
+                *o = self.value_at(*p, f[k], own, &mut at);
             }
         }
     }
@@ -301,7 +288,7 @@ impl Field for Blend {
                 (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
             }
         }
-        let mut place = Place::default();
+        let (mut place, mut near) = (Place::default(), Near::new());
         let mut quantiles = vec![End::default(); n];
         for (k, p) in points.iter().enumerate() {
             let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
@@ -310,6 +297,7 @@ impl Field for Blend {
             let levels = self.levels.as_deref().filter(|_| !alone);
             if let Some(levels) = levels {
                 levels.grid.place(w, &mut place);
+                levels.near(&self.strands, *p, &mut near);
             }
             if let Some(levels) = self.varied().filter(|_| !alone) {
                 for (i, q) in quantiles.iter_mut().enumerate() {
@@ -329,7 +317,7 @@ impl Field for Blend {
                 }
                 if let Some(levels) = levels {
                     let own = (w, dw, &place);
-                    let more = levels.added_gradients(&self.strands, *p, own, &quantiles, end);
+                    let more = levels.added_gradients(&self.strands, &near, own, &quantiles, end);
                     (level, slope) = (level + more.0, add(slope, more.1));
                 }
                 let (v, g) = match end == HIGH {

@@ -89,6 +89,16 @@ impl Grade {
         }
     }
 
+    /// Along which axes it may change; no, where moving along one leaves every bit as it is.
+    pub fn varies(&self) -> [bool; 3] {
+        match self {
+            Grade::Constant(_) => [false; 3],
+            Grade::Linear { along, .. } => along.map(|c| c != 0.0),
+            Grade::Formula(f) => f.varies(),
+            _ => [true; 3],
+        }
+    }
+
     /// Fills `out[i]` with the value at `points[i]` (mm).
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         match self {

@@ -2,7 +2,7 @@
 //!
 //! Everything is linear between the tables (`levels`) of the neighbourhoods about a point, and between their nodes.
 
-use super::levels::{Levels, blended};
+use super::levels::{Levels, Station, blended};
 use super::quantile::quantile;
 use super::simplex::Place;
 use super::strand::Strand;
@@ -28,6 +28,8 @@ pub(super) struct At {
     /// The quantiles of the lattices, where they vary.
     pub q: Vec<[f64; 2]>,
     terms: Vec<Term>,
+    /// Those of each end.
+    asked: [Vec<Term>; 2],
 }
 
 /// A node's part in what is added: how often its number counts and, of a quantile function, at which share. (No enum: read
@@ -40,9 +42,10 @@ struct Term {
 }
 
 /// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
-#[derive(Default)]
 pub(super) struct Row {
-    /// Between which neighbourhoods along y and z it lies.
+    /// For each node along x: between which neighbourhoods it lies, and the share of the second.
+    along: Vec<(usize, f64)>,
+    /// Between which neighbourhoods along y and z the row lies.
     across: [(usize, f64); 2],
     /// How many rows have been.
     count: u64,
@@ -51,20 +54,38 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// Begins the row at this y and z.
-    pub fn enter(&mut self, levels: &Levels, at: [f64; 2]) {
-        let along = |a: usize| {
-            let (n, share, _) = levels.joint.along(a + 1, at[a]);
+    /// Rows with nodes at these x.
+    pub fn new(levels: &Levels, xs: &[f64]) -> Row {
+        let along = |x: &f64| {
+            let (n, share, _) = levels.joint.along(0, *x);
             (n, share)
         };
-        self.across = [along(0), along(1)];
-        self.count += 1;
-        if self.columns.is_empty() {
-            let column = |_| (0, levels.table());
-            self.columns = (0..levels.joint.shape[0]).map(column).collect();
+        Row {
+            along: xs.iter().map(along).collect(),
+            across: [(0, 0.0); 2],
+            count: 0,
+            columns: (0..levels.joint.shape[0])
+                .map(|_| (0, levels.table()))
+                .collect(),
+        }
+    }
+
+    /// Begins the row at this y and z.
+    pub fn enter(&mut self, levels: &Levels, at: [f64; 2]) {
+        let across = [0, 1].map(|a| {
+            let (n, share, _) = levels.joint.along(a + 1, at[a]);
+            (n, share)
+        });
+        // Of one neighbourhood that serves all, everything is known already.
+        if self.count == 0 || across != self.across {
+            self.across = across;
+            self.count += 1;
         }
     }
 }
+
+/// The neighbourhoods about a point: the number of each, what is known of it, its share and the gradient of that (per mm).
+pub(super) type Near<'a> = Vec<(usize, &'a Station, f64, Vec3)>;
 
 impl Levels {
     /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at a place and have quantiles.
@@ -79,42 +100,51 @@ impl Levels {
         sum
     }
 
-    /// The same at x in a row that has been entered.
+    /// The same of some ends at the i-th node of a row that has been entered.
     pub fn added_in_row(
         &self,
         strands: &[Strand],
-        x: f64,
+        i: usize,
         w: &[f64],
         at: &mut At,
-        end: usize,
+        ends: &[usize],
         row: &mut Row,
-    ) -> f64 {
-        let mut sum = self.terms(strands, w, at, end);
-        let (first, share, _) = self.joint.along(0, x);
-        for (i, near) in [(first, 1.0 - share), (first + 1, share)] {
+    ) -> [f64; 2] {
+        let (first, share) = row.along[i];
+        let mut out = [0.0; 2];
+        let uniform = self.is_uniform();
+        for &end in ends.iter().filter(|_| !uniform) {
+            out[end] = self.terms(strands, w, at, end);
+            at.asked[end].clone_from(&at.terms);
+        }
+        for (column, near) in [(first, 1.0 - share), (first + 1, share)] {
             if near <= 0.0 {
                 continue;
             }
-            let (count, column) = &mut row.columns[i];
+            let (count, known) = &mut row.columns[column];
             if *count != row.count {
                 *count = row.count;
-                column.clear();
+                known.clear();
             }
-            let mut here = 0.0;
-            for t in &at.terms {
-                let found = match column.get(t.node) {
-                    Some(numbers) => self.ask(numbers, end, t.q),
-                    None => {
-                        let numbers = column.add(t.node);
-                        self.between(strands, i, t.node, row.across, numbers);
-                        self.ask(numbers, end, t.q)
-                    }
-                };
-                here += t.times * found.0;
+            let across = row.across;
+            let find =
+                |node| move |out: &mut [f32]| self.between(strands, column, node, across, out);
+            if uniform {
+                for (node, times) in at.place.nodes.iter().zip(&at.place.shares) {
+                    let (v, times) = (known.get_or(*node, find(*node)), near * times);
+                    out[LOW] += times * f64::from(v[LOW]);
+                    out[HIGH] += times * f64::from(v[HIGH]);
+                }
+                continue;
             }
-            sum += near * here;
+            for &end in ends {
+                for t in &at.asked[end] {
+                    let v = known.get_or(t.node, find(t.node));
+                    out[end] += near * t.times * quantile(v, t.q).0;
+                }
+            }
         }
-        sum
+        out
     }
 
     /// Adds a node's numbers at the i-th neighbourhood along x, between those along y and z.
@@ -150,7 +180,9 @@ impl Levels {
 
     /// Finds which nodes have a part in what is added to an end; what is added besides.
     fn terms(&self, strands: &[Strand], w: &[f64], at: &mut At, end: usize) -> f64 {
-        let At { place, q, terms } = at;
+        let At {
+            place, q, terms, ..
+        } = at;
         let own = match self.is_uniform() {
             true => 0.0,
             false => blended(w, q.iter().copied())[end],
@@ -179,26 +211,35 @@ impl Levels {
         more
     }
 
-    /// The same with its gradient (per mm); `dw` are those of the shares.
+    /// Finds what is known about a point.
+    pub fn near<'a>(&'a self, strands: &[Strand], p: Vec3, out: &mut Near<'a>) {
+        out.clear();
+        let corners = self.joint.corners(p).into_iter();
+        let some = corners.filter(|c| c.1 > 0.0 || c.2 != [0.0; 3]);
+        out.extend(some.map(|(i, share, slope)| (i, self.station(i, strands), share, slope)));
+    }
+
+    /// What is added at a point with its gradient (per mm); `dw` are those of the shares.
     pub fn added_gradients(
         &self,
         strands: &[Strand],
-        p: Vec3,
+        near: &Near,
         (w, dw, place): (&[f64], &[Vec3], &Place),
         ends: &[End],
         end: usize,
     ) -> (f64, Vec3) {
-        let corners = self.joint.corners(p);
         // What the neighbourhoods answer together, how that changes from place to place, and with the share.
         let sum = |node: usize, q: f64| {
             let (mut v, mut d, mut steep) = (0.0, [0.0; 3], 0.0);
-            for (i, share, slope) in &corners {
-                if *share > 0.0 || *slope != [0.0; 3] {
-                    let of = self.ask(self.numbers(*i, strands, node), end, q);
-                    v += share * of.0;
-                    d = add(d, scale(*slope, of.0));
-                    steep += share * of.1;
-                }
+            for (i, station, share, slope) in near {
+                let numbers = match station.known(node) {
+                    Some(numbers) => numbers,
+                    None => self.numbers(*i, strands, node),
+                };
+                let of = self.ask(numbers, end, q);
+                v += share * of.0;
+                d = add(d, scale(*slope, of.0));
+                steep += share * of.1;
             }
             (v, d, steep)
         };

@@ -5,7 +5,7 @@
 //! lattice that is alone by its bounds is alone by its shares too.
 
 use super::Blend;
-use super::added::{At, Row};
+use super::mixed::Mixed;
 use super::strand;
 use crate::field::Block;
 use crate::math::{Aabb, Interval, Vec3};
@@ -73,7 +73,9 @@ impl Blend {
             .map(|(i, s)| (all >> i & 1 == 1).then(|| s.rows(block, wanted)))
             .collect();
         let mut cores = vec![vec![0f32; xs.len()]; self.strands.len()];
-        let mut some = Nodes::default();
+        let mut nodes = Vec::new();
+        let mut alone = Alone::default();
+        let mut mixed = several(all).then(|| Mixed::new(self, xs));
         for k in 0..zs.len() {
             rows.iter_mut().flatten().for_each(|r| r.enter_layer(k));
             for j in 0..ys.len() {
@@ -91,91 +93,26 @@ impl Blend {
                         rows.fill(j, k, word, &mut cores[i]);
                     }
                 }
+                let line = Line {
+                    rows: &rows,
+                    cores: &cores,
+                    number: [j, k],
+                    at: [ys[j], zs[k]],
+                    xs,
+                };
                 // Runs of cubes: those with one and the same lattice, and those with several.
                 let mut from = 0;
                 for run in of_row.chunk_by(|a, b| a == b || (several(*a) && several(*b))) {
                     let to = from + run.len() * CUBE;
-                    let line = Line {
-                        rows: &rows,
-                        cores: &cores,
-                        at: [ys[j], zs[k]],
-                        xs,
-                    };
-                    some.nodes.clear();
-                    some.nodes.extend((from..to.min(xs.len())).filter(here));
-                    if several(run[0]) {
-                        self.fill_mixed(&mut some, &line, row);
-                    } else {
-                        self.fill_alone(run[0].trailing_zeros() as usize, &mut some, &line, row);
+                    nodes.clear();
+                    nodes.extend((from..to.min(xs.len())).filter(here));
+                    match &mut mixed {
+                        Some(mixed) if several(run[0]) => mixed.fill(self, &nodes, &line, row),
+                        _ => alone.fill(self, run[0].trailing_zeros() as usize, &nodes, &line, row),
                     }
                     from = to;
                 }
             }
-        }
-    }
-
-    /// The nodes of a row where one lattice is alone.
-    fn fill_alone(&self, s: usize, some: &mut Nodes, line: &Line, row: &mut [f32]) {
-        let (Some(rows), strand) = (&line.rows[s], &self.strands[s]) else {
-            return;
-        };
-        some.high.resize(some.nodes.len(), 0.0);
-        match strand.uniform() {
-            Some(high) => some.high.fill(high),
-            None => {
-                some.place(line);
-                strand.highs(&some.points, &mut some.high);
-            }
-        }
-        for (i, high) in some.nodes.iter().zip(&some.high) {
-            let low = strand.low_alone(*high);
-            row[*i] = self.value_of([rows.value(line.cores[s][*i]), low, *high]) as f32;
-        }
-    }
-
-    /// The nodes of a row where several lattices may be.
-    fn fill_mixed(&self, some: &mut Nodes, line: &Line, row: &mut [f32]) {
-        let n = self.strands.len();
-        some.place(line);
-        let Nodes {
-            nodes,
-            points,
-            w,
-            high,
-            highs,
-            at,
-            row: known,
-        } = some;
-        if let Some(levels) = &self.levels {
-            known.enter(levels, line.at);
-        }
-        w.resize(n * points.len(), 0.0);
-        self.weights.values(points, w);
-        highs.resize(n * points.len(), 0.0);
-        high.resize(points.len(), 0.0);
-        for (s, strand) in self.strands.iter().enumerate() {
-            match strand.uniform() {
-                Some(v) => high.fill(v),
-                None if (0..points.len()).any(|i| w[i * n + s] > 0.0) => strand.highs(points, high),
-                None => {}
-            }
-            for (all, high) in highs.chunks_exact_mut(n).zip(&*high) {
-                all[s] = *high;
-            }
-        }
-        for ((node, p), (w, high)) in
-            (nodes.iter().zip(&*points)).zip(w.chunks_exact(n).zip(highs.chunks_exact(n)))
-        {
-            let mut f = 0.0;
-            for (s, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-                if let Some(rows) = &line.rows[s] {
-                    f += w * rows.value(line.cores[s][*node]);
-                }
-            }
-            let value = self.value_at(*p, f, (w, high), at, |levels, end, at| {
-                levels.added_in_row(&self.strands, p[0], w, at, end, known)
-            });
-            row[*node] = value as f32;
         }
     }
 }
@@ -186,34 +123,59 @@ fn several(lattices: u64) -> bool {
 }
 
 /// A row of nodes and what the lattices are there.
-struct Line<'a> {
-    rows: &'a [Option<strand::Rows<'a>>],
-    cores: &'a [Vec<f32>],
+pub(super) struct Line<'a> {
+    pub rows: &'a [Option<strand::Rows<'a>>],
+    pub cores: &'a [Vec<f32>],
+    /// Its number along y and z.
+    pub number: [usize; 2],
     /// Its y and z.
-    at: [f64; 2],
-    xs: &'a [f64],
+    pub at: [f64; 2],
+    pub xs: &'a [f64],
 }
 
-/// Some nodes of a row: buffers.
+impl Line<'_> {
+    /// A node.
+    pub fn place(&self, i: usize) -> Vec3 {
+        [self.xs[i], self.at[0], self.at[1]]
+    }
+
+    /// The core of a lattice at a node.
+    #[inline]
+    pub fn core(&self, s: usize, i: usize) -> f64 {
+        let rows = self.rows[s].as_ref();
+        rows.map_or(0.0, |rows| rows.value(self.cores[s][i]))
+    }
+}
+
+/// The nodes of a row where one lattice is alone: buffers.
 #[derive(Default)]
-struct Nodes {
-    nodes: Vec<usize>,
+struct Alone {
     points: Vec<Vec3>,
-    /// Shares, those of a node side by side.
-    w: Vec<f64>,
-    /// Upper ends of one lattice, and of all, those of a node side by side.
     high: Vec<f64>,
-    highs: Vec<f64>,
-    at: At,
-    row: Row,
 }
 
-impl Nodes {
-    /// Finds where the nodes are.
-    fn place(&mut self, line: &Line) {
-        let [y, z] = line.at;
-        self.points.clear();
-        self.points
-            .extend(self.nodes.iter().map(|i| [line.xs[*i], y, z]));
+impl Alone {
+    fn fill(&mut self, blend: &Blend, s: usize, nodes: &[usize], line: &Line, row: &mut [f32]) {
+        let strand = &blend.strands[s];
+        self.high.resize(nodes.len(), 0.0);
+        match strand.uniform() {
+            Some(high) => self.high.fill(high),
+            None => {
+                self.points.clear();
+                self.points.extend(nodes.iter().map(|i| line.place(*i)));
+                strand.highs(&self.points, &mut self.high);
+            }
+        }
+        for (i, high) in nodes.iter().zip(&self.high) {
+            row[*i] = blend.alone(s, line.core(s, *i), *high) as f32;
+        }
+    }
+}
+
+impl Blend {
+    /// The value where a lattice is alone, its core is `g` and its upper end `high`.
+    #[inline]
+    pub(super) fn alone(&self, s: usize, g: f64, high: f64) -> f64 {
+        self.value_of([g, self.strands[s].low_alone(high), high])
     }
 }

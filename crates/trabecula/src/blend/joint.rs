@@ -201,24 +201,17 @@ impl Joint {
             out[0].1 = 1.0;
             return out;
         }
-        let along: [(usize, f64, f64); 3] = core::array::from_fn(|a| self.along(a, p[a]));
+        let [nx, ny, _] = self.shape;
+        // Along each axis: number, share and slope of the two.
+        let [xs, ys, zs]: [[(usize, f64, f64); 2]; 3] = core::array::from_fn(|a| {
+            let (i, share, slope) = self.along(a, p[a]);
+            let next = (i + 1).min(self.shape[a] - 1);
+            [(i, 1.0 - share, -slope), (next, share, slope)]
+        });
         for (c, o) in out.iter_mut().enumerate() {
-            let up = |a: usize| c >> a & 1;
-            let share = |a: usize| {
-                if up(a) == 1 {
-                    along[a].1
-                } else {
-                    1.0 - along[a].1
-                }
-            };
-            let slope = |a: usize| if up(a) == 1 { along[a].2 } else { -along[a].2 };
-            let [x, y, z] = [0, 1, 2].map(|a| (along[a].0 + up(a)).min(self.shape[a] - 1));
-            let [sx, sy, sz] = [0, 1, 2].map(share);
-            *o = (
-                (z * self.shape[1] + y) * self.shape[0] + x,
-                sx * sy * sz,
-                [slope(0) * sy * sz, sx * slope(1) * sz, sx * sy * slope(2)],
-            );
+            let ((x, sx, dx), (y, sy, dy), (z, sz, dz)) = (xs[c & 1], ys[c >> 1 & 1], zs[c >> 2]);
+            let slope = [dx * sy * sz, sx * dy * sz, sx * sy * dz];
+            *o = ((z * ny + y) * nx + x, sx * sy * sz, slope);
         }
         out
     }

@@ -40,13 +40,21 @@ fn hull(of: impl Iterator<Item = f64>) -> Interval {
 const MANY: usize = 64;
 
 /// What is known of one neighbourhood.
-struct Station {
+pub(super) struct Station {
     /// The solid share of each lattice, found by looking.
     own: Vec<f64>,
     /// At the nodes that shares about here need.
     near: Table,
     /// At all nodes, once a point beyond needs them.
     whole: OnceLock<Table>,
+}
+
+impl Station {
+    /// The numbers of a node, if shares about here need it.
+    #[inline]
+    pub fn known(&self, node: usize) -> Option<&[f32]> {
+        self.near.get(node)
+    }
 }
 
 /// The levels of a blend by fraction.
@@ -129,7 +137,8 @@ impl Levels {
         w
     }
 
-    fn station(&self, i: usize, strands: &[Strand]) -> &Station {
+    #[inline]
+    pub fn station(&self, i: usize, strands: &[Strand]) -> &Station {
         self.stations[i].get_or_init(|| {
             let samples = self.samples(i, strands);
             let own = samples.iter().map(|s| {

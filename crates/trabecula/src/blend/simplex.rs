@@ -102,30 +102,33 @@ impl Grid {
             at.axes.clear();
             return at.axes.push(0);
         }
-        at.floor.clear();
         at.floor.resize(d, 0);
         at.order.clear();
-        at.order.resize(d, (0.0, 0));
         let mut sum = 0.0;
+        let mut node = 0;
         for k in (0..d).rev() {
             sum += w[k + 1];
             let y = (m * sum).clamp(0.0, m);
             let low = (y as usize).min(self.steps - 1);
             at.floor[k] = low;
-            at.order[k] = (y - low as f64, k);
+            node += self.binomial[low + d - 1 - k][d - k];
+            // The furthest first; of equal ones the first axis, so that the order of the y is kept.
+            let share = y - low as f64;
+            let before = at.order.iter().position(|o| o.0 <= share);
+            at.order
+                .insert(before.unwrap_or(at.order.len()), (share, k));
         }
-        // Stable: of equal y the first goes first, so that the order is kept.
-        at.order.sort_by(|a, b| b.0.total_cmp(&a.0));
         at.nodes.clear();
         at.shares.clear();
         at.axes.clear();
         let mut before = 1.0;
-        at.nodes.push(self.rank(&at.floor));
+        at.nodes.push(node);
         for &(share, k) in &at.order {
             at.shares.push(before - share);
             before = share;
-            at.floor[k] += 1;
-            at.nodes.push(self.rank(&at.floor));
+            // A y that rises by one: C(y + 1, d − k) = C(y, d − k) + C(y, d − k − 1).
+            node += self.binomial[at.floor[k] + d - 1 - k][d - k - 1];
+            at.nodes.push(node);
             at.axes.push(k);
         }
         at.shares.push(before);

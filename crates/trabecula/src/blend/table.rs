@@ -34,6 +34,15 @@ impl Table {
         (first != NONE).then(|| &self.numbers[first as usize..][..self.width])
     }
 
+    /// The numbers of a node; `find` adds them to zeros if it was not looked at.
+    #[inline]
+    pub fn get_or(&mut self, node: usize, find: impl FnOnce(&mut [f32])) -> &[f32] {
+        if self.first[node] == NONE {
+            find(self.add(node));
+        }
+        &self.numbers[self.first[node] as usize..][..self.width]
+    }
+
     /// Gives a node that has none its numbers, zeros to begin with.
     pub fn add(&mut self, node: usize) -> &mut [f32] {
         let first = self.numbers.len();

@@ -150,6 +150,15 @@ impl Formula {
         (v[0], g[0])
     }
 
+    /// Along which axes it may change: those that it names.
+    pub fn varies(&self) -> [bool; 3] {
+        [0, 1, 2].map(|a| {
+            self.program
+                .iter()
+                .any(|i| matches!(i, Instruction::Variable(n) if *n == a))
+        })
+    }
+
     /// Contains every value in the box, by interval arithmetic; everything where the formula may be undefined.
     pub fn bound(&self, b: &Aabb) -> Interval {
         let at = [0, 1, 2].map(|a| Interval::new(b.min[a], b.max[a]));

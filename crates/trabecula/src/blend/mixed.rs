@@ -1,0 +1,172 @@
+//! The nodes of a row where several lattices may be.
+//!
+//! Shares, upper ends and quantiles are found again only where they change: what varies along x alone once for a block, what
+//! does not vary along x once for a row.
+
+use super::Blend;
+use super::added::{At, HIGH, LOW, Row};
+use super::fill::Line;
+use super::strand::Strand;
+use crate::math::Vec3;
+
+/// What is found on the rows of a block where several lattices may be.
+pub(super) struct Mixed {
+    /// Shares, those of a node side by side.
+    shares: Numbers,
+    /// For each lattice: its upper end, and the quantiles of both where levels vary.
+    ends: Vec<Numbers>,
+    at: At,
+    /// What is known of the levels, where the fraction is kept.
+    row: Option<Row>,
+}
+
+impl Mixed {
+    /// For rows with nodes at these x.
+    pub fn new(blend: &Blend, xs: &[f64]) -> Mixed {
+        let mut varies = [false; 3];
+        for grade in blend.weights.grades() {
+            let of = grade.varies();
+            (0..3).for_each(|a| varies[a] |= of[a]);
+        }
+        let ends = |s: &Strand| {
+            let varies = match s.lattice() {
+                Some(l) if l.uniform().is_some() => [false; 3],
+                Some(l) => l.level.grade().varies(),
+                // Its share is found by looking.
+                None => [blend.varied().is_some(); 3],
+            };
+            Numbers::new(3, varies, xs.len())
+        };
+        Mixed {
+            shares: Numbers::new(blend.strands.len(), varies, xs.len()),
+            ends: blend.strands.iter().map(ends).collect(),
+            at: At::default(),
+            row: blend.levels.as_deref().map(|levels| Row::new(levels, xs)),
+        }
+    }
+
+    /// Fills the values at some nodes of a row.
+    pub fn fill(&mut self, blend: &Blend, nodes: &[usize], line: &Line, row: &mut [f32]) {
+        let Mixed {
+            shares,
+            ends,
+            at,
+            row: known,
+        } = self;
+        let (n, strands) = (blend.strands.len(), &blend.strands);
+        shares.renew(line, nodes, |points, out| blend.weights.values(points, out));
+        for (s, of) in ends.iter_mut().enumerate() {
+            if nodes.iter().any(|i| shares.at(*i)[s] > 0.0) {
+                of.renew(line, nodes, |points, out| blend.ends_at(s, points, out));
+            }
+        }
+        if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
+            known.enter(levels, line.at);
+        }
+        for &i in nodes {
+            let w = &shares.at(i)[..n];
+            if let Some(s) = w.iter().position(|w| *w == 1.0) {
+                row[i] = blend.alone(s, line.core(s, i), ends[s].at(i)[0]) as f32;
+                continue;
+            }
+            let (mut f, mut level) = (0.0, [0.0; 2]);
+            for (s, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                let high = ends[s].at(i)[0];
+                f += w * line.core(s, i);
+                level[LOW] += w * strands[s].low(high);
+                level[HIGH] += w * high;
+            }
+            if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
+                levels.grid.place(w, &mut at.place);
+                if !levels.is_uniform() {
+                    at.q.clear();
+                    at.q.extend(ends.iter().map(|e| [e.at(i)[1], e.at(i)[2]]));
+                }
+                let more = levels.added_in_row(strands, i, w, at, blend.ends(), known);
+                level = [level[LOW] + more[LOW], level[HIGH] + more[HIGH]];
+            }
+            row[i] = blend.value_of([f, level[LOW], level[HIGH]]) as f32;
+        }
+    }
+}
+
+impl Blend {
+    /// Fills a lattice's upper end at points (mm), and the quantiles of both ends where levels vary.
+    fn ends_at(&self, s: usize, points: &[Vec3], out: &mut [f64]) {
+        let mut high = vec![0.0; points.len()];
+        self.strands[s].highs(points, &mut high);
+        for ((out, p), high) in out.chunks_exact_mut(3).zip(points).zip(high) {
+            let q = self
+                .varied()
+                .map(|l| l.quantiles(&self.strands, *p, s, high));
+            let [a, b] = q.unwrap_or_default();
+            out.copy_from_slice(&[high, a, b]);
+        }
+    }
+}
+
+/// Some numbers for each node of a row.
+struct Numbers {
+    width: usize,
+    /// Along which axes they may change.
+    varies: [bool; 3],
+    of: Vec<f64>,
+    /// The row that all of them are of, as far as rows differ.
+    known: Option<[usize; 2]>,
+    points: Vec<Vec3>,
+    found: Vec<f64>,
+}
+
+impl Numbers {
+    fn new(width: usize, varies: [bool; 3], nodes: usize) -> Numbers {
+        Numbers {
+            width,
+            varies,
+            of: vec![0.0; width * nodes],
+            known: None,
+            points: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+
+    #[inline]
+    fn at(&self, node: usize) -> &[f64] {
+        &self.of[node * self.width..][..self.width]
+    }
+
+    /// Makes the numbers at some nodes those of a row; `find` fills them at points (mm).
+    fn renew(&mut self, line: &Line, nodes: &[usize], find: impl Fn(&[Vec3], &mut [f64])) {
+        let [x, y, z] = self.varies;
+        // All nodes at once where another row asks for the same, or one is as good as all.
+        let whole = !x || !(y || z);
+        let row = [
+            usize::from(y) * line.number[0],
+            usize::from(z) * line.number[1],
+        ];
+        if whole && self.known == Some(row) {
+            return;
+        }
+        self.known = whole.then_some(row);
+        self.points.clear();
+        match (x, whole) {
+            (false, _) => self.points.push(line.place(0)),
+            (_, true) => self
+                .points
+                .extend((0..line.xs.len()).map(|i| line.place(i))),
+            _ => self.points.extend(nodes.iter().map(|i| line.place(*i))),
+        }
+        self.found.resize(self.points.len() * self.width, 0.0);
+        find(&self.points, &mut self.found);
+        match (x, whole) {
+            (false, _) => {
+                (self.of.chunks_exact_mut(self.width)).for_each(|n| n.copy_from_slice(&self.found))
+            }
+            (_, true) => self.of.copy_from_slice(&self.found),
+            _ => {
+                for (i, found) in nodes.iter().zip(self.found.chunks_exact(self.width)) {
+                    self.of[i * self.width..][..self.width].copy_from_slice(found);
+                }
+            }
+        }
+    }
+}
