@@ -11,6 +11,7 @@ mod fill;
 mod joint;
 mod levels;
 mod mixed;
+mod near;
 mod quantile;
 mod simplex;
 mod strand;
@@ -27,9 +28,10 @@ pub use joint::Phases;
 pub use strand::Constituent;
 pub use weights::Weights;
 
-use added::{At, End, HIGH, LOW, Near};
+use added::{At, End, HIGH, LOW};
 use joint::Joint;
 use levels::Levels;
+use near::Near;
 use simplex::Place;
 use strand::Strand;
 
@@ -275,29 +277,36 @@ impl Field for Blend {
         let (mut f, mut df) = zeros(points.len());
         let (mut high, mut dhigh) = zeros(n * points.len());
         for (i, s) in self.strands.iter().enumerate() {
-            let here: Vec<usize> = (0..points.len()).filter(|k| w[k * n + i] > 0.0).collect();
-            let at: Vec<Vec3> = here.iter().map(|k| points[*k]).collect();
+            let (mut here, mut at) = (Vec::new(), Vec::new());
+            let all = (0..points.len()).all(|k| w[k * n + i] > 0.0);
+            if !all {
+                here.extend((0..points.len()).filter(|k| w[k * n + i] > 0.0));
+                at.extend(here.iter().map(|k| points[*k]));
+            }
+            let at = if all { points } else { &at };
             let (mut g, mut dg) = zeros(at.len());
             let (mut own, mut down) = zeros(at.len());
-            s.gradients(&at, &mut g, &mut dg);
-            s.high_gradients(&at, &mut own, &mut down);
-            for (j, k) in here.into_iter().enumerate() {
+            s.gradients(at, &mut g, &mut dg);
+            s.high_gradients(at, &mut own, &mut down);
+            for j in 0..at.len() {
+                let k = if all { j } else { here[j] };
                 let (w, dw) = (w[k * n + i], dw[k * n + i]);
                 f[k] += w * g[j];
                 df[k] = add(df[k], add(scale(dg[j], w), scale(dw, g[j])));
                 (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
             }
         }
-        let (mut place, mut near) = (Place::default(), Near::new());
+        let mut place = Place::default();
+        let mut near = self.levels.as_deref().map(|l| Near::new(l, &self.strands));
         let mut quantiles = vec![End::default(); n];
         for (k, p) in points.iter().enumerate() {
             let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
             let (high, dhigh) = (&high[k * n..][..n], &dhigh[k * n..][..n]);
             let alone = w.contains(&1.0);
             let levels = self.levels.as_deref().filter(|_| !alone);
-            if let Some(levels) = levels {
+            if let (Some(levels), Some(near)) = (levels, &mut near) {
                 levels.grid.place(w, &mut place);
-                levels.near(&self.strands, *p, &mut near);
+                near.enter(*p);
             }
             if let Some(levels) = self.varied().filter(|_| !alone) {
                 for (i, q) in quantiles.iter_mut().enumerate() {
@@ -315,9 +324,9 @@ impl Field for Blend {
                     let own = scale(dhigh[i], w[i] * s.end_slope(end));
                     slope = add(slope, add(own, scale(dw[i], v)));
                 }
-                if let Some(levels) = levels {
+                if let (Some(levels), Some(near)) = (levels, &near) {
                     let own = (w, dw, &place);
-                    let more = levels.added_gradients(&self.strands, &near, own, &quantiles, end);
+                    let more = levels.added_gradients(&self.strands, near, own, &quantiles, end);
                     (level, slope) = (level + more.0, add(slope, more.1));
                 }
                 let (v, g) = match end == HIGH {

@@ -2,7 +2,8 @@
 //!
 //! Everything is linear between the tables (`levels`) of the neighbourhoods about a point, and between their nodes.
 
-use super::levels::{Levels, Station, blended};
+use super::levels::{Levels, blended};
+use super::near::Near;
 use super::quantile::quantile;
 use super::simplex::Place;
 use super::strand::Strand;
@@ -28,8 +29,6 @@ pub(super) struct At {
     /// The quantiles of the lattices, where they vary.
     pub q: Vec<[f64; 2]>,
     terms: Vec<Term>,
-    /// Those of each end.
-    asked: [Vec<Term>; 2],
 }
 
 /// A node's part in what is added: how often its number counts and, of a quantile function, at which share. (No enum: read
@@ -84,9 +83,6 @@ impl Row {
     }
 }
 
-/// The neighbourhoods about a point: the number of each, what is known of it, its share and the gradient of that (per mm).
-pub(super) type Near<'a> = Vec<(usize, &'a Station, f64, Vec3)>;
-
 impl Levels {
     /// What is added to Σ wᵢ loᵢ or Σ wᵢ hiᵢ at a point with shares `w`, which lie at a place and have quantiles.
     pub fn added(&self, strands: &[Strand], p: Vec3, w: &[f64], at: &mut At, end: usize) -> f64 {
@@ -100,23 +96,25 @@ impl Levels {
         sum
     }
 
-    /// The same of some ends at the i-th node of a row that has been entered.
+    /// The same of some ends at the i-th node of a row that has been entered: of shares `w` that lie at `nodes`, so many
+    /// times at each; `q` are the lattices' quantiles.
     pub fn added_in_row(
         &self,
         strands: &[Strand],
         i: usize,
-        w: &[f64],
-        at: &mut At,
+        [w, nodes, times]: [&[f64]; 3],
+        q: impl Fn(usize) -> [f64; 2],
         ends: &[usize],
         row: &mut Row,
     ) -> [f64; 2] {
         let (first, share) = row.along[i];
         let mut out = [0.0; 2];
         let uniform = self.is_uniform();
-        for &end in ends.iter().filter(|_| !uniform) {
-            out[end] = self.terms(strands, w, at, end);
-            at.asked[end].clone_from(&at.terms);
-        }
+        let own = match uniform {
+            true => [0.0; 2],
+            false => blended(w, (0..w.len()).map(&q)),
+        };
+        let lattices = || strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0);
         for (column, near) in [(first, 1.0 - share), (first + 1, share)] {
             if near <= 0.0 {
                 continue;
@@ -129,18 +127,27 @@ impl Levels {
             let across = row.across;
             let find =
                 |node| move |out: &mut [f32]| self.between(strands, column, node, across, out);
-            if uniform {
-                for (node, times) in at.place.nodes.iter().zip(&at.place.shares) {
-                    let (v, times) = (known.get_or(*node, find(*node)), near * times);
+            for (node, times) in nodes.iter().zip(times).filter(|(_, times)| **times != 0.0) {
+                let (node, times) = (*node as usize, near * times);
+                let v = known.get_or(node, find(node));
+                if uniform {
                     out[LOW] += times * f64::from(v[LOW]);
                     out[HIGH] += times * f64::from(v[HIGH]);
+                } else {
+                    ends.iter()
+                        .for_each(|e| out[*e] += times * quantile(v, own[*e]).0);
                 }
-                continue;
             }
-            for &end in ends {
-                for t in &at.asked[end] {
-                    let v = known.get_or(t.node, find(t.node));
-                    out[end] += near * t.times * quantile(v, t.q).0;
+            for (s, strand) in lattices().filter(|_| !uniform) {
+                let v = known.get_or(self.alone[s], find(self.alone[s]));
+                let q = q(s);
+                for &end in ends {
+                    out[end] -= near
+                        * w[s]
+                        * match end == HIGH || strand.is_sheet() {
+                            true => quantile(v, q[end]).0,
+                            false => strand.low(0.0),
+                        };
                 }
             }
         }
@@ -171,7 +178,7 @@ impl Levels {
 
     /// What is added to an end by the numbers of a node (at the share q), and how it changes with that.
     #[inline(always)]
-    fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
+    pub fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
         match self.is_uniform() {
             true => (f64::from(numbers[end]), 0.0),
             false => quantile(numbers, q),
@@ -180,9 +187,7 @@ impl Levels {
 
     /// Finds which nodes have a part in what is added to an end; what is added besides.
     fn terms(&self, strands: &[Strand], w: &[f64], at: &mut At, end: usize) -> f64 {
-        let At {
-            place, q, terms, ..
-        } = at;
+        let At { place, q, terms } = at;
         let own = match self.is_uniform() {
             true => 0.0,
             false => blended(w, q.iter().copied())[end],
@@ -211,15 +216,7 @@ impl Levels {
         more
     }
 
-    /// Finds what is known about a point.
-    pub fn near<'a>(&'a self, strands: &[Strand], p: Vec3, out: &mut Near<'a>) {
-        out.clear();
-        let corners = self.joint.corners(p).into_iter();
-        let some = corners.filter(|c| c.1 > 0.0 || c.2 != [0.0; 3]);
-        out.extend(some.map(|(i, share, slope)| (i, self.station(i, strands), share, slope)));
-    }
-
-    /// What is added at a point with its gradient (per mm); `dw` are those of the shares.
+    /// The same with its gradient (per mm); `near` is what is known about the point, `dw` are the gradients of the shares.
     pub fn added_gradients(
         &self,
         strands: &[Strand],
@@ -228,21 +225,7 @@ impl Levels {
         ends: &[End],
         end: usize,
     ) -> (f64, Vec3) {
-        // What the neighbourhoods answer together, how that changes from place to place, and with the share.
-        let sum = |node: usize, q: f64| {
-            let (mut v, mut d, mut steep) = (0.0, [0.0; 3], 0.0);
-            for (i, station, share, slope) in near {
-                let numbers = match station.known(node) {
-                    Some(numbers) => numbers,
-                    None => self.numbers(*i, strands, node),
-                };
-                let of = self.ask(numbers, end, q);
-                v += share * of.0;
-                d = add(d, scale(*slope, of.0));
-                steep += share * of.1;
-            }
-            (v, d, steep)
-        };
+        let sum = |node: usize, q: f64| near.ask(node, end, q);
         let (q, dq) = match self.is_uniform() {
             true => (0.0, [0.0; 3]),
             false => blended_gradient(w, dw, ends, end),

@@ -4,18 +4,18 @@
 //! does not vary along x once for a row.
 
 use super::Blend;
-use super::added::{At, HIGH, LOW, Row};
+use super::added::{HIGH, LOW, Row};
 use super::fill::Line;
+use super::simplex::Place;
 use super::strand::Strand;
 use crate::math::Vec3;
 
 /// What is found on the rows of a block where several lattices may be.
 pub(super) struct Mixed {
-    /// Shares, those of a node side by side.
+    /// Shares, and where the levels are tabulated for them: the nodes of the table, and how often each counts.
     shares: Numbers,
     /// For each lattice: its upper end, and the quantiles of both where levels vary.
     ends: Vec<Numbers>,
-    at: At,
     /// What is known of the levels, where the fraction is kept.
     row: Option<Row>,
 }
@@ -38,9 +38,8 @@ impl Mixed {
             Numbers::new(3, varies, xs.len())
         };
         Mixed {
-            shares: Numbers::new(blend.strands.len(), varies, xs.len()),
+            shares: Numbers::new(3 * blend.strands.len(), varies, xs.len()),
             ends: blend.strands.iter().map(ends).collect(),
-            at: At::default(),
             row: blend.levels.as_deref().map(|levels| Row::new(levels, xs)),
         }
     }
@@ -50,11 +49,10 @@ impl Mixed {
         let Mixed {
             shares,
             ends,
-            at,
             row: known,
         } = self;
         let (n, strands) = (blend.strands.len(), &blend.strands);
-        shares.renew(line, nodes, |points, out| blend.weights.values(points, out));
+        shares.renew(line, nodes, |points, out| blend.shares_at(points, out));
         for (s, of) in ends.iter_mut().enumerate() {
             if nodes.iter().any(|i| shares.at(*i)[s] > 0.0) {
                 of.renew(line, nodes, |points, out| blend.ends_at(s, points, out));
@@ -64,7 +62,8 @@ impl Mixed {
             known.enter(levels, line.at);
         }
         for &i in nodes {
-            let w = &shares.at(i)[..n];
+            let here = shares.at(i);
+            let (w, place) = here.split_at(n);
             if let Some(s) = w.iter().position(|w| *w == 1.0) {
                 row[i] = blend.alone(s, line.core(s, i), ends[s].at(i)[0]) as f32;
                 continue;
@@ -77,12 +76,9 @@ impl Mixed {
                 level[HIGH] += w * high;
             }
             if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
-                levels.grid.place(w, &mut at.place);
-                if !levels.is_uniform() {
-                    at.q.clear();
-                    at.q.extend(ends.iter().map(|e| [e.at(i)[1], e.at(i)[2]]));
-                }
-                let more = levels.added_in_row(strands, i, w, at, blend.ends(), known);
+                let of = [w, &place[..n], &place[n..]];
+                let q = |s: usize| [ends[s].at(i)[1], ends[s].at(i)[2]];
+                let more = levels.added_in_row(strands, i, of, q, blend.ends(), known);
                 level = [level[LOW] + more[LOW], level[HIGH] + more[HIGH]];
             }
             row[i] = blend.value_of([f, level[LOW], level[HIGH]]) as f32;
@@ -91,6 +87,23 @@ impl Mixed {
 }
 
 impl Blend {
+    /// Fills shares at points (mm), and where they lie in the tables of levels.
+    fn shares_at(&self, points: &[Vec3], out: &mut [f64]) {
+        let n = self.strands.len();
+        let mut w = vec![0.0; n * points.len()];
+        self.weights.values(points, &mut w);
+        let mut place = Place::default();
+        for (out, w) in out.chunks_exact_mut(3 * n).zip(w.chunks_exact(n)) {
+            out[..n].copy_from_slice(w);
+            if let Some(levels) = &self.levels {
+                levels.grid.place(w, &mut place);
+                let nodes = place.nodes.iter().map(|node| *node as f64);
+                let place = nodes.chain(place.shares.iter().copied());
+                out[n..].iter_mut().zip(place).for_each(|(o, v)| *o = v);
+            }
+        }
+    }
+
     /// Fills a lattice's upper end at points (mm), and the quantiles of both ends where levels vary.
     fn ends_at(&self, s: usize, points: &[Vec3], out: &mut [f64]) {
         let mut high = vec![0.0; points.len()];

@@ -63,28 +63,28 @@ impl Quantity for Interval {
     }
 }
 
-/// A value and its gradient (forward differentiation).
+/// A value and its slopes along some axes (forward differentiation).
 #[derive(Clone, Copy)]
-struct Dual(f64, Vec3);
+struct Dual<const N: usize>(f64, [f64; N]);
 
-impl Quantity for Dual {
-    fn constant(v: f64) -> Dual {
-        Dual(v, [0.0; 3])
+impl<const N: usize> Quantity for Dual<N> {
+    fn constant(v: f64) -> Dual<N> {
+        Dual(v, [0.0; N])
     }
     #[inline(always)]
-    fn apply(op: Operation, args: [Dual; 3]) -> Dual {
+    fn apply(op: Operation, args: [Dual<N>; 3]) -> Dual<N> {
         let at = args.map(|d| d.0);
         let partials = op.partials(at);
-        let mut gradient = [0.0; 3];
+        let mut slopes = [0.0; N];
         for (d, partial) in args.iter().zip(partials) {
-            for a in 0..3 {
+            for a in 0..N {
                 // An argument that stands still adds nothing, even where the partial is infinite or undefined.
                 if d.1[a] != 0.0 {
-                    gradient[a] += partial * d.1[a];
+                    slopes[a] += partial * d.1[a];
                 }
             }
         }
-        Dual(op.value(at), gradient)
+        Dual(op.value(at), slopes)
     }
 }
 
@@ -128,17 +128,35 @@ impl Formula {
 
     /// Fills values and gradients (per mm).
     pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        match self.varies() {
+            [_, false, false] => self.slopes([0], points, values, gradients),
+            [false, true, false] => self.slopes([1], points, values, gradients),
+            [false, false, true] => self.slopes([2], points, values, gradients),
+            _ => self.slopes([0, 1, 2], points, values, gradients),
+        }
+    }
+
+    /// The same, where it varies along these axes alone.
+    fn slopes<const N: usize>(
+        &self,
+        axes: [usize; N],
+        points: &[Vec3],
+        values: &mut [f64],
+        gradients: &mut [Vec3],
+    ) {
         let mut stack = Vec::new();
         let out = values.chunks_mut(LANES).zip(gradients.chunks_mut(LANES));
         for (points, (values, gradients)) in points.chunks(LANES).zip(out) {
             let variable = |lane: usize, axis: usize| {
-                let mut slope = [0.0; 3];
-                slope[axis] = 1.0;
-                Dual(points.get(lane).map_or(0.0, |p| p[axis]), slope)
+                let slopes = axes.map(|a| f64::from(u8::from(a == axis)));
+                Dual(points.get(lane).map_or(0.0, |p| p[axis]), slopes)
             };
             let found = self.run_lanes(variable, &mut stack);
             for ((v, g), d) in values.iter_mut().zip(gradients).zip(found) {
-                (*v, *g) = (d.0, d.1);
+                (*v, *g) = (d.0, [0.0; 3]);
+                for (a, slope) in axes.iter().zip(d.1) {
+                    g[*a] = slope;
+                }
             }
         }
     }
