@@ -139,7 +139,8 @@ impl Blend {
                         .enumerate()
                         .filter(|(k, _)| w[k * n + i] > 0.0)
                     {
-                        *o = levels.share_found(&self.strands, points[k], i).0;
+                        let [a, b] = levels.found(&self.strands, points[k], i).quantiles;
+                        *o = b - a.max(0.0);
                     }
                 }
                 (None, None) => own.fill(f64::NAN),

@@ -263,6 +263,14 @@ impl Tiling {
         matches!(self.level, Level::Nodes(_)) || self.cells.iter().any(|c| c.weights.is_some())
     }
 
+    /// The level, where it does not vary.
+    pub fn uniform(&self) -> Option<f64> {
+        match self.level {
+            Level::Same(t) => Some(t),
+            Level::Nodes(_) => None,
+        }
+    }
+
     /// The least and greatest level.
     pub fn levels(&self) -> Interval {
         match &self.level {

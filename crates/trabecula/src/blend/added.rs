@@ -4,7 +4,7 @@
 
 use super::levels::{Levels, blended};
 use super::near::Near;
-use super::quantile::quantile;
+use super::quantile::{Spot, quantile};
 use super::simplex::Place;
 use super::strand::Strand;
 use super::table::Table;
@@ -48,8 +48,11 @@ pub(super) struct Row {
     across: [(usize, f64); 2],
     /// How many rows have been.
     count: u64,
-    /// For each neighbourhood along x the numbers there, and in which row.
-    columns: Vec<(u64, Table)>,
+    /// For each neighbourhood along x the row that its numbers are of: what is added to the ends at each node of the table, NaN
+    /// where nobody has asked; or, where levels vary, quantile functions.
+    of: Vec<u64>,
+    ends: Vec<[f32; 2]>,
+    curves: Vec<Table>,
 }
 
 impl Row {
@@ -59,12 +62,22 @@ impl Row {
             let (n, share, _) = levels.joint.along(0, *x);
             (n, share)
         };
+        let (columns, uniform) = (levels.joint.shape[0], levels.is_uniform());
         Row {
             along: xs.iter().map(along).collect(),
             across: [(0, 0.0); 2],
             count: 0,
-            columns: (0..levels.joint.shape[0])
-                .map(|_| (0, levels.table()))
+            of: vec![0; columns],
+            ends: vec![
+                [f32::NAN; 2];
+                if uniform {
+                    columns * levels.grid.len()
+                } else {
+                    0
+                }
+            ],
+            curves: (0..if uniform { 0 } else { columns })
+                .map(|_| levels.table())
                 .collect(),
         }
     }
@@ -108,46 +121,53 @@ impl Levels {
         row: &mut Row,
     ) -> [f64; 2] {
         let (first, share) = row.along[i];
-        let mut out = [0.0; 2];
-        let uniform = self.is_uniform();
-        let own = match uniform {
-            true => [0.0; 2],
-            false => blended(w, (0..w.len()).map(&q)),
-        };
-        let lattices = || strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0);
-        for (column, near) in [(first, 1.0 - share), (first + 1, share)] {
-            if near <= 0.0 {
-                continue;
-            }
-            let (count, known) = &mut row.columns[column];
-            if *count != row.count {
-                *count = row.count;
-                known.clear();
-            }
-            let across = row.across;
-            let find =
-                |node| move |out: &mut [f32]| self.between(strands, column, node, across, out);
-            for (node, times) in nodes.iter().zip(times).filter(|(_, times)| **times != 0.0) {
-                let (node, times) = (*node as usize, near * times);
-                let v = known.get_or(node, find(node));
-                if uniform {
-                    out[LOW] += times * f64::from(v[LOW]);
-                    out[HIGH] += times * f64::from(v[HIGH]);
-                } else {
-                    ends.iter()
-                        .for_each(|e| out[*e] += times * quantile(v, own[*e]).0);
+        let columns = [(first, 1.0 - share), (first + 1, share)];
+        let columns = columns.into_iter().filter(|c| c.1 > 0.0);
+        let nodes = || (nodes.iter().zip(times)).filter(|(_, times)| **times != 0.0);
+        let (mut out, across) = ([0.0; 2], row.across);
+        if self.is_uniform() {
+            for (column, near) in columns {
+                let known = &mut row.ends[column * self.grid.len()..][..self.grid.len()];
+                if row.of[column] != row.count {
+                    row.of[column] = row.count;
+                    known.fill([f32::NAN; 2]);
+                }
+                for (node, times) in nodes() {
+                    let of = &mut known[*node as usize];
+                    if of[HIGH].is_nan() {
+                        *of = [0.0; 2];
+                        self.between(strands, column, *node as usize, across, of);
+                    }
+                    let times = near * times;
+                    out[LOW] += times * f64::from(of[LOW]);
+                    out[HIGH] += times * f64::from(of[HIGH]);
                 }
             }
-            for (s, strand) in lattices().filter(|_| !uniform) {
-                let v = known.get_or(self.alone[s], find(self.alone[s]));
-                let q = q(s);
+            return out;
+        }
+        let own = blended(w, (0..w.len()).map(&q)).map(Spot::of);
+        for (column, near) in columns {
+            let known = &mut row.curves[column];
+            if row.of[column] != row.count {
+                row.of[column] = row.count;
+                known.clear();
+            }
+            let find =
+                |node| move |out: &mut [f32]| self.between(strands, column, node, across, out);
+            for (node, times) in nodes() {
+                let v = known.get_or(*node as usize, find(*node as usize));
                 for &end in ends {
-                    out[end] -= near
-                        * w[s]
-                        * match end == HIGH || strand.is_sheet() {
-                            true => quantile(v, q[end]).0,
-                            false => strand.low(0.0),
-                        };
+                    out[end] += near * times * own[end].ask(v).0;
+                }
+            }
+            for (s, strand) in strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
+                let v = known.get_or(self.alone[s], find(self.alone[s]));
+                for &end in ends {
+                    let base = match end == HIGH || strand.is_sheet() {
+                        true => quantile(v, q(s)[end]).0,
+                        false => strand.low(0.0),
+                    };
+                    out[end] -= near * w[s] * base;
                 }
             }
         }
@@ -178,7 +198,7 @@ impl Levels {
 
     /// What is added to an end by the numbers of a node (at the share q), and how it changes with that.
     #[inline(always)]
-    pub fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
+    fn ask(&self, numbers: &[f32], end: usize, q: f64) -> (f64, f64) {
         match self.is_uniform() {
             true => (f64::from(numbers[end]), 0.0),
             false => quantile(numbers, q),

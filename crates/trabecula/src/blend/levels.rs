@@ -13,7 +13,7 @@ use super::added::End;
 use super::joint::Joint;
 use super::quantile::{Counted, KNOTS, add_times, quantile};
 use super::simplex::Grid;
-use super::strand::{BELOW, Strand};
+use super::strand::Strand;
 use super::table::Table;
 use super::weights::Weights;
 use crate::math::{Aabb, Interval, Vec3, add, scale};
@@ -41,8 +41,8 @@ const MANY: usize = 64;
 
 /// What is known of one neighbourhood.
 pub(super) struct Station {
-    /// The solid share of each lattice, found by looking.
-    own: Vec<f64>,
+    /// The quantiles of each lattice, found by looking.
+    own: Vec<[f64; 2]>,
     /// At the nodes that shares about here need.
     near: Table,
     /// At all nodes, once a point beyond needs them.
@@ -140,12 +140,9 @@ impl Levels {
     #[inline]
     pub fn station(&self, i: usize, strands: &[Strand]) -> &Station {
         self.stations[i].get_or_init(|| {
-            let samples = self.samples(i, strands);
-            let own = samples.iter().map(|s| {
-                let solid = s.iter().filter(|v| **v <= 0.0).count();
-                solid as f64 / s.len() as f64
-            });
-            let own: Vec<f64> = own.collect();
+            let (places, samples) = self.samples(i, strands);
+            let of = |(s, of): (&Strand, &Vec<f32>)| s.quantiles_of(&places, of);
+            let own: Vec<[f64; 2]> = strands.iter().zip(&samples).map(of).collect();
             Station {
                 near: self.look(strands, &samples, &own, &self.about(&self.shares(i))),
                 own,
@@ -154,9 +151,10 @@ impl Levels {
         })
     }
 
-    fn samples(&self, i: usize, strands: &[Strand]) -> Vec<Vec<f32>> {
+    fn samples(&self, i: usize, strands: &[Strand]) -> (Vec<Vec3>, Vec<Vec<f32>>) {
         let places = self.joint.places(i);
-        strands.iter().map(|s| s.samples(&places)).collect()
+        let samples = strands.iter().map(|s| s.samples(&places)).collect();
+        (places, samples)
     }
 
     /// The numbers of a node in a neighbourhood.
@@ -175,7 +173,7 @@ impl Levels {
         let station = self.station(i, strands);
         let whole = station.whole.get_or_init(|| {
             let all: Vec<usize> = (0..self.nodes.len()).collect();
-            self.look(strands, &self.samples(i, strands), &station.own, &all)
+            self.look(strands, &self.samples(i, strands).1, &station.own, &all)
         });
         whole.get(node).unwrap_or(&[0.0; KNOTS + 1])
     }
@@ -185,13 +183,13 @@ impl Levels {
         &self,
         strands: &[Strand],
         samples: &[Vec<f32>],
-        own: &[f64],
+        own: &[[f64; 2]],
         wanted: &[usize],
     ) -> Table {
         let mut table = self.table();
         let exact: Option<Vec<[f64; 2]>> = self.uniform.as_ref().map(|uniform| {
             let each = uniform.iter().zip(own);
-            each.map(|(q, own)| q.unwrap_or([-BELOW, *own])).collect()
+            each.map(|(q, own)| q.unwrap_or(*own)).collect()
         });
         let mut ends: Vec<(usize, [f64; 2])> = Vec::new();
         let mut sum = vec![0f32; samples[0].len()];
@@ -235,32 +233,34 @@ impl Levels {
         table
     }
 
-    /// The share of a field that is solid about a point, found by looking, and its gradient (per mm).
-    pub fn share_found(&self, strands: &[Strand], p: Vec3, i: usize) -> (f64, Vec3) {
+    /// The quantiles of a field about a point, found by looking, and their gradients (per mm).
+    pub fn found(&self, strands: &[Strand], p: Vec3, i: usize) -> End {
         let near = self.joint.corners(p);
         let near = near.iter().filter(|c| c.1 > 0.0 || c.2 != [0.0; 3]);
-        near.fold((0.0, [0.0; 3]), |(v, g), (n, share, slope)| {
+        near.fold(End::default(), |mut end, (n, share, slope)| {
             let own = self.station(*n, strands).own[i];
-            (v + share * own, add(g, scale(*slope, own)))
+            for (e, own) in own.into_iter().enumerate() {
+                end.quantiles[e] += share * own;
+                end.slopes[e] = add(end.slopes[e], scale(*slope, own));
+            }
+            end
         })
     }
 
     /// The quantiles of the i-th lattice at a point where its upper end is `high`.
     pub fn quantiles(&self, strands: &[Strand], p: Vec3, i: usize, high: f64) -> [f64; 2] {
-        let found = || [-BELOW, self.share_found(strands, p, i).0];
+        let found = || self.found(strands, p, i).quantiles;
         strands[i].quantiles(high).unwrap_or_else(found)
     }
 
     /// The same with gradients (per mm), the upper end's being given.
     pub fn end(&self, strands: &[Strand], p: Vec3, i: usize, (high, slope): (f64, Vec3)) -> End {
-        if let Some(quantiles) = strands[i].quantiles(high) {
-            let slopes = strands[i].quantile_slopes(high).map(|by| scale(slope, by));
-            return End { quantiles, slopes };
-        }
-        let (share, slope) = self.share_found(strands, p, i);
-        End {
-            quantiles: [-BELOW, share],
-            slopes: [[0.0; 3], slope],
+        match strands[i].quantiles(high) {
+            Some(quantiles) => {
+                let slopes = strands[i].quantile_slopes(high).map(|by| scale(slope, by));
+                End { quantiles, slopes }
+            }
+            None => self.found(strands, p, i),
         }
     }
 
@@ -292,10 +292,7 @@ impl Levels {
             .map(
                 |i| match [highs[i].lo, highs[i].hi].map(|h| strands[i].quantiles(h)) {
                     [Some(lo), Some(hi)] => [0, 1].map(|e| hull([lo[e], hi[e]].into_iter())),
-                    _ => [
-                        Interval::new(-BELOW, -BELOW),
-                        hull(near.iter().map(|s| s.own[i])),
-                    ],
+                    _ => [0, 1].map(|e| hull(near.iter().map(|s| s.own[i][e]))),
                 },
             )
             .collect();

@@ -32,8 +32,8 @@ impl Mixed {
             let varies = match s.lattice() {
                 Some(l) if l.uniform().is_some() => [false; 3],
                 Some(l) => l.level.grade().varies(),
-                // Its share is found by looking.
-                None => [blend.varied().is_some(); 3],
+                // Its quantiles are found by looking.
+                None => [s.uniform().is_none() || blend.varied().is_some(); 3],
             };
             Numbers::new(3, varies, xs.len())
         };

@@ -1,6 +1,7 @@
 //! What the neighbourhoods about a point say together, and how that changes from place to place.
 
 use super::levels::{Levels, Station};
+use super::quantile::Spot;
 use super::strand::Strand;
 use crate::math::Vec3;
 
@@ -61,12 +62,17 @@ impl<'a> Near<'a> {
 
     /// What is said at a node of the table (of an end, or at the share q), how that changes per mm, and with q.
     pub fn ask(&self, node: usize, end: usize, q: f64) -> (f64, Vec3, f64) {
+        let spot = Spot::of(q);
+        let uniform = self.levels.is_uniform();
         let of = |&(i, station): &(usize, &Station)| {
             let numbers = match station.known(node) {
                 Some(numbers) => numbers,
                 None => self.levels.numbers(i, self.strands, node),
             };
-            self.levels.ask(numbers, end, q)
+            match uniform {
+                true => (f64::from(numbers[end]), 0.0),
+                false => spot.ask(numbers),
+            }
         };
         let Some(corners) = self.corners.as_chunks::<8>().0.first() else {
             let (v, steep) = self.corners.first().map_or((0.0, 0.0), of);
@@ -74,7 +80,7 @@ impl<'a> Near<'a> {
         };
         let found = corners.each_ref().map(of);
         let (v, rise) = self.linear(found.map(|f| f.0));
-        let steep = match self.levels.is_uniform() {
+        let steep = match uniform {
             true => 0.0,
             false => self.linear(found.map(|f| f.1)).0,
         };

@@ -91,19 +91,41 @@ pub(super) fn add_times(sum: &mut [f32], w: f32, values: &[f32]) {
     sum.iter_mut().zip(values).for_each(|(o, v)| *o += w * v);
 }
 
-/// Value and slope of a quantile function at the share q, from its knots. Below none it falls on as steeply as it rises
-/// in all.
+/// Where a share lies among the knots of quantile functions: between which two, and how far past the first. Below none a
+/// function falls on as steeply as it rises in all.
+#[derive(Clone, Copy)]
+pub(super) struct Spot {
+    knots: [usize; 2],
+    past: f64,
+    /// The second less the first, per share.
+    per: f64,
+}
+
+impl Spot {
+    /// Where the share q lies.
+    #[inline]
+    pub fn of(q: f64) -> Spot {
+        let x = q.min(1.0) * KNOTS as f64;
+        let k = (x as usize).min(KNOTS - 1);
+        let (knots, past, per) = match q < 0.0 {
+            true => ([0, KNOTS], q, 1.0),
+            false => ([k, k + 1], x - k as f64, KNOTS as f64),
+        };
+        Spot { knots, past, per }
+    }
+
+    /// Value and slope of a quantile function there, from its knots.
+    #[inline]
+    pub fn ask(&self, knots: &[f32]) -> (f64, f64) {
+        let [a, b] = self.knots.map(|k| f64::from(knots[k]));
+        (a + (b - a) * self.past, (b - a) * self.per)
+    }
+}
+
+/// Value and slope of a quantile function at the share q, from its knots.
 #[inline]
 pub(super) fn quantile(knots: &[f32], q: f64) -> (f64, f64) {
-    let knot = |k: usize| f64::from(knots[k]);
-    if q < 0.0 {
-        let whole = knot(KNOTS) - knot(0);
-        return (knot(0) + q * whole, whole);
-    }
-    let x = q.min(1.0) * KNOTS as f64;
-    let k = (x as usize).min(KNOTS - 1);
-    let rise = knot(k + 1) - knot(k);
-    (knot(k) + rise * (x - k as f64), rise * KNOTS as f64)
+    Spot::of(q).ask(knots)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::added::HIGH;
 use crate::cell::Part;
 use crate::field::{Block, Field};
 use crate::lattice::{self, Lattice};
-use crate::math::{Aabb, Interval, Vec3, scale};
+use crate::math::{Aabb, Interval, Vec3, add, scale};
 
 /// One of what is blended.
 #[derive(Clone)]
@@ -20,6 +20,15 @@ pub enum Constituent {
         /// How long its cells are, mm.
         wavelength: f64,
     },
+    /// A wall that is no lattice: the greater of its sides f − t and −f − t, by its core f.
+    Wall {
+        /// Both sides.
+        sides: [Arc<dyn Field>; 2],
+        /// t, where it does not vary.
+        half: Option<f64>,
+        /// How long its cells are, mm.
+        wavelength: f64,
+    },
 }
 
 impl Constituent {
@@ -27,7 +36,7 @@ impl Constituent {
     pub fn lattice(&self) -> Option<&Lattice> {
         match self {
             Constituent::Lattice(l) => Some(l),
-            Constituent::Field { .. } => None,
+            Constituent::Field { .. } | Constituent::Wall { .. } => None,
         }
     }
 
@@ -36,6 +45,9 @@ impl Constituent {
         match self {
             Constituent::Lattice(l) => l.cores(points, out),
             Constituent::Field { field, .. } => field.values(points, out),
+            Constituent::Wall { sides, .. } => {
+                values_of(sides, points, out, |[a, b]| 0.5 * (a - b));
+            }
         }
     }
 
@@ -43,8 +55,40 @@ impl Constituent {
     pub fn longest(&self) -> f64 {
         match self {
             Constituent::Lattice(l) => l.map.longest(),
-            Constituent::Field { wavelength, .. } => *wavelength,
+            Constituent::Field { wavelength, .. } | Constituent::Wall { wavelength, .. } => {
+                *wavelength
+            }
         }
+    }
+}
+
+/// Fills what two fields make together.
+fn values_of(
+    sides: &[Arc<dyn Field>; 2],
+    points: &[Vec3],
+    out: &mut [f64],
+    made: impl Fn([f64; 2]) -> f64,
+) {
+    let mut other = vec![0.0; points.len()];
+    sides[0].values(points, out);
+    sides[1].values(points, &mut other);
+    (out.iter_mut().zip(other)).for_each(|(o, b)| *o = made([*o, b]));
+}
+
+/// Fills so many times the first field and the second together, and the gradient of that.
+fn halves(
+    sides: &[Arc<dyn Field>; 2],
+    [first, second]: [f64; 2],
+    points: &[Vec3],
+    values: &mut [f64],
+    gradients: &mut [Vec3],
+) {
+    let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
+    sides[0].gradients(points, values, gradients);
+    sides[1].gradients(points, &mut v, &mut g);
+    for ((a, da), (b, db)) in values.iter_mut().zip(gradients).zip(v.into_iter().zip(g)) {
+        *a = first * *a + second * b;
+        *da = add(scale(*da, first), scale(db, second));
     }
 }
 
@@ -97,6 +141,8 @@ impl Strand {
                 made.least = below(made.turned(Interval::new(lo.min(hi), hi)));
                 made.floor = made.least.min(proven.max(BOTTOM) - made.factor);
             }
+            // Both its ends count.
+            Constituent::Wall { .. } => {}
         }
         made
     }
@@ -107,7 +153,11 @@ impl Strand {
 
     /// Whether it has two ends.
     pub fn is_sheet(&self) -> bool {
-        self.lattice().is_some_and(|l| l.part == Part::Sheet)
+        match &self.of {
+            Constituent::Lattice(l) => l.part == Part::Sheet,
+            Constituent::Field { .. } => false,
+            Constituent::Wall { .. } => true,
+        }
     }
 
     /// The greatest length of a cell, mm.
@@ -120,6 +170,7 @@ impl Strand {
         let own = match &self.of {
             Constituent::Lattice(l) => l.slope(),
             Constituent::Field { field, .. } => field.slope(),
+            Constituent::Wall { sides, .. } => sides[0].slope().max(sides[1].slope()),
         };
         own * self.factor.abs()
     }
@@ -156,6 +207,9 @@ impl Strand {
         match &self.of {
             Constituent::Lattice(l) => l.core_gradients(points, values, gradients),
             Constituent::Field { field, .. } => field.gradients(points, values, gradients),
+            Constituent::Wall { sides, .. } => {
+                halves(sides, [0.5, -0.5], points, values, gradients);
+            }
         }
         values.iter_mut().for_each(|v| *v *= self.factor);
         gradients
@@ -168,14 +222,24 @@ impl Strand {
         self.turned(match &self.of {
             Constituent::Lattice(l) => l.core_bound(b),
             Constituent::Field { field, .. } => field.bound(b),
+            Constituent::Wall { sides, .. } => {
+                (sides[0].bound(b) - sides[1].bound(b)).times(Interval::new(0.5, 0.5))
+            }
         })
     }
 
     /// An interval that contains the upper end in the box.
     pub fn high_bound(&self, b: &Aabb) -> Interval {
+        if let Some(high) = self.uniform() {
+            return Interval::new(high, high);
+        }
         match &self.of {
             Constituent::Lattice(l) => self.turned(l.iso_bound(b)),
             Constituent::Field { .. } => Interval::new(0.0, 0.0),
+            Constituent::Wall { sides, .. } => {
+                let sum = sides[0].bound(b) + sides[1].bound(b);
+                self.turned(sum.times(Interval::new(-0.5, -0.5)))
+            }
         }
     }
 
@@ -189,6 +253,7 @@ impl Strand {
         match &self.of {
             Constituent::Lattice(l) => l.uniform().map(|t| self.factor * t),
             Constituent::Field { .. } => Some(0.0),
+            Constituent::Wall { half, .. } => half.map(|t| self.factor * t),
         }
     }
 
@@ -197,6 +262,10 @@ impl Strand {
         match &self.of {
             Constituent::Lattice(l) => l.isos(points, out),
             Constituent::Field { .. } => out.fill(0.0),
+            Constituent::Wall { half: Some(t), .. } => out.fill(*t),
+            Constituent::Wall { sides, .. } => {
+                values_of(sides, points, out, |[a, b]| -0.5 * (a + b));
+            }
         }
         out.iter_mut().for_each(|v| *v *= self.factor);
     }
@@ -208,6 +277,13 @@ impl Strand {
             Constituent::Field { .. } => {
                 values.fill(0.0);
                 gradients.fill([0.0; 3]);
+            }
+            Constituent::Wall { half: Some(t), .. } => {
+                values.fill(*t);
+                gradients.fill([0.0; 3]);
+            }
+            Constituent::Wall { sides, .. } => {
+                halves(sides, [-0.5, -0.5], points, values, gradients);
             }
         }
         values.iter_mut().for_each(|v| *v *= self.factor);
@@ -258,6 +334,23 @@ impl Strand {
         })
     }
 
+    /// The same by looking: of its values at some places, which are `samples`.
+    pub fn quantiles_of(&self, places: &[Vec3], samples: &[f32]) -> [f64; 2] {
+        let mut high = vec![0.0; places.len()];
+        self.highs(places, &mut high);
+        let mut count = [0usize; 2];
+        for (v, high) in samples.iter().zip(high) {
+            count[0] += usize::from(f64::from(*v) < -high);
+            count[1] += usize::from(f64::from(*v) <= high);
+        }
+        let share = count.map(|n| n as f64 / samples.len() as f64);
+        if self.is_sheet() {
+            share
+        } else {
+            [-BELOW, share[1]]
+        }
+    }
+
     /// How the quantiles change with `high`.
     pub fn quantile_slopes(&self, high: f64) -> [f64; 2] {
         let Some(l) = self.lattice() else {
@@ -280,15 +373,22 @@ impl Strand {
 
     /// g on the rows of a block; `wanted` says where.
     pub fn rows<'a>(&'a self, block: &Block<'a>, wanted: Option<&[u64]>) -> Rows<'a> {
+        let shape = [block.axes[0].len(), block.axes[1].len()];
+        let filled = |field: &dyn Field| {
+            let mut values = vec![0f32; block.len()];
+            match wanted {
+                Some(w) => field.fill_where(block, w, &mut values),
+                None => field.fill(block, &mut values),
+            }
+            values
+        };
         let of = match &self.of {
             Constituent::Lattice(l) => Kind::Lattice(Box::new(lattice::Rows::new(l, block))),
-            Constituent::Field { field, .. } => {
-                let mut values = vec![0f32; block.len()];
-                match wanted {
-                    Some(w) => field.fill_where(block, w, &mut values),
-                    None => field.fill(block, &mut values),
-                }
-                Kind::Filled(values, [block.axes[0].len(), block.axes[1].len()])
+            Constituent::Field { field, .. } => Kind::Filled(filled(&**field), shape),
+            Constituent::Wall { sides, .. } => {
+                let [mut a, b] = sides.each_ref().map(|side| filled(&**side));
+                (a.iter_mut().zip(b)).for_each(|(a, b)| *a = 0.5 * (*a - b));
+                Kind::Filled(a, shape)
             }
         };
         Rows {

@@ -254,9 +254,16 @@ fn members(
     let tilings = tilings.iter().map(|t| blend::Member {
         table: "lattice",
         name: t.name.clone(),
-        of: Constituent::Field {
-            field: t.tiling.clone(),
-            wavelength: t.tiling.wavelength(),
+        of: match <[_; 2]>::try_from(t.tiling.parts()) {
+            Ok(sides) => Constituent::Wall {
+                sides,
+                half: t.tiling.uniform(),
+                wavelength: t.tiling.wavelength(),
+            },
+            Err(_) => Constituent::Field {
+                field: t.tiling.clone(),
+                wavelength: t.tiling.wavelength(),
+            },
         },
     });
     let graphs = graphs.iter().map(|(name, b)| blend::Member {

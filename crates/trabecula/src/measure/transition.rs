@@ -17,6 +17,10 @@ const MOST: f64 = 6e5;
 const FINE: f64 = 16.0;
 /// Shares of the second lattice at which the fraction is told.
 const BINS: usize = 10;
+/// Where a lattice is alone nowhere, its side of a transition is where it counts most: a tenth of the way between the least and
+/// the greatest share, if these are so far apart that there is a way.
+const END: f32 = 0.1;
+const WAY: f32 = 0.05;
 /// What hangs by a neck thinner than this share of the widest way's neck is dangling.
 const THIN: f64 = 0.5;
 
@@ -29,7 +33,8 @@ pub struct Transition {
     pub volume: f64,
     /// Bodies of solid, with what is theirs on either side, that come into it: one where it holds together.
     pub pieces: usize,
-    /// Bodies of solid that touch neither side, and their volume, mm³.
+    /// Bodies of solid that touch neither side, and their volume, mm³. A side is where a lattice is alone, or else where it
+    /// counts most.
     pub loose: (usize, f64),
     /// Bodies that hang by necks thinner than half the narrowest of the widest way, and their volume, mm³.
     pub dangling: (usize, f64),
@@ -267,17 +272,21 @@ impl Bodies {
         self.sides[a as usize]
     }
 
-    /// Bodies that reach neither side and the points in them, of the points that are in.
+    /// Bodies that reach neither side and the points in them, of the points that are in. Where there are no sides the
+    /// greatest body stands for them.
     fn apart(&mut self, inside: &[bool]) -> (usize, u64) {
-        let (mut count, mut all) = (0, 0);
-        for i in 0..self.parent.len() as u32 {
-            let own = inside[i as usize] && self.parent[i as usize] == i;
-            if own && self.sides[i as usize] & SIDES == 0 {
-                count += 1;
-                all += u64::from(self.size[i as usize]);
+        let (mut count, mut all, mut most, mut sides) = (0usize, 0, 0, 0);
+        for i in (0..self.parent.len()).filter(|i| inside[*i] && self.parent[*i] as usize == *i) {
+            sides |= self.sides[i] & SIDES;
+            if self.sides[i] & SIDES == 0 {
+                let size = u64::from(self.size[i]);
+                (count, all, most) = (count + 1, all + size, most.max(size));
             }
         }
-        (count, all)
+        match sides {
+            0 => (count.saturating_sub(1), all - most),
+            _ => (count, all),
+        }
     }
 
     /// Bodies that come into the transition, of the points that are in.
@@ -300,10 +309,30 @@ fn transition(
     let [nx, ny, nz] = points.shape;
     let of_pair =
         |p: &Point| p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == pair;
+    // The share of the second of the pair.
+    let second = |p: &Point| match p.first == pair[0] {
+        true => p.share,
+        false => 1.0 - p.share,
+    };
+    let all = || points.of.iter().flatten();
+    let (least, most) = all()
+        .filter(|p| of_pair(p))
+        .map(second)
+        .fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
+    let alone = |i: usize| all().any(|p| p.share == 0.0 && p.first == pair[i]);
+    let reach = match most - least > WAY {
+        true => END * (most - least),
+        false => -1.0,
+    };
+    let ends = [0, 1].map(|i| if alone(i) { -1.0 } else { reach });
     let side = |p: &Point| match p.share {
         0.0 if p.first == pair[0] => 1u8,
         0.0 if p.first == pair[1] => 2,
-        _ if of_pair(p) => WITHIN,
+        _ if of_pair(p) => {
+            let first = second(p) - least <= ends[0];
+            let last = most - second(p) <= ends[1];
+            WITHIN | u8::from(first) | u8::from(last) << 1
+        }
         _ => 0,
     };
     let cell = step.powi(3);
@@ -311,11 +340,7 @@ fn transition(
     let mut count = 0usize;
     let each = points.of.iter().zip(found);
     for (p, f) in each.filter_map(|(p, f)| p.as_ref().filter(|p| of_pair(p)).map(|p| (p, f))) {
-        let share = f64::from(if p.first == pair[0] {
-            p.share
-        } else {
-            1.0 - p.share
-        });
+        let share = f64::from(second(p));
         let s = &mut sums[((share * BINS as f64) as usize).min(BINS - 1)];
         *s = [s[0] + 1.0, s[1] + f64::from(f[0]), s[2] + f64::from(f[1])];
         count += 1;

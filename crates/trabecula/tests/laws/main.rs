@@ -16,3 +16,4 @@ mod surface;
 mod tets;
 mod thickness;
 mod tiling;
+mod walls;
