@@ -147,16 +147,16 @@ fn thin_walls_over_tetrahedra_are_kept() {
             Err(path.to_string())
         }
     }
-    let text = "schema = 1\n[region.box]\nsize = [14, 6, 6]\n\
+    let text = "schema = 1\n[region.box]\nsize = [9, 4, 4]\n\
         [lattice.a]\ncell.tet.name = \"diamond\"\npart = \"sheet\"\nmap.tets.size = 3\nlevel.fraction = 0.15\n\
         [lattice.b]\ncell = \"gyroid\"\npart = \"sheet\"\nmap.affine.wavelength = 4\nlevel.fraction = 0.15\n\
-        [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[1, 0], [7, 1]] }";
+        [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[0, 0], [4, 1]] }";
     let design = Design::from_toml(text).expect("text");
     let built = design.build(&Nothing).expect("built");
     let blend = built.blend.as_ref().expect("blend").blend.clone();
     let n = 60;
     let at = |i: usize, a: usize| {
-        let size = [14.0, 6.0, 6.0][a];
+        let size = [9.0, 4.0, 4.0][a];
         ((i as f64 + 0.5) / n as f64 - 0.5) * size
     };
     let points: Vec<Vec3> = (0..n * n * n)
@@ -165,14 +165,16 @@ fn thin_walls_over_tetrahedra_are_kept() {
     let mut v = vec![0.0; points.len()];
     blend.values(&points, &mut v);
     let share = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
-    // A wall of 15 % in cells of about four millimetres is some 0.25 mm thick.
-    let made = surface(&built.solid, 0.2, &Silent).expect("surface");
-    check("thin walls", &made);
-    let volume = made.mesh.volume() / (14.0 * 6.0 * 6.0);
-    println!("{volume:.4} of {share:.4}");
-    // What is counted, to a third of a percent of all; what is meshed, to second order in a step.
+    // A wall of 15 % in cells of about four millimetres is some 0.25 mm thick. What is meshed is off by the square of a step: a
+    // quarter at half of it, less what counting leaves open.
+    let off = [0.2, 0.1].map(|edge| {
+        let made = surface(&built.solid, edge, &Silent).expect("surface");
+        check("thin walls", &made);
+        (made.mesh.volume() / (9.0 * 4.0 * 4.0) - share).abs()
+    });
+    println!("{off:?} of {share:.4}");
     assert!(
-        (volume - share).abs() < 0.05 * share,
-        "{volume:.4} {share:.4}"
+        off[0] < 0.1 * share && off[1] < 0.4 * off[0],
+        "{off:?} of {share:.4}"
     );
 }
