@@ -185,7 +185,9 @@ class Solid(Picture):
         return {name: t for name, t in ends.items() if t}
 
     def _is_fine(self, spacing: float) -> bool:
-        """Whether only fractions of a hundredth or two can be lost at this spacing; `report` tells of them."""
+        """Whether a wavelength has so many steps that what is too thin for them is a hundredth or two of the part: then
+        nothing is warned of, and `report` tells of the walls.
+        """
         return self.wavelength / spacing >= 64
 
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
@@ -264,7 +266,7 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
-        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
+        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
         self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
@@ -274,7 +276,8 @@ class Solid(Picture):
     def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
         """Refuses a mesh file that the disk has no room for."""
         need = self._need(spacing)["triangles"]
-        fits(file_size(extension(path, WRITES), need), f"{need:.3g} triangles", path, spacing)
+        size = file_size(extension(path, WRITES), need)
+        fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
     def save_stl(
         self,
@@ -315,7 +318,7 @@ class Solid(Picture):
         spacing = self.spacing(step, per_cell)
         low, high = self.bounds
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
-        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step")
+        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")

@@ -27,6 +27,7 @@ mod skin;
 mod tests;
 mod tets;
 mod tiling;
+mod warn;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,6 +47,7 @@ use crate::solid::Solid;
 use crate::tets::TetMesh;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
+use read::RegionIn;
 
 pub use blend::Blended;
 pub use data::*;
@@ -233,11 +235,16 @@ impl Design {
     }
 }
 
-/// The region of a design, or of a tree with the key `region` alone.
+/// The region of a design, or of a tree with the key `region` alone. The region of a lattice over tetrahedra is what these fill.
 pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
-    let mut notes = region::Notes::default();
-    region::region(&read::region_in(node)?, "region", loader, &mut notes).map_err(|mut e| {
+    let found = match read::region_in(node)? {
+        RegionIn::Design(design) => build::space(&design, loader),
+        RegionIn::Alone(spec) => {
+            region::region(&spec, "region", loader, &mut region::Notes::default())
+        }
+    };
+    found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));
         e
     })
