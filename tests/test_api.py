@@ -147,7 +147,7 @@ def test_bodies_that_do_not_touch_are_warned_of():
 
 
 def test_metres_taken_for_millimetres_are_asked_about():
-    with pytest.raises(lt.DesignError, match="0.008 mm across, less than a wavelength, 4 mm: are the units right"):
+    with pytest.raises(lt.DesignError, match=r"0\.008 mm across, less than a wavelength, 4 mm: are the units right"):
         cube(size=0.008).build()
 
 
