@@ -70,7 +70,7 @@ def check(args) -> None:
     for name, it in report["lattices"].items():
         neck = "thinnest wall" if it["part"] == "sheet" else "narrowest neck"
         print(f"lattice {name}: {it['part']}, wavelength {figure(it['wavelength'])} mm")
-        print(f"  iso        {span(it['iso'])}")
+        print(f"  iso        {span(it['iso'])}{'' if it.get('folding') is None else ' of a wall of levels with this fraction'}")
         print(f"  fraction   {span(it['fraction'])}")
         print(f"  porosity   {span(it['porosity'])}")
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")

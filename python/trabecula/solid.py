@@ -62,10 +62,9 @@ class Solid(Picture):
         return f"<trabecula.Solid in {d - a:g} x {e - b:g} x {f - c:g} mm, wavelength {self.wavelength:g} mm>"
 
     @property
-    def bounds(self) -> tuple[list[float], list[float]]:
+    def bounds(self) -> list[list[float]]:
         """Lower and upper corner of the region's bounds, mm."""
-        low, high = self._core.bounds
-        return list(low), list(high)
+        return [list(corner) for corner in self._core.bounds]
 
     @property
     def wavelength(self) -> float:
@@ -115,7 +114,8 @@ class Solid(Picture):
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
         and the warnings; with a blend ``blend``: the lattices' names, ``by``, ``phases`` (locked, independent or drifting),
         the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
-        level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which the wall folds.
+        level is a thickness, ``iso`` is the level that would have the same fraction and ``folding`` the thickness (mm)
+        beyond which the wall folds.
         """
         import json
 

@@ -266,7 +266,7 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
 impl Built {
     /// The numbers of the design without meshing it: for each lattice iso, fraction, porosity, thickness and
     /// connected_fraction (a number, or [min, max] over the region where it varies), the region's bounds and
-    /// volume, and the warnings. Where the level is a thickness, iso is null and folding is the thickness (mm) beyond
+    /// volume, and the warnings. Where the level is a thickness, iso is the level of the same fraction and folding is the thickness (mm) beyond
     /// which the wall folds, else null.
     pub fn report(&self) -> Json {
         report::report(self)

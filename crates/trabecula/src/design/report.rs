@@ -115,8 +115,11 @@ pub(super) fn report(built: &Built) -> Json {
         let mut entry = json!({
             "part": word(lattice.part),
             "wavelength": lattice.map.wavelength(),
-            // A wall of even thickness is not bounded by levels of f.
-            "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
+            // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
+            "iso": match lattice.distance() {
+                Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).json(),
+                None => iso.json(),
+            },
             "fraction": fraction.json(),
             "porosity": fraction.map(|f| 1.0 - f).json(),
             "thickness": thickness(lattice, iso),
