@@ -6,6 +6,7 @@
 mod beams;
 mod blend;
 mod build;
+mod cell;
 mod control;
 mod data;
 mod error;
@@ -16,6 +17,7 @@ mod level;
 mod map;
 mod node;
 mod pattern;
+mod place;
 mod read;
 mod region;
 mod report;
@@ -260,7 +262,7 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
             ))
         }
     }
-    Ok(build::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
+    Ok(cell::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
 }
 
 impl Built {

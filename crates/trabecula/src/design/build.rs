@@ -1,43 +1,26 @@
 //! Data to solid: values are checked, pieces are joined, and what may not be meant is warned of.
 
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use super::cell::cell;
 use super::data::*;
 use super::error::DesignError;
+use super::place::{LOOKS, Place};
 use super::{
-    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, samples, skin,
-    tets, tiling, warn,
+    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, skin, tets,
+    tiling, warn,
 };
 use crate::blend::Constituent;
-use crate::cell::{Cell, Part, Series, Term, named};
-use crate::face::Body;
-use crate::fault::{Fault, number};
+use crate::cell::Part;
+use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
-use crate::math::sin_cos_turns;
 use crate::region::Region;
 use crate::solid::Solid;
-use crate::symmetry::{Group, Side};
 use crate::truss::Beams;
-
-/// Points at which a design is looked at.
-pub(super) const LOOKS: usize = 8_000;
 
 /// How far from the origin a region may reach, mm: a thousand kilometres.
 const FARTHEST: f64 = 1e9;
-
-/// Where a part of a lattice stands, and the region it is to fill.
-pub(super) struct Place<'a> {
-    pub path: String,
-    pub region: &'a Region,
-    /// Points inside the region.
-    pub points: &'a [[f64; 3]],
-    /// What is solid in the region whatever the lattice says.
-    pub filled: &'a [Body],
-    /// Hands over files.
-    pub loader: &'a dyn Loader,
-}
 
 impl From<PartSpec> for Part {
     fn from(p: PartSpec) -> Part {
@@ -46,19 +29,6 @@ impl From<PartSpec> for Part {
             PartSpec::Lower => Part::Lower,
             PartSpec::Upper => Part::Upper,
         }
-    }
-}
-
-/// `v`, or an error that says it is not a finite number.
-pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
-    if v.is_finite() {
-        Ok(v)
-    } else {
-        Err(DesignError::new(
-            path,
-            format!("expected a finite number, found {}", number(v)),
-        )
-        .found(number(v)))
     }
 }
 
@@ -306,90 +276,4 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
     };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
-}
-
-/// The cell, and its name if it has one.
-pub(super) fn cell<'a>(
-    spec: &'a CellSpec,
-    path: &str,
-    loader: &dyn Loader,
-) -> Result<(Option<&'a str>, Cell), DesignError> {
-    let (name, terms, at) = match spec {
-        CellSpec::Name(name) => {
-            let known = named(name).ok_or_else(|| {
-                let names: Vec<&str> = crate::cell::catalogue().iter().map(|n| n.name).collect();
-                DesignError::unknown(path, "cell", name, &names)
-            })?;
-            (Some(name.as_str()), known.terms(), path.to_string())
-        }
-        CellSpec::Kind(CellKind::File(f)) => {
-            return Ok((None, samples::cell(f, &format!("{path}.file"), loader)?));
-        }
-        CellSpec::Kind(CellKind::Tet(_)) => {
-            let message = "a tetrahedral cell goes with a map over a tetrahedral mesh ([lattice.NAME.map.tets])";
-            return Err(DesignError::new(format!("{path}.tet"), message));
-        }
-        CellSpec::Kind(CellKind::Series(s)) => {
-            let at = format!("{path}.series");
-            for (i, t) in s.terms.iter().enumerate() {
-                finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
-                finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
-            }
-            let terms = match &s.group {
-                None => s.terms.iter().map(plain_term).collect(),
-                Some(symbol) => {
-                    let wrong = |place: &str, f| DesignError::fault(&format!("{at}.{place}"), f);
-                    let group = Group::named(symbol).map_err(|f| wrong("group", f))?;
-                    let mut all = Vec::new();
-                    for (i, t) in s.terms.iter().enumerate() {
-                        let orbit = orbit_terms(&group, t);
-                        all.extend(orbit.map_err(|f| wrong(&format!("terms[{i}]"), f))?);
-                    }
-                    all
-                }
-            };
-            (None, terms, at)
-        }
-    };
-    let series = Series::new(terms).map_err(|f| DesignError::fault(&at, f))?;
-    Ok((name, Cell::new(series)))
-}
-
-fn plain_term(t: &TermSpec) -> Term {
-    // sin a = cos(a − a quarter turn).
-    let behind = match t.component {
-        Component::Re => 0.0,
-        Component::Im => 0.25,
-    };
-    Term {
-        hkl: t.hkl,
-        amplitude: t.amplitude,
-        phase: t.phase - behind,
-    }
-}
-
-/// The sum of a term over a space group. A phase mixes its two parts, each of them normalised.
-pub(super) fn orbit_terms(group: &Group, t: &TermSpec) -> Result<Vec<Term>, Fault> {
-    let (s, c) = sin_cos_turns(t.phase);
-    let (parts, word, other) = match t.component {
-        Component::Re => ([(Side::Re, c), (Side::Im, -s)], "real", "im"),
-        Component::Im => ([(Side::Re, s), (Side::Im, c)], "imaginary", "re"),
-    };
-    let mut terms = Vec::new();
-    for (side, factor) in parts.into_iter().filter(|p| p.1 != 0.0) {
-        let waves = group.orbit(t.hkl, side)?;
-        terms.extend(waves.into_iter().map(|(hkl, cosine, sine)| Term {
-            hkl,
-            amplitude: t.amplitude * factor * cosine.hypot(sine),
-            phase: (-sine).atan2(cosine) / TAU,
-        }));
-    }
-    if terms.is_empty() {
-        let message = format!(
-            "the {word} part of the sum of {:?} over {} vanishes; use component = \"{other}\", or another origin choice",
-            t.hkl, group.name
-        );
-        return Err(Fault::new("hkl", message));
-    }
-    Ok(terms)
 }

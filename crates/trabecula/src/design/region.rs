@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
+use super::place::finite;
 use super::{Loader, Warning};
 use crate::fault::{Fault, number};
 use crate::io;

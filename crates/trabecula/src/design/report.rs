@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Blended, Built, Joins, Tiled, beams, build::LOOKS, sample};
+use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::extract;

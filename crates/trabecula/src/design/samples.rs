@@ -6,10 +6,10 @@ mod grid;
 use std::sync::Arc;
 
 use super::Loader;
-use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::Allowed;
+use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
 use crate::fault::{Fault, counted, number};
 use crate::field::Field;

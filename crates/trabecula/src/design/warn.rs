@@ -1,8 +1,8 @@
 //! What a lattice in a region is refused for, and warned of.
 
-use super::build::{LOOKS, Place};
 use super::data::*;
 use super::error::DesignError;
+use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Warning, map, sample};
 use crate::cell::Distance;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{bytes, extension, percent, pick};
-use crate::design::build::Place;
 use crate::design::data::*;
 use crate::design::error::DesignError;
+use crate::design::place::Place;
 use crate::fault::{Fault, counted, number};
 use crate::grade::{Grade, Samples};
 use crate::io::{self, Shape};

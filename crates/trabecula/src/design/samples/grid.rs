@@ -1,9 +1,9 @@
 //! Grids of numbers: arrays, images, stacks of pictures.
 
 use super::{bytes, extension, percent, pick};
-use crate::design::build::Place;
 use crate::design::data::*;
 use crate::design::error::DesignError;
+use crate::design::place::Place;
 use crate::fault::Fault;
 use crate::grade::Samples;
 use crate::io::{self, Shape};
