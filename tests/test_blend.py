@@ -266,3 +266,34 @@ def test_beams_take_part_with_the_fraction_they_have():
     (it,) = design.build().transitions()
     assert all(row["asked"] is not None for row in it["fractions"])
     assert max(abs(row["found"] - row["asked"]) for row in it["fractions"]) < 0.01
+
+
+BEAMS = """schema = 1
+[region.box]
+size = [24, 12, 12]
+[beams.a]
+cell = "octet"
+radius = 0.4
+map.affine.wavelength = 6
+"""
+
+
+def test_beams_in_a_blend_have_a_fraction_of_their_own(tmp_path):
+    file = tmp_path / "beams.toml"
+    file.write_text(BEAMS, encoding="utf-8")
+    alone = lt.load(file).build().report()["beams"]["a"]["fraction"]
+    lattice = BAR[BAR.index("[lattice.b]") : BAR.index("[blend]")]
+    blend = '[blend]\nbetween = ["a", "b"]\nweight.linear = { along = [1, 0, 0], stops = [[-12, 0], [12, 1]] }\n'
+    file.write_text(BEAMS + lattice + blend, encoding="utf-8")
+    # The same beams at the same places.
+    assert lt.load(file).build().report()["beams"]["a"]["fraction"] == pytest.approx(alone, abs=1e-12)
+
+
+def test_where_no_lattice_is_alone_not_all_is_loose(tmp_path):
+    ramp = "weight = { linear = { along = [1, 0, 0], stops = [[-6, 0], [6, 1]] } }"
+    slow = "weight = { linear = { along = [1, 0, 0], stops = [[-12, 0.2], [12, 0.8]] } }"
+    for weight, crosses in ((slow, True), ("weight = 0.5", False)):
+        (told,) = lt.load(bar(tmp_path, (ramp, weight))).build().transitions()
+        assert (told["neck"] is not None) == crosses
+        # Crumbs that the sides of the bar cut off, of some 460 mm³ of solid.
+        assert told["loose"]["volume"] < 5

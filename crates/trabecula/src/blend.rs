@@ -7,6 +7,7 @@
 //! are then in units of their own root mean square, so that none drowns the others.
 
 mod added;
+mod constituent;
 mod fill;
 mod joint;
 mod levels;
@@ -24,8 +25,8 @@ use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Interval, Vec3, add, scale, sub};
 
+pub use constituent::Constituent;
 pub use joint::Phases;
-pub use strand::Constituent;
 pub use weights::Weights;
 
 use added::{At, End, HIGH, LOW};

@@ -7,7 +7,7 @@
 
 use std::sync::OnceLock;
 
-use super::strand::Constituent;
+use super::constituent::Constituent;
 use crate::map::Map;
 use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 

@@ -10,6 +10,7 @@ use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
 use crate::measure;
+use crate::truss::Beams;
 
 /// The least and the greatest of a number over a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +101,18 @@ pub(super) fn expected(built: &Built) -> (f64, f64) {
     (solid as f64 / points.len().max(1) as f64, volume)
 }
 
+/// The solid share of the region; of beams in a blend, if they filled it alone.
+fn filling(built: &Built, beams: &Beams) -> f64 {
+    if built.blend.is_none() {
+        return expected(built).0;
+    }
+    let (points, _) = sample::inside(&built.solid.region, 2 * LOOKS);
+    let mut values = vec![0.0; points.len()];
+    beams.field().values(&points, &mut values);
+    let solid = values.iter().filter(|v| **v <= 0.0).count();
+    solid as f64 / points.len().max(1) as f64
+}
+
 pub(super) fn report(built: &Built) -> Json {
     let region = &built.solid.region;
     let bounds = region.bounds();
@@ -137,9 +150,8 @@ pub(super) fn report(built: &Built) -> Json {
     for it in &built.tilings {
         lattices.insert(it.name.clone(), tiled(it));
     }
-    let share = (!built.beams.is_empty()).then(|| expected(built).0);
     let beams: serde_json::Map<String, Json> = (built.beams.iter())
-        .map(|(name, made)| (name.clone(), beams::report(made, share.unwrap_or_default())))
+        .map(|(name, made)| (name.clone(), beams::report(made, filling(built, made))))
         .collect();
     let mut report = json!({
         "lattices": lattices,

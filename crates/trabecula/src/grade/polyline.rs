@@ -1,6 +1,6 @@
 //! Distance to a line of control points.
 
-use crate::fault::Fault;
+use crate::fault::{Fault, counted};
 use crate::field::Field;
 use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -38,7 +38,7 @@ impl Polyline {
     ) -> Result<Polyline, Fault> {
         let least = if closed { 3 } else { 2 };
         if points.len() < least {
-            let message = format!("{} points; a line needs at least {least}", points.len());
+            let message = format!("{}; a line needs at least {least}", counted(points.len(), "point"));
             return Err(Fault::new("points", message));
         }
         if let Some(k) = sharpness.filter(|k| !(*k >= LEAST_SHARPNESS && k.is_finite())) {
