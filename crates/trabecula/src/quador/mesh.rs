@@ -16,7 +16,7 @@ use crate::mesh::Mesh;
 use super::Quadors;
 use super::classes::Classes;
 use super::complex::Complex;
-use super::facets::Facets;
+use super::facets::{Facets, TAKEN};
 use super::hub::{Hub, Stub};
 use super::integral::tangled;
 
@@ -65,7 +65,7 @@ impl Quadors {
     fn ring(&self, beam: usize, chord: f64) -> usize {
         let p = &self.pencils[beam];
         let r = p.squared(p.split()).max(0.0).sqrt();
-        let half = (1.0 - chord / r).clamp(-1.0, 1.0).acos();
+        let half = (1.0 - TAKEN * chord / r).clamp(-1.0, 1.0).acos();
         ((PI / half).ceil() as usize).max(8)
     }
 
@@ -284,13 +284,13 @@ impl Part {
                 circle(axis, n, radius).map(|x| add(middle, x)).collect()
             })
             .collect();
-        let mut facets = Facets::new(hub, complex, &rims)?;
+        let mut facets = Facets::new(hub, complex, &rims, chord)?;
         // Points of a rim are on its circle.
         let sagitta = |(s, n): (&Stub, &usize)| {
             s.squared(s.split).max(0.0).sqrt() * (1.0 - (PI / *n as f64).cos())
         };
         let rims_off = hub.stubs.iter().zip(rings).map(sagitta).fold(0.0, f64::max);
-        let error = facets.refine(chord)?.max(rims_off);
+        let error = facets.refine()?.max(rims_off);
         Some(Part {
             rims: rings.iter().sum(),
             bounds: facets.points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)),
