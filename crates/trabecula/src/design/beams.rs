@@ -36,7 +36,7 @@ pub(super) fn beams(
     warnings: &mut Vec<Warning>,
 ) -> Result<Beams, DesignError> {
     if let Some(pattern) = &spec.pattern {
-        return pattern::laid(spec, pattern, place).map(|p| Beams::Pattern(Arc::new(p)));
+        return pattern::laid(spec, pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
@@ -545,11 +545,44 @@ fn warn(
     }
 }
 
-/// The figures of beams; `fraction` is the solid share of the region.
-pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
+/// Whether a design is one graph of beams and nothing else.
+pub(super) fn lone(built: &Built) -> bool {
+    built.beams.len() == 1
+        && built.lattices.is_empty()
+        && built.tilings.is_empty()
+        && built.solid.filled.is_empty()
+}
+
+/// Whether all beams lie in the region: of a pattern, by the box that holds it.
+pub(super) fn held(beams: &Beams, built: &Built) -> bool {
+    match beams {
+        Beams::Truss(truss) => truss.whole,
+        Beams::Pattern(laid) => built.solid.region.bound(&laid.bounds()).hi <= 0.0,
+    }
+}
+
+/// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.
+pub(super) fn share(
+    volume: Option<f64>,
+    whole: bool,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> (f64, bool) {
+    match (volume, built.solid.region.volume()) {
+        (Some(solid), Some(region)) if whole && lone(built) => (solid / region, true),
+        _ => (**sampled, false),
+    }
+}
+
+/// The figures of beams; `sampled` is the solid share of the region, by looks at points.
+pub(super) fn report(
+    beams: &Beams,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> Json {
     let truss = match beams {
         Beams::Truss(truss) => truss,
-        Beams::Pattern(laid) => return pattern::report(laid, fraction),
+        Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
     };
     let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
     let [least, most] = (graph.hubs.iter().map(|h| h.radius))
@@ -565,12 +598,14 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
     // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();
+    let (fraction, exact) = share(mass.map(|m| m.volume), truss.whole, built, sampled);
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
         "hubs": facts.valence.values().sum::<usize>(),
         "beams": facts.struts,
         "fraction": fraction,
+        "fraction_exact": exact,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * thin,
         "hub_radius": [least, most],

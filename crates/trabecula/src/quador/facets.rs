@@ -481,7 +481,7 @@ fn walk(chains: &[Vec<u32>], walked: &[(u32, bool)]) -> Vec<u32> {
 
 /// Triangles between a loop around an axis and the rim beyond it, by azimuth.
 fn strip(axis: Vec3, points: &[Vec3], inner: &[u32], ring: &[u32]) -> Vec<[u32; 3]> {
-    let side = super::mesh::across(axis);
+    let side = super::drawn::across(axis);
     let other = cross(axis, side);
     let azimuth = |i: u32| dot(points[i as usize], other).atan2(dot(points[i as usize], side));
     let sorted = |of: &[u32]| {
