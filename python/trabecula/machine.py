@@ -13,6 +13,9 @@ __all__ = ["file_size", "fits"]
 #: Bytes of a file for each triangle and each vertex; those of text as they come out for parts of some hundred mm.
 SIZES = {"stl": (50, 0), "ply": (13, 24), "obj": (27, 50), "3mf": (7, 9)}
 
+#: A request that would have to be this many times coarser has no place at all, and no other is advised.
+COARSER = 100
+
 
 def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
     """Bytes of a mesh file. A closed surface has half as many vertices as triangles."""
@@ -54,7 +57,8 @@ def fits(
     request, advice = "this", ""
     if edge is not None:
         better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
-        request, advice = f"{word} {edge:g} mm", f"; try {word} {_up(better):g} mm"
+        request = f"{word} {edge:g} mm"
+        advice = f"; try {word} {_up(better):g} mm" if better < COARSER * edge else ""
     raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
 
 

@@ -39,10 +39,23 @@ TRIANGLE = 2 * (12 + 12)
 
 
 class Solid(Picture):
-    """A region and the lattice in it. Made by ``Design.build``."""
+    """A region and the lattice in it. Made by ``Design.build``.
 
-    def __init__(self, core: _core.Solid):
+    It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
+    """
+
+    def __init__(self, core: _core.Solid, folder: str = ""):
         self._core = core
+        self._folder = folder
+
+    def __copy__(self) -> Solid:
+        return self
+
+    def __deepcopy__(self, memo: dict) -> Solid:
+        return self
+
+    def __reduce__(self) -> tuple:
+        return _rebuilt, (self._core.design, self._folder)
 
     def __repr__(self) -> str:
         (a, b, c), (d, e, f) = self.bounds
@@ -397,3 +410,8 @@ def _a(word: str) -> str:
 
 def _threads(threads: int | None) -> int | None:
     return None if threads is None else whole("threads", threads, 1, 4096)
+
+
+def _rebuilt(design: str, folder: str) -> Solid:
+    """A solid that was pickled."""
+    return Solid(_core.Design.from_text(design).build(folder), folder)

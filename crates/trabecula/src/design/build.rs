@@ -71,7 +71,13 @@ pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
 
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
     let mut notes = region::Notes::default();
-    let space = region::region(&d.region, "region", loader, &mut notes)?;
+    let (space, soup) = match region::region(&d.region, "region", loader, &mut notes) {
+        Ok(space) => (space, None),
+        Err(why) => {
+            let (made, space) = tiling::of_soup(d, loader, why)?;
+            (space, Some(made))
+        }
+    };
     let bounds = space.bounds();
     if bounds.is_empty() {
         return Err(DesignError::new("region", "the region is empty"));
@@ -90,7 +96,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         );
         return Err(DesignError::new("region", message));
     }
-    let domain = tiling::domain(d, &space, loader, &mut notes.warnings)?;
+    let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     let space = domain.as_ref().map_or(space, |d| d.region.clone());
     let bounds = space.bounds();
     let (mut points, _) = sample::inside(&space, LOOKS);
@@ -432,7 +438,18 @@ fn check_solid(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(
             range.lo, range.hi
         )
     };
-    let message = format!("the lattice leaves the region {what}; {why}");
+    let (size, wavelength) = (place.region.bounds().size(), lattice.map.wavelength());
+    let largest = size.into_iter().fold(0.0, f64::max);
+    let unit = if largest < wavelength {
+        format!(
+            "; the region is {} mm across, less than a wavelength, {} mm: are the units right?",
+            number(largest),
+            number(wavelength)
+        )
+    } else {
+        String::new()
+    };
+    let message = format!("the lattice leaves the region {what}; {why}{unit}");
     Err(DesignError::new(path, message))
 }
 

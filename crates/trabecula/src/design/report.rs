@@ -79,10 +79,13 @@ impl Varied {
 
 impl core::fmt::Display for Varied {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        if self.min == self.max {
-            write!(f, "{:.4}", self.min)
+        // Adding zero takes the sign off a negative one.
+        let [min, max] =
+            [self.min, self.max].map(|v| format!("{:.4}", (v * 1e4).round() / 1e4 + 0.0));
+        if min == max {
+            write!(f, "{min}")
         } else {
-            write!(f, "{:.4} to {:.4}", self.min, self.max)
+            write!(f, "{min} to {max}")
         }
     }
 }
