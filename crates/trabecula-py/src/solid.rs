@@ -303,8 +303,8 @@ impl Solid {
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let made = run(py, threads, None, |_| {
-            let beams = self.built.lone_beams().map_err(Stopped::Fault)?;
-            let drawn = beams.drawn(chord).map_err(Stopped::Fault)?;
+            let beams = self.built.lone_beams().map_err(Stopped::Refused)?;
+            let drawn = beams.drawn(chord).map_err(Stopped::Refused)?;
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
             let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
             io::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out)

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::complex::{Arc, Complex, Face, MERGE};
+use super::complex::{Arc, Complex, MERGE};
 use super::hub::Hub;
 use cover::strip;
 

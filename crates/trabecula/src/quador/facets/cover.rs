@@ -151,7 +151,7 @@ impl Facets<'_> {
 
 /// Triangles between a loop around an axis and the rim beyond it, by azimuth.
 pub(super) fn strip(axis: Vec3, points: &[Vec3], inner: &[u32], ring: &[u32]) -> Vec<[u32; 3]> {
-    let side = super::drawn::across(axis);
+    let side = super::super::drawn::across(axis);
     let other = cross(axis, side);
     let azimuth = |i: u32| dot(points[i as usize], other).atan2(dot(points[i as usize], side));
     let sorted = |of: &[u32]| {
