@@ -264,7 +264,8 @@ def test_the_road_of_soups(tmp_path, monkeypatch, how, words):
             part = lt.Design(**design).build()
         assert part.report()["region"]["volume"] == pytest.approx(1000, rel=1e-6)
         surface = part.mesh(edge=0.5)
-        assert surface.report()["closed"] and surface.report()["solid_fraction"] == pytest.approx(0.3, abs=1e-3)
+        # Its fraction is the tetrahedra's, whichever of the sides of cubes they have: no regular ones, and few.
+        assert surface.closed and surface.solid_fraction == pytest.approx(0.3, abs=0.02)
         return
     started = time.monotonic()
     with pytest.raises(lt.DesignError, match=words):

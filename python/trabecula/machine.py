@@ -13,9 +13,6 @@ __all__ = ["file_size", "fits"]
 #: Bytes of a file for each triangle and each vertex; those of text as they come out for parts of some hundred mm.
 SIZES = {"stl": (50, 0), "ply": (13, 24), "obj": (27, 50), "3mf": (7, 9)}
 
-#: A request that would have to be this many times coarser has no place at all, and no other is advised.
-COARSER = 100
-
 
 def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
     """Bytes of a mesh file. A closed surface has half as many vertices as triangles."""
@@ -40,10 +37,12 @@ def fits(
     edge: float | None = None,
     power: int = 2,
     word: str = "edge",
+    coarsest: float = math.inf,
 ) -> None:
     """Refuses a request for ``need`` bytes of memory, or of disk for the file ``path``, that the machine does not have.
 
-    The need grows as the grid's ``edge`` to the minus ``power``, which gives the edge to suggest.
+    The need grows as the grid's ``edge`` to the minus ``power``, which gives the edge to suggest, unless that is beyond
+    ``coarsest``.
     """
     if path is None:
         have = _core.free_memory()
@@ -58,7 +57,9 @@ def fits(
     if edge is not None:
         better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
         request = f"{word} {edge:g} mm"
-        advice = f"; try {word} {_up(better):g} mm" if better < COARSER * edge else ""
+        advice = f"; try {word} {_up(better):g} mm"
+        if _up(better) > coarsest:
+            advice = f"; no {word} that would be of use needs little enough, so ask for less of the part, or another place"
     raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
 
 

@@ -360,11 +360,15 @@ class Mesh(Picture):
         return None if self._simplification is None else dict(self._simplification)
 
     def within(self, solid_or_region) -> Mesh:
-        """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
+        """The same mesh measured against a region, from the builders of that name or that of a Solid: solid fraction, lattice
+        and cut area.
+        """
         region = getattr(solid_or_region, "_core", solid_or_region)
         region = region.region if isinstance(region, _core.Solid) else region
+        if isinstance(region, dict):
+            region = _core.Region.from_data({"region": region}, os.getcwd())
         if not isinstance(region, _core.Region):
-            raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
+            raise TypeError(f"within takes a Solid or a region, found {solid_or_region!r}")
         return Mesh(self._core.split_by(region), region, self._edge, self._islands)
 
     def uncapped(self) -> Mesh:

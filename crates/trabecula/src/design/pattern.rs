@@ -3,10 +3,10 @@
 use serde_json::{Value as Json, json};
 
 use super::beams::{check_open, fillet, given, share};
-use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::Allowed;
+use super::place::{Place, finite};
 use super::{Built, Warning};
 use crate::fault::{counted, number};
 use crate::graph::{Hub, Profile};

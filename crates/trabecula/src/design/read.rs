@@ -125,20 +125,27 @@ pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
 }
 
 /// The region in a design, or in a tree that says nothing else.
-pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
+pub(super) fn region_in(node: &Node) -> Read<RegionIn> {
     let at = At::root(node);
     if at
         .entries("a design or a region")?
         .iter()
         .any(|(key, _)| ["lattice", "beams"].contains(key))
     {
-        return Ok(design(node)?.region);
+        return Ok(RegionIn::Design(Box::new(design(node)?)));
     }
     let f = at.fields("a region file", &["schema", "units", "region"])?;
     region(f.need(
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
     )?)
+    .map(RegionIn::Alone)
+}
+
+/// What a file that is read for its region holds.
+pub(super) enum RegionIn {
+    Design(Box<Design>),
+    Alone(RegionSpec),
 }
 
 /// The entry of a table with other keys, which are left alone.

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
+use super::place::finite;
 use super::{Loader, Warning};
 use crate::fault::{Fault, number};
 use crate::io;
@@ -227,7 +227,11 @@ fn mesh(
         );
         return Err(DesignError::new(at, message).found(&spec.path));
     }
-    positive(path, "scale", spec.scale)?;
+    if !(spec.scale.is_finite() && spec.scale > 0.0) {
+        let scale = number(spec.scale);
+        let message = format!("scale is {scale}; it must be a finite number greater than 0");
+        return Err(DesignError::new(format!("{path}.scale"), message).found(scale));
+    }
     let bytes = loader
         .load(&spec.path)
         .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;

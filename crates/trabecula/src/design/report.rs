@@ -4,7 +4,7 @@ use std::cell::LazyCell;
 
 use serde_json::{Value as Json, json};
 
-use super::{Blended, Built, Joins, Tiled, beams, build::LOOKS, sample};
+use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::extract;
@@ -117,8 +117,11 @@ pub(super) fn report(built: &Built) -> Json {
         let mut entry = json!({
             "part": word(lattice.part),
             "wavelength": lattice.map.wavelength(),
-            // A wall of even thickness is not bounded by levels of f.
-            "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
+            // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
+            "iso": match lattice.distance() {
+                Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).json(),
+                None => iso.json(),
+            },
             "fraction": fraction.json(),
             "porosity": fraction.map(|f| 1.0 - f).json(),
             "thickness": thickness(lattice, iso),

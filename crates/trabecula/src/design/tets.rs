@@ -5,10 +5,10 @@ mod source;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-use super::build::{LOOKS, Place};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::place::{LOOKS, Place};
 use super::{Loader, Node, Warning, read, region, sample};
 use crate::fault::{Fault, counted, number};
 use crate::math::{Vec3, add, scale};

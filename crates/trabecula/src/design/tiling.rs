@@ -3,13 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
+use super::cell::orbit_terms;
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::joins::{Joins, joins};
+use super::place::{LOOKS, Place, finite};
 use super::report::Varied;
 use super::tets::{self, TetReport};
+use super::warn::{amount_key, gaps};
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series, named};
