@@ -314,8 +314,8 @@ def slice(args) -> None:
     if args.output:
         cut.write(args.output, args.chord)
     curves = sum(len(it["weights"]) for it in cut.loops)
-    figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs, "whole": quadors.whole}
-    figures |= {"moved": cut.moved, "seconds": seconds}
+    figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
+    figures |= {"whole": quadors.whole, "moved": cut.moved, "seconds": seconds}
     if not quadors.whole:
         say("the slice is of the beams alone, uncut: the design's region cuts them, or more is added to them")
     if args.json:

@@ -23,8 +23,8 @@ __all__ = ["Quadors", "Slice"]
 class Quadors:
     """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
 
-    These are the beams alone, as far as they reach: no region cuts them, no skin is added. ``whole`` says whether that is the part;
-    where it is not, ``Solid.field`` has the part's own sign.
+    These are the beams alone, as far as they reach: no region cuts them, no skin is added. ``whole`` says whether that is
+    the part; where it is not, ``Solid.field`` has the part's own sign.
     """
 
     def __init__(self, core: _core.Quadors, whole: bool):
@@ -40,8 +40,8 @@ class Quadors:
 
     @property
     def whole(self) -> bool:
-        """Whether these beams are all of the part: the region cuts none, there is no skin, kept zone or other lattice. If not, what is
-        told here is of the beams alone, uncut. Of a pattern it is told by a box that holds it.
+        """Whether these beams are all of the part: the region cuts none, there is no skin, kept zone or other lattice. If
+        not, what is told here is of the beams alone, uncut. Of a pattern it is told by a box that holds it.
         """
         return self._whole
 

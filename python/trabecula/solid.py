@@ -99,8 +99,8 @@ class Solid(Picture):
         return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
 
     def quadors(self, name: str | None = None) -> Quadors:
-        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries. They are not cut by the region:
-        ``Quadors.whole`` says whether that makes a difference.
+        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries. They are not cut by the
+        region: ``Quadors.whole`` says whether that makes a difference.
         """
         if name is None:
             names = list(self.beams)
