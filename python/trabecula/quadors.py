@@ -41,7 +41,8 @@ class Quadors:
     @property
     def whole(self) -> bool:
         """Whether these beams are all of the part: the region cuts none, there is no skin, kept zone or other lattice. If
-        not, what is told here is of the beams alone, uncut. Of a pattern it is told by a box that holds it.
+        not, what is told here is of the beams alone, uncut. Of a pattern of more than 20 000 beams it is told by a box
+        that holds it.
         """
         return self._whole
 

@@ -189,7 +189,7 @@ impl Solid {
         self.built.beams.iter().map(graph).collect()
     }
 
-    /// Whether the beams of a name are all that the design is: not cut, nothing added. Of a pattern, by what holds it.
+    /// Whether the beams of a name are all that the design is: not cut, nothing added. Of a large pattern, by a box that holds it.
     fn whole_beams(&self, name: &str) -> bool {
         self.built.whole_beams(name)
     }

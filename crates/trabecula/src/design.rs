@@ -282,8 +282,8 @@ impl Built {
         beams::alone(self)
     }
 
-    /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a pattern, by a box that
-    /// holds it.
+    /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a large pattern, by a box
+    /// that holds it.
     pub fn whole_beams(&self, name: &str) -> bool {
         let found = self.beams.iter().find(|b| b.0 == name);
         found.is_some_and(|(_, made)| beams::lone(self) && beams::held(made, self))

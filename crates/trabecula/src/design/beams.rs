@@ -18,6 +18,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use crate::graph::{self, Cleaned, Graph, Nodes, Profile, Radii, Trim, Wire, sized};
 use crate::math::{Aabb, Vec3, norm, sub};
+use crate::pattern::Laid;
 use crate::quador::pencil::Pencil;
 use crate::quador::{Fillet, Quadors};
 use crate::truss::{Beams, Truss};
@@ -553,12 +554,22 @@ pub(super) fn lone(built: &Built) -> bool {
         && built.solid.filled.is_empty()
 }
 
-/// Whether all beams lie in the region: of a pattern, by the box that holds it.
+/// Most beams of a pattern that are looked at one by one.
+const FEW: f64 = 2e4;
+
+/// Whether all beams lie in the region: of a large pattern, by the box that holds it.
 pub(super) fn held(beams: &Beams, built: &Built) -> bool {
     match beams {
         Beams::Truss(truss) => truss.whole,
-        Beams::Pattern(laid) => built.solid.region.bound(&laid.bounds()).hi <= 0.0,
+        Beams::Pattern(laid) => inside(laid, built),
     }
+}
+
+/// The same of a pattern.
+pub(super) fn inside(laid: &Laid, built: &Built) -> bool {
+    let region = &*built.solid.region;
+    let each = || laid.written().is_ok_and(|written| whole(&written, region));
+    region.bound(&laid.bounds()).hi <= 0.0 || laid.pattern().counts().1 <= FEW && each()
 }
 
 /// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.

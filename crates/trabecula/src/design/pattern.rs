@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::beams::{check_open, fillet, given, share};
+use super::beams::{check_open, fillet, given, inside, share};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::Allowed;
@@ -152,7 +152,7 @@ pub(super) fn report(
     let clear = found.is_none_or(|c| c.count == 0);
     let volume = clear.then(|| laid.volume().ok()).flatten();
     // Of what was not looked for, nothing is sure.
-    let whole = found.is_some() && built.solid.region.bound(&laid.bounds()).hi <= 0.0;
+    let whole = found.is_some() && inside(laid, built);
     let (fraction, exact) = share(volume, whole, built, sampled);
     json!({
         "cell": null,
