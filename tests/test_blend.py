@@ -285,8 +285,8 @@ def test_beams_in_a_blend_have_a_fraction_of_their_own(tmp_path):
     lattice = BAR[BAR.index("[lattice.b]") : BAR.index("[blend]")]
     blend = '[blend]\nbetween = ["a", "b"]\nweight.linear = { along = [1, 0, 0], stops = [[-12, 0], [12, 1]] }\n'
     file.write_text(BEAMS + lattice + blend, encoding="utf-8")
-    # The same beams at the same places.
-    assert lt.load(file).build().report()["beams"]["a"]["fraction"] == pytest.approx(alone, abs=1e-12)
+    # The same beams, looked at in some thousands of places.
+    assert lt.load(file).build().report()["beams"]["a"]["fraction"] == pytest.approx(alone, abs=0.01)
 
 
 def test_where_no_lattice_is_alone_not_all_is_loose(tmp_path):

@@ -14,6 +14,12 @@ def tell_json(figures: dict) -> None:
     print(json.dumps(figures, indent=2))
 
 
+def tell_share(it: dict) -> None:
+    """The solid share of a part of beams."""
+    how = "exact" if it["fraction_exact"] else "sampled"
+    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part ({how})")
+
+
 def tell_beams(name: str, it: dict) -> None:
     """What a graph of beams is."""
     least, most = it["hub_radius"]
@@ -22,7 +28,7 @@ def tell_beams(name: str, it: dict) -> None:
         print(f"beams {name}: a pattern of {times}, {it['hubs']:.9g} hubs of {it['kinds']} kinds, {it['beams']:.9g} beams")
         print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
         print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
-        print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+        tell_share(it)
         return
     print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
     low, high = it["length"]
@@ -36,7 +42,7 @@ def tell_beams(name: str, it: dict) -> None:
     if it["smallest_angle"] is not None:
         x, y, z = map(figure, it["smallest_angle_at"])
         print(f"  angle      {it['smallest_angle']:.1f}° at least, at ({x}, {y}, {z}) mm")
-    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+    tell_share(it)
     if it["volume"] is not None:
         print(f"  exactly    {figure(it['volume'])} mm³, {figure(it['area'])} mm² of surface")
     done = {"cleaned": it["cleaned"], "trimmed": it["trimmed"]}

@@ -1,5 +1,7 @@
 //! What a design is, in numbers, without meshing it.
 
+use std::cell::LazyCell;
+
 use serde_json::{Value as Json, json};
 
 use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
@@ -150,9 +152,11 @@ pub(super) fn report(built: &Built) -> Json {
     for it in &built.tilings {
         lattices.insert(it.name.clone(), tiled(it));
     }
-    let beams: serde_json::Map<String, Json> = (built.beams.iter())
-        .map(|(name, made)| (name.clone(), beams::report(made, filling(built, made))))
-        .collect();
+    let told = |(name, made): &(String, Beams)| {
+        let sampled = LazyCell::new(|| filling(built, made));
+        (name.clone(), beams::report(made, built, &sampled))
+    };
+    let beams: serde_json::Map<String, Json> = (built.beams.iter()).map(told).collect();
     let mut report = json!({
         "lattices": lattices,
         "beams": beams,

@@ -38,7 +38,10 @@ impl Polyline {
     ) -> Result<Polyline, Fault> {
         let least = if closed { 3 } else { 2 };
         if points.len() < least {
-            let message = format!("{}; a line needs at least {least}", counted(points.len(), "point"));
+            let message = format!(
+                "{}; a line needs at least {least}",
+                counted(points.len(), "point")
+            );
             return Err(Fault::new("points", message));
         }
         if let Some(k) = sharpness.filter(|k| !(*k >= LEAST_SHARPNESS && k.is_finite())) {

@@ -47,11 +47,14 @@ fn blended(first: Constituent, second: &Arc<Lattice>, by: By) -> Blend {
     Blend::new(of, weights, by, &BOUNDS).expect("blend")
 }
 
-fn points() -> Vec<Vec3> {
+/// Places of an even sequence in the unit cube about the origin.
+fn even(count: usize) -> impl Iterator<Item = Vec3> {
     let unit = [0.8191725134, 0.6710436067, 0.5497004779];
-    let at = |i: usize| unit.map(|a| (0.5 + a * i as f64).fract() - 0.5);
-    (0..6000)
-        .map(at)
+    (0..count).map(move |i| unit.map(|a| (0.5 + a * i as f64).fract() - 0.5))
+}
+
+fn points() -> Vec<Vec3> {
+    even(6000)
         .map(|u| [32.0 * u[0], 16.0 * u[1], 16.0 * u[2]])
         .collect()
 }
@@ -154,13 +157,8 @@ fn thin_walls_over_tetrahedra_are_kept() {
     let design = Design::from_toml(text).expect("text");
     let built = design.build(&Nothing).expect("built");
     let blend = built.blend.as_ref().expect("blend").blend.clone();
-    let n = 60;
-    let at = |i: usize, a: usize| {
-        let size = [9.0, 4.0, 4.0][a];
-        ((i as f64 + 0.5) / n as f64 - 0.5) * size
-    };
-    let points: Vec<Vec3> = (0..n * n * n)
-        .map(|i| [at(i % n, 0), at(i / n % n, 1), at(i / n / n, 2)])
+    let points: Vec<Vec3> = even(300_000)
+        .map(|u| [9.0 * u[0], 4.0 * u[1], 4.0 * u[2]])
         .collect();
     let mut v = vec![0.0; points.len()];
     blend.values(&points, &mut v);
