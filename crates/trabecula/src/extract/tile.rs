@@ -191,7 +191,7 @@ impl<'a> Nodes<'a> {
     }
 
     pub fn count(&self) -> usize {
-        self.shape.iter().product()
+        self.shape[2] * self.stride[2]
     }
 
     pub fn at(&self, n: usize) -> [usize; 3] {

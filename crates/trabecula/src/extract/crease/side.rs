@@ -428,13 +428,13 @@ impl Knots<'_> {
 /// Whether all polygons of a side are what they are meant to be in single precision: then they do not overlap either, for
 /// together they fill the side.
 fn is_sound(pieces: &[Polygon], axis: usize) -> bool {
+    let way = orient2d(
+        [0.0, 0.0],
+        drop_axis(AXES[(axis + 1) % 3], axis),
+        drop_axis(AXES[(axis + 2) % 3], axis),
+    );
     pieces.iter().all(|(_, ring)| {
         let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
-        let way = orient2d(
-            [0.0, 0.0],
-            drop_axis(AXES[(axis + 1) % 3], axis),
-            drop_axis(AXES[(axis + 2) % 3], axis),
-        );
         (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
     })
 }

@@ -231,8 +231,15 @@ impl Knots<'_> {
     /// by `apart` times what crossings keep from nodes.
     pub fn spot_place(&self, simplex: &Simplex, spot: Spot, apart: f64) -> Vec3 {
         let (part, faces, met) = self.part(simplex, spot);
+        let first = self.place_of(part.nodes[0]);
+        if part.count == 1 {
+            return first;
+        }
         let mut shares = self.shares(&part, &faces[..met]);
-        let places = part.nodes.map(|n| self.place_of(n));
+        let mut places = [first; 4];
+        for c in 1..part.count {
+            places[c] = self.place_of(part.nodes[c]);
+        }
         if part.count == 2 {
             let length = sub(places[1], places[0])
                 .map(f64::abs)
