@@ -37,23 +37,35 @@ def one_line(text):
     return " ".join(str(text).split()).replace("|", "\\|")
 
 
-def properties(schema):
-    """Rows for the keys of an object, those of its alternatives included."""
+def properties(schema, needed="yes", about=""):
+    """Rows for the keys of an object. Of alternatives, words and other tables too, one is needed."""
     rows = []
     for key, value in schema.get("properties", {}).items():
-        needed = (
-            "yes" if key in schema.get("required", []) else one_line(json.dumps(value["default"])) if "default" in value else ""
-        )
-        rows.append(f"| `{key}` | {kind(value)} | {needed} | {one_line(value.get('description', ''))} |")
+        word = needed if key in schema.get("required", []) else ""
+        if "default" in value:
+            word = f"`{one_line(json.dumps(value['default']))}`"
+        rows.append(f"| `{key}` | {kind(value)} | {word} | {one_line(value.get('description', about))} |")
     for join in ("anyOf", "oneOf"):
         for part in schema.get(join, []):
-            rows += properties(part)
+            said = part.get("description", "")
+            rows += properties(part, "one of", said)
+            if "properties" not in part and part.get("type") != "null":
+                words = [f'"{w}"' for w in part.get("enum", [part["const"]] if "const" in part else [])]
+                rows.append(
+                    f"| {' '.join(f'`{w}`' for w in words)} | {'' if words else kind(part)} | one of | {one_line(said)} |"
+                )
     return rows
 
 
 def design(schema):
     """The schema as tables."""
-    lines = [STAMP, "# Design file: every key", "", "Needed: `yes`, or the default.", ""]
+    lines = [
+        STAMP,
+        "# Design file: every key",
+        "",
+        "Needed: `yes`; `one of` those that say so; or the default, where the schema knows it.",
+        "",
+    ]
     for name, part in {"design": schema, **schema.get("$defs", schema.get("definitions", {}))}.items():
         lines += [f"## {name}", "", part.get("description", ""), ""]
         rows = properties(part)

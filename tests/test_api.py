@@ -1,5 +1,7 @@
 """The Python door."""
 
+import copy
+import pickle
 import warnings
 
 import numpy as np
@@ -91,6 +93,62 @@ def test_a_mesh_has_its_figures():
     assert abs(mesh.porosity + mesh.solid_fraction - 1) < 1e-12
     edges = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     assert mesh.euler == len(mesh.vertices) - len(np.unique(edges, axis=0)) + len(mesh.triangles)
+
+
+def test_meshes_of_arrays():
+    """A mesh goes to arrays and back; what is no mesh is refused."""
+    first = cube().build().mesh(edge=0.5)
+    again = lt.Mesh.of(first.vertices, first.triangles)
+    assert again.volume == first.volume and again.closed and again.solid_fraction is None
+    half = again.within(lt.region.box(size=[8, 8, 8]))
+    assert half.solid_fraction == pytest.approx(first.solid_fraction, rel=1e-12)
+    for vertices, triangles, words in (
+        ([[0, 0, 0]], [[0, 0, 1]], "indices of 1 vertices"),
+        ([[0, 0, float("nan")]], [[0, 0, 0]], "finite"),
+        ([[0, 0]], [[0, 0, 0]], "vertices \\(n, 3\\)"),
+        ([[0, 0, 0]], [[0.0, 0.0, 0.0]], "whole numbers"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            lt.Mesh.of(vertices, triangles)
+    with pytest.raises(TypeError, match=r"Mesh\.of"):
+        lt.Mesh(first.vertices, first.triangles)
+
+
+def test_pickles_and_copies():
+    """For sweeps in several processes: designs, solids and meshes come out as they went in."""
+    design = cube()
+    solid = design.build()
+    mesh = solid.mesh(edge=0.5)
+    assert copy.deepcopy(mesh) is mesh and copy.copy(solid) is solid
+    again = pickle.loads(pickle.dumps(mesh))
+    assert again.measure() == mesh.measure() and (again.cut == mesh.cut).all()
+    rebuilt = pickle.loads(pickle.dumps(solid))
+    assert rebuilt.report() == solid.report() and pickle.loads(pickle.dumps(design)) == design
+
+
+def test_corners_that_single_precision_parts_are_one(tmp_path):
+    """Triangles of an STL whose corners differ in the last place are read as neighbours."""
+    mesh = cube().build().mesh(edge=1.0)
+    corners = mesh.vertices[mesh.triangles] + 1e-7 * np.random.default_rng(1).uniform(-1, 1, (len(mesh.triangles), 3, 3))
+    lines = ["solid s"]
+    for t in corners:
+        lines += ["facet normal 0 0 0", "outer loop", *(f"vertex {x!r} {y!r} {z!r}" for x, y, z in t.tolist())]
+        lines += ["endloop", "endfacet"]
+    (tmp_path / "parted.stl").write_text("\n".join([*lines, "endsolid s\n"]))
+    read = lt.Mesh.read(tmp_path / "parted.stl")
+    assert read.closed and read.counts == mesh.counts and read.volume == pytest.approx(mesh.volume, rel=1e-6)
+
+
+def test_bodies_that_do_not_touch_are_warned_of():
+    apart = lt.region.union(lt.region.box(size=[4, 4, 4]), lt.region.sphere(radius=2, center=[9, 0, 0]))
+    design = cube()
+    with pytest.warns(lt.DesignWarning, match="2 bodies that do not touch"):
+        lt.Design(region=apart, lattice=design.lattice).build()
+
+
+def test_metres_taken_for_millimetres_are_asked_about():
+    with pytest.raises(lt.DesignError, match=r"0\.008 mm across, less than a wavelength, 4 mm: are the units right"):
+        cube(size=0.008).build()
 
 
 def test_files_round_trip(tmp_path):
@@ -331,7 +389,7 @@ MESH = SOLID.mesh(edge=0.25)
         (lambda: cube(cell=lt.cell.series([lt.cell.term([float("inf"), 0, 0])])).build(), "whole numbers"),
         (lambda: cube(cell=lt.cell.series([lt.cell.term("abc")])).build(), "whole numbers"),
         (lambda: cube(level=lt.level.fraction(lt.grade.linear([0, 0, 1], [1, 2]))).build(), "stops"),
-        (lambda: MESH.within(3), "within takes a Solid, found 3"),
+        (lambda: MESH.within(3), "within takes a Solid or a region, found 3"),
         (lambda: MESH.within(MESH), "within takes a Solid"),
         (lambda: MESH.png((10**30, 10)), "size is out of range"),
         (lambda: MESH.png((80.5, 60)), "size must be a whole number"),

@@ -24,6 +24,14 @@ CASES = [
     ("fraction = 0.3", "fracton = 0.3", f"{LEVEL}.fracton", ['did you mean "fraction"']),
     ('units = "mm"', 'units = "inch"', "units", ["mm", '"inch"']),
     ("schema = 1", "schema = 7", "schema", ["schema 1", "7"]),
+    # what cannot be, and why
+    ('cell = "gyroid"', 'cell.tet.name = "gyroid"', "lattice.core.cell.tet.name", ["no point of full tetrahedral symmetry"]),
+    (
+        "wavelength = 4.0",
+        'wavelength = { formula = "4 + x" }',
+        f"{MAP}.wavelength",
+        ["map.phase takes a wavelength and an orientation that vary"],
+    ),
     # amounts
     ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["iso and fraction at once", "exactly one"]),
     ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of iso, fraction, porosity"]),

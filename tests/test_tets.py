@@ -254,10 +254,18 @@ def test_the_road_of_soups(tmp_path, monkeypatch, how, words):
     tets = lt.map.tets(size=3, mesher="ftetwild", limit=60 if how == "answers" else 2)
     design = {"region": {"mesh": {"path": str(soup)}}, "lattice": {"core": {"map": tets}}}
     if words is None:
-        with pytest.warns(lt.DesignWarning, match="no region, so how the mesh fits is not told"):
+        with pytest.warns(lt.DesignWarning, match="no region, so the boundary of the tetrahedra is taken for one"):
             mesh = lt.TetMesh.of(design)
         # One of them was numbered the other way round, and was turned.
         assert np.isclose(mesh.volume, 1000) and (volumes(mesh.nodes, mesh.tets) > 0).all()
+        # And on to the part, of which the tetrahedra are the region.
+        design["lattice"]["core"] |= {"part": "lower", "cell": {"tet": {"name": "diamond"}}, "level": {"fraction": 0.3}}
+        with pytest.warns(lt.DesignWarning, match="no region"):
+            part = lt.Design(**design).build()
+        assert part.report()["region"]["volume"] == pytest.approx(1000, rel=1e-6)
+        surface = part.mesh(edge=0.5)
+        # Its fraction is the tetrahedra's, whichever of the sides of cubes they have: no regular ones, and few.
+        assert surface.closed and surface.solid_fraction == pytest.approx(0.3, abs=0.02)
         return
     started = time.monotonic()
     with pytest.raises(lt.DesignError, match=words):

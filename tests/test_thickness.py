@@ -39,13 +39,14 @@ def test_every_door_gives_the_same(tmp_path):
     report = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)
     assert report == built.report()
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    assert "iso        none" in text and "thickness  0.4000 mm" in text
+    assert "of a wall of levels with this fraction" in text and "thickness  0.4000 mm" in text
 
 
 def test_the_report():
     """What a wall of even thickness is, in numbers."""
     it = figures(lt.level.thickness(0.4))
-    assert it["iso"] is None and it["thickness"] == 0.4
+    assert it["thickness"] == 0.4
+    assert it["iso"] == pytest.approx(lt.iso("gyroid", it["fraction"], "sheet"), rel=1e-9)
     # Steiner's formula about the minimal gyroid, w = 0.1 of the cell; f = 0 is within 1e-4 of it.
     assert it["fraction"] == pytest.approx(3.091444 * 0.1 - 4.18879e-3, rel=5e-4)
     assert it["fraction"] + it["porosity"] == pytest.approx(1)

@@ -398,6 +398,8 @@ def told(error: Exception) -> str:
 
     if isinstance(error, OSError) and error.filename:
         return f"{os.fsdecode(error.filename)}: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:
+        return f"the output could not be written: {error.strerror}"
     text = " ".join(str(error).split("\n"))
     if isinstance(error, (Refused, ValueError, OverflowError, OSError, MemoryError)):
         return text or type(error).__name__

@@ -70,7 +70,7 @@ def check(args) -> None:
     for name, it in report["lattices"].items():
         neck = "thinnest wall" if it["part"] == "sheet" else "narrowest neck"
         print(f"lattice {name}: {it['part']}, wavelength {figure(it['wavelength'])} mm")
-        print(f"  iso        {span(it['iso'])}")
+        print(f"  iso        {span(it['iso'])}{'' if it.get('folding') is None else ' of a wall of levels with this fraction'}")
         print(f"  fraction   {span(it['fraction'])}")
         print(f"  porosity   {span(it['porosity'])}")
         print(f"  thickness  {span(it['thickness'])}{'' if it['thickness'] is None else f' mm ({neck})'}")
@@ -108,6 +108,12 @@ def mesh(args) -> None:
             surface.write(args.output)
         elif kind_of(args.output) == "stl" and streams and not closes(solid, resolved(args)):
             made = solid.save_stl(args.output, threads=args.threads, progress=progress, **options)
+            if made["cavities"]:
+                progress.clear()
+                say(
+                    f"warning: {made['cavities']} closed void{'s' * (made['cavities'] > 1)}, from which powder or resin cannot "
+                    f"drain; `trabecula measure {args.output}` tells where"
+                )
         else:
             if not any(lighter.values()):
                 solid._room(args.output, solid.spacing(**resolved(args)))
@@ -232,6 +238,11 @@ def measure(args) -> None:
         )
     if not figures["closed"]:
         say(f"warning: {args.file} is not closed ({flaws(made)}), so its volume and what follows from it mean little")
+    if figures["closed"] and made.self_intersections:
+        say(
+            f"warning: the surface of {args.file} crosses itself, so what is within several of its bodies is counted as "
+            "often; taken as a region (region.mesh) they are united"
+        )
     figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
     if args.thickness:
         with Progress("fitting balls", args.progress) as progress:
@@ -250,13 +261,18 @@ def measure(args) -> None:
         if key == "bounds":
             text = " to ".join("(" + ", ".join(figure(v) for v in corner) + ")" for corner in value) + " mm"
         elif value is None:
-            text = ABSENT.get(key, "needs a region (--region)")
+            needed = (
+                "needs a region (--region)"
+                if solid is None and not args.region
+                else "none: all of it is the region's own surface"
+            )
+            text = ABSENT.get(key, needed)
         elif isinstance(value, list):
             text = ", ".join(value) or "none"
         elif isinstance(value, bool):
             text = "yes, but inside out" if value and inverted else "yes" if value else "no"
         else:
-            text = (f"{value:.6g}" if isinstance(value, float) else str(value)) + units.get(key, "")
+            text = (figure(value) if isinstance(value, float) else str(value)) + units.get(key, "")
         print(f"{key:{width}} {text}")
     tell_transitions(found)
     if figures["closed"] and not inverted:
@@ -393,7 +409,8 @@ def build(path: str, tell: bool = True) -> Solid:
         warnings.simplefilter("ignore", DesignWarning)
         try:
             read = _core.Design.from_text(read_text(path), kind_of(path) == "json", path)
-            solid = Solid(read.build(os.path.dirname(os.path.abspath(path))))
+            folder = os.path.dirname(os.path.abspath(path))
+            solid = Solid(read.build(folder), folder)
         except DesignError as error:
             raise Refused(str(error)) from None
     if tell:

@@ -122,6 +122,10 @@ class Design:
     def __hash__(self) -> int:
         return hash(self._meaning())
 
+    def __getstate__(self) -> dict:
+        # What was read from a file is read again from the data.
+        return self.__dict__ | {"_read": None}
+
     def _meaning(self) -> str:
         data, folder = self.to_dict(), self.folder or os.getcwd()
         data = _moved(data, lambda path: os.path.abspath(os.path.join(folder, path)))
@@ -145,7 +149,8 @@ class Design:
         """
         from .solid import Solid
 
-        made = Solid(self._checked().build(self.folder or os.getcwd()))
+        folder = self.folder or os.getcwd()
+        made = Solid(self._checked().build(folder), folder)
         for warning in made.warnings:
             warnings.warn(f"{warning['path']}: {warning['message']}", DesignWarning, stacklevel=2)
         return made

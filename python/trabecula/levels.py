@@ -35,7 +35,7 @@ def fraction(cell, iso, part="sheet"):
 
 
 def _levels(cell, values, part, to_iso):
-    if not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
+    if isinstance(values, str) or not hasattr(values, "__len__") or getattr(values, "ndim", 1) == 0:
         return _core.levels(cell, part, [number("the amount", values)], to_iso)[0]
     import numpy as np
 

@@ -37,10 +37,12 @@ def fits(
     edge: float | None = None,
     power: int = 2,
     word: str = "edge",
+    coarsest: float = math.inf,
 ) -> None:
     """Refuses a request for ``need`` bytes of memory, or of disk for the file ``path``, that the machine does not have.
 
-    The need grows as the grid's ``edge`` to the minus ``power``, which gives the edge to suggest.
+    The need grows as the grid's ``edge`` to the minus ``power``, which gives the edge to suggest, unless that is beyond
+    ``coarsest``.
     """
     if path is None:
         have = _core.free_memory()
@@ -54,7 +56,10 @@ def fits(
     request, advice = "this", ""
     if edge is not None:
         better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
-        request, advice = f"{word} {edge:g} mm", f"; try {word} {_up(better):g} mm"
+        request = f"{word} {edge:g} mm"
+        advice = f"; try {word} {_up(better):g} mm"
+        if _up(better) > coarsest:
+            advice = f"; no {word} that would be of use needs little enough, so ask for less of the part, or another place"
     raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
 
 

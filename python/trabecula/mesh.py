@@ -67,7 +67,11 @@ class Picture:
 
 
 class Mesh(Picture):
-    """A triangle mesh. Made by ``Solid.mesh``, or read from a file by ``Mesh.read``."""
+    """A triangle mesh. Made by ``Solid.mesh``, read from a file by ``Mesh.read``, or ``Mesh.of`` arrays.
+
+    It never changes, so a copy is the mesh itself. Pickled it keeps its figures, but not its region: ``thickness`` is then of
+    the solid alone, until ``within`` gives a region back.
+    """
 
     def __init__(
         self,
@@ -77,6 +81,8 @@ class Mesh(Picture):
         islands: dict | None = None,
         chord_error: float | None = None,
     ):
+        if not isinstance(core, _core.Mesh):
+            raise TypeError("use Mesh.of(vertices, triangles), or Mesh.read(path)")
         self._core = core
         self._region = region
         self._edge = edge
@@ -85,8 +91,25 @@ class Mesh(Picture):
         self._simplification: dict | None = None
 
     @staticmethod
+    def of(vertices: ArrayLike, triangles: ArrayLike) -> Mesh:
+        """The mesh of vertices (n, 3), mm, and triangles (m, 3), the indices of their corners, counter-clockwise seen from
+        outside. A ValueError for other shapes, places that are not finite, and indices of no vertex.
+        """
+        import numpy as np
+
+        places, corners = np.asarray(vertices, dtype=np.float64), np.asarray(triangles)
+        if corners.size and not np.issubdtype(corners.dtype, np.integer):
+            raise ValueError(f"expected triangles as whole numbers, found {corners.dtype}")
+        if places.ndim != 2 or corners.ndim != 2:
+            raise ValueError(f"expected vertices (n, 3) and triangles (m, 3), found {places.shape} and {corners.shape}")
+        return Mesh(_core.Mesh.of(places, corners.astype(np.int64)))
+
+    @staticmethod
     def read(path: str | os.PathLike[str]) -> Mesh:
-        """Reads a mesh file (stl, 3mf, ply, obj, off; any letter case)."""
+        """Reads a mesh file (stl, 3mf, ply, obj, off; any letter case).
+
+        Corners of an STL file that differ by no more than single precision rounds are one, if it would not be closed else.
+        """
         name = os.fsdecode(path)
         kind = extension(name, READS)
         data = _core.read_file(name)
@@ -94,6 +117,17 @@ class Mesh(Picture):
             return Mesh(_core.Mesh.read(data, kind))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
+
+    def __copy__(self) -> Mesh:
+        return self
+
+    def __deepcopy__(self, memo: dict) -> Mesh:
+        return self
+
+    def __reduce__(self) -> tuple:
+        state = (self._core.vertices, self._core.triangles, self._core.known_cut(), self._core.design)
+        names = ("_region_volume", "_edge", "_islands", "_chord_error", "_simplification")
+        return _revived, (state, {name: getattr(self, name) for name in names})
 
     def __repr__(self) -> str:
         vertices, triangles = self._core.counts
@@ -137,13 +171,11 @@ class Mesh(Picture):
     @cached_property
     def solid_fraction(self) -> float | None:
         """Volume of the solid over volume of its region; None for a mesh without a region."""
-        if self._region is None:
-            return None
-        return self.volume / self._region_volume
+        return None if self._region_volume is None else self.volume / self._region_volume
 
     @cached_property
-    def _region_volume(self) -> float:
-        return self._region.volume(self._edge or self._spacing())
+    def _region_volume(self) -> float | None:
+        return None if self._region is None else self._region.volume(self._edge or self._spacing())
 
     @property
     def specific_surface(self) -> dict[str, float | None]:
@@ -151,7 +183,7 @@ class Mesh(Picture):
         ``lattice_of_region`` the lattice's area, without cuts, over the region's volume.
         """
         area, lattice = self.area, self._figures["area_lattice"]
-        whole = None if self._region is None else self._region_volume
+        whole = self._region_volume
         return {
             "area_of_solid": area / self.volume if self.volume else None,
             "area_of_region": area / whole if whole else None,
@@ -164,7 +196,7 @@ class Mesh(Picture):
         cuts. None without a region or a lattice.
         """
         lattice = self._figures["area_lattice"]
-        if self._region is None or not lattice:
+        if self._region_volume is None or not lattice:
             return None
         return 4 * (self._region_volume - self.volume) / lattice
 
@@ -328,11 +360,15 @@ class Mesh(Picture):
         return None if self._simplification is None else dict(self._simplification)
 
     def within(self, solid_or_region) -> Mesh:
-        """The same mesh measured against the region of a Solid: solid fraction, lattice and cut area."""
+        """The same mesh measured against a region, from the builders of that name or that of a Solid: solid fraction, lattice
+        and cut area.
+        """
         region = getattr(solid_or_region, "_core", solid_or_region)
         region = region.region if isinstance(region, _core.Solid) else region
+        if isinstance(region, dict):
+            region = _core.Region.from_data({"region": region}, os.getcwd())
         if not isinstance(region, _core.Region):
-            raise TypeError(f"within takes a Solid, found {solid_or_region!r}")
+            raise TypeError(f"within takes a Solid or a region, found {solid_or_region!r}")
         return Mesh(self._core.split_by(region), region, self._edge, self._islands)
 
     def uncapped(self) -> Mesh:
@@ -415,3 +451,11 @@ class Mesh(Picture):
     def _spacing(self) -> float:
         low, high = self.bounds
         return max(b - a for a, b in zip(low, high, strict=True)) / 200
+
+
+def _revived(state: tuple, known: dict) -> Mesh:
+    """A mesh that was pickled."""
+    vertices, triangles, cut, design = state
+    mesh = Mesh(_core.Mesh.of(vertices, triangles.astype("int64"), cut, design))
+    mesh.__dict__.update(known)
+    return mesh

@@ -48,7 +48,10 @@ class Quadors:
 
         ``distance`` in lengths of the way, infinite without a hit; ``normals`` out of the solid; ``hubs``, -1 without.
         """
-        distance, normals, hubs = self._core.rays(_points("origins", origins), _points("ways", ways))
+        starts, along = _points("origins", origins), _points("ways", ways)
+        if along.size and not along.any(axis=1).all():
+            raise ValueError(f"way {int((~along.any(axis=1)).argmax())} is (0, 0, 0): it leads nowhere")
+        distance, normals, hubs = self._core.rays(starts, along)
         return {"distance": distance, "normals": normals, "hubs": hubs}
 
     def closest(self, points: ArrayLike) -> dict[str, NDArray]:

@@ -39,20 +39,32 @@ TRIANGLE = 2 * (12 + 12)
 
 
 class Solid(Picture):
-    """A region and the lattice in it. Made by ``Design.build``."""
+    """A region and the lattice in it. Made by ``Design.build``.
 
-    def __init__(self, core: _core.Solid):
+    It never changes, so a copy is the solid itself; pickled it is its design, and is built again where that is read.
+    """
+
+    def __init__(self, core: _core.Solid, folder: str = ""):
         self._core = core
+        self._folder = folder
+
+    def __copy__(self) -> Solid:
+        return self
+
+    def __deepcopy__(self, memo: dict) -> Solid:
+        return self
+
+    def __reduce__(self) -> tuple:
+        return _rebuilt, (self._core.design, self._folder)
 
     def __repr__(self) -> str:
         (a, b, c), (d, e, f) = self.bounds
         return f"<trabecula.Solid in {d - a:g} x {e - b:g} x {f - c:g} mm, wavelength {self.wavelength:g} mm>"
 
     @property
-    def bounds(self) -> tuple[list[float], list[float]]:
+    def bounds(self) -> list[list[float]]:
         """Lower and upper corner of the region's bounds, mm."""
-        low, high = self._core.bounds
-        return list(low), list(high)
+        return [list(corner) for corner in self._core.bounds]
 
     @property
     def wavelength(self) -> float:
@@ -102,7 +114,8 @@ class Solid(Picture):
         Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
         and the warnings; with a blend ``blend``: the lattices' names, ``by``, ``phases`` (locked, independent or drifting),
         the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
-        level is a thickness, ``iso`` is None and ``folding`` the thickness (mm) beyond which the wall folds.
+        level is a thickness, ``iso`` is the level that would have the same fraction and ``folding`` the thickness (mm)
+        beyond which the wall folds.
         """
         import json
 
@@ -172,7 +185,9 @@ class Solid(Picture):
         return {name: t for name, t in ends.items() if t}
 
     def _is_fine(self, spacing: float) -> bool:
-        """Whether only fractions of a hundredth or two can be lost at this spacing; `report` tells of them."""
+        """Whether a wavelength has so many steps that what is too thin for them is a hundredth or two of the part: then
+        nothing is warned of, and `report` tells of the walls.
+        """
         return self.wavelength / spacing >= 64
 
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
@@ -251,7 +266,7 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
-        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing)
+        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
         self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
@@ -261,7 +276,8 @@ class Solid(Picture):
     def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
         """Refuses a mesh file that the disk has no room for."""
         need = self._need(spacing)["triangles"]
-        fits(file_size(extension(path, WRITES), need), f"{need:.3g} triangles", path, spacing)
+        size = file_size(extension(path, WRITES), need)
+        fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
     def save_stl(
         self,
@@ -302,7 +318,7 @@ class Solid(Picture):
         spacing = self.spacing(step, per_cell)
         low, high = self.bounds
         count = math.prod(math.ceil((b - a) / spacing) for a, b in zip(low, high, strict=True))
-        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step")
+        fits(2.0 * count, f"{count:.3g} voxels", edge=spacing, power=3, word="step", coarsest=self.wavelength)
         self._warn_thin(spacing, "step")
         made = Voxels(self._core.voxels(spacing, _threads(threads), progress))
         self._warn_coarse(made.volume, spacing, "step")
@@ -377,3 +393,8 @@ def _a(word: str) -> str:
 
 def _threads(threads: int | None) -> int | None:
     return None if threads is None else whole("threads", threads, 1, 4096)
+
+
+def _rebuilt(design: str, folder: str) -> Solid:
+    """A solid that was pickled."""
+    return Solid(_core.Design.from_text(design).build(folder), folder)

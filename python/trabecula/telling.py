@@ -107,8 +107,8 @@ def tell_distortion(d: dict) -> None:
     print(f"  angle      off by {worst['mean']:.1f}° on average, {worst['max']:.1f}° at most, along the worst axis")
     farthest = max(d["spacing"], key=lambda s: abs(s["max"] - 1))
     print(
-        f"  spacing    {farthest['mean']:.2f} of what was asked for on average, up to {farthest['max']:.2f}; "
-        f"{100 * d['outside']:.1f} % outside 1/1.5 to 1.5"
+        f"  spacing    {farthest['mean']:.2f} of what was asked for on average, off by a factor of {farthest['max']:.2f} at "
+        f"most; {100 * d['outside']:.1f} % outside 1/1.5 to 1.5"
     )
     print(f"  turn       {d['turn']:.1f}° per cell at most")
 

@@ -64,15 +64,18 @@ def duration(seconds: float) -> str:
 
 
 def figure(v: float) -> str:
-    """A number with six digits."""
-    return f"{v:.6g}"
+    """A number with six digits; what is left of a difference that should be nothing is nothing."""
+    return f"{v:.6g}" if abs(v) > 1e-12 else "0"
 
 
 def span(v) -> str:
     """A number, a range, or none."""
     if v is None:
         return "none"
-    return f"{v:.4f}" if isinstance(v, (int, float)) else f"{v[0]:.4f} to {v[1]:.4f}"
+    ends = [v] if isinstance(v, (int, float)) else v
+    # Adding zero takes the sign off a negative one.
+    told = [f"{round(end, 4) + 0.0:.4f}" for end in ends]
+    return " to ".join(dict.fromkeys(told))
 
 
 def say(text: str) -> None:

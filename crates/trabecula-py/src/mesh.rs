@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -38,6 +38,16 @@ impl Mesh {
             design,
         }
     }
+
+    /// A mesh of which nothing more is known.
+    fn bare(mesh: trabecula::mesh::Mesh) -> Self {
+        let cut = vec![false; mesh.triangles.len()];
+        Mesh {
+            surface: Surface { mesh, cut },
+            split: false,
+            design: String::new(),
+        }
+    }
 }
 
 #[pymethods]
@@ -45,16 +55,66 @@ impl Mesh {
     /// Reads the bytes of a mesh file; `extension` names the format.
     #[staticmethod]
     fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
-        let loaded = run(py, None, None, |_| io::read_mesh(bytes, extension))?;
-        let mesh = loaded
-            .map_err(|f| PyValueError::new_err(f.to_string()))?
-            .mesh;
-        let cut = vec![false; mesh.triangles.len()];
-        Ok(Mesh {
-            surface: Surface { mesh, cut },
-            split: false,
-            design: String::new(),
-        })
+        let by_place = extension.eq_ignore_ascii_case("stl");
+        let read = run(py, None, None, |_| match io::read_mesh(bytes, extension) {
+            Ok(loaded) if by_place => Ok(measure::joined_where_open(loaded.mesh)),
+            Ok(loaded) => Ok(loaded.mesh),
+            Err(f) => Err(f),
+        })?;
+        read.map(Mesh::bare)
+            .map_err(|f| PyValueError::new_err(f.to_string()))
+    }
+
+    /// The mesh of vertices (n, 3), mm, and triangles (m, 3) by index; which of them are cuts, and the design, if known.
+    #[staticmethod]
+    #[pyo3(signature = (vertices, triangles, cut=None, design=String::new()))]
+    fn of(
+        vertices: PyReadonlyArray2<f64>,
+        triangles: PyReadonlyArray2<i64>,
+        cut: Option<Vec<bool>>,
+        design: String,
+    ) -> PyResult<Mesh> {
+        let wrong = |message: String| Err(PyValueError::new_err(message));
+        let (points, corners) = (vertices.as_array(), triangles.as_array());
+        if points.ncols() != 3 || corners.ncols() != 3 {
+            let (points, corners) = (points.shape(), corners.shape());
+            return wrong(format!(
+                "expected vertices (n, 3) and triangles (m, 3), found {points:?} and {corners:?}"
+            ));
+        }
+        let mut places = points.rows().into_iter().enumerate();
+        if let Some((i, p)) = places.find(|(_, p)| !p.iter().all(|x| x.is_finite())) {
+            return wrong(format!(
+                "expected finite vertices, found {:?} as vertex {i}",
+                p.to_vec()
+            ));
+        }
+        let known = 0..points.nrows().min(u32::MAX as usize) as i64;
+        let mut named = corners.rows().into_iter().enumerate();
+        if let Some((i, t)) = named.find(|(_, t)| !t.iter().all(|v| known.contains(v))) {
+            return wrong(format!(
+                "expected indices of {} vertices, found {:?} as triangle {i}",
+                known.end,
+                t.to_vec()
+            ));
+        }
+        let rows = points.rows().into_iter();
+        let vertices = rows.map(|p| [p[0], p[1], p[2]]).collect();
+        let rows = corners.rows().into_iter();
+        let triangles = rows.map(|t| [t[0], t[1], t[2]].map(|v| v as u32)).collect();
+        let mut made = Mesh::bare(trabecula::mesh::Mesh {
+            vertices,
+            triangles,
+        });
+        if let Some(cut) = cut.filter(|c| c.len() == made.surface.cut.len()) {
+            (made.surface.cut, made.split) = (cut, true);
+        }
+        Ok(Mesh { design, ..made })
+    }
+
+    /// Which triangles are cuts, if that is known.
+    fn known_cut(&self) -> Option<Vec<bool>> {
+        self.split.then(|| self.surface.cut.clone())
     }
 
     /// The same mesh, its triangles that lie on the region's boundary marked as cuts.

@@ -6,6 +6,7 @@
 mod beams;
 mod blend;
 mod build;
+mod cell;
 mod control;
 mod data;
 mod error;
@@ -16,6 +17,7 @@ mod level;
 mod map;
 mod node;
 mod pattern;
+mod place;
 mod read;
 mod region;
 mod report;
@@ -27,6 +29,7 @@ mod skin;
 mod tests;
 mod tets;
 mod tiling;
+mod warn;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,6 +49,7 @@ use crate::solid::Solid;
 use crate::tets::TetMesh;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
+use read::RegionIn;
 
 pub use blend::Blended;
 pub use data::*;
@@ -233,11 +237,16 @@ impl Design {
     }
 }
 
-/// The region of a design, or of a tree with the key `region` alone.
+/// The region of a design, or of a tree with the key `region` alone. The region of a lattice over tetrahedra is what these fill.
 pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
-    let mut notes = region::Notes::default();
-    region::region(&read::region_in(node)?, "region", loader, &mut notes).map_err(|mut e| {
+    let found = match read::region_in(node)? {
+        RegionIn::Design(design) => build::space(&design, loader),
+        RegionIn::Alone(spec) => {
+            region::region(&spec, "region", loader, &mut region::Notes::default())
+        }
+    };
+    found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));
         e
     })
@@ -253,13 +262,13 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
             ))
         }
     }
-    Ok(build::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
+    Ok(cell::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
 }
 
 impl Built {
     /// The numbers of the design without meshing it: for each lattice iso, fraction, porosity, thickness and
     /// connected_fraction (a number, or [min, max] over the region where it varies), the region's bounds and
-    /// volume, and the warnings. Where the level is a thickness, iso is null and folding is the thickness (mm) beyond
+    /// volume, and the warnings. Where the level is a thickness, iso is the level of the same fraction and folding is the thickness (mm) beyond
     /// which the wall folds, else null.
     pub fn report(&self) -> Json {
         report::report(self)

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, cross, norm, sub};
+use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::{Mesh, degenerate};
 
 mod adjacency;
@@ -27,7 +27,8 @@ const CHUNK: usize = 1 << 16;
 /// What a closed mesh is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Size {
-    /// Enclosed volume, mm³.
+    /// Enclosed volume, mm³. Of a mesh that is not closed: that of the cones over its triangles from the middle of its bounds,
+    /// which is near it where what is missing is small.
     pub volume: f64,
     /// Area, mm².
     pub area: f64,
@@ -53,14 +54,44 @@ pub fn size(mesh: &Mesh) -> Size {
         Some(apart) => Bodies::of(&apart).volumes(&apart),
         None => bodies.volumes(mesh),
     };
+    let closed = edges.all == edges.sound && edges.loops == 0;
+    let bounds = mesh.bounds();
     Size {
-        volume: signed.iter().sum(),
+        // The cones over an open body depend on where they meet: bodies that belong together need one place.
+        volume: match closed {
+            true => signed.iter().sum(),
+            false => cones(mesh, scale(add(bounds.min, bounds.max), 0.5)),
+        },
         area: area(mesh),
         euler: bodies.vertices as i64 - edges.all as i64 + mesh.triangles.len() as i64,
         pieces: signed.iter().filter(|v| **v > 0.0).count(),
         cavities: signed.iter().filter(|v| **v < 0.0).count(),
-        closed: edges.all == edges.sound && edges.loops == 0,
-        bounds: mesh.bounds(),
+        closed,
+        bounds,
+    }
+}
+
+/// The signed volume of the cones over a mesh's triangles from one point, mm³.
+fn cones(mesh: &Mesh, from: Vec3) -> f64 {
+    let six = mesh.triangles.iter().map(|t| {
+        let [a, b, c] = t.map(|v| sub(mesh.vertices[v as usize], from));
+        dot(a, cross(b, c))
+    });
+    six.sum::<f64>() / 6.0
+}
+
+/// The mesh with corners made one that differ by no more than single precision rounds, if it has open edges that this closes:
+/// files that hold triangles by their corners' places, as STL does, leave such edges.
+pub fn joined_where_open(mesh: Mesh) -> Mesh {
+    let open = Edges::count(&mesh).open;
+    if open == 0 {
+        return mesh;
+    }
+    let joined = mesh.joined(mesh.single_rounding());
+    if Edges::count(&joined).open < open {
+        joined
+    } else {
+        mesh
     }
 }
 
@@ -217,6 +248,30 @@ mod tests {
             (1, 0, 0, 1)
         );
         assert!(!size(&m).closed);
+    }
+
+    #[test]
+    fn the_volume_of_bodies_that_should_be_one() {
+        // A cube of six faces that have no vertex in common, each in its place: six open bodies that enclose one volume.
+        let whole = cube([5.0, -2.0, 1.0], 2.0);
+        let mut apart = Mesh::default();
+        for t in &whole.triangles {
+            let first = apart.vertices.len() as u32;
+            let corners = t.map(|v| whole.vertices[v as usize]);
+            apart.vertices.extend(corners);
+            apart.triangles.push([first, first + 1, first + 2]);
+        }
+        let s = size(&apart);
+        assert!(!s.closed && (s.volume - 8.0).abs() < 1e-12, "{}", s.volume);
+        // Corners that differ by a rounding are one; those of another size of part are not.
+        let shift = |by: f64| {
+            let mut m = apart.clone();
+            let each = m.vertices.iter_mut().enumerate();
+            each.for_each(|(i, v)| v[i % 3] += by * (i % 2) as f64);
+            joined_where_open(m)
+        };
+        assert!(size(&shift(1e-8)).closed && !size(&shift(1e-3)).closed);
+        assert_eq!(joined_where_open(whole.clone()), whole);
     }
 
     #[test]

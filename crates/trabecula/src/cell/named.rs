@@ -146,6 +146,12 @@ static CATALOGUE: [Named; 10] = [
 ];
 
 impl Named {
+    /// The number of its space group.
+    pub fn number(&self) -> &'static str {
+        let (_, number) = self.group.rsplit_once('(').unwrap_or(("", self.group));
+        number.trim_end_matches(')')
+    }
+
     /// f as plane waves.
     pub fn terms(&self) -> Vec<Term> {
         let mut terms = Vec::new();

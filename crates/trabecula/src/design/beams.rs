@@ -5,12 +5,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde_json::{Value as Json, json};
 
-use super::build::{LOOKS, Place};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
 use super::pattern;
+use super::place::{LOOKS, Place};
 use super::{Built, Warning};
 use super::{map, sample, samples};
 use crate::fault::{Fault, counted, number};
@@ -412,7 +412,7 @@ pub(super) fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> 
         };
         let path = format!("{path}[{i}]");
         for v in at {
-            super::build::finite(&path, v)?;
+            super::place::finite(&path, v)?;
         }
         if let Some(r) = radius {
             Allowed::Positive("radius").check(&path, r, "")?;

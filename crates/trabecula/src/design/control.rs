@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
+use super::place::{Place, finite};
 use super::region::{self, Notes};
 use super::samples;
 use crate::fault::{Fault, number};

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::build::{Place, finite};
 use super::data::{GradeKind, GradeSpec};
 use super::error::DesignError;
+use super::place::{Place, finite};
 use super::{control, samples};
 use crate::fault::number;
 use crate::grade::{Formula, Grade};

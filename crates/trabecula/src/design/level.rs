@@ -1,9 +1,9 @@
 //! How much is solid: data to [`Level`].
 
-use super::build::{Place, finite};
 use super::data::{AmountSpec, Fit, LevelSpec, Of, PartSpec};
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::place::{Place, finite};
 use super::sample;
 use crate::cell::{Cell, Part};
 use crate::fault::number;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::Warning;
-use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::place::{Place, finite};
 use super::{control, samples};
 use crate::fault::number;
 use crate::field::Field;

@@ -309,7 +309,11 @@ impl<'a> At<'a> {
         match &self.node.value {
             Value::Number(v) => Ok(*v),
             Value::Table(t) if t.first().is_some_and(|e| GRADES.contains(&e.0.as_str())) => {
-                Err(self.error("this number cannot vary in space in this version; give one number"))
+                let of_map = [".map.affine.", ".map.spartan."];
+                Err(self.error(match of_map.iter().any(|m| self.path.contains(m)) {
+                    true => "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary",
+                    false => "this number cannot vary in space; give one number",
+                }))
             }
             _ => Err(self.expected("a number")),
         }

@@ -3,10 +3,10 @@
 use serde_json::{Value as Json, json};
 
 use super::beams::{check_open, fillet, given};
-use super::build::{Place, finite};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::Allowed;
+use super::place::{Place, finite};
 use crate::fault::number;
 use crate::graph::{Hub, Profile};
 use crate::pattern::{Laid, Pattern, Similarity, Strut};

@@ -6,9 +6,10 @@ use super::Design;
 use super::data::*;
 use super::error::DesignError;
 use super::node::{At, Node};
-use crate::cell::catalogue;
 use crate::cell::tet::ready_cells;
+use crate::cell::{catalogue, named};
 use crate::fault::{self, counted};
+use crate::symmetry::Group;
 
 mod beams;
 mod blend;
@@ -124,20 +125,27 @@ pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
 }
 
 /// The region in a design, or in a tree that says nothing else.
-pub(super) fn region_in(node: &Node) -> Read<RegionSpec> {
+pub(super) fn region_in(node: &Node) -> Read<RegionIn> {
     let at = At::root(node);
     if at
         .entries("a design or a region")?
         .iter()
         .any(|(key, _)| ["lattice", "beams"].contains(key))
     {
-        return Ok(design(node)?.region);
+        return Ok(RegionIn::Design(Box::new(design(node)?)));
     }
     let f = at.fields("a region file", &["schema", "units", "region"])?;
     region(f.need(
         "region",
         "say where the part may be, such as [region.box] with size = [20, 20, 20]",
     )?)
+    .map(RegionIn::Alone)
+}
+
+/// What a file that is read for its region holds.
+pub(super) enum RegionIn {
+    Design(Box<Design>),
+    Alone(RegionSpec),
 }
 
 /// The entry of a table with other keys, which are left alone.
@@ -432,6 +440,22 @@ fn cell(at: &At) -> Read<CellSpec> {
     })))
 }
 
+/// The name of a ready tetrahedral cell. Of a periodic cell that can be none it says why.
+fn tet_name(at: &At) -> Read<&'static str> {
+    let names: Vec<(&str, &'static str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
+    at.word("tetrahedral cell", &names).map_err(|e| {
+        let periodic = at.text("").ok().and_then(named);
+        let group = periodic.and_then(|n| Group::named(n.number()).ok());
+        match group.map(|g| g.tetrahedral_sites()) {
+            Some(Err(why)) => DesignError {
+                message: format!("{}. {}", why.message, e.message),
+                ..e
+            },
+            _ => e,
+        }
+    })
+}
+
 fn tet(at: &At) -> Read<TetCellSpec> {
     let own = ["group", "terms", "site", "dual", "edge"];
     let mut keys = vec!["name", "zones"];
@@ -443,15 +467,11 @@ fn tet(at: &At) -> Read<TetCellSpec> {
                 other.error("with zones every cell is a ready one, by its name; leave this out")
             );
         }
-        let names: Vec<(&str, &str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
         let mut of = BTreeMap::new();
         for (zone, at) in
             zones.entries("a ready cell for each zone, such as { 1 = \"diamond\" }")?
         {
-            of.insert(
-                zone.to_string(),
-                at.word("tetrahedral cell", &names)?.to_string(),
-            );
+            of.insert(zone.to_string(), tet_name(&at)?.to_string());
         }
         return Ok(TetCellSpec {
             zones: of,
@@ -464,9 +484,8 @@ fn tet(at: &At) -> Read<TetCellSpec> {
                 "a ready cell has its own group, terms, site and edge; give a name or these";
             return Err(other.error(message));
         }
-        let names: Vec<(&str, &str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
         return Ok(TetCellSpec {
-            name: Some(name.word("tetrahedral cell", &names)?.to_string()),
+            name: Some(tet_name(name)?.to_string()),
             ..TetCellSpec::default()
         });
     }

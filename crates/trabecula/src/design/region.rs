@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::build::finite;
 use super::data::*;
 use super::error::DesignError;
+use super::place::finite;
 use super::{Loader, Warning};
 use crate::fault::{Fault, number};
 use crate::io;
@@ -16,6 +16,9 @@ use crate::region::{
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
 const SMALL: f64 = 1.0;
+
+/// Boxes looked at before two regions are taken to touch.
+const BOXES: usize = 2000;
 
 /// What building a region has to tell beside the region.
 #[derive(Debug, Default)]
@@ -61,8 +64,19 @@ pub(super) fn region(
         }
         RegionSpec::Mesh(m) => mesh(m, &format!("{path}.mesh"), loader, notes),
         RegionSpec::Union(of) => {
+            let whole = path == "region";
             let path = format!("{path}.union");
-            shared(&path, Union::new(several(of, &path, loader, notes)?))
+            let of = several(of, &path, loader, notes)?;
+            let groups = if whole { groups(&of) } else { 1 };
+            if groups > 1 {
+                let message = format!(
+                    "these {} regions are {groups} bodies that do not touch: the part is in pieces",
+                    of.len()
+                );
+                let path = path.clone();
+                notes.warnings.push(Warning { path, message });
+            }
+            shared(&path, Union::new(of))
         }
         RegionSpec::Intersection(of) => {
             let path = format!("{path}.intersection");
@@ -92,6 +106,48 @@ pub(super) fn halfspace(h: &HalfSpaceSpec, path: &str) -> Result<HalfSpace, Desi
 fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Region, DesignError> {
     made.map(|s| Arc::new(s) as Region)
         .map_err(|f| DesignError::fault(path, f))
+}
+
+/// How many bodies regions surely are when united, at least.
+fn groups(of: &[Region]) -> usize {
+    let mut left: Vec<usize> = (0..of.len()).collect();
+    let mut count = 0;
+    while let Some(first) = left.pop() {
+        count += 1;
+        let mut reached = vec![first];
+        while let Some(i) = reached.pop() {
+            let (met, rest) = left.iter().partition(|j| may_meet(&of[i], &of[**j]));
+            left = rest;
+            reached.extend::<Vec<usize>>(met);
+        }
+    }
+    count
+}
+
+/// Whether two regions have a point in common. Only that they have none is proven, by boxes of which each is outside one of them.
+fn may_meet(a: &Region, b: &Region) -> bool {
+    let both = a.bounds().intersection(b.bounds());
+    if !both.is_finite() {
+        return !both.is_empty();
+    }
+    let mut boxes = if both.is_empty() { vec![] } else { vec![both] };
+    for _ in 0..BOXES {
+        let Some(part) = boxes.pop() else {
+            return false;
+        };
+        if a.bound(&part).lo > 0.0 || b.bound(&part).lo > 0.0 {
+            continue;
+        }
+        let (middle, size) = (part.center(), part.size());
+        if a.value(middle) <= 0.0 && b.value(middle) <= 0.0 {
+            return true;
+        }
+        let longest = (0..3).fold(0, |l, c| if size[c] > size[l] { c } else { l });
+        let (mut below, mut above) = (part, part);
+        (below.max[longest], above.min[longest]) = (middle[longest], middle[longest]);
+        boxes.extend([below, above]);
+    }
+    true
 }
 
 fn several(
@@ -171,7 +227,11 @@ fn mesh(
         );
         return Err(DesignError::new(at, message).found(&spec.path));
     }
-    positive(path, "scale", spec.scale)?;
+    if !(spec.scale.is_finite() && spec.scale > 0.0) {
+        let scale = number(spec.scale);
+        let message = format!("scale is {scale}; it must be a finite number greater than 0");
+        return Err(DesignError::new(format!("{path}.scale"), message).found(scale));
+    }
     let bytes = loader
         .load(&spec.path)
         .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
@@ -216,4 +276,28 @@ fn mesh(
     }
     notes.repairs.push((path.into(), made.repaired().clone()));
     Ok(Arc::new(made))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_of_a_union() {
+        let ball = |x: f64, radius| Arc::new(Sphere::new([x, 0.0, 0.0], radius).unwrap()) as Region;
+        let post = |x: f64| {
+            Arc::new(Cylinder::new([x, x, -5.0], [0.0, 0.0, 1.0], 1.0, 10.0).unwrap()) as Region
+        };
+        assert_eq!(groups(&[ball(0.0, 1.0), ball(3.0, 1.0), ball(1.5, 1.0)]), 1);
+        assert_eq!(groups(&[ball(0.0, 1.0), ball(3.0, 1.0), ball(9.0, 1.0)]), 3);
+        // Their bounds overlap, they do not: the diagonal is √2 · 1.5 mm, the radii 2 mm together; or 1.3 mm.
+        assert_eq!(groups(&[post(0.0), post(1.5)]), 2);
+        assert_eq!(groups(&[post(0.0), post(1.3)]), 1);
+        // Faces in common touch.
+        let cube =
+            |x: f64| Arc::new(Cuboid::new([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]).unwrap()) as Region;
+        assert_eq!(groups(&[cube(0.0), cube(1.0)]), 1);
+        assert_eq!(groups(&[cube(0.0), cube(1.001)]), 2);
+    }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::{Blended, Built, Joins, Tiled, beams, build::LOOKS, sample};
+use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::extract;
@@ -77,10 +77,13 @@ impl Varied {
 
 impl core::fmt::Display for Varied {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        if self.min == self.max {
-            write!(f, "{:.4}", self.min)
+        // Adding zero takes the sign off a negative one.
+        let [min, max] =
+            [self.min, self.max].map(|v| format!("{:.4}", (v * 1e4).round() / 1e4 + 0.0));
+        if min == max {
+            write!(f, "{min}")
         } else {
-            write!(f, "{:.4} to {:.4}", self.min, self.max)
+            write!(f, "{min} to {max}")
         }
     }
 }
@@ -112,8 +115,11 @@ pub(super) fn report(built: &Built) -> Json {
         let mut entry = json!({
             "part": word(lattice.part),
             "wavelength": lattice.map.wavelength(),
-            // A wall of even thickness is not bounded by levels of f.
-            "iso": if lattice.distance().is_some() { Json::Null } else { iso.json() },
+            // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
+            "iso": match lattice.distance() {
+                Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).json(),
+                None => iso.json(),
+            },
             "fraction": fraction.json(),
             "porosity": fraction.map(|f| 1.0 - f).json(),
             "thickness": thickness(lattice, iso),

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::build::{LOOKS, Place};
 use super::data::{OpenSpec, SkinSpec};
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
+use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Design, Loader, region, sample};
 use crate::face::Body;

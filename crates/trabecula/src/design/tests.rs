@@ -265,7 +265,7 @@ fn values_of_the_wrong_type_say_what_was_found() {
         (
             "[4, 4, 5]",
             "{ linear = { along = [1,0,0], stops = [] } }",
-            "cannot vary in space in this version",
+            "map.phase takes a wavelength",
         ),
         ("[0, 30, 0]", "[0, true, 0]", "found true"),
         (

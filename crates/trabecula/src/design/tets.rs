@@ -5,10 +5,10 @@ mod source;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-use super::build::{LOOKS, Place};
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
+use super::place::{LOOKS, Place};
 use super::{Loader, Node, Warning, read, region, sample};
 use crate::fault::{Fault, counted, number};
 use crate::math::{Vec3, add, scale};
@@ -59,7 +59,7 @@ impl Tets {
             let mut notes = region::Notes::default();
             let space = match region::region(&region_spec, "region", loader, &mut notes) {
                 Ok(space) => space,
-                Err(e) => return of_soup(&spec, &region_spec, &path, loader, e),
+                Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
             };
             let bounds = space.bounds();
             if !bounds.is_empty() && !bounds.is_finite() {
@@ -154,7 +154,7 @@ pub(super) fn tets(
     };
     let mut notes = region::Notes::default();
     if let TetsSpec::Made(made) = spec {
-        mesh.zones = zones(&mesh, made, place, &mut notes)?;
+        mesh.zones = zones(&mesh, made, &place.path, place.loader, &mut notes)?;
     }
     let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
     let todo = match spec {
@@ -172,7 +172,8 @@ pub(super) fn tets(
 fn zones(
     mesh: &TetMesh,
     made: &MadeTetsSpec,
-    place: &Place,
+    path: &str,
+    loader: &dyn Loader,
     notes: &mut region::Notes,
 ) -> Result<Vec<u32>, DesignError> {
     if made.zones.is_empty() {
@@ -192,8 +193,8 @@ fn zones(
         .collect();
     numbered.sort_by_key(|z| z.0);
     for (zone, spec) in numbered {
-        let path = format!("{}.zones.{zone}", place.path);
-        let region = region::region(spec, &path, place.loader, notes)?;
+        let path = format!("{path}.zones.{zone}");
+        let region = region::region(spec, &path, loader, notes)?;
         let mut values = vec![0.0; middles.len()];
         region.values(&middles, &mut values);
         let mut count = 0;
@@ -238,8 +239,9 @@ fn told(
     })
 }
 
-/// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one.
-fn of_soup(
+/// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the
+/// region then.
+pub(super) fn of_soup(
     spec: &TetsSpec,
     space: &RegionSpec,
     path: &str,
@@ -254,7 +256,7 @@ fn of_soup(
     };
     if made.mesher == MesherSpec::Background {
         let message = format!(
-            "{}; `trabecula tets` with mesher = \"ftetwild\" takes such triangles too, and the boundary of its mesh is a region",
+            "{}; {path}.mesher = \"ftetwild\" takes such triangles too, and the boundary of its mesh is the region then",
             why.message
         );
         return Err(DesignError { message, ..why });
@@ -263,16 +265,18 @@ fn of_soup(
         return Err(why);
     };
     let size = Allowed::Positive("size").check(&format!("{path}.size"), size, "")?;
-    let (mesh, checked) = wild(made, &surface, size, path, loader)?;
-    let mut made = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
-    made.warnings.push(Warning {
-        path: "region.mesh".into(),
-        message: format!(
-            "no region, so how the mesh fits is not told: {}",
-            why.message
-        ),
-    });
-    Ok(made)
+    let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
+    let mut notes = region::Notes::default();
+    mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
+    let mut told = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
+    told.warnings.extend(notes.warnings);
+    let message = format!(
+        "no region, so the boundary of the tetrahedra is taken for one: {}",
+        why.message
+    );
+    let path = "region.mesh".into();
+    told.warnings.push(Warning { path, message });
+    Ok(told)
 }
 
 /// What may not be meant.

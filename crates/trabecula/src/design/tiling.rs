@@ -3,19 +3,22 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::build::{LOOKS, Place, amount_key, finite, gaps, orbit_terms};
+use super::cell::orbit_terms;
 use super::data::*;
 use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::joins::{Joins, joins};
+use super::place::{LOOKS, Place, finite};
 use super::report::Varied;
 use super::tets::{self, TetReport};
+use super::warn::{amount_key, gaps};
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
-use crate::cell::{Part, Series};
-use crate::fault::number;
+use crate::cell::{Part, Series, named};
+use crate::fault::{Fault, number};
 use crate::grade::Grade;
 use crate::map::Tets;
+use crate::mesh::Mesh;
 use crate::region::{MeshRegion, Region, Repair};
 use crate::symmetry::Group;
 use crate::tiling::{Amount, Level, Share, Tiling};
@@ -43,24 +46,61 @@ impl Domain<'_> {
     }
 }
 
-/// The mesh of a design that has one.
+/// The lattice over tetrahedra of a design, by name, and their mesh.
+fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsSpec)> {
+    d.lattice.iter().find_map(|(name, spec)| match &spec.map {
+        MapSpec::Tets(t) => Some((name, spec, t)),
+        _ => None,
+    })
+}
+
+/// The tetrahedra of a design whose region is none, for the reason `why`, if they can be made without one, and the region
+/// that they fill.
+pub(super) fn of_soup(
+    d: &Design,
+    loader: &dyn Loader,
+    why: DesignError,
+) -> Result<(tets::Tets, Region), DesignError> {
+    let Some((name, _, spec)) = over_tets(d) else {
+        return Err(why);
+    };
+    let path = format!("lattice.{name}.map.tets");
+    let made = tets::of_soup(spec, &d.region, &path, loader, why)?;
+    let region = enclosed(made.mesh.boundary(), &path)?;
+    Ok((made, region))
+}
+
+/// The region within the boundary of a tetrahedral mesh.
+fn enclosed(boundary: Mesh, path: &str) -> Result<Region, DesignError> {
+    let region = MeshRegion::new(boundary, Repair::Auto);
+    let wrong = |f: Fault| format!("the boundary of the mesh: {}", f.message);
+    Ok(Arc::new(
+        region.map_err(|f| DesignError::new(path, wrong(f)))?,
+    ))
+}
+
+/// The mesh of a design that has one; `soup` is what was made of triangles that are no region.
 pub(super) fn domain<'a>(
     d: &'a Design,
     space: &Region,
+    soup: Option<tets::Tets>,
     loader: &dyn Loader,
     warnings: &mut Vec<Warning>,
 ) -> Result<Option<Domain<'a>>, DesignError> {
-    let found = d.lattice.iter().find_map(|(name, spec)| match &spec.map {
-        MapSpec::Tets(t) => Some((name, spec, t)),
-        _ => None,
-    });
-    let Some((name, spec, spec_of_mesh)) = found else {
+    let Some((name, spec, spec_of_mesh)) = over_tets(d) else {
         return Ok(None);
     };
     let path = format!("lattice.{name}");
     let CellSpec::Kind(CellKind::Tet(cell)) = &spec.cell else {
-        let message = "a map over tetrahedra needs a cell that fits face to face: a tetrahedral one, such as \
-                       cell.tet.name = \"primitive\"";
+        let why = match &spec.cell {
+            CellSpec::Name(name) => named(name).and_then(|n| Group::named(n.number()).ok()),
+            CellSpec::Kind(_) => None,
+        };
+        let why = why.and_then(|g| g.tetrahedral_sites().err());
+        let why = why.map_or(String::new(), |f| format!(": {}", f.message));
+        let message = format!(
+            "a map over tetrahedra needs a cell that fits face to face, a tetrahedral one such as cell.tet.name = \"primitive\"{why}"
+        );
         return Err(DesignError::new(format!("{path}.cell"), message));
     };
     let others = d.lattice.iter().filter(|(n, _)| *n != name);
@@ -87,21 +127,24 @@ pub(super) fn domain<'a>(
         );
         return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
     }
-    let (mut points, _) = sample::inside(space, LOOKS);
-    points.extend(sample::nodes(space));
-    let place = Place {
-        path: path.clone(),
-        region: space,
-        points: &points,
-        filled: &[],
-        loader,
+    let made = match soup {
+        Some(made) => made,
+        None => {
+            let (mut points, _) = sample::inside(space, LOOKS);
+            points.extend(sample::nodes(space));
+            let place = Place {
+                path: path.clone(),
+                region: space,
+                points: &points,
+                filled: &[],
+                loader,
+            };
+            tets::tets(spec_of_mesh, &d.region, &place)?
+        }
     };
-    let made = tets::tets(spec_of_mesh, &d.region, &place)?;
     warnings.extend(made.warnings);
     let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
-    let region = MeshRegion::new(map.boundary(), Repair::Auto);
-    let region = region
-        .map_err(|f| DesignError::new(&path, format!("the boundary of the mesh: {}", f.message)))?;
+    let region = enclosed(map.boundary(), &path)?;
     Ok(Some(Domain {
         name,
         spec,
@@ -109,7 +152,7 @@ pub(super) fn domain<'a>(
         joined,
         map: Arc::new(map),
         report: made.report,
-        region: Arc::new(region),
+        region,
     }))
 }
 

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use crate::face::{Face, Sign, Tree};
-use crate::fault::Fault;
+use crate::fault::{Fault, number};
 use crate::field::Block;
 use crate::math::Aabb;
 use crate::solid::Solid;
@@ -176,9 +176,11 @@ impl Grid {
             return Err(Fault::new(
                 "edge",
                 format!(
-                    "steps of {finest:.3e} mm at {farthest:.6} mm from the origin vanish in the files' single precision; \
-                     use an edge above {:.3e} mm or move the part nearer to the origin",
-                    64.0 * farthest * f64::from(f32::EPSILON)
+                    "steps of {} mm at {} mm from the origin vanish in the files' single precision; use an edge above {} mm or \
+                     move the part nearer to the origin",
+                    number(finest),
+                    number(farthest),
+                    number(64.0 * farthest * f64::from(f32::EPSILON))
                 ),
             ));
         }

@@ -1,9 +1,9 @@
 //! Where tetrahedral meshes come from that are not made here: files, and another mesher.
 
 use crate::design::Loader;
-use crate::design::build::Place;
 use crate::design::data::*;
 use crate::design::error::DesignError;
+use crate::design::place::Place;
 use crate::extract::{self, Silent, Stopped};
 use crate::fault::{Fault, number};
 use crate::io::{self, Elements, Shape};

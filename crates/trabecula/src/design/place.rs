@@ -1,0 +1,35 @@
+//! Where a part of a design stands: what every reader of data needs to know of the rest.
+
+use super::Loader;
+use super::error::DesignError;
+use crate::face::Body;
+use crate::fault::number;
+use crate::region::Region;
+
+/// Points at which a design is looked at.
+pub(super) const LOOKS: usize = 8_000;
+
+/// Where a part of a lattice stands, and the region it is to fill.
+pub(super) struct Place<'a> {
+    pub path: String,
+    pub region: &'a Region,
+    /// Points inside the region.
+    pub points: &'a [[f64; 3]],
+    /// What is solid in the region whatever the lattice says.
+    pub filled: &'a [Body],
+    /// Hands over files.
+    pub loader: &'a dyn Loader,
+}
+
+/// `v`, or an error that says it is not a finite number.
+pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
+    if v.is_finite() {
+        Ok(v)
+    } else {
+        Err(DesignError::new(
+            path,
+            format!("expected a finite number, found {}", number(v)),
+        )
+        .found(number(v)))
+    }
+}

@@ -1,0 +1,193 @@
+//! Grids of numbers: arrays, images, stacks of pictures.
+
+use super::{bytes, extension, percent, pick};
+use crate::design::data::*;
+use crate::design::error::DesignError;
+use crate::design::place::Place;
+use crate::fault::Fault;
+use crate::grade::Samples;
+use crate::io::{self, Shape};
+
+pub(in crate::design) fn grid(
+    spec: &GridSpec,
+    path: &str,
+    place: &Place,
+) -> Result<Samples, DesignError> {
+    let at = format!("{path}.path");
+    let kind = extension(&spec.path);
+    let pictures = ["png", "tif", "tiff"].contains(&kind.as_str());
+    let file = if pictures {
+        Vec::new()
+    } else {
+        bytes(&spec.path, &at, place)?
+    };
+    let wrong =
+        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    let (origin, step, shape, values) = match extension(&spec.path).as_str() {
+        "npy" => {
+            let (shape, values) = io::read_npy(&file).map_err(wrong)?;
+            let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
+                wrong(Fault::new(
+                    "",
+                    format!("the array has shape {shape:?}; a grid has three dimensions [x, y, z]"),
+                ))
+            })?;
+            let need = |key: &str, what: &str| {
+                DesignError::new(
+                    format!("{path}.{key}"),
+                    format!("an NPY file does not say where it lies; give {key}, {what}"),
+                )
+            };
+            let origin = spec
+                .origin
+                .ok_or_else(|| need("origin", "the place of the first number, [x, y, z] in mm"))?;
+            let step = spec
+                .step
+                .ok_or_else(|| need("step", "the distance between numbers in mm, one or three"))?;
+            (origin, step.three(), shape, values)
+        }
+        "vti" | "vtk" => {
+            let data = io::read_vtk(&file).map_err(wrong)?;
+            let Shape::Image {
+                origin,
+                step,
+                nodes,
+            } = data.shape
+            else {
+                return Err(wrong(Fault::new(
+                    "",
+                    "the file holds a mesh; use the grade field for it",
+                )));
+            };
+            let array = pick(&data.arrays, spec.array.as_deref())
+                .map_err(|m| DesignError::new(format!("{path}.array"), m))?;
+            if array.components != 1 {
+                let message = format!(
+                    "the array \"{}\" has {} components; a number needs an array with one",
+                    array.name, array.components
+                );
+                return Err(DesignError::new(format!("{path}.array"), message));
+            }
+            let (origin, shape) = if array.of_cells {
+                let at = core::array::from_fn(|a| {
+                    origin[a] + if nodes[a] > 1 { 0.5 * step[a] } else { 0.0 }
+                });
+                (at, nodes.map(|n| n.saturating_sub(1).max(1)))
+            } else {
+                (origin, nodes)
+            };
+            (
+                spec.origin.unwrap_or(origin),
+                spec.step.map_or(step, OneOrThree::three),
+                shape,
+                array.values.clone(),
+            )
+        }
+        "png" | "tif" | "tiff" => {
+            let need = |key: &str, what: &str| {
+                DesignError::new(
+                    format!("{path}.{key}"),
+                    format!("pictures do not say where they lie; give {key}, {what}"),
+                )
+            };
+            let origin = spec
+                .origin
+                .ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
+            let step = spec.step.ok_or_else(|| {
+                need(
+                    "step",
+                    "the distance between pixels and pictures in mm, one or three",
+                )
+            })?;
+            let (shape, values) = stack(spec, &at, place)?;
+            (origin, step.three(), shape, values)
+        }
+        _ => {
+            let message = format!(
+                "the name must end in npy, vti or vtk, or in png or tif for pictures; found \"{}\"",
+                spec.path
+            );
+            return Err(DesignError::new(at, message).found(&spec.path));
+        }
+    };
+    let samples = Samples::new(origin, step, shape, values).map_err(|f| match f.at.as_str() {
+        "path" => wrong(f),
+        _ => DesignError::fault(path, f),
+    })?;
+    // A number stands for half a step about it as well.
+    let reach = samples.step().into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
+    let covered = samples.bounds().grown(reach);
+    let missing = place
+        .points
+        .iter()
+        .filter(|p| covered.distance(**p) > 0.0)
+        .count();
+    if missing > 0 {
+        let (b, share) = (samples.bounds(), missing as f64 / place.points.len() as f64);
+        let message = format!(
+            "{}: the grid does not cover {} of the region; it reaches from {:?} to {:?} mm",
+            spec.path,
+            percent(share),
+            b.min,
+            b.max
+        );
+        return Err(DesignError::new(at, message).found(&spec.path));
+    }
+    Ok(samples)
+}
+
+/// Grey pictures one above the other: the files that the path stands for in the order of their names, in which 10 comes after 9,
+/// each with one picture or more.
+fn stack(spec: &GridSpec, at: &str, place: &Place) -> Result<([usize; 3], Vec<f64>), DesignError> {
+    let mut names = match spec.path.contains('*') {
+        true => place
+            .loader
+            .list(&spec.path)
+            .map_err(|m| DesignError::new(at, m).found(&spec.path))?,
+        false => vec![spec.path.clone()],
+    };
+    names.sort_by_cached_key(|n| counted_name(n));
+    let (mut size, mut values, mut count) = (None, Vec::new(), 0);
+    for name in &names {
+        let wrong =
+            |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
+        let file = bytes(name, at, place)?;
+        for picture in io::read_pictures(&file).map_err(|f| wrong(f.message))? {
+            let [w, h] = picture.size;
+            let first = *size.get_or_insert(picture.size);
+            if first != picture.size {
+                let message = format!(
+                    "a picture of {w} × {h} pixels among those of {} × {}",
+                    first[0], first[1]
+                );
+                return Err(wrong(message));
+            }
+            values.extend(picture.values);
+            count += 1;
+        }
+    }
+    let [w, h] = size.ok_or_else(|| {
+        DesignError::new(at, format!("{}: no pictures", spec.path)).found(&spec.path)
+    })?;
+    Ok(([w, h, count], values))
+}
+
+/// A name as its words and numbers, so that they sort as people count.
+fn counted_name(name: &str) -> Vec<(String, u64)> {
+    let mut parts: Vec<(String, u64)> = vec![(String::new(), 0)];
+    let mut digits = false;
+    for c in name.chars() {
+        match (c.to_digit(10), parts.last_mut()) {
+            (Some(d), Some(last)) => {
+                last.1 = last.1.saturating_mul(10).saturating_add(u64::from(d));
+                digits = true;
+            }
+            (None, Some(last)) if !digits => last.0.push(c),
+            _ => {
+                parts.push((c.to_string(), 0));
+                digits = false;
+            }
+        }
+    }
+    parts
+}

@@ -1,0 +1,242 @@
+//! What a lattice in a region is refused for, and warned of.
+
+use super::data::*;
+use super::error::DesignError;
+use super::place::{LOOKS, Place};
+use super::report::Varied;
+use super::{Warning, map, sample};
+use crate::cell::Distance;
+use crate::fault::number;
+use crate::field::Field;
+use crate::lattice::Lattice;
+
+/// The share of a cell in a file that may be left out before it is warned of.
+const TRUNCATED: f64 = 0.25;
+
+/// Index of a series beyond which the grids on which a cell is analysed have less than four nodes on a wave.
+const FINEST: usize = 24;
+
+/// The key under which the amount stands.
+pub(super) fn amount_key(spec: &LatticeSpec) -> &'static str {
+    match spec.level.amount {
+        AmountSpec::Iso(_) => "iso",
+        AmountSpec::Fraction(_) => "fraction",
+        AmountSpec::Porosity(_) => "porosity",
+        AmountSpec::Thickness(_) => "thickness",
+    }
+}
+
+/// Refuses a lattice that leaves the region empty or solid everywhere.
+pub(super) fn check(
+    lattice: &Lattice,
+    place: &Place,
+    spec: &LatticeSpec,
+) -> Result<(), DesignError> {
+    let mut values = vec![0.0; place.points.len()];
+    lattice.values(place.points, &mut values);
+    let path = format!("{}.level.{}", place.path, amount_key(spec));
+    if values.iter().any(|v| v.is_nan()) {
+        return Err(DesignError::new(
+            path,
+            "the level is not a number somewhere in the region",
+        ));
+    }
+    let solid = values.iter().filter(|v| **v <= 0.0).count();
+    if solid > 0 && solid < values.len() {
+        return Ok(());
+    }
+    // Too few looks for a sparse lattice or a thin gap: look closer before refusing.
+    let (points, _) = sample::inside(place.region, 50 * LOOKS);
+    let mut values = vec![0.0; points.len()];
+    lattice.values(&points, &mut values);
+    let solid = values.iter().filter(|v| **v <= 0.0).count();
+    if solid > 0 && solid < values.len() {
+        return Ok(());
+    }
+    let what = if solid == 0 {
+        "empty: nothing is solid"
+    } else {
+        "solid everywhere: nothing is open"
+    };
+    let iso = Varied::of_iso(lattice, place.points);
+    let why = if lattice.distance().is_some() {
+        lattice.cores(&points, &mut values);
+        let (near, far) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), d| {
+            (a.min(d.abs()), b.max(d.abs()))
+        });
+        format!(
+            "half the thickness is {iso} mm, the mid-surface is between {near:.4} and {far:.4} mm away in the region"
+        )
+    } else {
+        let range = lattice.cell.range();
+        format!(
+            "the level t is {iso}, the cell's values run from {:.4} to {:.4}",
+            range.lo, range.hi
+        )
+    };
+    let (size, wavelength) = (place.region.bounds().size(), lattice.map.wavelength());
+    let largest = size.into_iter().fold(0.0, f64::max);
+    let unit = if largest < wavelength {
+        format!(
+            "; the region is {} mm across, less than a wavelength, {} mm: are the units right?",
+            number(largest),
+            number(wavelength)
+        )
+    } else {
+        String::new()
+    };
+    let message = format!("the lattice leaves the region {what}; {why}{unit}");
+    Err(DesignError::new(path, message))
+}
+
+/// What the ascending intervals `of` leave of [min, max].
+pub(super) fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut left = Vec::new();
+    let mut from = min;
+    for &[lo, hi] in of {
+        if lo > from {
+            left.push([from, lo.min(max)]);
+        }
+        if hi >= max {
+            return left;
+        }
+        from = from.max(hi);
+    }
+    left.push([from, max]);
+    left
+}
+
+/// A length in a sentence.
+fn figure(v: f64) -> String {
+    if (1e-2..1e6).contains(&v) {
+        format!("{v:.4}")
+    } else {
+        format!("{v:.2e}")
+    }
+}
+
+/// Warns of what may not be meant.
+pub(super) fn warn(
+    lattice: &Lattice,
+    place: &Place,
+    spec: &LatticeSpec,
+    warnings: &mut Vec<Warning>,
+) {
+    let path = &place.path;
+    let fraction = Varied::of_fraction(lattice, place.points);
+    let whole = lattice.connected_fraction();
+    let broken = gaps([fraction.min, fraction.max], &whole);
+    if !broken.is_empty() {
+        let ranges = |of: &[[f64; 2]]| {
+            let texts = of.iter().map(|&[min, max]| Varied { min, max }.to_string());
+            texts.collect::<Vec<String>>().join(" and ")
+        };
+        let limit = match whole.as_slice() {
+            [] => "it is in one piece at no fraction".to_string(),
+            some => format!("it is in one piece at fractions {}", ranges(some)),
+        };
+        let place = if broken == [[fraction.min, fraction.max]] {
+            format!("at solid fraction {fraction}")
+        } else {
+            format!(
+                "the solid fraction is {fraction} over the region, and at {}",
+                ranges(&broken)
+            )
+        };
+        let message = format!("{place} the periodic solid is not one piece in space; {limit}");
+        warnings.push(Warning {
+            path: format!("{}.level.{}", path, amount_key(spec)),
+            message,
+        });
+    }
+    if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
+        let message = format!(
+            "the waves that are kept leave out {:.1} % (root mean square) of the cell in the file; keep more terms",
+            100.0 * share
+        );
+        warnings.push(Warning {
+            path: format!("{}.cell.file.terms", place.path),
+            message,
+        });
+    }
+    let top = lattice.cell.plain().top();
+    if top > FINEST {
+        let message = format!(
+            "indices reach {top}: beyond {FINEST} waves are finer than the grids on which the fraction, the walls and \
+             the connectivity of a cell are found, and these figures are rough"
+        );
+        warnings.push(Warning {
+            path: format!("{}.cell.series.terms", place.path),
+            message,
+        });
+    }
+    if let Some(error) = lattice.distance().map(Distance::error) {
+        let half = Varied::of_iso(lattice, place.points);
+        if error > 0.025 * half.min {
+            let message = format!(
+                "the mid-surface bends too sharply for its table of distances: a thickness of {} mm is met only within {} mm; \
+                 give a fraction, or a cell of fewer waves or less stretch",
+                figure(2.0 * half.min),
+                figure(2.0 * error)
+            );
+            warnings.push(Warning {
+                path: format!("{}.level.{}", place.path, amount_key(spec)),
+                message,
+            });
+        }
+    }
+    if let Some(limit) = lattice.folding() {
+        let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
+        if thickness.max > limit {
+            let most = figure(thickness.max);
+            let message = format!(
+                "a thickness of {most} mm is above the folding limit, {} mm, twice the least radius of curvature of the \
+                 mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
+                figure(limit)
+            );
+            warnings.push(Warning {
+                path: format!("{}.level.{}", place.path, amount_key(spec)),
+                message,
+            });
+        }
+    }
+    let wavelength = lattice.map.wavelength();
+    let least = place
+        .region
+        .bounds()
+        .size()
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    if wavelength > least {
+        let message = format!(
+            "the wavelength, {} mm, is more than the region's least extent, {} mm: the part is less than one cell thick and \
+             its fraction is not the cell's",
+            number(wavelength),
+            number(least)
+        );
+        let kind = map::kind(&spec.map);
+        warnings.push(Warning {
+            path: format!("{}.map.{kind}.wavelength", place.path),
+            message,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gaps;
+
+    #[test]
+    fn what_intervals_leave() {
+        let whole = [[0.2, 0.5], [0.7, 1.0]];
+        assert_eq!(gaps([0.3, 0.3], &whole), [[0.0; 2]; 0]);
+        assert_eq!(gaps([0.1, 0.1], &whole), [[0.1, 0.1]]);
+        assert_eq!(gaps([0.1, 0.4], &whole), [[0.1, 0.2]]);
+        assert_eq!(gaps([0.1, 0.8], &whole), [[0.1, 0.2], [0.5, 0.7]]);
+        assert_eq!(gaps([0.55, 0.6], &whole), [[0.55, 0.6]]);
+        assert_eq!(gaps([0.6, 0.6], &whole), [[0.6, 0.6]]);
+        assert_eq!(gaps([0.6, 0.6], &[]), [[0.6, 0.6]]);
+        assert_eq!(gaps([0.3, 0.9], &[[0.2, 0.6]]), [[0.6, 0.9]]);
+        assert_eq!(gaps([0.8, 0.8], &[[0.2, 0.6]]), [[0.8, 0.8]]);
+    }
+}
