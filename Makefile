@@ -119,6 +119,7 @@ docs: $(VENV)/.installed
 	$(BIN)/python scripts/turning_tables.py
 	$(BIN)/python scripts/blend_tables.py
 	$(BIN)/python scripts/beam_tables.py
+	$(BIN)/python scripts/gallery.py
 	$(BIN)/python scripts/design_reference.py
 
 clean:

@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""Writes docs/gallery.md and its pictures: the example designs, each meshed and seen, with what came out."""
+
+import sys
+import warnings
+from pathlib import Path
+
+import trabecula as lt
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES, PICTURES = ROOT / "examples", ROOT / "docs" / "images" / "gallery"
+STAMP = "<!-- Made by scripts/gallery.py; do not edit. -->"
+SIZE = (640, 520)
+#: Example, samples on the smallest wavelength, azimuth and elevation of the camera (degrees).
+SHOWN = (
+    ("hybrid_stem", 24, 70, 12),
+    ("kelvin_stem", 32, 240, 12),
+    ("stress_bracket", 20, 300, 20),
+    ("heat_exchanger", 24, 30, 35),
+    ("helmet_liner", 20, 30, -20),
+    ("octet_filleted", 32, 30, 25),
+    ("diamond_cylinder", 32, 30, 25),
+    ("swirl", 16, 30, 25),
+    ("hybrid_bar", 24, 290, 25),
+    ("hybrid_rbf_gyroid", 16, 270, 55),
+    ("oriented_vortex", 20, 270, 55),
+    ("swept_beam", 20, 280, 40),
+    ("wrapped_tube", 24, 30, 35),
+    ("wavy_panel", 24, 300, 35),
+    ("bracket", 24, 40, -30),
+    ("user_series", 32, 30, 25),
+)
+
+
+def about(path):
+    """The comment at the head of a design, in one paragraph."""
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        words = line.removeprefix("#").strip()
+        if not line.startswith("#") or not words:
+            break
+        lines.append(words)
+    return " ".join(lines)
+
+
+def entry(name, per_cell, azimuth, elevation):
+    """A section: what it is, its picture, what came out. The picture is made on the way."""
+    path = EXAMPLES / f"{name}.toml"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lt.DesignWarning)
+        mesh = lt.load(path).build().mesh(per_cell=per_cell)
+    mesh.render(PICTURES / f"{name}.png", SIZE, azimuth, elevation)
+    pieces = "one piece" if mesh.pieces == 1 else f"{mesh.pieces} pieces"
+    count = f"{mesh.counts[1]:,}".replace(",", " ")
+    figures = f"{count} triangles, {mesh.volume:.4g} mm³, solid fraction {mesh.solid_fraction:.3f}, {pieces}"
+    return [
+        f"## [{name}.toml](../examples/{name}.toml)",
+        "",
+        about(path),
+        "",
+        f"![{name}](images/gallery/{name}.png)",
+        "",
+        f"{figures}; {per_cell} samples on the smallest wavelength.",
+        "",
+    ]
+
+
+def main():
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    lines = [STAMP, "# Gallery", "", "What the [examples](../examples) make.", ""]
+    for shown in SHOWN:
+        print(shown[0], file=sys.stderr, flush=True)
+        lines += entry(*shown)
+    (ROOT / "docs" / "gallery.md").write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
