@@ -97,7 +97,9 @@ def mesh(args) -> None:
     with Progress("meshing", args.progress) as progress:
         lighter = {"tolerance": args.tolerance, "triangles": args.triangles}
         streams = not (any(lighter.values()) or args.open)
-        if args.chord is not None:
+        if args.chord is not None and kind_of(args.output) == "stl" and streams:
+            made = solid.save_stl(args.output, threads=args.threads, **options) | {"chord": args.chord}
+        elif args.chord is not None:
             surface = solid.mesh(threads=args.threads, progress=progress, **options)
             told = {"chord": args.chord, "chord_error": surface.chord_error}
             if any(lighter.values()):
@@ -313,7 +315,9 @@ def slice(args) -> None:
         cut.write(args.output, args.chord)
     curves = sum(len(it["weights"]) for it in cut.loops)
     figures = {"z": args.z, "area": cut.area, "loops": len(cut.loops), "curves": curves, "hubs": cut.hubs}
-    figures |= {"moved": cut.moved, "seconds": seconds}
+    figures |= {"whole": quadors.whole, "moved": cut.moved, "seconds": seconds}
+    if not quadors.whole:
+        say("the slice is of the beams alone, uncut: the design's region cuts them, or more is added to them")
     if args.json:
         return tell_json(figures)
     print(f"area   {figure(cut.area)} mm², exact")

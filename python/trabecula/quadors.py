@@ -23,24 +23,35 @@ __all__ = ["Quadors", "Slice"]
 class Quadors:
     """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
 
-    These are the beams alone, as far as they reach: no region cuts them, no skin is added.
+    These are the beams alone, as far as they reach: no region cuts them, no skin is added. ``whole`` says whether that is
+    the part; where it is not, ``Solid.field`` has the part's own sign.
     """
 
-    def __init__(self, core: _core.Quadors):
+    def __init__(self, core: _core.Quadors, whole: bool):
         self._core = core
+        self._whole = whole
 
     def __len__(self) -> int:
         return self._core.hubs
 
     def __repr__(self) -> str:
-        return f"<trabecula.Quadors of {self._core.hubs} hubs and {self._core.beams} beams>"
+        uncut = "" if self._whole else ", uncut"
+        return f"<trabecula.Quadors of {self._core.hubs} hubs and {self._core.beams} beams{uncut}>"
+
+    @property
+    def whole(self) -> bool:
+        """Whether these beams are all of the part: the region cuts none, there is no skin, kept zone or other lattice. If
+        not, what is told here is of the beams alone, uncut. Of a pattern of more than 20 000 beams it is told by a box
+        that holds it.
+        """
+        return self._whole
 
     def volume(self) -> float:
         """The volume in mm³, fillets included, to 1e-10. Beams that run into each other without a node are refused."""
         return self._core.volume()
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points (n, 3) in mm are in the solid."""
+        """Whether points (n, 3) in mm are in the beams."""
         return self._core.contains(_points("points", points))
 
     def rays(self, origins: ArrayLike, ways: ArrayLike) -> dict[str, NDArray]:

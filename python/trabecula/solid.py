@@ -99,13 +99,15 @@ class Solid(Picture):
         return {name: {"centers": c, "radii": r, "struts": s} for name, c, r, s in self._core.beams}
 
     def quadors(self, name: str | None = None) -> Quadors:
-        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries."""
+        """The beams of a ``name`` (needed only if there are several) as quadrics, for exact queries. They are not cut by the
+        region: ``Quadors.whole`` says whether that makes a difference.
+        """
         if name is None:
             names = list(self.beams)
             if len(names) != 1:
                 raise ValueError(f"name the beams that are meant: there are {', '.join(names) or 'none'}")
             name = names[0]
-        return Quadors(self._core.quadors(name))
+        return Quadors(self._core.quadors(name), self._core.whole_beams(name))
 
     def report(self) -> dict:
         """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``, and
@@ -254,11 +256,7 @@ class Solid(Picture):
         """
         check_islands(islands)
         if chord is not None:
-            if edge is not None or per_cell is not None:
-                raise ValueError("give a chord error or the spacing of a grid, not both")
-            if islands != "keep":
-                raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
-            need = self._core.expected_beams(positive("chord", chord))
+            need, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
             # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
             fits(2 * TRIANGLE * need, f"{need:.3g} triangles", edge=chord, power=1, word="chord")
             core, error = self._core.mesh_beams(chord, _threads(threads), progress)
@@ -272,6 +270,24 @@ class Solid(Picture):
         self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
         warn_islands(told["islands"], words)
         return Mesh(core, self._core.region, spacing, told["islands"])
+
+    def _chord(self, chord: float, edge: float | None, per_cell: float | None, islands: str) -> float:
+        """A chord error, where nothing is asked for that needs a grid."""
+        if edge is not None or per_cell is not None:
+            raise ValueError("give a chord error or the spacing of a grid, not both")
+        if islands != "keep":
+            raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
+        return positive("chord", chord)
+
+    def _stream_beams(self, path: str | os.PathLike[str], chord: float, threads: int | None) -> dict:
+        """Beams alone, those of equal hubs made once, hub by hub into a file."""
+        need, held = self._core.expected_beams(chord)
+        fits(2 * TRIANGLE * held, f"{held:.3g} triangles of hubs that differ", edge=chord, power=1, word="chord")
+        fits(file_size("stl", need), f"{need:.3g} triangles", path, chord, 1, "chord")
+        if special(os.fsdecode(path)):
+            return self._core.stream_beams(path, chord, _threads(threads))
+        with whole_file(path) as temporary:
+            return self._core.stream_beams(temporary, chord, _threads(threads))
 
     def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
         """Refuses a mesh file that the disk has no room for."""
@@ -287,13 +303,17 @@ class Solid(Picture):
         threads: int | None = None,
         progress: Progress | None = None,
         islands: Islands = "keep",
+        chord: float | None = None,
     ) -> dict:
         """Streams the surface to a binary STL without holding it in memory; gives its triangles, volume, areas, Euler
-        number, pieces and cavities, and what ``islands`` (as for ``mesh``) came to.
+        number, pieces and cavities, and what ``islands`` (as for ``mesh``) came to. ``chord`` is for beams alone, as for
+        ``mesh``: then ``chord_error`` is told too.
         """
         check_islands(islands)
         extension(path, ("stl",))
         check_place(path)
+        if chord is not None:
+            return self._stream_beams(path, self._chord(chord, edge, per_cell, islands), threads)
         spacing = self.spacing(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
             made = self.mesh(spacing, None, threads, progress, islands)

@@ -14,6 +14,12 @@ def tell_json(figures: dict) -> None:
     print(json.dumps(figures, indent=2))
 
 
+def tell_share(it: dict) -> None:
+    """The solid share of a part of beams."""
+    how = "exact" if it["fraction_exact"] else "sampled"
+    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part ({how})")
+
+
 def tell_beams(name: str, it: dict) -> None:
     """What a graph of beams is."""
     least, most = it["hub_radius"]
@@ -22,9 +28,9 @@ def tell_beams(name: str, it: dict) -> None:
         print(f"beams {name}: a pattern of {times}, {it['hubs']:.9g} hubs of {it['kinds']} kinds, {it['beams']:.9g} beams")
         print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
         print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
-        print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+        tell_share(it)
         return
-    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
+    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {counted(it['hubs'], 'hub')}, {counted(it['beams'], 'beam')}")
     low, high = it["length"]
     print(f"  length     {span(low if low == high else [low, high])} mm, {figure(it['total_length'])} mm in all")
     print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
@@ -36,7 +42,7 @@ def tell_beams(name: str, it: dict) -> None:
     if it["smallest_angle"] is not None:
         x, y, z = map(figure, it["smallest_angle_at"])
         print(f"  angle      {it['smallest_angle']:.1f}° at least, at ({x}, {y}, {z}) mm")
-    print(f"  fraction   {it['fraction']:.4f}, porosity {it['porosity']:.4f} of the part (sampled)")
+    tell_share(it)
     if it["volume"] is not None:
         print(f"  exactly    {figure(it['volume'])} mm³, {figure(it['area'])} mm² of surface")
     done = {"cleaned": it["cleaned"], "trimmed": it["trimmed"]}
@@ -44,7 +50,7 @@ def tell_beams(name: str, it: dict) -> None:
         told = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
         if told:
             print(f"  {what}    {', '.join(told)}")
-    print(f"  pieces     {it['pieces']}; {it['dangling']} nodes with a free end")
+    print(f"  pieces     {it['pieces']}; {counted(it['dangling'], 'node')} with a free end")
 
 
 def tell_tiling(t: dict) -> None:
@@ -176,6 +182,6 @@ def tell_tets(report: dict) -> None:
         print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
 
 
-def counted(pieces: int) -> str:
-    """A number of pieces."""
-    return "1 piece" if pieces == 1 else f"{pieces} pieces"
+def counted(n: int, what: str = "piece") -> str:
+    """A number of things."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"

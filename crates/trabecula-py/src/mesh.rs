@@ -226,7 +226,8 @@ impl Mesh {
         d.set_item("volume", size.volume)?;
         d.set_item("area", size.area)?;
         d.set_item("area_lattice", self.split.then_some(size.area - cut))?;
-        d.set_item("area_cut", self.split.then_some(cut))?;
+        // Of nothing the sum is −0.
+        d.set_item("area_cut", self.split.then_some(cut + 0.0))?;
         d.set_item("euler", size.euler)?;
         d.set_item("pieces", size.pieces)?;
         d.set_item("cavities", size.cavities)?;

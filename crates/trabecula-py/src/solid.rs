@@ -189,6 +189,11 @@ impl Solid {
         self.built.beams.iter().map(graph).collect()
     }
 
+    /// Whether the beams of a name are all that the design is: not cut, nothing added. Of a large pattern, by a box that holds it.
+    fn whole_beams(&self, name: &str) -> bool {
+        self.built.whole_beams(name)
+    }
+
     /// The beams of a name as quadrics.
     fn quadors(&self, py: Python<'_>, name: &str) -> PyResult<Quadors> {
         match self.built.beams.iter().find(|b| b.0 == name) {
@@ -280,10 +285,45 @@ impl Solid {
         Ok((mesh, told, words))
     }
 
-    /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches.
-    fn expected_beams(&self, py: Python<'_>, chord: f64) -> PyResult<f64> {
+    /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches, and of how many all others
+    /// are copies.
+    fn expected_beams(&self, py: Python<'_>, chord: f64) -> PyResult<[f64; 2]> {
         let told = run(py, None, None, |_| self.built.lone_beams()?.expected(chord))?;
         told.map_err(error::fault)
+    }
+
+    /// Streams the surface of beams alone to a binary STL at `path`, triangles within `chord` (mm) of their patches; gives what is
+    /// told of it.
+    #[pyo3(signature = (path, chord, threads=None))]
+    fn stream_beams<'py>(
+        &self,
+        py: Python<'py>,
+        path: PathBuf,
+        chord: f64,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let made = run(py, threads, None, |_| {
+            let beams = self.built.lone_beams().map_err(Stopped::Refused)?;
+            let drawn = beams.drawn(chord).map_err(Stopped::Refused)?;
+            let mut out = file::anew(&path).map_err(Stopped::Io)?;
+            let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
+            io::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out)
+                .map_err(Stopped::Io)?;
+            Ok((drawn.figures(), drawn.error()))
+        })?;
+        let (f, error) = made.map_err(error::stopped)?;
+        let d = PyDict::new(py);
+        d.set_item("triangles", f.triangles)?;
+        d.set_item("volume", f.volume)?;
+        d.set_item("area", f.area)?;
+        d.set_item("area_lattice", f.area)?;
+        d.set_item("area_cut", 0.0)?;
+        d.set_item("euler", f.euler)?;
+        d.set_item("pieces", f.pieces)?;
+        d.set_item("cavities", 0)?;
+        d.set_item("islands", py.None())?;
+        d.set_item("chord_error", error)?;
+        Ok(d)
     }
 
     /// The surface of beams alone, from their patches, within `chord` (mm) of them; and how far it is from them, mm.

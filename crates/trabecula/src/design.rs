@@ -282,6 +282,13 @@ impl Built {
         beams::alone(self)
     }
 
+    /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a large pattern, by a box
+    /// that holds it.
+    pub fn whole_beams(&self, name: &str) -> bool {
+        let found = self.beams.iter().find(|b| b.0 == name);
+        found.is_some_and(|(_, made)| beams::lone(self) && beams::held(made, self))
+    }
+
     /// The transitions between the lattices of a blend, as JSON: for each the two names (`between`), `volume`, `pieces` (`loose`
     /// and `dangling` bodies with their volumes), `neck` (diameter and place of the narrowest neck of the widest way across,
     /// or null), and `fractions` (share of the second, fraction asked for, fraction found). Empty without a blend.

@@ -25,6 +25,7 @@ mod vtu;
 pub use elements::Elements;
 pub use npy::{read_npy, write_npy};
 pub use picture::{Picture, read_pictures};
+pub use stl::write_pieces as write_stl_pieces;
 pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;

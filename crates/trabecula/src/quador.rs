@@ -14,6 +14,7 @@ mod classes;
 pub mod closest;
 pub mod collide;
 pub mod complex;
+pub mod drawn;
 mod facets;
 mod field;
 mod foot;

@@ -18,6 +18,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use crate::graph::{self, Cleaned, Graph, Nodes, Profile, Radii, Trim, Wire, sized};
 use crate::math::{Aabb, Vec3, norm, sub};
+use crate::pattern::Laid;
 use crate::quador::pencil::Pencil;
 use crate::quador::{Fillet, Quadors};
 use crate::truss::{Beams, Truss};
@@ -36,7 +37,7 @@ pub(super) fn beams(
     warnings: &mut Vec<Warning>,
 ) -> Result<Beams, DesignError> {
     if let Some(pattern) = &spec.pattern {
-        return pattern::laid(spec, pattern, place).map(|p| Beams::Pattern(Arc::new(p)));
+        return pattern::laid(spec, pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
@@ -545,11 +546,54 @@ fn warn(
     }
 }
 
-/// The figures of beams; `fraction` is the solid share of the region.
-pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
+/// Whether a design is one graph of beams and nothing else.
+pub(super) fn lone(built: &Built) -> bool {
+    built.beams.len() == 1
+        && built.lattices.is_empty()
+        && built.tilings.is_empty()
+        && built.solid.filled.is_empty()
+}
+
+/// Most beams of a pattern that are looked at one by one.
+const FEW: f64 = 2e4;
+
+/// Whether all beams lie in the region: of a large pattern, by the box that holds it.
+pub(super) fn held(beams: &Beams, built: &Built) -> bool {
+    match beams {
+        Beams::Truss(truss) => truss.whole,
+        Beams::Pattern(laid) => inside(laid, built),
+    }
+}
+
+/// The same of a pattern.
+pub(super) fn inside(laid: &Laid, built: &Built) -> bool {
+    let region = &*built.solid.region;
+    let each = || laid.written().is_ok_and(|written| whole(&written, region));
+    region.bound(&laid.bounds()).hi <= 0.0 || laid.pattern().counts().1 <= FEW && each()
+}
+
+/// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.
+pub(super) fn share(
+    volume: Option<f64>,
+    whole: bool,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> (f64, bool) {
+    match (volume, built.solid.region.volume()) {
+        (Some(solid), Some(region)) if whole && lone(built) => (solid / region, true),
+        _ => (**sampled, false),
+    }
+}
+
+/// The figures of beams; `sampled` is the solid share of the region, by looks at points.
+pub(super) fn report(
+    beams: &Beams,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> Json {
     let truss = match beams {
         Beams::Truss(truss) => truss,
-        Beams::Pattern(laid) => return pattern::report(laid, fraction),
+        Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
     };
     let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
     let [least, most] = (graph.hubs.iter().map(|h| h.radius))
@@ -565,12 +609,14 @@ pub(super) fn report(beams: &Beams, fraction: f64) -> Json {
     // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();
+    let (fraction, exact) = share(mass.map(|m| m.volume), truss.whole, built, sampled);
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
         "hubs": facts.valence.values().sum::<usize>(),
         "beams": facts.struts,
         "fraction": fraction,
+        "fraction_exact": exact,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * thin,
         "hub_radius": [least, most],

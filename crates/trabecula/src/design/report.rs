@@ -1,5 +1,7 @@
 //! What a design is, in numbers, without meshing it.
 
+use std::cell::LazyCell;
+
 use serde_json::{Value as Json, json};
 
 use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
@@ -137,9 +139,9 @@ pub(super) fn report(built: &Built) -> Json {
     for it in &built.tilings {
         lattices.insert(it.name.clone(), tiled(it));
     }
-    let share = (!built.beams.is_empty()).then(|| expected(built).0);
+    let sampled = LazyCell::new(|| expected(built).0);
     let beams: serde_json::Map<String, Json> = (built.beams.iter())
-        .map(|(name, made)| (name.clone(), beams::report(made, share.unwrap_or_default())))
+        .map(|(name, made)| (name.clone(), beams::report(made, built, &sampled)))
         .collect();
     let mut report = json!({
         "lattices": lattices,

@@ -8,6 +8,7 @@ use super::join::Joiner;
 use super::text::{Lines, at_line, position, shown, words};
 use super::{in_order, invalid};
 use crate::fault::Fault;
+use crate::math::Vec3;
 use crate::mesh::Mesh;
 
 pub(crate) const HEADER: usize = 84;
@@ -16,13 +17,7 @@ pub(crate) const RECORD: usize = 50;
 /// Writes binary STL; normals are those of the rounded positions.
 pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
     let count = mesh.triangles.len();
-    let Ok(number) = u32::try_from(count) else {
-        return Err(invalid(format!(
-            "STL holds at most {} triangles, the mesh has {count}",
-            u32::MAX
-        )));
-    };
-    out.write_all(&header(number))?;
+    out.write_all(&header(counted(count)?))?;
     let make = |range: std::ops::Range<usize>| {
         let mut bytes = Vec::with_capacity(range.len() * RECORD);
         for t in &mesh.triangles[range] {
@@ -34,6 +29,40 @@ pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
         bytes
     };
     in_order(count, 1 << 14, make, |bytes| out.write_all(&bytes))
+}
+
+/// Writes binary STL of `count` triangles that `pieces` are made of, a few at a time: `each` calls with those of a piece.
+///
+/// # Errors
+/// What the writer gives, and more triangles than STL can count.
+pub fn write_pieces<W: Write>(
+    count: usize,
+    pieces: usize,
+    each: impl Fn(usize, &mut dyn FnMut([Vec3; 3])) + Sync,
+    out: &mut W,
+) -> io::Result<()> {
+    out.write_all(&header(counted(count)?))?;
+    let make = |range: std::ops::Range<usize>| {
+        let mut bytes = Vec::new();
+        for piece in range {
+            each(piece, &mut |t| {
+                push_record(&mut bytes, t.map(|p| p.map(|x| x as f32)))
+            });
+        }
+        bytes
+    };
+    let some = (pieces << 14).div_ceil(count.max(1)).max(1);
+    in_order(pieces, some, make, |bytes| out.write_all(&bytes))
+}
+
+/// A number of triangles as STL writes it.
+fn counted(count: usize) -> io::Result<u32> {
+    u32::try_from(count).map_err(|_| {
+        invalid(format!(
+            "STL holds at most {} triangles, the mesh has {count}",
+            u32::MAX
+        ))
+    })
 }
 
 /// The header of a binary STL of `count` triangles. (It must not begin with "solid".)

@@ -1,6 +1,7 @@
 //! A pattern as a field, without its beams being written out.
 
 mod classes;
+pub mod collide;
 mod row;
 
 use rayon::prelude::*;
@@ -211,6 +212,21 @@ impl Laid {
     /// hub is; until it says that it has enough.
     fn near(&self, p: &Aabb, found: &mut impl FnMut(&Kind, Aabb, f64) -> bool) {
         let nodes = self.pattern.nodes.len();
+        self.places(p, &mut |_, first, home, s| {
+            self.kinds[first..first + nodes].iter().all(|kind| {
+                let seen = Aabb {
+                    min: add(home.min, kind.aside),
+                    max: add(home.max, kind.aside),
+                };
+                found(kind, seen, s)
+            })
+        });
+    }
+
+    /// Calls `found` with each [i, j, k] whose hubs may lie near a box, the first of their kinds, the box pulled back, and how much
+    /// larger they are; until it says that it has enough.
+    fn places(&self, p: &Aabb, found: &mut impl FnMut([usize; 3], usize, Aabb, f64) -> bool) {
+        let nodes = self.pattern.nodes.len();
         let [lu, lv, _] = self.classes.map(|c| c.len());
         let [u, v, w] = &self.pattern.steps;
         let meets = |b: &Aabb, held: &Aabb| !b.intersection(*held).is_empty();
@@ -233,13 +249,7 @@ impl Laid {
                     let home = carried(&undone_u, &in_line);
                     let s = 1.0 / (undone_u.scale * undone_v.scale * undone_w.scale);
                     let first = ((c * lv + b) * lu + self.classes[0].of(i)) * nodes;
-                    self.kinds[first..first + nodes].iter().all(|kind| {
-                        let seen = Aabb {
-                            min: add(home.min, kind.aside),
-                            max: add(home.max, kind.aside),
-                        };
-                        found(kind, seen, s)
-                    })
+                    found([i, j, k], first, home, s)
                 };
                 let more = match self.rows.get(b) {
                     Some(row) => row.near(&in_line, &mut one),
@@ -326,7 +336,7 @@ impl Laid {
     }
 
     /// The volume of the whole pattern (mm³), to 1e-10: of one hub of each kind, and the sum of the cubes of scales. Beams must
-    /// not meet but in hubs.
+    /// not meet but in hubs (`collisions`).
     ///
     /// # Errors
     /// Beams that overlap too far for closed forms.

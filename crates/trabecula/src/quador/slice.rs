@@ -177,7 +177,8 @@ impl Quadors {
                     return Ok(Slice {
                         plane: at,
                         moved: by,
-                        area: area.iter().sum(),
+                        // Of nothing the sum is −0.
+                        area: area.iter().sum::<f64>() + 0.0,
                         loops,
                         hubs: hubs.len(),
                     });

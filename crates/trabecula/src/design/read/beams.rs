@@ -75,7 +75,9 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
         }
         (Some(_), None) => {
             f.need("map", "such as map.affine with wavelength = 5")?;
-            f.need("radius", "of a beam at mid length, mm")?;
+            if f.get("hub").is_none() {
+                f.need("radius", "of a beam at mid length, mm")?;
+            }
         }
     }
     let maybe = |key: &str| f.read(key, None, |at| grade(at).map(Some));

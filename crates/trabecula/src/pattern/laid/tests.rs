@@ -136,3 +136,47 @@ fn different_hubs_are_few_where_steps_commute() {
     assert!(laid.contains([750.0, 751.5, 750.7]) && !laid.contains([750.7, 750.7, 750.7]));
     assert_eq!(laid.pattern().counts().0, 1e9);
 }
+
+/// A strut that misses its neighbours by little or runs into them: as the whole written out has it.
+#[test]
+fn beams_that_run_into_each_other_are_found() {
+    let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
+    let crossing = |apart: f64, r: f64| {
+        let strut = |ends, by| Strut {
+            ends,
+            by,
+            profile: Profile::Mid(r),
+        };
+        let node = |z| Hub {
+            center: [0.0, 0.0, z],
+            radius: r,
+        };
+        // Both diagonals of a square, one above the other.
+        Pattern {
+            nodes: vec![node(0.0), node(apart)],
+            struts: vec![strut([0, 0], [1, 1, 0]), strut([1, 1], [1, -1, 0])],
+            steps: [
+                (by([3.0, 0.0, 0.0]), 40),
+                (by([0.0, 3.0, 0.0]), 30),
+                (by([0.0, 0.0, 4.0]), 1),
+            ],
+        }
+    };
+    let laid = |p: Pattern| Laid::new(p, Fillet::None).expect("a pattern");
+    for (r, some) in [(0.24, false), (0.26, true)] {
+        let found = laid(crossing(0.5, r)).collisions().expect("beams");
+        let found = found.expect("few kinds");
+        assert_eq!(found.count > 0, some, "{r}: {found:?}");
+        if let Some(p) = found.at {
+            // In the middle of a square, halfway up.
+            assert!((p[2] - 0.25).abs() < 1e-9, "{p:?}");
+            assert!((0..2).all(|a| (p[a] / 3.0).fract() - 0.5 < 1e-9), "{p:?}");
+        }
+    }
+    for (n, pattern) in samples().into_iter().enumerate() {
+        let laid = laid(pattern);
+        let found = laid.collisions().expect("beams").expect("few kinds");
+        let all = laid.written().expect("small").collisions();
+        assert_eq!(found.count > 0, !all.is_empty(), "sample {n}: {found:?}");
+    }
+}

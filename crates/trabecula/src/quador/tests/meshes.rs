@@ -117,3 +117,60 @@ fn symmetric_hubs_are_meshed() {
         }
     }
 }
+
+/// Hub by hub as it is streamed: the same triangles, and the figures of the whole from those of the classes.
+#[test]
+fn what_is_drawn_hub_by_hub_is_the_mesh() {
+    for fillet in [Fillet::Auto, Fillet::None] {
+        let q = Quadors::new(&cubic(2, 1.0), fillet).expect("a lattice");
+        let drawn = q.drawn(0.02).expect("drawn");
+        let mesh = drawn.mesh().expect("joined");
+        let streamed: Vec<[Vec3; 3]> = (0..q.len()).flat_map(|i| drawn.hub(i)).collect();
+        let placed = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
+        assert!(
+            streamed
+                .iter()
+                .eq(&mesh.triangles.iter().map(placed).collect::<Vec<_>>())
+        );
+        let (want, got) = (crate::measure::size(&mesh), drawn.figures());
+        assert_eq!(got.triangles, mesh.triangles.len());
+        assert_eq!((got.euler, got.pieces), (want.euler, want.pieces));
+        // Sums of thousands of terms in another order.
+        assert!((got.volume / want.volume - 1.0).abs() < 1e-11);
+        assert!((got.area / want.area - 1.0).abs() < 1e-11);
+    }
+}
+
+/// A cylinder's triangles run along it: what is between its seam and its rim takes about as many as both have points, and no more.
+#[test]
+fn cylinders_take_few_triangles() {
+    let q = equal(&six(), 14.0, Fillet::None);
+    for chord in [0.03, 0.003, 0.0003] {
+        let drawn = q.drawn(chord).expect("drawn");
+        let n: usize = (0..q.beams()).map(|b| q.ring(b, chord)).sum();
+        let got = drawn.part(0).triangles.len();
+        assert!(got < 3 * n, "{chord}: {got} for {n} points of rims");
+    }
+}
+
+/// As many as the chord error says: four times finer is four times as many, and triangles use what they are allowed.
+#[test]
+fn fillets_take_triangles_as_the_chord_error_says() {
+    for axes in [six(), orbit([1.0, 1.0, 0.0]), orbit([1.0, 1.0, 1.0])] {
+        let q = equal(&axes, 14.0, Fillet::Auto);
+        let [some, more] = [0.02, 0.005].map(|c| q.drawn(c).expect("drawn").triangles() as f64);
+        assert!(more < 4.4 * some, "{}: {some} {more}", axes.len());
+        let (mesh, _) = q.mesh(0.005).expect("meshed");
+        let middles: Vec<Vec3> = (mesh.triangles.iter())
+            .map(|t| {
+                let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+                scale(add(a, add(b, c)), 1.0 / 3.0)
+            })
+            .collect();
+        let near = q.nearest();
+        let off = |p: &Vec3| near.closest(*p).expect("a place").distance.abs();
+        let mean = middles.iter().map(off).sum::<f64>() / middles.len() as f64;
+        // Halving leaves from a quarter to all of it, along the sides; in the middle less where a surface is a saddle.
+        assert!(mean > 0.2 * 0.005, "{}: {mean}", axes.len());
+    }
+}
