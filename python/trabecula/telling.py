@@ -30,7 +30,7 @@ def tell_beams(name: str, it: dict) -> None:
         print(f"  hubs       radius {span(least if least == most else [least, most])} mm")
         tell_share(it)
         return
-    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {it['hubs']} hubs, {it['beams']} beams")
+    print(f"beams {name}: {it['cell'] or 'nodes and struts'}, {counted(it['hubs'], 'hub')}, {counted(it['beams'], 'beam')}")
     low, high = it["length"]
     print(f"  length     {span(low if low == high else [low, high])} mm, {figure(it['total_length'])} mm in all")
     print(f"  thickness  {figure(it['thickness'])} mm (thinnest beam)")
@@ -50,7 +50,7 @@ def tell_beams(name: str, it: dict) -> None:
         told = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
         if told:
             print(f"  {what}    {', '.join(told)}")
-    print(f"  pieces     {it['pieces']}; {it['dangling']} nodes with a free end")
+    print(f"  pieces     {it['pieces']}; {counted(it['dangling'], 'node')} with a free end")
 
 
 def tell_tiling(t: dict) -> None:
@@ -182,6 +182,6 @@ def tell_tets(report: dict) -> None:
         print(f"left out    {100 * fit['lost']:.2g} % of the region, up to {fit['lost_depth']:.2g} mm deep")
 
 
-def counted(pieces: int) -> str:
-    """A number of pieces."""
-    return "1 piece" if pieces == 1 else f"{pieces} pieces"
+def counted(n: int, what: str = "piece") -> str:
+    """A number of things."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"

@@ -25,6 +25,7 @@ use crate::field::Field;
 use crate::math::{Vec3, add, dot, norm, scale, sub};
 
 use super::grid::{Grid, Local, TILE};
+use super::islands::By;
 use super::key::Key;
 use super::knot::middle;
 use super::signs::{Signs, bits};
@@ -47,21 +48,21 @@ pub(super) struct Edges {
     fitted: Vec<u64>,
     fitted_to: Option<usize>,
     /// The face that has the edges.
-    pub face: HashMap<usize, usize>,
+    pub face: By<usize, usize>,
     /// The chords of sides, by the lowest node of the side and the axis normal to it.
-    sides: HashMap<(usize, usize), Vec<Chord>>,
+    sides: By<(usize, usize), Vec<Chord>>,
     /// Grid edges that a face crosses twice, by the face, their lower nodes and axes: the lower point first.
-    twice: HashMap<(usize, usize, usize), [Vec3; 2]>,
+    twice: By<(usize, usize, usize), [Vec3; 2]>,
     /// The places of points that nothing else has.
-    points: HashMap<Key, Vec3>,
+    points: By<Key, Vec3>,
     /// Where edges of live faces pierce sides.
     pierced: Vec<(usize, (usize, usize), Vec3)>,
     /// Pieces of edges in cells, by the face and the cells' lowest nodes.
-    pieces: HashMap<(usize, usize), Vec<[Vec3; 2]>>,
+    pieces: By<(usize, usize), Vec<[Vec3; 2]>>,
     /// Places where edges end, meet or bend, and how many are there, likewise.
-    corners: HashMap<(usize, usize), Vec<(Vec3, usize)>>,
+    corners: By<(usize, usize), Vec<(Vec3, usize)>>,
     /// The corner that the patch of a cell has in a cell beside it, likewise.
-    beyond: HashMap<usize, Vec3>,
+    beyond: By<usize, Vec3>,
 }
 
 /// A block, and a face in it.
@@ -144,7 +145,7 @@ impl Edges {
             self.find_twice(seen, cells);
         }
         // In the order of the segments where they pierce one side.
-        let mut at: HashMap<(usize, usize), Vec<Vec3>> = HashMap::new();
+        let mut at: By<(usize, usize), Vec<Vec3>> = By::default();
         for (_, side, p) in self.pierced.iter().filter(|p| p.0 == seen.face) {
             at.entry(*side).or_default().push(seen.inside(*side, *p));
         }
@@ -196,7 +197,7 @@ impl Edges {
     fn find_beyond<P: Fn(usize, usize) -> Option<Vec3>>(
         &mut self,
         seen: &Seen<P>,
-        pierced: &HashMap<(usize, usize), Vec<Vec3>>,
+        pierced: &By<(usize, usize), Vec<Vec3>>,
     ) {
         let nodes = seen.nodes;
         let mut found: Vec<(usize, Vec3)> = Vec::new();

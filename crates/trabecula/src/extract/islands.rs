@@ -125,9 +125,15 @@ impl Hasher for Spread {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        for b in bytes {
-            self.write_u64(u64::from(*b));
+        for part in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..part.len()].copy_from_slice(part);
+            self.write_u64(u64::from_le_bytes(word));
         }
+    }
+
+    fn write_usize(&mut self, n: usize) {
+        self.write_u64(n as u64);
     }
 
     fn write_u64(&mut self, n: u64) {
@@ -141,8 +147,10 @@ impl Hasher for Spread {
     }
 }
 
+/// Something by names or numbers of places.
+pub(super) type By<K, T> = HashMap<K, T, BuildHasherDefault<Spread>>;
 /// Something by the names of vertices.
-pub(super) type ByName<T> = HashMap<u128, T, BuildHasherDefault<Spread>>;
+pub(super) type ByName<T> = By<u128, T>;
 
 /// The bodies of all tiles so far. They are numbered as they come.
 #[derive(Default)]

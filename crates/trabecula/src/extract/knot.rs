@@ -16,8 +16,7 @@
 
 mod simplex;
 
-use std::collections::{HashMap, HashSet};
-use std::hash::BuildHasherDefault;
+use std::collections::HashSet;
 use std::ops::Range;
 
 use crate::math::{Vec3, add, scale};
@@ -25,7 +24,7 @@ use crate::mesh::{Mesh, is_embedded};
 
 use super::crease::{Edges, Fits};
 use super::grid::{Grid, Local};
-use super::islands::Spread;
+use super::islands::By;
 use super::key::Key;
 use super::signs::Signs;
 use super::table::{CASES, EDGES};
@@ -35,7 +34,7 @@ pub(super) use simplex::{Simplex, Spot};
 /// What is not on plain cells' edges.
 #[derive(Default)]
 pub(super) struct Extra {
-    names: HashMap<Key, u32, BuildHasherDefault<Spread>>,
+    names: By<Key, u32>,
     /// The names of the extra vertices.
     pub keys: Vec<Key>,
     /// Triangles, and whether they lie on the region's surface.
@@ -373,18 +372,21 @@ impl Knots<'_> {
         let on = |k: &Key| k.faces().any(|f| f == face);
         let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let fitted = self.fits.sides.get(&(low, axis));
-        let cut = match fitted {
-            Some(_) => Vec::new(),
-            None => self.side_pieces(cell, axis, upper),
-        };
         if let Some(side) = fitted.filter(|_| self.is_fitted(face)) {
             let chords = side.chords.iter();
             steps.extend(chords.flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
         } else {
-            for (negative, ring) in fitted.map_or(&cut, |s| &s.pieces) {
+            let mut add = |negative: u64, ring: &[Key]| {
                 if negative >> face & 1 == 1 {
                     let edges = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
                     steps.extend(edges.filter(|(a, b)| on(a) && on(b)));
+                }
+            };
+            match fitted {
+                Some(side) => side.pieces().for_each(|(n, ring)| add(n, ring)),
+                None => {
+                    let cut = self.side_pieces(cell, axis, upper);
+                    cut.iter().for_each(|(n, ring)| add(*n, ring));
                 }
             }
         }

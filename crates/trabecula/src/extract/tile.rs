@@ -191,15 +191,14 @@ impl<'a> Nodes<'a> {
     }
 
     pub fn count(&self) -> usize {
-        self.shape.iter().product()
+        self.shape[2] * self.stride[2]
     }
 
     pub fn at(&self, n: usize) -> [usize; 3] {
-        [
-            n % self.shape[0],
-            n / self.stride[1] % self.shape[1],
-            n / self.stride[2],
-        ]
+        // Divisions of short numbers are the faster ones, and a block has few nodes.
+        let (n, nx, ny) = (n as u32, self.shape[0] as u32, self.shape[1] as u32);
+        let row = n / nx;
+        [n - row * nx, row % ny, row / ny].map(|i| i as usize)
     }
 
     pub fn index(&self, at: [usize; 3]) -> usize {
@@ -385,7 +384,7 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         extra: &mut s.extra,
         edges: &s.edges,
         moved: HashSet::new(),
-        fits: Fits::default(),
+        fits: Fits::none(local.live.len()),
     };
     if knotted {
         knots.all(own);

@@ -1,9 +1,10 @@
 //! The surface in cells in which a face with edges meets others.
 
-use std::collections::HashMap;
+use std::rc::Rc;
 
 use super::rim::Step;
-use super::side::Part;
+use super::side::{Part, Side};
+use crate::extract::islands::By;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
 use crate::field::Field;
@@ -27,7 +28,7 @@ struct Tet {
     outer: u8,
     /// The side, and its corners among the side's if it is divided.
     side: (usize, usize),
-    corners: Option<[usize; 3]>,
+    divided: Option<(Rc<Side>, [usize; 3])>,
 }
 
 /// A triangle of a side of a cell, seen from outside.
@@ -37,8 +38,11 @@ struct Base {
     inside: bool,
     walls: [bool; 3],
     side: (usize, usize),
-    corners: Option<[usize; 3]>,
+    divided: Option<(Rc<Side>, [usize; 3])>,
 }
+
+/// The name of a spot inside a cell: the nodes and points that it lies between, and the faces that meet there.
+type Inner = ([usize; 4], u64);
 
 impl Knots<'_> {
     /// Fills a cell in which a face with edges meets others.
@@ -61,12 +65,11 @@ impl Knots<'_> {
         let center = self.center_of(cell);
         let field = self.grid.faces[self.local.live[face]].field.clone();
         let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
-        let solid = field.value(center) <= 0.0;
-        let shares = if rims.len() > 1 {
-            self.shares_by_fit(&bases, center, solid, &*field)
-        } else {
-            INNER
-        };
+        let (mut solid, mut shares) = (false, INNER);
+        if rims.len() > 1 {
+            solid = field.value(center) <= 0.0;
+            shares = self.shares_by_fit(&bases, center, solid, &*field);
+        }
         let first = self.extra.triangles.len();
         for attempt in 0..TRIES {
             let tets = if rims.len() > 1 {
@@ -108,7 +111,7 @@ impl Knots<'_> {
                     inside: p.inside,
                     walls: p.walls,
                     side,
-                    corners: Some(p.corners),
+                    divided: Some((fit.clone(), p.corners)),
                 }));
                 continue;
             }
@@ -120,7 +123,7 @@ impl Knots<'_> {
                     inside: self.signs.is_negative(face, low),
                     walls: [false; 3],
                     side,
-                    corners: None,
+                    divided: None,
                 });
             }
         }
@@ -148,7 +151,7 @@ impl Knots<'_> {
             walls: [b.walls[0], b.walls[1], b.walls[2], false].map(|w| w && b.inside),
             outer: 7,
             side: b.side,
-            corners: b.corners,
+            divided: b.divided.clone(),
         };
         bases.iter().map(tet).collect()
     }
@@ -186,7 +189,7 @@ impl Knots<'_> {
         solid: bool,
         share: f64,
     ) -> Vec<Tet> {
-        let mut inner: HashMap<usize, usize> = HashMap::new();
+        let mut inner: By<usize, usize> = By::default();
         let middle = self.inner_point(cell, center);
         let mut tets = Vec::with_capacity(4 * bases.len());
         for b in bases {
@@ -238,7 +241,7 @@ impl Knots<'_> {
                     walls: [0, 1, 2, 3].map(|c| b.inside && wall(c)),
                     outer: (1 << n) - 1,
                     side: b.side,
-                    corners: b.corners.map(|c| order.map(|i| c[i])),
+                    divided: (b.divided.as_ref()).map(|(s, c)| (s.clone(), order.map(|i| c[i]))),
                 });
             }
             tets.push(Tet {
@@ -251,7 +254,7 @@ impl Knots<'_> {
                 walls: [false, false, false, solid && !b.inside],
                 outer: 0,
                 side: b.side,
-                corners: None,
+                divided: None,
             });
         }
         tets
@@ -260,12 +263,18 @@ impl Knots<'_> {
     /// Adds the surface in some tetrahedra of a cell.
     fn fill(&mut self, cell: [usize; 3], face: usize, tets: &[Tet]) {
         let node = self.nodes.index(cell);
-        let mut names: HashMap<([usize; 4], u64), u32> = HashMap::new();
+        let mut names: Vec<(Inner, u32)> = Vec::with_capacity(16);
         for tet in tets {
             let (negative, mixed) = self.others_of(&tet.simplex, face, tet.inside);
             let walls = tet.walls.map(|w| w.then_some(face));
             let wall = tet.walls.contains(&true) && self.holds(cell, negative | mixed);
             if !wall && self.holds(cell, negative) == self.holds(cell, negative | mixed) {
+                continue;
+            }
+            if mixed == 0 {
+                if !self.holds(cell, negative & !(1 << face)) {
+                    self.fill_walls(node, face, tet, &mut names);
+                }
                 continue;
             }
             for piece in self.cut(&tet.simplex, tet.right, (negative, mixed), walls) {
@@ -289,18 +298,28 @@ impl Knots<'_> {
         }
     }
 
+    /// Adds the sides of a tetrahedron that lie on the face, where no other crosses it.
+    fn fill_walls(&mut self, node: usize, face: usize, tet: &Tet, names: &mut Vec<(Inner, u32)>) {
+        let cut = self.grid.faces[self.local.live[face]].cut;
+        let sides = Simplex::sides(tet.right);
+        for (ring, _) in sides.iter().zip(tet.walls).filter(|s| s.1) {
+            let ring = ring.map(|s| self.spot_name(node, tet, s, names));
+            self.fan(&ring, cut);
+        }
+    }
+
     /// The vertex at a spot of a tetrahedron; `inner` are those inside the cell.
     fn spot_name(
         &mut self,
         node: usize,
         tet: &Tet,
         spot: Spot,
-        inner: &mut HashMap<([usize; 4], u64), u32>,
+        inner: &mut Vec<(Inner, u32)>,
     ) -> u32 {
         if spot.corners & !tet.outer == 0 {
-            let key = match (tet.corners, self.fits.sides.get(&tet.side).cloned()) {
-                (Some(corners), Some(side)) => self.side_key(tet.side, &side, &corners, spot),
-                _ => self.key(&tet.simplex, spot),
+            let key = match &tet.divided {
+                Some((side, corners)) => self.side_key(tet.side, side, corners, spot),
+                None => self.key(&tet.simplex, spot),
             };
             return self.vertex(key);
         }
@@ -309,19 +328,19 @@ impl Knots<'_> {
             ids[c] = self.first_of(tet.simplex.nodes[c]);
         }
         ids.sort_unstable();
-        if let Some(v) = inner.get(&(ids, spot.faces)) {
+        let name = (ids, spot.faces);
+        if let Some((_, v)) = inner.iter().find(|(n, _)| *n == name) {
             return *v;
         }
         let place = self.spot_place(&tet.simplex, spot, 1.0);
         let v = self.push(Key::center(node, 7), place);
-        inner.insert((ids, spot.faces), v);
+        inner.push((name, v));
         v
     }
 }
 
 /// The closed lines that some paths make.
 fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
-    let next: HashMap<Key, usize> = paths.iter().enumerate().map(|(i, p)| (p[0], i)).collect();
     let mut used = vec![false; paths.len()];
     let mut rims = Vec::new();
     for first in 0..paths.len() {
@@ -330,8 +349,8 @@ fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
             used[at] = true;
             let path = &paths[at];
             rim.extend(&path[..path.len() - 1]);
-            match next.get(&path[path.len() - 1]) {
-                Some(n) => at = *n,
+            match paths.iter().rposition(|p| p[0] == path[path.len() - 1]) {
+                Some(n) => at = n,
                 None => break,
             }
         }

@@ -9,12 +9,12 @@
 //! a cell they keep between their values at the nodes around: then none shows where a neighbour would not see it.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::side::{Corner, Side};
 use super::{Edges, Others, Seen};
 use crate::extract::grid::Local;
+use crate::extract::islands::By;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::extract::signs::Signs;
@@ -24,26 +24,36 @@ use crate::math::Vec3;
 /// Points that are no nodes, and the sides of cells that they divide.
 #[derive(Default)]
 pub(in crate::extract) struct Fits {
+    /// How many faces there are.
+    live: usize,
     /// Places of the points.
     places: Vec<Vec3>,
-    /// Values of all live faces at them.
-    values: Vec<Vec<f64>>,
+    /// Values of all live faces at them, one point after the other.
+    values: Vec<f64>,
     /// The first of those that are the same point, with other values.
     first: Vec<usize>,
     /// The grid edge that each lies on, if it does: by its lower node and its axis.
     lines: Vec<Option<(usize, usize)>>,
-    pub(super) numbers: HashMap<Key, usize>,
+    pub(super) numbers: By<Key, usize>,
     /// By the lowest node and the axis normal to the side.
-    pub sides: HashMap<(usize, usize), Rc<Side>>,
+    pub sides: By<(usize, usize), Rc<Side>>,
 }
 
 impl Fits {
+    /// None yet, where there are so many faces.
+    pub fn none(live: usize) -> Fits {
+        Fits {
+            live,
+            ..Fits::default()
+        }
+    }
+
     pub fn place(&self, point: usize) -> Vec3 {
         self.places[point]
     }
 
     pub fn value(&self, point: usize, face: usize) -> f64 {
-        self.values[point][face]
+        self.values[point * self.live + face]
     }
 
     pub fn line(&self, point: usize) -> Option<(usize, usize)> {
@@ -267,7 +277,7 @@ impl Knots<'_> {
     ) -> usize {
         self.fits.places.push(place);
         self.fits.lines.push(line);
-        self.fits.values.push(values);
+        self.fits.values.extend(values);
         let id = self.nodes.count() + self.fits.places.len() - 1;
         self.fits.first.push(id);
         id
@@ -289,7 +299,7 @@ impl Knots<'_> {
             let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
             self.kept(
                 f,
-                self.fits.values[point][f] * (1.0 + 0.7 * self.chance(seed, low)),
+                self.fits.value(point, f) * (1.0 + 0.7 * self.chance(seed, low)),
             )
         });
         let values = shaken.collect();
@@ -299,14 +309,14 @@ impl Knots<'_> {
         id
     }
 
-    /// The values of all live faces at a place, between those at some nodes.
+    /// The values of all live faces at a place, between those at some nodes. The one with edges needs none.
     pub(super) fn values_between(&self, place: Vec3, around: &[usize]) -> Vec<f64> {
         let value = |f: usize| {
             let at = around.iter().map(|n| self.value(f, *n));
             let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
                 (l.min(v), h.max(v))
             });
-            if (low <= 0.0) == (high <= 0.0) {
+            if (low <= 0.0) == (high <= 0.0) || self.is_fitted(f) {
                 return low;
             }
             let id = self.local.live[f];

@@ -299,6 +299,9 @@ impl Knots<'_> {
 /// The triangles of a simple polygon, by clipping its best ear again and again; the first one is not the best but one of
 /// those after it, as `other` says, if there are as many.
 pub(super) fn ears(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
+    if ring.len() == 3 {
+        return vec![[0, 1, 2]];
+    }
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let area: f64 = (0..ring.len())
         .map(|i| {

@@ -18,8 +18,10 @@ pub(in crate::extract) struct Side {
     /// Its nodes and the points in it: number behind that of the nodes, number in the side, and name.
     pub(super) corners: Vec<Corner>,
     pub(super) parts: Vec<Part>,
-    /// The parts cut by all other faces, as the sides of a knotted cell are.
-    pub pieces: Vec<(u64, Vec<Key>)>,
+    /// The parts cut by all other faces, as the sides of a knotted cell are: the names of all their corners, and for each
+    /// the faces that are negative in it and where its names end.
+    names: Vec<Key>,
+    ends: Vec<(u64, usize)>,
     /// The chords with the points where other faces cross them.
     pub chords: Vec<Vec<Key>>,
     /// How often it was divided anew.
@@ -45,6 +47,15 @@ pub(super) struct Part {
     pub inside: bool,
     /// Whether the line across from each corner is part of a chord.
     pub walls: [bool; 3],
+}
+
+impl Side {
+    /// The parts cut by all other faces: those that are negative, and the corners counter-clockwise about the side's axis.
+    pub fn pieces(&self) -> impl Iterator<Item = (u64, &[Key])> {
+        let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
+        let each = starts.zip(&self.ends);
+        each.map(|(start, (negative, end))| (*negative, &self.names[start..*end]))
+    }
 }
 
 const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -140,7 +151,8 @@ impl Knots<'_> {
         let mut side = Side {
             parts: self.parts(axis, &corners, &boundary, &chords, (solid, 0)),
             corners,
-            pieces: Vec::new(),
+            names: Vec::new(),
+            ends: Vec::new(),
             chords: Vec::new(),
             tries: 0,
         };
@@ -155,14 +167,16 @@ impl Knots<'_> {
             side.parts = self.parts(axis, &side.corners, &boundary, &chords, again);
             pieces = self.cut_parts(at, face, &side);
         }
+        side.ends.reserve(pieces.len());
+        side.names.reserve(pieces.iter().map(|p| p.1.len()).sum());
         for (negative, ring) in pieces {
-            let keys = ring.into_iter().map(|(key, place)| {
+            for (key, place) in ring {
                 if key.is_between() {
                     self.named(key, place);
                 }
-                key
-            });
-            side.pieces.push((negative, keys.collect()));
+                side.names.push(key);
+            }
+            side.ends.push((negative, side.names.len()));
         }
         let chords = chords.iter().map(|c| self.crossed(at, face, &side, c));
         side.chords = chords.collect();
@@ -349,23 +363,32 @@ impl Knots<'_> {
         corners: &[usize],
         spot: Spot,
     ) -> Key {
-        let between = bits(u64::from(spot.corners)).map(|c| side.corners[corners[c]]);
-        let mut between: Vec<Corner> = between.collect();
-        if let [only] = between[..] {
+        let (mut all, mut count) = ([side.corners[0]; 3], 0);
+        for c in bits(u64::from(spot.corners)) {
+            all[count] = side.corners[corners[c]];
+            count += 1;
+        }
+        let between = &mut all[..count];
+        if let [only] = between {
             return only.key;
         }
         between.sort_by_key(|c| c.code);
         let line = between.iter().fold(15, |l, c| l & lines(c.code));
-        let faces: Vec<usize> = bits(spot.faces).collect();
+        let (mut faces, mut met) = ([0; 3], 0);
+        for f in bits(spot.faces).take(3) {
+            faces[met] = f;
+            met += 1;
+        }
+        let faces = &faces[..met];
         if line != 0 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
             let lines = [(low, u), (low + du, v), (low + dv, u), (low, v)];
             let (node, along) = lines[line.trailing_zeros() as usize];
-            return Key::new(node, &[1 << along], &faces);
+            return Key::new(node, &[1 << along], faces);
         }
-        let codes: Vec<usize> = between.iter().map(|c| c.code).collect();
-        Key::between(low, 7 & !(1 << axis), &codes, &faces)
+        let codes = all.map(|c| c.code);
+        Key::between(low, 7 & !(1 << axis), &codes[..count], faces)
     }
 
     /// A chord with the points where faces cross it.
@@ -405,13 +428,13 @@ impl Knots<'_> {
 /// Whether all polygons of a side are what they are meant to be in single precision: then they do not overlap either, for
 /// together they fill the side.
 fn is_sound(pieces: &[Polygon], axis: usize) -> bool {
+    let way = orient2d(
+        [0.0, 0.0],
+        drop_axis(AXES[(axis + 1) % 3], axis),
+        drop_axis(AXES[(axis + 2) % 3], axis),
+    );
     pieces.iter().all(|(_, ring)| {
         let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
-        let way = orient2d(
-            [0.0, 0.0],
-            drop_axis(AXES[(axis + 1) % 3], axis),
-            drop_axis(AXES[(axis + 2) % 3], axis),
-        );
         (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
     })
 }

@@ -52,7 +52,7 @@ impl Knots<'_> {
             let low = node + self.offset(usize::from(upper) << axis);
             let fitted = self.fits.sides.get(&(low, axis));
             let pieces = match fitted {
-                Some(side) => side.pieces.clone(),
+                Some(side) => side.pieces().map(|(n, ring)| (n, ring.to_vec())).collect(),
                 None => self.side_pieces(cell, axis, upper),
             };
             for (negative, mut ring) in pieces {

@@ -46,6 +46,32 @@ pub(super) struct Halves {
     edge: Option<(Spot, Spot)>,
 }
 
+/// What a face makes of a polygon.
+pub(super) enum Parted {
+    /// It is negative everywhere.
+    Inside(Vec<Spot>),
+    /// Nowhere.
+    Outside(Vec<Spot>),
+    Both(Halves),
+}
+
+impl Simplex {
+    /// The corners of a tetrahedron's sides, each across from a corner, counter-clockwise seen from outside; `right`: whether
+    /// it is right-handed.
+    pub fn sides(right: bool) -> [[Spot; 3]; 4] {
+        let sides = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+        sides.map(|mut c: [u8; 3]| {
+            if !right {
+                c.swap(1, 2);
+            }
+            c.map(|c| Spot {
+                corners: 1 << c,
+                faces: 0,
+            })
+        })
+    }
+}
+
 impl Knots<'_> {
     pub(in crate::extract) fn offset(&self, step: usize) -> usize {
         (0..3)
@@ -205,8 +231,15 @@ impl Knots<'_> {
     /// by `apart` times what crossings keep from nodes.
     pub fn spot_place(&self, simplex: &Simplex, spot: Spot, apart: f64) -> Vec3 {
         let (part, faces, met) = self.part(simplex, spot);
+        let first = self.place_of(part.nodes[0]);
+        if part.count == 1 {
+            return first;
+        }
         let mut shares = self.shares(&part, &faces[..met]);
-        let places = part.nodes.map(|n| self.place_of(n));
+        let mut places = [first; 4];
+        for c in 1..part.count {
+            places[c] = self.place_of(part.nodes[c]);
+        }
         if part.count == 2 {
             let length = sub(places[1], places[0])
                 .map(f64::abs)
@@ -292,34 +325,35 @@ impl Knots<'_> {
         (negative, mixed): (u64, u64),
         walls: [Option<usize>; 4],
     ) -> Vec<Piece> {
-        let sides = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-        let sides = [0, 1, 2, 3].map(|across| {
-            let mut c: [u8; 3] = sides[across];
-            if !right {
-                c.swap(1, 2);
-            }
-            Side {
-                face: walls[across],
-                ring: c
-                    .map(|c| Spot {
-                        corners: 1 << c,
-                        faces: 0,
-                    })
-                    .to_vec(),
-            }
+        let sides = Simplex::sides(right).into_iter().zip(walls);
+        let sides = sides.map(|(ring, face)| Side {
+            face,
+            ring: ring.to_vec(),
         });
         let mut pieces = vec![Piece {
             negative,
-            sides: sides.to_vec(),
+            sides: sides.collect(),
         }];
         for f in bits(mixed) {
             let mut next = Vec::with_capacity(2 * pieces.len());
             for piece in pieces {
-                let (mut inside, mut outside) = (Vec::new(), Vec::new());
+                let room = piece.sides.len() + 1;
+                let (mut inside, mut outside) =
+                    (Vec::with_capacity(room), Vec::with_capacity(room));
                 // The new edges, from end to end as the inside's new side has them.
                 let mut edges: Vec<(Spot, Spot)> = Vec::new();
-                for side in &piece.sides {
-                    let halves = self.split(simplex, &side.ring, f);
+                for side in piece.sides {
+                    let halves = match self.split(simplex, side.ring, f) {
+                        Parted::Inside(ring) => {
+                            inside.push(Side { ring, ..side });
+                            continue;
+                        }
+                        Parted::Outside(ring) => {
+                            outside.push(Side { ring, ..side });
+                            continue;
+                        }
+                        Parted::Both(halves) => halves,
+                    };
                     for (part, to) in [(halves.inside, &mut inside), (halves.outside, &mut outside)]
                     {
                         if part.len() > 2 {
@@ -382,12 +416,17 @@ impl Knots<'_> {
         for f in bits(mixed) {
             let mut next = Vec::with_capacity(2 * pieces.len());
             for (negative, ring) in pieces {
-                let halves = self.split(simplex, &ring, f);
-                if halves.inside.len() > 2 {
-                    next.push((negative | 1 << f, halves.inside));
-                }
-                if halves.outside.len() > 2 {
-                    next.push((negative, halves.outside));
+                match self.split(simplex, ring, f) {
+                    Parted::Inside(ring) => next.push((negative | 1 << f, ring)),
+                    Parted::Outside(ring) => next.push((negative, ring)),
+                    Parted::Both(halves) => {
+                        if halves.inside.len() > 2 {
+                            next.push((negative | 1 << f, halves.inside));
+                        }
+                        if halves.outside.len() > 2 {
+                            next.push((negative, halves.outside));
+                        }
+                    }
                 }
             }
             pieces = next;
@@ -397,30 +436,43 @@ impl Knots<'_> {
 
     /// The parts of a polygon where a face is negative and positive, and the edge between them, as the new side of
     /// the negative part runs along it.
-    pub(super) fn split(&self, simplex: &Simplex, ring: &[Spot], f: usize) -> Halves {
-        let signs: Vec<bool> = ring
-            .iter()
-            .map(|s| self.is_negative_at(simplex, *s, f))
-            .collect();
-        let (mut inside, mut outside) = (Vec::with_capacity(6), Vec::with_capacity(6));
+    pub(super) fn split(&self, simplex: &Simplex, ring: Vec<Spot>, f: usize) -> Parted {
+        // A side has three corners, and one more for each of at most 64 faces.
+        let signs = (0..).zip(&ring).fold(0u128, |w, (i, s)| {
+            w | u128::from(self.is_negative_at(simplex, *s, f)) << i
+        });
+        if signs == 0 {
+            return Parted::Outside(ring);
+        }
+        if signs.count_ones() as usize == ring.len() {
+            return Parted::Inside(ring);
+        }
+        let is_inside = |i: usize| signs >> i & 1 == 1;
+        let room = ring.len() + 1;
+        let (mut inside, mut outside) = (Vec::with_capacity(room), Vec::with_capacity(room));
         let (mut leave, mut enter) = (None, None);
         for i in 0..ring.len() {
             let next = (i + 1) % ring.len();
-            (if signs[i] { &mut inside } else { &mut outside }).push(ring[i]);
-            if signs[i] != signs[next] {
+            (if is_inside(i) {
+                &mut inside
+            } else {
+                &mut outside
+            })
+            .push(ring[i]);
+            if is_inside(i) != is_inside(next) {
                 let new = Spot {
                     corners: ring[i].corners | ring[next].corners,
                     faces: (ring[i].faces & ring[next].faces) | 1 << f,
                 };
                 inside.push(new);
                 outside.push(new);
-                *(if signs[i] { &mut leave } else { &mut enter }) = Some(new);
+                *(if is_inside(i) { &mut leave } else { &mut enter }) = Some(new);
             }
         }
-        Halves {
+        Parted::Both(Halves {
             inside,
             outside,
             edge: enter.zip(leave),
-        }
+        })
     }
 }
