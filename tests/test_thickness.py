@@ -114,3 +114,36 @@ def test_the_part_weighs_what_the_report_says(cell):
     mesh = solid.mesh(per_cell=32)
     assert mesh.closed
     assert mesh.solid_fraction == pytest.approx(solid.report()["lattices"]["core"]["fraction"], rel=2e-3)
+
+
+def test_bits_that_dangle(tmp_path):
+    """A block with balls on posts, kept solid but for its foot: those on thin posts dangle."""
+    balls = [lt.region.box(min=[-10, -10, -10], max=[10, 10, 0])]
+    for i, thick in enumerate((0.3, 0.4, 0.8, 1.2)):
+        balls.append(lt.region.cylinder(base=[4 * i - 6, 0, -1], radius=thick / 2, height=2))
+        balls.append(lt.region.sphere(radius=1, center=[4 * i - 6, 0, 1.5]))
+    whole = lt.region.union(*balls)
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=8), level=lt.level.fraction(0.5))
+    design = lt.Design(
+        region=whole, lattice={"core": core}, keep={"upper": lt.region.box(min=[-20, -20, -9], max=[20, 20, 20])}
+    )
+    found = design.build().dangling(neck=1.0)
+    assert found["count"] == 2 and found["neck"] == 0.5
+    assert found["largest"]["place"][2] > 0.5
+    assert found["volume"] == pytest.approx(2 * 4 / 3 * np.pi, rel=0.1)
+    design.save(tmp_path / "balls.toml")
+    words = [
+        sys.executable,
+        "-m",
+        "trabecula",
+        "measure",
+        str(tmp_path / "balls.toml"),
+        "--edge",
+        "0.5",
+        "--dangling",
+        "--json",
+    ]
+    told = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)["dangling"]
+    assert set(told) == {"count", "volume", "largest", "neck", "step"}
+    with pytest.raises(ValueError, match="neck is 0"):
+        design.build().dangling(neck=0)

@@ -300,6 +300,9 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help="draw the distributions (with --thickness)")
     p.add_argument(
+        "--dangling", action="store_true", help="also bits of a design that hang by less than half the lattice's narrowest neck"
+    )
+    p.add_argument(
         "--transitions",
         metavar="OUT.png",
         type=ending(("png",)),

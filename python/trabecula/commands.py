@@ -246,6 +246,11 @@ def measure(args) -> None:
             "often; taken as a region (region.mesh) they are united"
         )
     figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
+    if args.dangling:
+        if solid is None:
+            raise Refused("--dangling is for designs: a mesh file does not tell the lattice's narrowest neck")
+        with Progress("looking for bits", args.progress) as progress:
+            figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
     if args.thickness:
         with Progress("fitting balls", args.progress) as progress:
             balls = made.thickness(args.step, args.threads, progress)
@@ -256,7 +261,8 @@ def measure(args) -> None:
         if found:
             figures["transitions"] = list(found)
         return tell_json(figures)
-    units = {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
+    units = {"dangling.volume": " mm³", "dangling.neck": " mm", "dangling.step": " mm"}
+    units |= {"volume": " mm³", "area": " mm²", "area_lattice": " mm²", "area_cut": " mm²", "hydraulic_diameter": " mm"}
     lines = listed(figures)
     width = max(15, *(len(key) for key, _ in lines))
     for key, value in lines:
@@ -269,6 +275,8 @@ def measure(args) -> None:
                 else "none: all of it is the region's own surface"
             )
             text = ABSENT.get(key, needed)
+        elif key == "dangling.largest":
+            text = f"{figure(value['volume'])} mm³ at ({', '.join(figure(v) for v in value['place'])}) mm"
         elif isinstance(value, list):
             text = ", ".join(value) or "none"
         elif isinstance(value, bool):

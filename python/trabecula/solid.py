@@ -130,6 +130,24 @@ class Solid(Picture):
 
         return Transitions(json.loads(self._core.transitions()))
 
+    def dangling(
+        self, neck: float | None = None, threads: int | None = None, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Bits that hang on the part by necks thinner than half of ``neck``, or by nothing: what the region cuts off the
+        lattice and leaves on a thread.
+
+        ``neck`` (mm) is the lattice's narrowest wall or neck unless given. ``count`` and ``volume`` (mm³) of all, ``largest``
+        (``volume`` and ``place``, mm, or None), the ``neck`` below which a bit counts (half of the one given) and the ``step``
+        of the points that were looked at, mm.
+        """
+        own = min(self._thinnest.values(), default=None)
+        if neck is None and own is None:
+            raise ValueError("the lattice's narrowest neck is not known: give neck, mm")
+        narrowest = own if neck is None else positive("neck", neck)
+        count, volume, largest, thin, step = self._core.dangling(narrowest, _threads(threads), progress)
+        found = None if largest is None else {"volume": largest[0], "place": list(largest[1])}
+        return {"count": count, "volume": volume, "largest": found, "neck": thin, "step": step}
+
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
         """Values at points (n, 3) in mm: negative in the solid, positive outside, continuous; not a distance."""
         import numpy as np

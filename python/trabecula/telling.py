@@ -120,7 +120,7 @@ def tell_distortion(d: dict) -> None:
 
 
 #: What is said where a figure is missing for another reason than that there is no region.
-ABSENT = {"quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
+ABSENT = {"dangling.largest": "none", "quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
 
 
 def listed(figures: dict) -> list[tuple]:

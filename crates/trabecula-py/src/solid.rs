@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use trabecula::design::{self, Built, Node};
 use trabecula::extract::{self, Stopped};
 use trabecula::field::Field;
-use trabecula::io;
 use trabecula::map::{Map, Misfit};
 use trabecula::region::Repaired;
 use trabecula::truss::Beams;
+use trabecula::{io, measure};
 
 use crate::design::Folder;
 use crate::error;
@@ -41,6 +41,9 @@ impl Solid {
         }
     }
 }
+
+/// Number, volume, volume and place of the largest, neck, step.
+type Bits = (usize, f64, Option<(f64, [f64; 3])>, f64, f64);
 
 /// Name, centres (n, 3), radii (n,), ends (m, 2).
 type Graph<'py> = (
@@ -160,6 +163,29 @@ impl Solid {
     /// The transitions between the lattices of a blend, as JSON text.
     fn transitions(&self, py: Python<'_>) -> PyResult<String> {
         run(py, None, None, |_| self.built.transitions().to_string())
+    }
+
+    /// Bits that hang by necks thinner than half of `neck` (mm): number, volume, volume and place of the largest, the neck,
+    /// the distance between points.
+    #[pyo3(signature = (neck, threads=None, progress=None))]
+    fn dangling(
+        &self,
+        py: Python<'_>,
+        neck: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bits> {
+        let found = run(py, threads, progress, |p| {
+            measure::dangling(&self.built.solid, neck, p)
+        })?
+        .map_err(error::stopped)?;
+        Ok((
+            found.count,
+            found.volume,
+            found.largest,
+            found.neck,
+            found.step,
+        ))
     }
 
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
