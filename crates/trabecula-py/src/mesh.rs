@@ -57,7 +57,7 @@ impl Mesh {
     fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
         let by_place = extension.eq_ignore_ascii_case("stl");
         let read = run(py, None, None, |_| match io::read_mesh(bytes, extension) {
-            Ok(loaded) if by_place => Ok(measure::joined_where_open(loaded.mesh)),
+            Ok(loaded) if by_place => Ok(loaded.mesh.joined_where_open()),
             Ok(loaded) => Ok(loaded.mesh),
             Err(f) => Err(f),
         })?;

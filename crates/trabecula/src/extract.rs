@@ -19,6 +19,7 @@ use crate::mesh::Mesh;
 use crate::solid::Solid;
 
 mod bodies;
+mod by;
 mod cap;
 mod crease;
 mod grid;
@@ -32,8 +33,9 @@ mod tets;
 mod tile;
 
 use bodies::Bodies;
+use by::ByName;
 use grid::Grid;
-use islands::{ByName, Census, Found};
+use islands::{Census, Found};
 pub use islands::{Island, Islands, Pieces};
 pub use sift::Store;
 pub use tets::{Foretold, Join, foretold};

@@ -31,3 +31,4 @@ pub mod symmetry;
 pub mod tets;
 pub mod tiling;
 pub mod truss;
+mod union;

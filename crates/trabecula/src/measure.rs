@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::{Mesh, degenerate};
+use crate::mesh::{Edges, Mesh, degenerate};
 
 mod adjacency;
 mod cavity;
@@ -15,8 +15,8 @@ mod quality;
 mod transition;
 
 pub use crate::mesh::{is_embedded, self_intersections};
+use adjacency::Bodies;
 pub use adjacency::non_manifold_vertices;
-use adjacency::{Bodies, Edges};
 pub use cavity::{Cavity, cavities};
 pub use cut::cut_triangles;
 pub use dangling::{Dangling, dangling};
@@ -81,21 +81,6 @@ fn cones(mesh: &Mesh, from: Vec3) -> f64 {
         dot(a, cross(b, c))
     });
     six.sum::<f64>() / 6.0
-}
-
-/// The mesh with corners made one that differ by no more than single precision rounds, if it has open edges that this closes:
-/// files that hold triangles by their corners' places, as STL does, leave such edges.
-pub fn joined_where_open(mesh: Mesh) -> Mesh {
-    let open = Edges::count(&mesh).open;
-    if open == 0 {
-        return mesh;
-    }
-    let joined = mesh.joined(mesh.single_rounding());
-    if Edges::count(&joined).open < open {
-        joined
-    } else {
-        mesh
-    }
 }
 
 /// Area by parts of equal size, so that the sum is the same for any number of threads.
@@ -271,10 +256,10 @@ mod tests {
             let mut m = apart.clone();
             let each = m.vertices.iter_mut().enumerate();
             each.for_each(|(i, v)| v[i % 3] += by * (i % 2) as f64);
-            joined_where_open(m)
+            m.joined_where_open()
         };
         assert!(size(&shift(1e-8)).closed && !size(&shift(1e-3)).closed);
-        assert_eq!(joined_where_open(whole.clone()), whole);
+        assert_eq!(whole.clone().joined_where_open(), whole);
     }
 
     #[test]

@@ -4,11 +4,13 @@ use std::collections::HashMap;
 
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 
+mod edges;
 pub(crate) mod exact;
 mod intersect;
 #[cfg(test)]
 pub(crate) mod samples;
 
+pub(crate) use edges::Edges;
 pub(crate) use intersect::{Tree as BoxTree, meet, near_pairs};
 pub use intersect::{is_embedded, self_intersections};
 
@@ -92,6 +94,23 @@ impl Mesh {
             .chain(&b.max)
             .fold(0.0f64, |m, x| m.max(x.abs()));
         largest * f64::from(f32::EPSILON)
+    }
+
+    /// The mesh with vertices made one that differ by no more than single precision rounds, if it has open edges that this
+    /// closes: files that hold triangles by the places of their corners, as STL does, leave such edges.
+    ///
+    /// Coordinates must be finite. Time and memory are linear in the mesh.
+    pub fn joined_where_open(self) -> Mesh {
+        let open = Edges::count(&self).open;
+        if open == 0 {
+            return self;
+        }
+        let joined = self.joined(self.single_rounding());
+        if Edges::count(&joined).open < open {
+            joined
+        } else {
+            self
+        }
     }
 
     /// The mesh with vertices closer than `tolerance` (mm) made one, triangles that collapse left out.

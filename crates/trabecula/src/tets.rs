@@ -2,6 +2,7 @@
 
 use crate::math::{Vec3, cross, dot, sub};
 use crate::mesh::Mesh;
+use crate::union::{find, unite};
 
 mod background;
 mod check;
@@ -112,27 +113,17 @@ impl TetMesh {
     pub fn pieces(&self) -> (usize, Vec<u32>) {
         let mut faces = self.faces();
         faces.sort_unstable();
-        let mut parent: Vec<u32> = (0..self.tets.len() as u32).collect();
-        fn root(parent: &mut [u32], mut i: u32) -> u32 {
-            while parent[i as usize] != i {
-                parent[i as usize] = parent[parent[i as usize] as usize];
-                i = parent[i as usize];
-            }
-            i
-        }
+        let mut root: Vec<u32> = (0..self.tets.len() as u32).collect();
         for same in faces.chunk_by(|a, b| a.0 == b.0) {
-            let first = root(&mut parent, same[0].1 / 4);
             for (_, f) in &same[1..] {
-                let other = root(&mut parent, f / 4);
-                let (low, high) = (first.min(other), first.max(other));
-                parent[high as usize] = low;
+                unite(&mut root, same[0].1 / 4, f / 4);
             }
         }
         let mut number = vec![u32::MAX; self.tets.len()];
         let mut count = 0;
         let piece = (0..self.tets.len() as u32)
             .map(|i| {
-                let r = root(&mut parent, i) as usize;
+                let r = find(&mut root, i) as usize;
                 if number[r] == u32::MAX {
                     number[r] = count;
                     count += 1;

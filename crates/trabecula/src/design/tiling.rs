@@ -127,8 +127,8 @@ pub(super) fn domain<'a>(
         );
         return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
     }
-    let made = match soup {
-        Some(made) => made,
+    let (made, filled) = match soup {
+        Some(made) => (made, Some(space.clone())),
         None => {
             let (mut points, _) = sample::inside(space, LOOKS);
             points.extend(sample::nodes(space));
@@ -139,12 +139,15 @@ pub(super) fn domain<'a>(
                 filled: &[],
                 loader,
             };
-            tets::tets(spec_of_mesh, &d.region, &place)?
+            (tets::tets(spec_of_mesh, &d.region, &place)?, None)
         }
     };
     warnings.extend(made.warnings);
     let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
-    let region = enclosed(map.boundary(), &path)?;
+    let region = match filled {
+        Some(region) => region,
+        None => enclosed(map.boundary(), &path)?,
+    };
     Ok(Some(Domain {
         name,
         spec,

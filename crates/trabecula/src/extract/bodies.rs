@@ -6,6 +6,7 @@
 //! solid bound the same piece of it, so they join a cavity to what it lies in, without a look inside.
 
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
+use crate::union::{find, unite};
 
 use super::grid::TILE;
 use super::signs::{bits, within};
@@ -122,27 +123,6 @@ impl Bodies {
             sums,
         }
     }
-}
-
-/// The root of `v`, halving the path on the way.
-#[inline]
-pub(super) fn find(root: &mut [u32], mut v: u32) -> u32 {
-    loop {
-        let up = root[v as usize];
-        if up == v {
-            return v;
-        }
-        let next = root[up as usize];
-        root[v as usize] = next;
-        v = next;
-    }
-}
-
-/// Joins two classes under their lower root.
-#[inline]
-pub(super) fn unite(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    root[a.max(b) as usize] = a.min(b);
 }
 
 /// Joins the corners of a triangle; a corner that none has named yet goes straight to the others' root.

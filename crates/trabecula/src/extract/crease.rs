@@ -24,8 +24,8 @@ use crate::face::Creases;
 use crate::field::Field;
 use crate::math::{Vec3, add, dot, norm, scale, sub};
 
+use super::by::By;
 use super::grid::{Grid, Local, TILE};
-use super::islands::By;
 use super::key::Key;
 use super::knot::middle;
 use super::signs::{Signs, bits};

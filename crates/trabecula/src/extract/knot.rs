@@ -22,9 +22,9 @@ use std::ops::Range;
 use crate::math::{Vec3, add, scale};
 use crate::mesh::{Mesh, is_embedded};
 
+use super::by::By;
 use super::crease::{Edges, Fits};
 use super::grid::{Grid, Local};
-use super::islands::By;
 use super::key::Key;
 use super::signs::Signs;
 use super::table::{CASES, EDGES};

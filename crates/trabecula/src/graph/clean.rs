@@ -2,8 +2,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::wire::{Stars, Wire, find};
+use super::wire::{Stars, Wire};
 use crate::math::{Vec3, norm, sub};
+use crate::union::{find, unite};
 
 /// What a clean-up did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,8 +108,7 @@ impl Wire {
                         let near = cubes.get(&key([x, y, z])).into_iter().flatten();
                         for other in near {
                             if norm(sub(self.nodes[*other as usize], *p)) <= within {
-                                let (a, b) = (find(&mut root, n as u32), find(&mut root, *other));
-                                root[a.max(b) as usize] = a.min(b);
+                                unite(&mut root, n as u32, *other);
                             }
                         }
                     }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use crate::math::{Vec3, dot, norm, sub, unit};
+use crate::union::unite;
 
 /// Nodes, and struts between them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -161,23 +162,10 @@ impl Wire {
         let ends: BTreeSet<u32> = self.struts.iter().flatten().copied().collect();
         let mut pieces = ends.len();
         for [a, b] in &self.struts {
-            let (a, b) = (find(&mut root, *a), find(&mut root, *b));
-            if a != b {
-                root[a.max(b) as usize] = a.min(b);
-                pieces -= 1;
-            }
+            pieces -= usize::from(unite(&mut root, *a, *b));
         }
         pieces
     }
-}
-
-/// The root of a tree of numbers, its path shortened.
-pub(super) fn find(root: &mut [u32], mut n: u32) -> u32 {
-    while root[n as usize] != n {
-        root[n as usize] = root[root[n as usize] as usize];
-        n = root[n as usize];
-    }
-    n
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::depth::depths;
 use crate::blend::Blend;
 use crate::field::Field;
 use crate::math::Vec3;
@@ -82,7 +83,10 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
         core::array::from_fn(|a| b.min[a] + (n[a] as f64 + 0.5) * size[a] / shape[a] as f64)
     };
     let points = look(solid, blend, shape, &at);
-    let depth = depths(&points, step);
+    // The region's surface is a cut and no surface of the lattice: what lies outside is as good as solid.
+    let open = |p: &Option<Point>| p.is_some_and(|p| !p.solid);
+    let open: Vec<bool> = points.of.iter().map(open).collect();
+    let depth = depths(&open, shape, step);
     let mut pairs: Vec<[u8; 2]> = Vec::new();
     for p in points.of.iter().flatten().filter(|p| p.share > 0.0) {
         let pair = [p.first.min(p.second), p.first.max(p.second)];
@@ -142,65 +146,6 @@ fn look(
         shape,
         of: rows.into_iter().flatten().collect(),
     }
-}
-
-/// How deep each solid point lies below the lattice's surface, mm: half a step less than the way to the nearest open
-/// point. Squares of distances along one axis after the other, each the lower envelope of parabolas (Felzenszwalb and
-/// Huttenlocher, Theory of Computing 8, 2012).
-fn depths(points: &Points, step: f64) -> Vec<f32> {
-    let [nx, ny, nz] = points.shape;
-    // The region's surface is a cut and no surface of the lattice: what lies outside is as good as solid.
-    let far = 1e12f32;
-    let open = |p: &Option<Point>| p.is_some_and(|p| !p.solid);
-    let mut d: Vec<f32> = points
-        .of
-        .iter()
-        .map(|p| if open(p) { 0.0 } else { far })
-        .collect();
-    let lines = |d: &mut Vec<f32>,
-                 count: usize,
-                 length: usize,
-                 stride: usize,
-                 start: &dyn Fn(usize) -> usize| {
-        let (mut f, mut v, mut z) = (
-            vec![0f32; length],
-            vec![0usize; length],
-            vec![0f32; length + 1],
-        );
-        for line in 0..count {
-            let from = start(line);
-            (0..length).for_each(|i| f[i] = d[from + i * stride]);
-            let mut k = 0;
-            (v[0], z[0], z[1]) = (0, f32::NEG_INFINITY, f32::INFINITY);
-            let meet = |p: usize, q: usize, f: &[f32]| {
-                let (a, b) = (p as f32, q as f32);
-                ((f[q] + b * b) - (f[p] + a * a)) / (2.0 * (b - a))
-            };
-            for q in 1..length {
-                let mut s = meet(v[k], q, &f);
-                while s <= z[k] {
-                    k -= 1;
-                    s = meet(v[k], q, &f);
-                }
-                k += 1;
-                (v[k], z[k], z[k + 1]) = (q, s, f32::INFINITY);
-            }
-            let mut k = 0;
-            for q in 0..length {
-                while z[k + 1] < q as f32 {
-                    k += 1;
-                }
-                let way = q as f32 - v[k] as f32;
-                d[from + q * stride] = way * way + f[v[k]];
-            }
-        }
-    };
-    lines(&mut d, ny * nz, nx, 1, &|l| l * nx);
-    lines(&mut d, nx * nz, ny, nx, &|l| l / nx * nx * ny + l % nx);
-    lines(&mut d, nx * ny, nz, nx * ny, &|l| l);
-    d.into_iter()
-        .map(|d| ((d.sqrt() - 0.5).max(0.0) as f64 * step) as f32)
-        .collect()
 }
 
 /// The fractions asked for and found about each point: means over a window that is a raised cosine along each axis and ends

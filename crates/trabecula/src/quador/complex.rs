@@ -5,6 +5,7 @@
 
 use crate::fault::Fault;
 use crate::math::{Vec3, add, cross, norm, scale, sub, unit};
+use crate::union::{find, unite};
 
 use super::bezier::{Bezier, curves};
 use super::hub::{Affine, Hub};
@@ -143,12 +144,6 @@ impl Complex {
     /// The same with arcs shorter than `least` made one place.
     fn merged(self, least: f64) -> Complex {
         let mut to: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        fn root(to: &[u32], mut v: u32) -> u32 {
-            while to[v as usize] != v {
-                v = to[v as usize];
-            }
-            v
-        }
         let mut gone = vec![false; self.arcs.len()];
         for (i, a) in self.arcs.iter().enumerate() {
             let [p, q] = a.ends;
@@ -158,8 +153,7 @@ impl Complex {
                 && chord(a.conic.at(a.conic.end / 2.0)) < least
             {
                 gone[i] = true;
-                let (p, q) = (root(&to, p), root(&to, q));
-                to[p.max(q) as usize] = p.min(q);
+                unite(&mut to, p, q);
             }
         }
         if !gone.contains(&true) {
@@ -179,7 +173,7 @@ impl Complex {
             if !gone[i] {
                 arc_name[i] = arcs.len() as u32;
                 arcs.push(Arc {
-                    ends: a.ends.map(|v| name[root(&to, v) as usize]),
+                    ends: a.ends.map(|v| name[find(&mut to, v) as usize]),
                     ..*a
                 });
             }

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use crate::fault::Fault;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
+use crate::union::unite;
 
 use super::Quadors;
 use super::classes::Classes;
@@ -83,20 +84,8 @@ impl Quadors {
     /// How many there are of what beams join.
     fn pieces(&self) -> usize {
         let mut to: Vec<u32> = (0..self.len() as u32).collect();
-        fn root(to: &mut [u32], mut v: u32) -> u32 {
-            while to[v as usize] != v {
-                to[v as usize] = to[to[v as usize] as usize];
-                v = to[v as usize];
-            }
-            v
-        }
-        let mut left = to.len();
-        for ends in &self.ends {
-            let [a, b] = ends.map(|e| root(&mut to, e));
-            left -= usize::from(a != b);
-            to[a.max(b) as usize] = a.min(b);
-        }
-        left
+        let joined = self.ends.iter().filter(|[a, b]| unite(&mut to, *a, *b));
+        self.len() - joined.count()
     }
 }
 

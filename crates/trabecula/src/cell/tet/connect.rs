@@ -6,6 +6,7 @@
 
 use super::nodes::{Grid, Nodes};
 use super::{Count, Part, Stencil};
+use crate::union::unite;
 
 /// Steps along the edge of the tetrahedron.
 const STEPS: usize = 48;
@@ -47,13 +48,6 @@ impl Sweep {
         births.sort_unstable_by(f64::total_cmp);
         self.links.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        fn find(root: &mut [u32], mut i: u32) -> u32 {
-            while root[i as usize] != i {
-                root[i as usize] = root[root[i as usize] as usize];
-                i = root[i as usize];
-            }
-            i
-        }
         let mut out: Vec<(f64, usize)> = Vec::new();
         let (mut born, mut joined, mut links) = (0, 0, self.links.iter().peekable());
         loop {
@@ -67,11 +61,7 @@ impl Sweep {
                 born += 1;
             }
             while let Some((_, a, b)) = links.next_if(|l| l.0 <= next + slack) {
-                let (a, b) = (find(&mut root, *a), find(&mut root, *b));
-                if a != b {
-                    root[a.max(b) as usize] = a.min(b);
-                    joined += 1;
-                }
+                joined += usize::from(unite(&mut root, *a, *b));
             }
             if out.last().is_none_or(|o| o.1 != born - joined) {
                 out.push((next, born - joined));

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use super::rim::Step;
 use super::side::{Part, Side};
-use crate::extract::islands::By;
+use crate::extract::by::By;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
 use crate::field::Field;

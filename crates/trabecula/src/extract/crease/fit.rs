@@ -13,8 +13,8 @@ use std::rc::Rc;
 
 use super::side::{Corner, Side};
 use super::{Edges, Others, Seen};
+use crate::extract::by::By;
 use crate::extract::grid::Local;
-use crate::extract::islands::By;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::extract::signs::Signs;

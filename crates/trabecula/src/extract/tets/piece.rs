@@ -10,11 +10,11 @@
 //! *Fitting.* A corner depends on values and slopes at the ends of its edge alone, and these are the same in all bits
 //! whichever tetrahedron looks at them.
 
-use super::super::bodies::{find, unite};
 use super::root::first_root;
 use super::template::{FACES, PAIRS, Template, Tile, pair};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
+use crate::union::{find, unite};
 
 /// How near a node a corner of the surface may come, in steps: what rounding must not reach.
 pub(super) const MARGIN: f64 = 0.01;

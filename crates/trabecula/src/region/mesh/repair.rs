@@ -145,8 +145,8 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     check::numbers(&mesh)?;
     let given = mesh.triangles.len();
     let mut edges = check::edges(&mesh);
-    if edges.as_ref().is_err_and(|found| found.contains("open")) {
-        mesh = mesh.joined(mesh.single_rounding());
+    if edges.is_err() {
+        mesh = mesh.joined_where_open();
         edges = check::edges(&mesh);
     }
     let found = match edges {
