@@ -53,7 +53,7 @@ use read::RegionIn;
 
 pub use blend::Blended;
 pub use data::*;
-pub use error::{DesignError, nearest};
+pub use error::DesignError;
 pub use joins::Joins;
 pub use node::{Lines, Node, Value};
 pub use schema::schema;

@@ -53,6 +53,43 @@ pub fn counted(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
+/// The allowed word nearest to `word`, if it is near enough to be meant: at most a third of its letters differ
+/// (two in short words), letter case not counted.
+pub fn nearest<'a>(word: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let word = word.to_lowercase().replace(['-', ' '], "_");
+    let limit = (word.chars().count() / 3).max(2);
+    allowed
+        .into_iter()
+        .map(|a| (distance(&word, a), a))
+        .filter(|&(d, a)| d <= limit && d < a.chars().count().max(2))
+        .min_by_key(|&(d, _)| d)
+        .map(|(_, a)| a)
+}
+
+/// Letters to insert, delete, replace or swap with a neighbour to turn `a` into `b`.
+fn distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut d = vec![vec![0; b.len() + 1]; a.len() + 1];
+    for (i, row) in d.iter_mut().enumerate() {
+        row[0] = i;
+    }
+    for j in 0..=b.len() {
+        d[0][j] = j;
+    }
+    for i in 1..=a.len() {
+        for j in 1..=b.len() {
+            let change = usize::from(a[i - 1] != b[j - 1]);
+            d[i][j] = (d[i - 1][j] + 1)
+                .min(d[i][j - 1] + 1)
+                .min(d[i - 1][j - 1] + change);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                d[i][j] = d[i][j].min(d[i - 2][j - 2] + 1);
+            }
+        }
+    }
+    d[a.len()][b.len()]
+}
+
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         if self.at.is_empty() {
@@ -89,5 +126,24 @@ mod tests {
             (counted(1, "value"), counted(0, "value")),
             ("1 value".into(), "0 values".into())
         );
+    }
+
+    #[test]
+    fn nearest_finds_slips_and_leaves_strangers_alone() {
+        let keys = ["wavelength", "rotate", "offset", "skew"];
+        for (slip, want) in [
+            ("wavelenght", Some("wavelength")),
+            ("wave_length", Some("wavelength")),
+            ("Rotate", Some("rotate")),
+            ("rotatoin", None),
+            ("rotates", Some("rotate")),
+            ("ofset", Some("offset")),
+            ("colour", None),
+            ("x", None),
+        ] {
+            assert_eq!(nearest(slip, keys), want, "{slip}");
+        }
+        assert_eq!(distance("abcd", "acbd"), 1);
+        assert_eq!(distance("", "abc"), 3);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::DesignError;
-use crate::fault::{counted, number};
+use crate::fault::{counted, nearest, number};
 
 /// A value with the line it stands on.
 #[derive(Clone, Debug, PartialEq)]
@@ -294,9 +294,9 @@ impl<'a> At<'a> {
         if let Some(hit) = words.iter().find(|w| w.0 == word) {
             return Ok(hit.1);
         }
-        let near = super::nearest(word, meant.iter().map(|m| m.0));
+        let near = nearest(word, meant.iter().map(|m| m.0));
         let near = near.and_then(|n| meant.iter().find(|m| m.0 == n));
-        Err(match (near, super::nearest(word, names.iter().copied())) {
+        Err(match (near, nearest(word, names.iter().copied())) {
             (Some((_, right)), None) => DesignError {
                 line: self.line.or(self.node.line),
                 ..DesignError::unknown_but(&self.path, what, word, &names, Some(*right))

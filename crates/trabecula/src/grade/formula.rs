@@ -1,25 +1,15 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
-//!
-//! ```text
-//! sum     = product { ("+" | "-") product }
-//! product = signed { ("*" | "/") signed }
-//! signed  = ("-" | "+") signed | power
-//! power   = atom [ "^" signed ]                       (so −x² is −(x²), and 2^3^2 is 2^9)
-//! atom    = number | x | y | z | pi | e | name "(" sum { "," sum } ")" | "(" sum ")"
-//! ```
 
 use crate::fault::Fault;
 use crate::math::{Aabb, Interval, Vec3};
 
 mod operation;
-use operation::{FUNCTIONS, Operation};
+mod parse;
+use operation::Operation;
+use parse::parse;
 
-/// The longest formula, in bytes.
-const LONGEST: usize = 4096;
 /// Points that an instruction is done for at once.
 const LANES: usize = 16;
-/// The deepest nesting of brackets, signs and powers.
-const DEEPEST: usize = 64;
 
 /// A parsed formula in x, y, z (mm). Angles of its functions are in radians.
 ///
@@ -94,26 +84,9 @@ impl Formula {
     /// **Errors** name the column, what was found there and what may stand there; an unknown word gets the nearest
     /// known one.
     pub fn parse(text: &str) -> Result<Formula, Fault> {
-        if text.len() > LONGEST {
-            let n = text.len();
-            return Err(Fault::new(
-                "",
-                format!("the formula has {n} characters; at most {LONGEST} are read"),
-            ));
-        }
-        let mut p = Parser {
-            text,
-            at: 0,
-            depth: 0,
-            program: Vec::new(),
-        };
-        p.sum()?;
-        match p.peek() {
-            None => Ok(Formula { program: p.program }),
-            Some('*') => Err(p.fault("write a power as ^, not **")),
-            Some(')') => Err(p.fault("this bracket was never opened")),
-            Some(_) => Err(p.fault("expected an operator (+ - * / ^) or the end")),
-        }
+        Ok(Formula {
+            program: parse(text)?,
+        })
     }
 
     /// Fills `out[i]` with the value at `points[i]` (mm).
@@ -245,242 +218,6 @@ fn apply_lanes<T: Quantity>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c
     lanes!(Negate Add Subtract Multiply Divide Sqrt Abs Min Max Clamp Smoothstep)
 }
 
-struct Parser<'a> {
-    text: &'a str,
-    at: usize,
-    depth: usize,
-    program: Vec<Instruction>,
-}
-
-impl<'a> Parser<'a> {
-    fn sum(&mut self) -> Result<(), Fault> {
-        self.product()?;
-        while let Some(sign @ ('+' | '-')) = self.peek() {
-            self.at += 1;
-            self.product()?;
-            self.apply(if sign == '+' {
-                Operation::Add
-            } else {
-                Operation::Subtract
-            });
-        }
-        Ok(())
-    }
-
-    fn product(&mut self) -> Result<(), Fault> {
-        self.signed()?;
-        while let Some(sign @ ('*' | '/')) = self.peek() {
-            if self.text[self.at..].starts_with("**") {
-                break;
-            }
-            self.at += 1;
-            self.signed()?;
-            self.apply(if sign == '*' {
-                Operation::Multiply
-            } else {
-                Operation::Divide
-            });
-        }
-        Ok(())
-    }
-
-    /// The only rule by which nesting grows; it keeps the recursion, and so the call stack, bounded.
-    fn signed(&mut self) -> Result<(), Fault> {
-        if self.depth == DEEPEST {
-            return Err(self.fault(&format!("nested more than {DEEPEST} deep")));
-        }
-        self.depth += 1;
-        match self.peek() {
-            Some('-') => {
-                self.at += 1;
-                self.signed()?;
-                self.apply(Operation::Negate);
-            }
-            Some('+') => {
-                self.at += 1;
-                self.signed()?;
-            }
-            _ => {
-                self.atom()?;
-                if self.peek() == Some('^') {
-                    self.at += 1;
-                    self.signed()?;
-                    self.apply(Operation::Power);
-                }
-            }
-        }
-        self.depth -= 1;
-        Ok(())
-    }
-
-    fn atom(&mut self) -> Result<(), Fault> {
-        match self.peek() {
-            Some('(') => {
-                self.at += 1;
-                self.sum()?;
-                self.expect(')')
-            }
-            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
-            Some(c) if c.is_alphabetic() || c == '_' => self.word(),
-            _ => Err(self.fault("expected a number, x, y, z, pi, e, a function or a bracket")),
-        }
-    }
-
-    fn number(&mut self) -> Result<(), Fault> {
-        let bytes = self.text.as_bytes();
-        let digits = |mut i: usize| {
-            while bytes.get(i).is_some_and(u8::is_ascii_digit) {
-                i += 1;
-            }
-            i
-        };
-        let mut end = digits(self.at);
-        if bytes.get(end) == Some(&b'.') {
-            end = digits(end + 1);
-        }
-        if let Some(b'e' | b'E') = bytes.get(end) {
-            let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
-            let last = digits(end + 1 + sign);
-            if last > end + 1 + sign {
-                end = last;
-            }
-        }
-        match self.text[self.at..end].parse::<f64>() {
-            Ok(v) if v.is_finite() => {
-                self.program.push(Instruction::Number(v));
-                self.at = end;
-                Ok(())
-            }
-            _ => Err(self.fault("expected a finite number")),
-        }
-    }
-
-    fn word(&mut self) -> Result<(), Fault> {
-        let rest = &self.text[self.at..];
-        let end = rest
-            .find(|c: char| !c.is_alphanumeric() && c != '_')
-            .unwrap_or(rest.len());
-        let word = &rest[..end];
-        let instruction = match word {
-            "x" => Instruction::Variable(0),
-            "y" => Instruction::Variable(1),
-            "z" => Instruction::Variable(2),
-            "pi" => Instruction::Number(core::f64::consts::PI),
-            "e" => Instruction::Number(core::f64::consts::E),
-            _ => return self.call(word),
-        };
-        self.program.push(instruction);
-        self.at += end;
-        if self.peek() == Some('(') {
-            return Err(self.fault(&format!("{word} is not a function; write * to multiply")));
-        }
-        Ok(())
-    }
-
-    fn call(&mut self, word: &str) -> Result<(), Fault> {
-        let Some(&(_, op)) = FUNCTIONS.iter().find(|f| f.0 == word) else {
-            let names = ["x", "y", "z", "pi", "e"]
-                .into_iter()
-                .chain(FUNCTIONS.iter().map(|f| f.0));
-            let nearest = names
-                .clone()
-                .min_by_key(|n| distance(word, n))
-                .unwrap_or("x");
-            let list = names.collect::<Vec<_>>().join(", ");
-            return Err(self.fault(&format!(
-                "nearest known word: {nearest}. Known words: {list}"
-            )));
-        };
-        self.at += word.len();
-        if self.peek() != Some('(') {
-            return Err(self.fault(&format!(
-                "{word} takes its argument in brackets: expected ("
-            )));
-        }
-        self.at += 1;
-        self.sum()?;
-        for k in 1..op.arity() {
-            if self.peek() != Some(',') {
-                return Err(self.fault(&format!(
-                    "{word} takes {} arguments, not {k}: expected a comma",
-                    op.arity()
-                )));
-            }
-            self.at += 1;
-            self.sum()?;
-        }
-        if self.peek() == Some(',') {
-            return Err(self.fault(&format!("{word} takes no more than {}", plural(op.arity()))));
-        }
-        self.expect(')')?;
-        self.apply(op);
-        Ok(())
-    }
-
-    fn apply(&mut self, op: Operation) {
-        self.program.push(Instruction::Apply(op));
-    }
-
-    fn expect(&mut self, c: char) -> Result<(), Fault> {
-        if self.peek() == Some(c) {
-            self.at += 1;
-            return Ok(());
-        }
-        Err(self.fault(&format!("expected an operator or {c}")))
-    }
-
-    /// The next character that is not white space.
-    fn peek(&mut self) -> Option<char> {
-        let rest = &self.text[self.at..];
-        let c = rest.chars().find(|c| !c.is_whitespace());
-        self.at += rest.len() - rest.trim_start().len();
-        c
-    }
-
-    /// A fault at the next character: column, what stands there, what to do.
-    fn fault(&mut self, message: &str) -> Fault {
-        let next = self.peek();
-        let column = self.text[..self.at].chars().count() + 1;
-        let rest = &self.text[self.at..];
-        let found = match next {
-            None => "the formula ends".to_string(),
-            Some(c) if c.is_alphabetic() || c == '_' => {
-                let word = rest
-                    .chars()
-                    .take_while(|c| c.is_alphanumeric() || *c == '_')
-                    .take(32);
-                format!("found '{}'", word.collect::<String>())
-            }
-            Some(c) => format!("found '{}'", c.escape_debug()),
-        };
-        Fault::new("", format!("column {column}: {found}; {message}"))
-    }
-}
-
-fn plural(n: usize) -> String {
-    if n == 1 {
-        "one argument".into()
-    } else {
-        format!("{n} arguments")
-    }
-}
-
-/// The number of single-letter changes between two words (Levenshtein), letter case aside.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, c) in a.chars().flat_map(char::to_lowercase).enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for j in 0..b.len() {
-            let change = diagonal + usize::from(b[j] != c);
-            diagonal = row[j + 1];
-            row[j + 1] = change.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -602,12 +339,9 @@ mod tests {
             ("1 +", "column 4: the formula ends"),
             (
                 "sinn(x)",
-                "column 1: found 'sinn'; nearest known word: sin. Known words: x, y, z, pi",
+                "column 1: found 'sinn'; did you mean sin? Known words: x, y, z, pi",
             ),
-            (
-                "0.3 + COS(x)",
-                "column 7: found 'COS'; nearest known word: cos",
-            ),
+            ("0.3 + COS(x)", "column 7: found 'COS'; did you mean cos?"),
             ("2 x", "column 3: found 'x'; expected an operator"),
             ("x(2)", "column 2: found '('; x is not a function"),
             (
@@ -622,7 +356,7 @@ mod tests {
             ),
             (
                 "sin(x, y)",
-                "column 6: found ','; sin takes no more than one argument",
+                "column 6: found ','; sin takes no more than 1 argument",
             ),
             (
                 "sin x",

@@ -1,0 +1,215 @@
+//! What is to be said of beams: warnings and figures.
+
+use serde_json::{Value as Json, json};
+
+use super::whole;
+use crate::design::data::*;
+use crate::design::place::Place;
+use crate::design::{Built, Warning, pattern};
+use crate::fault::{counted, number};
+use crate::graph::Cleaned;
+use crate::math::Vec3;
+use crate::pattern::Laid;
+use crate::truss::{Beams, Truss};
+
+/// An angle between beams (degrees) below which it is warned of.
+const NARROW: f64 = 15.0;
+
+pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
+    let told: Vec<String> = [
+        (c.merged, "node", "merged into another at the same place"),
+        (c.short, "strut", "of no length left out"),
+        (
+            c.duplicates,
+            "strut",
+            "left out because another joins the same nodes",
+        ),
+        (c.isolated, "node", "left out because no strut ends there"),
+    ]
+    .into_iter()
+    .filter(|t| t.0 > 0)
+    .map(|(n, what, done)| format!("{} {done}", counted(n, what)))
+    .collect();
+    if !told.is_empty() {
+        warnings.push(Warning {
+            path: path.into(),
+            message: told.join(", "),
+        });
+    }
+}
+
+pub(super) fn warn(
+    truss: &Truss,
+    fillets: &[(usize, f64)],
+    spec: &BeamsSpec,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) {
+    let mut say = |message: String| {
+        warnings.push(Warning {
+            path: place.path.clone(),
+            message,
+        });
+    };
+    let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
+    if truss.dangling > 0 && truss.cleaned.dangling == 0 {
+        say(format!(
+            "{} inside the region with a single beam; dangling = \"drop\" leaves such beams out",
+            counted(truss.dangling, "node")
+        ));
+    }
+    let inside = |hub: usize| place.region.value(truss.quadors.center(hub)) <= 0.0;
+    let short: Vec<(usize, f64)> = match spec.fillet {
+        FilletSpec::Radius(r) => {
+            let less = |f: &&(usize, f64)| f.1 < r * (1.0 - 1e-9);
+            fillets.iter().filter(less).copied().collect()
+        }
+        _ => (truss.quadors.shortfalls().iter())
+            .filter(|s| inside(s.hub))
+            .map(|s| (s.hub, s.radius))
+            .collect(),
+    };
+    if let Some((hub, radius)) = short.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+        let asked = match spec.fillet {
+            FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
+            _ => "the fillet asked for".into(),
+        };
+        say(format!(
+            "{} cannot have {asked}, only the largest that fits; the tightest has {radius:.3} mm, at {}",
+            counted(short.len(), "hub"),
+            at(truss.quadors.center(*hub))
+        ));
+    }
+    let over: Vec<_> = (truss.quadors.overlaps().iter())
+        .filter(|o| inside(o.hub))
+        .collect();
+    if let (false, Some(o)) = (spec.fillet == FilletSpec::None, over.first()) {
+        say(format!(
+            "{} of beams still overlap halfway along, the first at {}: no fillet is made between them; make them thinner",
+            counted(over.len(), "pair"),
+            at(truss.quadors.center(o.hub))
+        ));
+    }
+    if let Some(c) = truss.collisions.first() {
+        say(format!(
+            "{} of beams run into each other without a common node, the first at {}: they are joined there, but not filleted, and \
+             exact figures of the whole are not told; make them thinner, or put nodes there",
+            counted(truss.collisions.len(), "pair"),
+            at(c.at)
+        ));
+    }
+    if let Some((n, p)) = truss.graph.swallowed() {
+        say(format!(
+            "{} lie within another one of the same hub, the first about {}",
+            counted(n, "beam"),
+            at(p)
+        ));
+    } else if let Some((angle, p)) = truss.facts.angle.filter(|a| a.0 < NARROW) {
+        say(format!(
+            "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
+            at(p)
+        ));
+    }
+}
+
+/// Whether a design is one graph of beams and nothing else.
+pub(in crate::design) fn lone(built: &Built) -> bool {
+    built.beams.len() == 1
+        && built.lattices.is_empty()
+        && built.tilings.is_empty()
+        && built.solid.filled.is_empty()
+}
+
+/// Most beams of a pattern that are looked at one by one.
+const FEW: f64 = 2e4;
+
+/// Whether all beams lie in the region: of a large pattern, by the box that holds it.
+pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
+    match beams {
+        Beams::Truss(truss) => truss.whole,
+        Beams::Pattern(laid) => inside(laid, built),
+    }
+}
+
+/// The same of a pattern.
+pub(in crate::design) fn inside(laid: &Laid, built: &Built) -> bool {
+    let region = &*built.solid.region;
+    let each = || laid.written().is_ok_and(|written| whole(&written, region));
+    region.bound(&laid.bounds()).hi <= 0.0 || laid.pattern().counts().1 <= FEW && each()
+}
+
+/// The solid share of the region, and whether it is exact: where beams of that volume are all there is, and the region's volume is known.
+pub(in crate::design) fn share(
+    volume: Option<f64>,
+    whole: bool,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> (f64, bool) {
+    match (volume, built.solid.region.volume()) {
+        (Some(solid), Some(region)) if whole && lone(built) => (solid / region, true),
+        _ => (**sampled, false),
+    }
+}
+
+/// The figures of beams; `sampled` is the solid share of the region, by looks at points.
+pub(in crate::design) fn report(
+    beams: &Beams,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> Json {
+    let truss = match beams {
+        Beams::Truss(truss) => truss,
+        Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
+    };
+    let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
+    let [least, most] = (graph.hubs.iter().map(|h| h.radius))
+        .fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+            [a.min(v), b.max(v)]
+        });
+    let valence: serde_json::Map<String, Json> = (facts.valence.iter())
+        .map(|(v, n)| (v.to_string(), json!(n)))
+        .collect();
+    let thin = (0..graph.beams.len())
+        .map(|b| quadors.pencil(b).waist())
+        .fold(f64::INFINITY, f64::min);
+    // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
+    let sum = truss.whole && truss.collisions.is_empty();
+    let mass = sum.then(|| quadors.mass().ok()).flatten();
+    let (fraction, exact) = share(mass.map(|m| m.volume), truss.whole, built, sampled);
+    json!({
+        "cell": truss.cell,
+        "wavelength": truss.wavelength,
+        "hubs": facts.valence.values().sum::<usize>(),
+        "beams": facts.struts,
+        "fraction": fraction,
+        "fraction_exact": exact,
+        "porosity": 1.0 - fraction,
+        "thickness": 2.0 * thin,
+        "hub_radius": [least, most],
+        "length": facts.length,
+        "total_length": facts.total,
+        "volume": mass.map(|m| m.volume),
+        "area": mass.map(|m| m.area),
+        "centroid": mass.map(|m| m.centroid()),
+        "inertia": mass.map(|m| m.inertia()),
+        "valence": valence,
+        "fillet_radius": truss.fillet,
+        "smallest_angle": facts.angle.map(|a| a.0),
+        "smallest_angle_at": facts.angle.map(|a| a.1),
+        "pieces": facts.pieces,
+        "dangling": truss.dangling,
+        "collisions": truss.collisions.len(),
+        "cleaned": {
+            "merged": truss.cleaned.merged,
+            "zero_length": truss.cleaned.short,
+            "duplicates": truss.cleaned.duplicates,
+            "isolated": truss.cleaned.isolated,
+            "dangling": truss.cleaned.dangling,
+        },
+        "trimmed": {
+            "outside": truss.trimmed.outside,
+            "dropped": truss.trimmed.dropped,
+            "snapped": truss.trimmed.snapped,
+        },
+    })
+}
