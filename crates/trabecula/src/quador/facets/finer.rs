@@ -3,7 +3,7 @@
 //! What is too far off is turned before it is halved: of the two ways across four corners one often runs along the surface where the
 //! other cuts through it, as on a beam all that runs along it. So triangles become long where the surface is straight.
 
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::math::{Vec3, add, cross, dot, norm, root, scale, sub};
 
 use super::super::complex::Face;
 use super::{Facets, Side, key, turn};
@@ -66,11 +66,12 @@ impl Facets<'_> {
         } else {
             hi = lo / 0.97;
         }
-        for _ in 0..60 {
-            let mid = (lo + hi) / 2.0;
-            if value(mid) < 0.0 { lo = mid } else { hi = mid }
-        }
-        scale(p, (lo + hi) / 2.0)
+        let along = |t: f64| {
+            let (value, slope) = hub.gradient(scale(p, t));
+            [value, dot(slope, p)]
+        };
+        let near = [0.0, 4.0 * f64::EPSILON];
+        scale(p, root([lo, hi], (lo + hi) / 2.0, true, near, along))
     }
 
     /// Turns sides, or halves them, the farthest off first, until the quarters of none and the middle of no triangle is further than
