@@ -54,14 +54,14 @@ pub fn counted(n: usize, what: &str) -> String {
 }
 
 /// The allowed word nearest to `word`, if it is near enough to be meant: at most a third of its letters differ
-/// (two in short words), letter case not counted.
+/// (two in short words, but never all of them), letter case not counted.
 pub fn nearest<'a>(word: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase().replace(['-', ' '], "_");
     let limit = (word.chars().count() / 3).max(2);
     allowed
         .into_iter()
         .map(|a| (distance(&word, a), a))
-        .filter(|&(d, a)| d <= limit && d < a.chars().count().max(2))
+        .filter(|&(d, a)| d <= limit && d < a.chars().count().max(word.chars().count()))
         .min_by_key(|&(d, _)| d)
         .map(|(_, a)| a)
 }
@@ -140,8 +140,17 @@ mod tests {
             ("ofset", Some("offset")),
             ("colour", None),
             ("x", None),
+            ("", None),
         ] {
             assert_eq!(nearest(slip, keys), want, "{slip}");
+        }
+        for (slip, want) in [
+            ("ü", None),
+            ("X", Some("x")),
+            ("xx", Some("x")),
+            ("p", Some("pi")),
+        ] {
+            assert_eq!(nearest(slip, ["x", "pi"]), want, "{slip}");
         }
         assert_eq!(distance("abcd", "acbd"), 1);
         assert_eq!(distance("", "abc"), 3);

@@ -364,7 +364,7 @@ mod tests {
             ),
             ("1e999", "column 1: found '1'; expected a finite number"),
             ("x ; y", "column 3: found ';'"),
-            ("ü + 1", "column 1: found 'ü'; nearest"),
+            ("ü + 1", "column 1: found 'ü'; known words: x, y, z, pi"),
             (".", "column 1: found '.'; expected a finite number"),
             ("__import__('os')", "column 1: found '__import__'"),
         ] {

@@ -178,9 +178,12 @@ impl<'a> Parser<'a> {
             let names = ["x", "y", "z", "pi", "e"].into_iter();
             let names = names.chain(FUNCTIONS.iter().map(|f| f.0));
             let meant = nearest(word, names.clone());
-            let meant = meant.map_or(String::new(), |n| format!("did you mean {n}? "));
+            let known = match meant {
+                Some(name) => format!("did you mean {name}? Known words"),
+                None => "known words".to_string(),
+            };
             let list = names.collect::<Vec<_>>().join(", ");
-            return Err(self.fault(&format!("{meant}Known words: {list}")));
+            return Err(self.fault(&format!("{known}: {list}")));
         };
         self.at += word.len();
         if self.peek() != Some('(') {
