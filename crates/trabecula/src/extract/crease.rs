@@ -106,6 +106,12 @@ impl Edges {
         !self.face.is_empty()
     }
 
+    /// The ends of all chords.
+    pub fn chord_ends(&self) -> impl Iterator<Item = Key> {
+        let chords = self.sides.values().flatten();
+        chords.flat_map(|c| [c.from, c.to])
+    }
+
     /// The place of a point that is none of a plain or a knotted cell.
     pub fn place(&self, key: Key) -> Option<Vec3> {
         self.points.get(&key).copied()

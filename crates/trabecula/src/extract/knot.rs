@@ -28,7 +28,7 @@ use super::grid::{Grid, Local};
 use super::key::Key;
 use super::signs::Signs;
 use super::table::{CASES, EDGES};
-use super::tile::{Nodes, Numbers};
+use super::tile::{Nodes, Numbers, numbered};
 pub(super) use simplex::{Simplex, Spot};
 
 /// What is not on plain cells' edges.
@@ -108,13 +108,7 @@ impl Knots<'_> {
 
     /// The number of a vertex that a plain cell has too.
     pub fn numbered(&self, key: Key) -> Option<u32> {
-        let steps = key.steps();
-        if !(steps.is_power_of_two() && steps < 8) {
-            return None;
-        }
-        let [i, j, k] = self.nodes.at(key.node());
-        let row = k * self.nodes.shape[1] + j;
-        self.numbers[key.faces().next()?].get(steps.trailing_zeros() as usize, row, i)
+        numbered(self.numbers, self.nodes, key)
     }
 
     pub fn push(&mut self, key: Key, place: Vec3) -> u32 {

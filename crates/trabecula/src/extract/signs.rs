@@ -173,6 +173,11 @@ impl Signs {
         self.knotted[cell[2] * self.shape[1] + cell[1]] >> cell[0] & 1 == 1
     }
 
+    /// Whether any cell of the block is knotted.
+    pub fn is_any_knotted(&self) -> bool {
+        self.knotted.iter().any(|w| *w != 0)
+    }
+
     /// The knotted cells of the block.
     pub fn knotted_cells(&self) -> impl Iterator<Item = [usize; 3]> {
         let ny = self.shape[1];

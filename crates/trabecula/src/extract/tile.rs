@@ -97,6 +97,17 @@ impl Numbers {
     }
 }
 
+/// The number of a vertex of a plain cell by its name.
+pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: Key) -> Option<u32> {
+    let steps = key.steps();
+    if !(steps.is_power_of_two() && steps < 8) {
+        return None;
+    }
+    let [i, j, k] = nodes.at(key.node());
+    let row = k * nodes.shape[1] + j;
+    numbers[key.faces().next()?].get(steps.trailing_zeros() as usize, row, i)
+}
+
 /// What plain cells make.
 #[derive(Default)]
 struct Plain {
@@ -264,6 +275,11 @@ pub(super) fn extract<'a>(
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
+    if s.edges.any() && s.signs.is_any_knotted() {
+        // Chords are laid between the points that stay.
+        let (mut knots, vertices, _) = knots(s, grid, &local, &nodes);
+        settle(&mut knots, vertices);
+    }
     edges(s, grid, &local, &nodes);
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes);
@@ -366,14 +382,15 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
     }
 }
 
-/// Adds what plain cells do not make: knots, the seams around them, and caps.
-fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
+/// What fills knotted and fitted cells; the vertices of plain ones, and the cells and faces of seams.
+fn knots<'a>(
+    s: &'a mut Scratch,
+    grid: &'a Grid,
+    local: &'a Local,
+    nodes: &'a Nodes,
+) -> (Knots<'a>, &'a [Vertex], &'a [([usize; 3], usize)]) {
     s.extra.clear();
-    let knotted = s.signs.knotted.iter().any(|w| *w != 0);
-    if !knotted && local.flat.is_empty() && !s.edges.any() {
-        return;
-    }
-    let mut knots = Knots {
+    let knots = Knots {
         nodes,
         grid,
         local,
@@ -386,15 +403,32 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Ran
         moved: HashSet::new(),
         fits: Fits::none(local.live.len()),
     };
+    (knots, &s.vertices, &s.plain.seams)
+}
+
+/// Places the vertices that plain cells share with knotted ones as these do.
+fn settle(knots: &mut Knots, vertices: &[Vertex]) {
+    for (i, v) in vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
+        let low = v.low(knots.nodes);
+        let key = Key::new(low, &[1 << v.axis], &[usize::from(v.face)]);
+        knots.places[i] = knots.place(key);
+    }
+}
+
+/// Adds what plain cells do not make: knots, the seams around them, and caps.
+fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
+    let knotted = s.signs.is_any_knotted();
+    if !knotted && local.flat.is_empty() && !s.edges.any() {
+        s.extra.clear();
+        return;
+    }
+    let (mut knots, vertices, seams) = knots(s, grid, local, nodes);
     if knotted {
         knots.all(own);
     }
-    for (i, v) in s.vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
-        let key = Key::new(v.low(nodes), &[1 << v.axis], &[usize::from(v.face)]);
-        knots.places[i] = knots.place(key);
-    }
+    settle(&mut knots, vertices);
     knots.fit_sides(own);
-    for &(cell, face) in &s.plain.seams {
+    for &(cell, face) in seams {
         knots.seam(cell, face);
     }
     for (cell, face) in crease::cells(knots.edges, nodes, own) {

@@ -206,13 +206,18 @@ impl Knots<'_> {
             if upper {
                 names.reverse();
             }
-            let flat: Vec<[f64; 2]> = names
-                .iter()
-                .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
-                .collect();
-            for t in ears(&flat, 0) {
-                self.extra.triangles.push((t.map(|i| names[i]), cut));
-            }
+            self.flat(&names, axis, cut);
+        }
+    }
+
+    /// Adds a simple polygon across an axis, not convex perhaps, by its vertices.
+    pub(super) fn flat(&mut self, names: &[u32], axis: usize, cut: bool) {
+        let flat: Vec<[f64; 2]> = names
+            .iter()
+            .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
+            .collect();
+        for t in ears(&flat, 0) {
+            self.extra.triangles.push((t.map(|i| names[i]), cut));
         }
     }
 

@@ -11,8 +11,12 @@ use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::math::{Vec3, add, scale, sub};
 
-/// A polygon of a side, counter-clockwise seen from outside, and whether it is solid.
-type Polygon = (bool, Vec<Key>);
+/// A polygon of a side, counter-clockwise seen from outside; the side's axis, and whether the polygon is solid.
+struct Polygon {
+    ring: Vec<Key>,
+    axis: usize,
+    solid: bool,
+}
 
 impl Knots<'_> {
     /// Fills a cell with walls, as long as single precision muddles them for one smaller cell after the other.
@@ -59,7 +63,8 @@ impl Knots<'_> {
                 if fitted.is_some() && !upper {
                     ring.reverse();
                 }
-                all.push((self.holds(cell, negative), ring));
+                let solid = self.holds(cell, negative);
+                all.push(Polygon { ring, axis, solid });
             }
         }
         all
@@ -81,8 +86,8 @@ impl Knots<'_> {
                 .map(|i| (ring[i], ring[(i + 1) % ring.len()]))
                 .collect()
         };
-        let of_solid = polygons.iter().filter(|p| p.0);
-        let lines: Vec<(Key, Key)> = of_solid.flat_map(|p| around(&p.1)).collect();
+        let of_solid = polygons.iter().filter(|p| p.solid);
+        let lines: Vec<(Key, Key)> = of_solid.flat_map(|p| around(&p.ring)).collect();
         let known: HashSet<(Key, Key)> = lines.iter().copied().collect();
         for (p, q) in lines
             .into_iter()
@@ -94,13 +99,13 @@ impl Knots<'_> {
             self.extra.triangles.push(([d, b, a], cut));
             self.extra.triangles.push(([d, a, c], cut));
         }
-        for (_, ring) in polygons.iter().filter(|p| p.0 != solid) {
-            let cut = self.is_cut(ring[0], ring[1]);
-            let mut names: Vec<u32> = ring.iter().map(|k| within(self, *k)).collect();
+        for p in polygons.iter().filter(|p| p.solid != solid) {
+            let cut = self.is_cut(p.ring[0], p.ring[1]);
+            let mut names: Vec<u32> = p.ring.iter().map(|k| within(self, *k)).collect();
             if !solid {
                 names.reverse();
             }
-            self.fan(&names, cut);
+            self.flat(&names, p.axis, cut);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::{Nodes, Scratch};
+use super::{Nodes, Scratch, numbered};
 use crate::extract::grid::{Grid, Local};
 use crate::math::Vec3;
 
@@ -43,6 +43,12 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
             &s.normals,
             &mut s.moments,
         );
+    }
+    // Chords over corners were laid between points where these are.
+    for key in s.edges.chord_ends() {
+        if let Some(v) = numbered(&s.numbers, nodes, key) {
+            s.moments[v as usize] = (0.0, 0.0);
+        }
     }
     let margin = grid.margin as f32;
     for ((v, place), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.places).zip(&s.moments) {

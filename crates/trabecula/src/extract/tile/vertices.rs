@@ -20,7 +20,7 @@ pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
     } = s;
     vertices.clear();
     numbers.resize_with(signs.negative.len(), Numbers::default);
-    let any_knot = signs.knotted.iter().any(|w| *w != 0);
+    let any_knot = signs.is_any_knotted();
     for (face, numbers) in numbers.iter_mut().enumerate() {
         let knots = if any_knot {
             Some(edges.knots(signs, face))
