@@ -195,6 +195,85 @@ impl Blend {
         self.value_of([f, ends[LOW], ends[HIGH]])
     }
 
+    /// Values and gradients of N lattices, or of any number if N is 0.
+    fn gradients_of<const N: usize>(
+        &self,
+        points: &[Vec3],
+        values: &mut [f64],
+        gradients: &mut [Vec3],
+    ) {
+        let n = if N > 0 { N } else { self.strands.len() };
+        let strands = &self.strands[..n];
+        let zeros = |n: usize| (vec![0.0; n], vec![[0.0; 3]; n]);
+        let (mut w, mut dw) = zeros(n * points.len());
+        self.weights.gradients(points, &mut w, &mut dw);
+        // The sum F and the upper ends.
+        let (mut f, mut df) = zeros(points.len());
+        let (mut high, mut dhigh) = zeros(n * points.len());
+        for (i, s) in strands.iter().enumerate() {
+            let (mut here, mut at) = (Vec::new(), Vec::new());
+            let all = (0..points.len()).all(|k| w[k * n + i] > 0.0);
+            if !all {
+                here.extend((0..points.len()).filter(|k| w[k * n + i] > 0.0));
+                at.extend(here.iter().map(|k| points[*k]));
+            }
+            let at = if all { points } else { &at };
+            let (mut g, mut dg) = zeros(at.len());
+            let (mut own, mut down) = zeros(at.len());
+            s.gradients(at, &mut g, &mut dg);
+            s.high_gradients(at, &mut own, &mut down);
+            for j in 0..at.len() {
+                let k = if all { j } else { here[j] };
+                let (w, dw) = (w[k * n + i], dw[k * n + i]);
+                f[k] += w * g[j];
+                df[k] = add(df[k], add(scale(dg[j], w), scale(dw, g[j])));
+                (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
+            }
+        }
+        let mut place = Place::default();
+        let mut near = self.levels.as_deref().map(|l| Near::new(l, strands));
+        let mut quantiles = vec![End::default(); n];
+        for (k, p) in points.iter().enumerate() {
+            let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
+            let (high, dhigh) = (&high[k * n..][..n], &dhigh[k * n..][..n]);
+            let alone = w.contains(&1.0);
+            let levels = self.levels.as_deref().filter(|_| !alone);
+            if let (Some(levels), Some(near)) = (levels, &mut near) {
+                levels.grid.place(w, &mut place);
+                near.enter(*p);
+            }
+            if let Some(levels) = self.varied().filter(|_| !alone) {
+                for (i, q) in quantiles.iter_mut().enumerate() {
+                    *q = match w[i] > 0.0 {
+                        true => levels.end(strands, *p, i, (high[i], dhigh[i])),
+                        false => End::default(),
+                    };
+                }
+            }
+            for (e, &end) in self.ends().iter().enumerate() {
+                let (mut level, mut slope) = (0.0, [0.0; 3]);
+                for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                    let v = s.end(end, high[i], alone);
+                    level += w[i] * v;
+                    let own = scale(dhigh[i], w[i] * s.end_slope(end));
+                    slope = add(slope, add(own, scale(dw[i], v)));
+                }
+                if let (Some(levels), Some(near)) = (levels, &mut near) {
+                    let own = (w, dw, &place);
+                    let more = levels.added_gradients(strands, near, own, &quantiles, end);
+                    (level, slope) = (level + more.0, add(slope, more.1));
+                }
+                let (v, g) = match end == HIGH {
+                    true => (f[k] - level, sub(df[k], slope)),
+                    false => (level - f[k], sub(slope, df[k])),
+                };
+                if e == 0 || v > values[k] {
+                    (values[k], gradients[k]) = (v, g);
+                }
+            }
+        }
+    }
+
     /// The value where F, LO and HI are these.
     fn value_of(&self, [f, lo, hi]: [f64; 3]) -> f64 {
         match self.side {
@@ -271,74 +350,11 @@ impl Field for Blend {
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let n = self.strands.len();
-        let zeros = |n: usize| (vec![0.0; n], vec![[0.0; 3]; n]);
-        let (mut w, mut dw) = zeros(n * points.len());
-        self.weights.gradients(points, &mut w, &mut dw);
-        // The sum F and the upper ends.
-        let (mut f, mut df) = zeros(points.len());
-        let (mut high, mut dhigh) = zeros(n * points.len());
-        for (i, s) in self.strands.iter().enumerate() {
-            let (mut here, mut at) = (Vec::new(), Vec::new());
-            let all = (0..points.len()).all(|k| w[k * n + i] > 0.0);
-            if !all {
-                here.extend((0..points.len()).filter(|k| w[k * n + i] > 0.0));
-                at.extend(here.iter().map(|k| points[*k]));
-            }
-            let at = if all { points } else { &at };
-            let (mut g, mut dg) = zeros(at.len());
-            let (mut own, mut down) = zeros(at.len());
-            s.gradients(at, &mut g, &mut dg);
-            s.high_gradients(at, &mut own, &mut down);
-            for j in 0..at.len() {
-                let k = if all { j } else { here[j] };
-                let (w, dw) = (w[k * n + i], dw[k * n + i]);
-                f[k] += w * g[j];
-                df[k] = add(df[k], add(scale(dg[j], w), scale(dw, g[j])));
-                (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
-            }
-        }
-        let mut place = Place::default();
-        let mut near = self.levels.as_deref().map(|l| Near::new(l, &self.strands));
-        let mut quantiles = vec![End::default(); n];
-        for (k, p) in points.iter().enumerate() {
-            let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
-            let (high, dhigh) = (&high[k * n..][..n], &dhigh[k * n..][..n]);
-            let alone = w.contains(&1.0);
-            let levels = self.levels.as_deref().filter(|_| !alone);
-            if let (Some(levels), Some(near)) = (levels, &mut near) {
-                levels.grid.place(w, &mut place);
-                near.enter(*p);
-            }
-            if let Some(levels) = self.varied().filter(|_| !alone) {
-                for (i, q) in quantiles.iter_mut().enumerate() {
-                    *q = match w[i] > 0.0 {
-                        true => levels.end(&self.strands, *p, i, (high[i], dhigh[i])),
-                        false => End::default(),
-                    };
-                }
-            }
-            for (n, &end) in self.ends().iter().enumerate() {
-                let (mut level, mut slope) = (0.0, [0.0; 3]);
-                for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
-                    let v = s.end(end, high[i], alone);
-                    level += w[i] * v;
-                    let own = scale(dhigh[i], w[i] * s.end_slope(end));
-                    slope = add(slope, add(own, scale(dw[i], v)));
-                }
-                if let (Some(levels), Some(near)) = (levels, &near) {
-                    let own = (w, dw, &place);
-                    let more = levels.added_gradients(&self.strands, near, own, &quantiles, end);
-                    (level, slope) = (level + more.0, add(slope, more.1));
-                }
-                let (v, g) = match end == HIGH {
-                    true => (f[k] - level, sub(df[k], slope)),
-                    false => (level - f[k], sub(slope, df[k])),
-                };
-                if n == 0 || v > values[k] {
-                    (values[k], gradients[k]) = (v, g);
-                }
-            }
+        // The same each time; of few it is told how many they are.
+        match self.strands.len() {
+            2 => self.gradients_of::<2>(points, values, gradients),
+            3 => self.gradients_of::<3>(points, values, gradients),
+            _ => self.gradients_of::<0>(points, values, gradients),
         }
     }
 

@@ -4,7 +4,7 @@
 
 use super::levels::{Levels, blended};
 use super::near::Near;
-use super::quantile::{Spot, quantile};
+use super::quantile::{Spot, add_times, quantile};
 use super::simplex::Place;
 use super::strand::Strand;
 use super::table::Table;
@@ -42,15 +42,14 @@ struct Term {
 
 /// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
 pub(super) struct Row {
-    /// For each node along x: between which neighbourhoods it lies, and the share of the second.
-    along: Vec<(usize, f64)>,
-    /// Between which neighbourhoods along y and z the row lies.
-    across: [(usize, f64); 2],
-    /// How many rows have been.
-    count: u64,
-    /// For each neighbourhood along x the row that its numbers are of: what is added to the ends at each node of the table, NaN
-    /// where nobody has asked; or, where levels vary, quantile functions.
-    of: Vec<u64>,
+    /// The first neighbourhood along x.
+    first: usize,
+    /// For each node along x: between which neighbourhoods it lies, counted from the first, and the share of the second.
+    along: Vec<([usize; 2], f64)>,
+    /// Between which neighbourhoods along y and z the row lies; none before the first row.
+    across: Option<[(usize, f64); 2]>,
+    /// For each neighbourhood along x what is added to the ends at each node of the table, NaN where nobody has asked; or,
+    /// where levels vary, quantile functions.
     ends: Vec<[f32; 2]>,
     curves: Vec<Table>,
 }
@@ -58,27 +57,25 @@ pub(super) struct Row {
 impl Row {
     /// Rows with nodes at these x.
     pub fn new(levels: &Levels, xs: &[f64]) -> Row {
+        let last = levels.joint.shape[0] - 1;
         let along = |x: &f64| {
             let (n, share, _) = levels.joint.along(0, *x);
-            (n, share)
+            ([n, (n + 1).min(last)], share)
         };
-        let (columns, uniform) = (levels.joint.shape[0], levels.is_uniform());
+        let mut along: Vec<_> = xs.iter().map(along).collect();
+        let first = along.first().map_or(0, |a| a.0[0]);
+        let columns = along.last().map_or(0, |a| a.0[1] + 1 - first);
+        along.iter_mut().for_each(|a| a.0 = a.0.map(|n| n - first));
+        let (ends, curves) = match levels.is_uniform() {
+            true => (columns * levels.grid.len(), 0),
+            false => (0, columns),
+        };
         Row {
-            along: xs.iter().map(along).collect(),
-            across: [(0, 0.0); 2],
-            count: 0,
-            of: vec![0; columns],
-            ends: vec![
-                [f32::NAN; 2];
-                if uniform {
-                    columns * levels.grid.len()
-                } else {
-                    0
-                }
-            ],
-            curves: (0..if uniform { 0 } else { columns })
-                .map(|_| levels.table())
-                .collect(),
+            first,
+            along,
+            across: None,
+            ends: vec![[f32::NAN; 2]; ends],
+            curves: (0..curves).map(|_| levels.table()).collect(),
         }
     }
 
@@ -89,9 +86,10 @@ impl Row {
             (n, share)
         });
         // Of one neighbourhood that serves all, everything is known already.
-        if self.count == 0 || across != self.across {
-            self.across = across;
-            self.count += 1;
+        if self.across != Some(across) {
+            self.across = Some(across);
+            self.ends.fill([f32::NAN; 2]);
+            self.curves.iter_mut().for_each(Table::clear);
         }
     }
 }
@@ -109,69 +107,103 @@ impl Levels {
         sum
     }
 
-    /// The same of some ends at the i-th node of a row that has been entered: of shares `w` that lie at `nodes`, so many
-    /// times at each; `q` are the lattices' quantiles.
+    /// The same at the i-th node of a row that has been entered: of shares that lie at `nodes`, so many times at each; where no
+    /// level varies.
+    #[inline(always)]
     pub fn added_in_row(
         &self,
         strands: &[Strand],
         i: usize,
-        [w, nodes, times]: [&[f64]; 3],
-        q: impl Fn(usize) -> [f64; 2],
-        ends: &[usize],
+        (nodes, times): (&[f64], &[f64]),
         row: &mut Row,
-    ) -> [f64; 2] {
-        let (first, share) = row.along[i];
-        let columns = [(first, 1.0 - share), (first + 1, share)];
-        let columns = columns.into_iter().filter(|c| c.1 > 0.0);
-        let nodes = || (nodes.iter().zip(times)).filter(|(_, times)| **times != 0.0);
-        let (mut out, across) = ([0.0; 2], row.across);
-        if self.is_uniform() {
-            for (column, near) in columns {
-                let known = &mut row.ends[column * self.grid.len()..][..self.grid.len()];
-                if row.of[column] != row.count {
-                    row.of[column] = row.count;
-                    known.fill([f32::NAN; 2]);
-                }
-                for (node, times) in nodes() {
-                    let of = &mut known[*node as usize];
-                    if of[HIGH].is_nan() {
-                        *of = [0.0; 2];
-                        self.between(strands, column, *node as usize, across, of);
+        end: usize,
+    ) -> f64 {
+        let (columns, share) = row.along[i];
+        let size = self.grid.len();
+        let [first, second] = columns.map(|c| &row.ends[c * size..][..size]);
+        let each = nodes.iter().zip(times).map(|(node, times)| {
+            let node = node.to_bits() as usize;
+            let [a, b] = [first, second].map(|of| f64::from(of[node][end]));
+            times * ((1.0 - share) * a + share * b)
+        });
+        let sum: f64 = each.sum();
+        match sum.is_nan() {
+            true => self.found_in_row(strands, i, (nodes, times), row, end),
+            false => sum,
+        }
+    }
+
+    /// The same where some of it has to be found first.
+    #[cold]
+    fn found_in_row(
+        &self,
+        strands: &[Strand],
+        i: usize,
+        (nodes, times): (&[f64], &[f64]),
+        row: &mut Row,
+        end: usize,
+    ) -> f64 {
+        let (columns, share) = row.along[i];
+        let near = [1.0 - share, share];
+        // What counts nothing need not be known; else the same sum to the last bit.
+        let each = nodes
+            .iter()
+            .zip(times)
+            .filter(|n| *n.1 != 0.0)
+            .map(|(node, times)| {
+                let node = node.to_bits() as usize;
+                let [a, b] = [0, 1].map(|c| {
+                    let known = &mut row.ends[columns[c] * self.grid.len() + node];
+                    if near[c] > 0.0 && known[end].is_nan() {
+                        *known = [0.0; 2];
+                        self.between(strands, row.first + columns[c], node, row.across, known);
                     }
-                    let times = near * times;
-                    out[LOW] += times * f64::from(of[LOW]);
-                    out[HIGH] += times * f64::from(of[HIGH]);
-                }
-            }
-            return out;
+                    if near[c] > 0.0 {
+                        f64::from(known[end])
+                    } else {
+                        0.0
+                    }
+                });
+                times * (near[0] * a + near[1] * b)
+            });
+        each.sum()
+    }
+
+    /// The same where levels vary; `w` are the shares and `q` the lattices' quantiles.
+    #[inline(always)]
+    pub fn added_by_curves(
+        &self,
+        strands: &[Strand],
+        i: usize,
+        (w, nodes, times, q): (&[f64], &[f64], &[f64], impl Fn(usize) -> [f64; 2]),
+        row: &mut Row,
+        end: usize,
+    ) -> f64 {
+        let (columns, share) = row.along[i];
+        let columns = || (columns.into_iter().zip([1.0 - share, share])).filter(|c| c.1 > 0.0);
+        let (first, across) = (row.first, row.across);
+        // A quantile function's value at a spot, between the two neighbourhoods.
+        let mut ask = |node: usize, spot: Spot| -> f64 {
+            let each = columns().map(|(column, near)| {
+                let find =
+                    |out: &mut [f32]| self.between(strands, first + column, node, across, out);
+                near * spot.ask(row.curves[column].get_or(node, find)).0
+            });
+            each.sum()
+        };
+        let mut sum = 0.0;
+        let own = Spot::of(blended(w, (0..w.len()).map(&q))[end]);
+        for (node, times) in nodes.iter().zip(times).filter(|n| *n.1 != 0.0) {
+            sum += times * ask(node.to_bits() as usize, own);
         }
-        let own = blended(w, (0..w.len()).map(&q)).map(Spot::of);
-        for (column, near) in columns {
-            let known = &mut row.curves[column];
-            if row.of[column] != row.count {
-                row.of[column] = row.count;
-                known.clear();
-            }
-            let find =
-                |node| move |out: &mut [f32]| self.between(strands, column, node, across, out);
-            for (node, times) in nodes() {
-                let v = known.get_or(*node as usize, find(*node as usize));
-                for &end in ends {
-                    out[end] += near * times * own[end].ask(v).0;
-                }
-            }
-            for (s, strand) in strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
-                let v = known.get_or(self.alone[s], find(self.alone[s]));
-                for &end in ends {
-                    let base = match end == HIGH || strand.is_sheet() {
-                        true => quantile(v, q(s)[end]).0,
-                        false => strand.low(0.0),
-                    };
-                    out[end] -= near * w[s] * base;
-                }
-            }
+        for (s, strand) in strands.iter().enumerate().filter(|(s, _)| w[*s] > 0.0) {
+            let base = match end == HIGH || strand.is_sheet() {
+                true => ask(self.alone[s], Spot::of(q(s)[end])),
+                false => strand.low(0.0),
+            };
+            sum -= w[s] * base;
         }
-        out
+        sum
     }
 
     /// Adds a node's numbers at the i-th neighbourhood along x, between those along y and z.
@@ -180,18 +212,16 @@ impl Levels {
         strands: &[Strand],
         i: usize,
         node: usize,
-        across: [(usize, f64); 2],
+        across: Option<[(usize, f64); 2]>,
         out: &mut [f32],
     ) {
         let [nx, ny, _] = self.joint.shape;
+        let Some(across) = across else { return };
         let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
         for (k, share_z) in z.into_iter().filter(|z| z.1 > 0.0) {
             for (j, share_y) in y.into_iter().filter(|y| y.1 > 0.0) {
                 let numbers = self.numbers((k * ny + j) * nx + i, strands, node);
-                let share = (share_y * share_z) as f32;
-                out.iter_mut()
-                    .zip(numbers)
-                    .for_each(|(o, v)| *o += share * v);
+                add_times(out, (share_y * share_z) as f32, numbers);
             }
         }
     }
@@ -237,15 +267,16 @@ impl Levels {
     }
 
     /// The same with its gradient (per mm); `near` is what is known about the point, `dw` are the gradients of the shares.
+    #[inline(always)]
     pub fn added_gradients(
         &self,
         strands: &[Strand],
-        near: &Near,
+        near: &mut Near,
         (w, dw, place): (&[f64], &[Vec3], &Place),
         ends: &[End],
         end: usize,
     ) -> (f64, Vec3) {
-        let sum = |node: usize, q: f64| near.ask(node, end, q);
+        let mut sum = |node: usize, q: f64| near.ask(node, end, q);
         let (q, dq) = match self.is_uniform() {
             true => (0.0, [0.0; 3]),
             false => blended_gradient(w, dw, ends, end),

@@ -47,6 +47,8 @@ pub(super) struct Joint {
     /// Middle of the first neighbourhood, distance between them, and how many along each axis.
     pub origin: Vec3,
     pub step: f64,
+    /// One over that.
+    per: f64,
     pub shape: [usize; 3],
     /// How far about its middle a neighbourhood is looked at, mm, and at how many places.
     reach: f64,
@@ -99,6 +101,7 @@ impl Joint {
             common,
             origin,
             step,
+            per: 1.0 / step,
             shape,
             reach: if slow { step } else { 2.0 * step },
             count: if slow { SLOWLY } else { NEARBY },
@@ -138,17 +141,14 @@ impl Joint {
 
     /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
     /// that (per mm).
+    #[inline]
     pub fn along(&self, a: usize, v: f64) -> (usize, f64, f64) {
         let last = (self.shape[a] - 1) as f64;
-        let s = (v - self.origin[a]) / self.step;
+        let s = (v - self.origin[a]) * self.per;
         let inside = s.clamp(0.0, last);
         let i = (inside as usize).min(self.shape[a].saturating_sub(2));
         let within = s == inside && last > 0.0;
-        (
-            i,
-            inside - i as f64,
-            if within { 1.0 / self.step } else { 0.0 },
-        )
+        (i, inside - i as f64, if within { self.per } else { 0.0 })
     }
 
     /// The box in which points have a neighbourhood among theirs, if there are several.

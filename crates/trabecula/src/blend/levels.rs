@@ -49,14 +49,6 @@ pub(super) struct Station {
     whole: OnceLock<Table>,
 }
 
-impl Station {
-    /// The numbers of a node, if shares about here need it.
-    #[inline]
-    pub fn known(&self, node: usize) -> Option<&[f32]> {
-        self.near.get(node)
-    }
-}
-
 /// The levels of a blend by fraction.
 pub(super) struct Levels {
     pub joint: Joint,

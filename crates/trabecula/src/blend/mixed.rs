@@ -4,7 +4,7 @@
 //! does not vary along x once for a row.
 
 use super::Blend;
-use super::added::{HIGH, LOW, Row};
+use super::added::{HIGH, Row};
 use super::fill::Line;
 use super::simplex::Place;
 use super::strand::Strand;
@@ -12,7 +12,7 @@ use crate::math::Vec3;
 
 /// What is found on the rows of a block where several lattices may be.
 pub(super) struct Mixed {
-    /// Shares, and where the levels are tabulated for them: the nodes of the table, and how often each counts.
+    /// Shares, and where the levels are tabulated for them: the nodes of the table, bit by bit, and how often each counts.
     shares: Numbers,
     /// For each lattice: its upper end, and the quantiles of both where levels vary.
     ends: Vec<Numbers>,
@@ -46,12 +46,29 @@ impl Mixed {
 
     /// Fills the values at some nodes of a row.
     pub fn fill(&mut self, blend: &Blend, nodes: &[usize], line: &Line, row: &mut [f32]) {
+        // The same each time; of few lattices it is told how many they are.
+        match blend.strands.len() {
+            2 => self.fill_of::<2>(blend, nodes, line, row),
+            3 => self.fill_of::<3>(blend, nodes, line, row),
+            _ => self.fill_of::<0>(blend, nodes, line, row),
+        }
+    }
+
+    /// The same for N lattices, or for any number if N is 0.
+    fn fill_of<const N: usize>(
+        &mut self,
+        blend: &Blend,
+        nodes: &[usize],
+        line: &Line,
+        row: &mut [f32],
+    ) {
         let Mixed {
             shares,
             ends,
             row: known,
         } = self;
-        let (n, strands) = (blend.strands.len(), &blend.strands);
+        let n = if N > 0 { N } else { blend.strands.len() };
+        let strands = &blend.strands[..n];
         shares.renew(line, nodes, |points, out| blend.shares_at(points, out));
         for (s, of) in ends.iter_mut().enumerate() {
             if nodes.iter().any(|i| shares.at(*i)[s] > 0.0) {
@@ -61,27 +78,31 @@ impl Mixed {
         if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
             known.enter(levels, line.at);
         }
+        let (ends, wanted) = (&ends[..n], blend.ends());
         for &i in nodes {
-            let here = shares.at(i);
-            let (w, place) = here.split_at(n);
+            let here = &shares.at(i)[..3 * n];
+            let (w, at, times) = (&here[..n], &here[n..2 * n], &here[2 * n..]);
             if let Some(s) = w.iter().position(|w| *w == 1.0) {
                 row[i] = blend.alone(s, line.core(s, i), ends[s].at(i)[0]) as f32;
                 continue;
             }
-            let (mut f, mut level) = (0.0, [0.0; 2]);
-            for (s, w) in w.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-                let high = ends[s].at(i)[0];
-                f += w * line.core(s, i);
-                level[LOW] += w * strands[s].low(high);
-                level[HIGH] += w * high;
-            }
-            if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
-                let of = [w, &place[..n], &place[n..]];
-                let q = |s: usize| [ends[s].at(i)[1], ends[s].at(i)[2]];
-                let more = levels.added_in_row(strands, i, of, q, blend.ends(), known);
-                level = [level[LOW] + more[LOW], level[HIGH] + more[HIGH]];
-            }
-            row[i] = blend.value_of([f, level[LOW], level[HIGH]]) as f32;
+            let there = || w.iter().enumerate().filter(|(_, w)| **w > 0.0);
+            let f: f64 = there().map(|(s, w)| w * line.core(s, i)).sum();
+            let value = |end: &usize| {
+                let end = *end;
+                let of = |s: usize| strands[s].end(end, ends[s].at(i)[0], false);
+                let mut level: f64 = there().map(|(s, w)| w * of(s)).sum();
+                if let (Some(levels), Some(known)) = (&blend.levels, &mut *known) {
+                    level += if levels.is_uniform() {
+                        levels.added_in_row(strands, i, (at, times), known, end)
+                    } else {
+                        let q = |s: usize| [ends[s].at(i)[1], ends[s].at(i)[2]];
+                        levels.added_by_curves(strands, i, (w, at, times, q), known, end)
+                    };
+                }
+                if end == HIGH { f - level } else { level - f }
+            };
+            row[i] = wanted.iter().map(value).fold(f64::NEG_INFINITY, f64::max) as f32;
         }
     }
 }
@@ -97,7 +118,7 @@ impl Blend {
             out[..n].copy_from_slice(w);
             if let Some(levels) = &self.levels {
                 levels.grid.place(w, &mut place);
-                let nodes = place.nodes.iter().map(|node| *node as f64);
+                let nodes = place.nodes.iter().map(|node| f64::from_bits(*node as u64));
                 let place = nodes.chain(place.shares.iter().copied());
                 out[n..].iter_mut().zip(place).for_each(|(o, v)| *o = v);
             }

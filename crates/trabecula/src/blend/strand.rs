@@ -23,6 +23,8 @@ pub(super) struct Strand {
     least: f64,
     /// Its lower end where it is alone: below all values, proven.
     floor: f64,
+    /// Some steps of a lattice's table of fractions.
+    fine: f64,
 }
 
 /// Below all values of a field of which no bound is known; its square is a number in single precision too.
@@ -38,6 +40,7 @@ impl Strand {
             of,
             least: 0.0,
             floor: 0.0,
+            fine: 0.0,
         };
         let below = |range: Interval| range.lo - BELOW * (range.hi - range.lo);
         match &made.of {
@@ -45,6 +48,8 @@ impl Strand {
                 let range = l.distance().map_or_else(|| l.cell.range(), |d| d.range());
                 made.least = below(made.turned(range));
                 made.floor = made.least;
+                let most = l.distance().map_or(f64::INFINITY, |d| d.range().abs().hi);
+                made.fine = 2e-4 * l.cell.series().amplitude().min(most);
             }
             Constituent::Field { field, .. } => {
                 // A bound of the whole part is far below all values: a sheet's second side would be gone at once.
@@ -271,12 +276,7 @@ impl Strand {
         let Some(l) = self.lattice() else {
             return [0.0; 2];
         };
-        // Some steps of the table.
-        let h = 2e-4
-            * l.cell
-                .series()
-                .amplitude()
-                .min(l.distance().map_or(f64::INFINITY, |d| d.range().abs().hi));
+        let h = self.fine;
         let t = high / self.factor;
         let slope = |t: f64| (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor;
         match l.part {

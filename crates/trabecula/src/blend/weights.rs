@@ -96,34 +96,18 @@ impl Weights {
                 }
             }
         }
+        if n == 2 {
+            let (values, gradients) = (
+                values.as_chunks_mut::<2>().0,
+                gradients.as_chunks_mut::<2>().0,
+            );
+            let both = values.iter_mut().zip(gradients);
+            return both.for_each(|(w, g)| normalise_gradients(w, g));
+        }
         let both = values
             .chunks_exact_mut(n)
             .zip(gradients.chunks_exact_mut(n));
-        for (w, g) in both {
-            // The gradient of r / Σr, twice: before and after the faint ones are left out.
-            let divide = |w: &[f64], g: &mut [Vec3], sum: f64| {
-                let whole = g.iter().fold([0.0; 3], |a, b| add(a, *b));
-                for (w, g) in w.iter().zip(g) {
-                    *g = scale(sub(*g, scale(whole, w / sum)), 1.0 / sum);
-                }
-            };
-            let sum: f64 = w.iter().sum();
-            if sum > 0.0 {
-                divide(w, g, sum);
-                for (w, g) in w.iter_mut().zip(g.iter_mut()) {
-                    *w = (*w / sum - FAINT).max(0.0);
-                    if *w == 0.0 {
-                        *g = [0.0; 3];
-                    }
-                }
-                let sum: f64 = w.iter().sum();
-                divide(w, g, sum);
-                w.iter_mut().for_each(|w| *w /= sum);
-            } else {
-                normalise(w);
-                g.fill([0.0; 3]);
-            }
-        }
+        both.for_each(|(w, g)| normalise_gradients(w, g));
     }
 
     /// Fills an interval for each share that contains its values in the box. One whose upper end is 0 is absent.
@@ -158,6 +142,35 @@ fn normalise(w: &mut [f64]) {
     w.iter_mut().for_each(|w| *w = (*w / sum - FAINT).max(0.0));
     let sum: f64 = w.iter().sum();
     w.iter_mut().for_each(|w| *w /= sum);
+}
+
+/// Makes shares of numbers, and gradients of shares of theirs.
+#[inline(always)]
+fn normalise_gradients(w: &mut [f64], g: &mut [Vec3]) {
+    // The gradient of r / Σr, twice: before and after the faint ones are left out.
+    let divide = |w: &mut [f64], g: &mut [Vec3], sum: f64| {
+        let per = 1.0 / sum;
+        let whole = g.iter().fold([0.0; 3], |a, b| add(a, *b));
+        for (w, g) in w.iter_mut().zip(g) {
+            *w /= sum;
+            *g = scale(sub(*g, scale(whole, *w)), per);
+        }
+    };
+    let sum: f64 = w.iter().sum();
+    if sum > 0.0 && sum.is_finite() {
+        divide(w, g, sum);
+        for (w, g) in w.iter_mut().zip(g.iter_mut()) {
+            *w = (*w - FAINT).max(0.0);
+            if *w == 0.0 {
+                *g = [0.0; 3];
+            }
+        }
+        let sum = w.iter().sum();
+        divide(w, g, sum);
+    } else {
+        normalise(w);
+        g.fill([0.0; 3]);
+    }
 }
 
 /// Makes intervals of shares of intervals of numbers: each against the least and the most of the others.
