@@ -8,7 +8,7 @@ import trabecula as lt
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "generated" / "blend_cost.md"
 EDGE = 0.2
-RUNS = 3
+RUNS = 7
 BOX = lt.region.box(size=[48, 24, 24])
 
 

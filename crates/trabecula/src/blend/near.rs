@@ -95,23 +95,24 @@ impl<'a> Near<'a> {
     #[inline(always)]
     pub fn ask(&mut self, node: usize, end: usize, q: f64) -> (f64, Vec3, f64) {
         let numbers = self.numbers(node);
+        let one = self.levels.joint.len() == 1;
         let per_mm = |rise: Vec3, slope: Vec3| [0, 1, 2].map(|a| rise[a] * slope[a]);
         if self.levels.is_uniform() {
+            if one {
+                return (f64::from(numbers[0][end]), [0.0; 3], 0.0);
+            }
             let (v, rise) = self.linear(numbers.map(|n| f64::from(n[end])));
             return (v, per_mm(rise, self.slope), 0.0);
         }
         let spot = Spot::of(q);
-        if self.levels.joint.len() == 1 {
+        if one {
             let (v, steep) = spot.ask(numbers[0]);
             return (v, [0.0; 3], steep);
         }
         let found = numbers.map(|n| spot.ask(n));
         let (v, rise) = self.linear(found.map(|f| f.0));
-        (
-            v,
-            per_mm(rise, self.slope),
-            self.linear(found.map(|f| f.1)).0,
-        )
+        let (steep, _) = self.linear(found.map(|f| f.1));
+        (v, per_mm(rise, self.slope), steep)
     }
 
     /// Linear between the corners along each axis: the value, and how it rises from the lower to the upper ones.

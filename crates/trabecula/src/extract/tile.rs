@@ -116,9 +116,11 @@ struct Plain {
     /// Number of triangles of each face.
     counts: Vec<usize>,
     kinds: Vec<Kind>,
-    /// The cells beside knotted ones: cell and face.
-    seams: Vec<([usize; 3], usize)>,
+    seams: Vec<Seam>,
 }
+
+/// A plain cell beside a knotted one, and its face.
+type Seam = ([usize; 3], usize);
 
 /// What a triangle of a plain cell is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -382,13 +384,13 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
     }
 }
 
-/// What fills knotted and fitted cells; the vertices of plain ones, and the cells and faces of seams.
+/// What fills knotted and fitted cells; the vertices of plain ones, and the seams.
 fn knots<'a>(
     s: &'a mut Scratch,
     grid: &'a Grid,
     local: &'a Local,
     nodes: &'a Nodes,
-) -> (Knots<'a>, &'a [Vertex], &'a [([usize; 3], usize)]) {
+) -> (Knots<'a>, &'a [Vertex], &'a [Seam]) {
     s.extra.clear();
     let knots = Knots {
         nodes,

@@ -196,10 +196,17 @@ impl Victim {
             }
             "flipped" => {
                 let share = some.between(0.0, 0.3);
-                for t in &mut self.mesh.triangles {
-                    if some.share() < share {
-                        t.swap(0, 1);
-                    }
+                let mut flipped: Vec<usize> = (0..count).filter(|_| some.share() < share).collect();
+                // A body within with half its faces flipped, as one of twelve may have, is another body.
+                let (at, clear) = self.inside;
+                let near = |v: &Vec3| norm(sub(*v, at)) < 0.6 * clear;
+                let inner = |i: &usize| self.mesh.corners(*i).iter().all(near);
+                let of_inner = flipped.iter().filter(|i| inner(i)).count();
+                if 2 * of_inner >= (0..count).filter(inner).count() {
+                    flipped.retain(|i| !inner(i));
+                }
+                for i in flipped {
+                    self.mesh.triangles[i].swap(0, 1);
                 }
             }
             "duplicates" => {
