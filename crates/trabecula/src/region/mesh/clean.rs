@@ -65,32 +65,36 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         let first = edges.partition_point(|e| e.0 < key);
         edges[first..].iter().take_while(|e| e.0 == key).count() - 1
     };
-    let of_two_bodies = of_two_bodies(mesh, &all);
-    let mut keep = vec![true; mesh.triangles.len()];
-    for group in all.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
-        if of_two_bodies.contains(&group[0].0) {
-            continue;
-        }
-        group.iter().for_each(|(_, i)| keep[*i as usize] = false);
+    // The way most copies face, and how many do.
+    let most = |group: &[([u32; 3], u32)]| {
         let ups = group
             .iter()
-            .filter(|(_, i)| even(mesh.triangles[*i as usize]))
-            .count();
-        let downs = group.len() - ups;
+            .filter(|(_, i)| even(mesh.triangles[*i as usize]));
+        let (ups, all) = (ups.count(), group.len());
+        (2 * ups >= all, ups.max(all - ups))
+    };
+    let alike = all.chunk_by(|a, b| a.0 == b.0).filter(|g| most(g).1 > 1);
+    let of_two_bodies = of_two_bodies(alike.map(|g| g[0].0).collect(), others);
+    let mut keep = vec![true; mesh.triangles.len()];
+    for group in all.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+        group.iter().for_each(|(_, i)| keep[*i as usize] = false);
+        let (up, count) = most(group);
         let [a, b, c] = group[0].0;
         let odd = [others(a, b), others(b, c), others(a, c)]
             .iter()
             .filter(|n| *n % 2 == 1)
             .count();
-        if ups == 0 || downs == 0 || group.len() % 2 == 1 || odd >= 2 {
-            let more = ups >= downs;
-            let first = group
-                .iter()
-                .find(|(_, i)| even(mesh.triangles[*i as usize]) == more);
-            if let Some((_, i)) = first {
-                keep[*i as usize] = true;
-            }
-        }
+        let left = if of_two_bodies.contains(&group[0].0) {
+            2
+        } else {
+            usize::from(count == group.len() || group.len() % 2 == 1 || odd >= 2)
+        };
+        let facing = group
+            .iter()
+            .filter(|(_, i)| even(mesh.triangles[*i as usize]) == up);
+        facing
+            .take(left)
+            .for_each(|(_, i)| keep[*i as usize] = true);
     }
     let before = mesh.triangles.len();
     let mut kept = keep.iter();
@@ -98,29 +102,15 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Of the triangles that are there twice, facing one way, those that two bodies have in common.
+/// Of triangles with several copies that face one way, those that two bodies have in common.
 ///
-/// A patch of them has edges along its rim with an even number of triangles where both copies go on, each in its own
-/// body, and with an odd number where a copy just ends. `all`: the triangles by their corners, and their numbers.
-fn of_two_bodies(mesh: &Mesh, all: &[([u32; 3], u32)]) -> HashSet<[u32; 3]> {
-    let turned = |t: [u32; 3]| {
-        let first = (0..3).fold(0, |m, k| if t[k] < t[m] { k } else { m });
-        t[(first + 1) % 3] > t[(first + 2) % 3]
-    };
-    let alike = |g: &[([u32; 3], u32)]| {
-        let [a, b] = [g[0].1, g[1].1].map(|i| turned(mesh.triangles[i as usize]));
-        a == b
-    };
-    let pairs: Vec<[u32; 3]> = all
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(|g| g.len() == 2 && alike(g))
-        .map(|g| g[0].0)
-        .collect();
+/// A patch of them has edges along its rim with an even number of other triangles where both copies go on, each in its own
+/// body, and with an odd number where a copy just ends. `others`: how many there are, copies not counted.
+fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
     let patches = Mesh {
         vertices: Vec::new(),
-        triangles: pairs,
+        triangles: alike,
     };
-    let every = halves(mesh);
     let (sides, mut sets) = (halves(&patches), Sets::new(patches.triangles.len()));
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
         for other in &edge[1..] {
@@ -130,12 +120,12 @@ fn of_two_bodies(mesh: &Mesh, all: &[([u32; 3], u32)]) -> HashSet<[u32; 3]> {
     // Along each patch's rim, edges at which both copies go on less those at which one ends.
     let mut votes = vec![0i64; patches.triangles.len()];
     for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
-        let first = every.partition_point(|e| e.0 < edge[0].0);
-        let count = every[first..]
-            .iter()
-            .take_while(|e| e.0 == edge[0].0)
-            .count();
-        let vote = if count % 2 == 0 { 1 } else { -1 };
+        let (a, b) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
+        let vote = if others(a, b).is_multiple_of(2) {
+            1
+        } else {
+            -1
+        };
         votes[sets.root(edge[0].1 / 3) as usize] += vote;
     }
     let found = (0..patches.triangles.len()).filter(|i| votes[sets.root(*i as u32) as usize] > 0);
