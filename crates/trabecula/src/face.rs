@@ -35,6 +35,8 @@ pub struct Segment {
     pub ends: [Vec3; 2],
     /// How much the normal turns across it, radians.
     pub turn: f64,
+    /// How long the straight line is that it and its neighbours make, mm.
+    pub run: f64,
 }
 
 /// The edges of a face's zero set.

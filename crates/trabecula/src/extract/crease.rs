@@ -33,7 +33,7 @@ use super::tile::Nodes;
 pub(super) use chord::Chord;
 pub(super) use fit::Fits;
 
-/// Pieces of edges that are this many steps long or more are shown, however little the face turns there.
+/// Straight edges that are this many steps long or more are shown, however little the face turns there.
 const LONG: f64 = 3.0;
 /// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
 /// step.
@@ -473,7 +473,7 @@ pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>
     let tiles = grid.tiles();
     for (i, s) in (0..).zip(&creases.segments) {
         let [p, q] = s.ends;
-        if s.turn < SHARP && norm(sub(q, p)) < LONG * grid.step {
+        if s.turn < SHARP && s.run < LONG * grid.step {
             continue;
         }
         let range = [0, 1, 2].map(|a| {

@@ -7,18 +7,38 @@ use super::tree::normal;
 use crate::face::{Creases, Segment};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
+use crate::union;
 
 /// The least turn of the normal across a crease, radians (10°): below it a rounded edge is off by a twentieth of a step.
 const TURN: f64 = 0.175;
 /// Two creases that meet and turn by more than this, radians (20°), meet in a corner.
 const BEND: f64 = 0.35;
+/// Two that turn by less than this, radians (1°), are pieces of one straight line: rounding turns them by far less, and the
+/// sides of what is round by more.
+const STRAIGHT: f64 = 0.0175;
+
+/// The creases that end at a vertex: how many, the sum of their directions, and the last of them.
+#[derive(Clone, Copy, Default)]
+struct About {
+    count: usize,
+    sum: Vec3,
+    last: u32,
+}
+
+impl About {
+    /// Whether two meet there and turn by no more than an angle.
+    fn runs_on(&self, angle: f64) -> bool {
+        self.count == 2 && norm(self.sum) <= 2.0 * (angle / 2.0).sin()
+    }
+}
 
 /// The creases of a mesh: edges of two triangles whose normals differ.
 pub fn creases(mesh: &Mesh) -> Creases {
     let halves = halves(mesh);
     let mut creases = Creases::default();
-    // At each vertex: how many creases end there, and the sum of their directions.
-    let mut about: HashMap<u32, (usize, Vec3)> = HashMap::new();
+    let mut about: HashMap<u32, About> = HashMap::new();
+    // Which creases go on in a straight line.
+    let mut straight: Vec<(u32, [u32; 2])> = Vec::new();
     for edge in halves.chunk_by(|a, b| a.0 == b.0) {
         let [(_, a), (_, b)] = edge else { continue };
         let [m, n] = [a, b].map(|h| normal(mesh.corners(*h as usize / 3)));
@@ -28,19 +48,92 @@ pub fn creases(mesh: &Mesh) -> Creases {
         }
         let ends = ends(mesh, *a);
         let [p, q] = ends.map(|v| mesh.vertices[v as usize]);
-        creases.segments.push(Segment { ends: [p, q], turn });
+        let number = creases.segments.len() as u32;
         let along = sub(q, p);
-        let along = scale(along, 1.0 / norm(along));
+        let run = norm(along);
+        creases.segments.push(Segment {
+            ends: [p, q],
+            turn,
+            run,
+        });
+        let along = scale(along, 1.0 / run);
         for (v, way) in ends.into_iter().zip([along, scale(along, -1.0)]) {
             let at = about.entry(v).or_default();
-            *at = (at.0 + 1, add(at.1, way));
+            if at.count == 1 {
+                straight.push((v, [at.last, number]));
+            }
+            *at = About {
+                count: at.count + 1,
+                sum: add(at.sum, way),
+                last: number,
+            };
         }
     }
-    let corner = |at: &(usize, Vec3)| at.0 != 2 || norm(at.1) > 2.0 * (BEND / 2.0).sin();
-    let corners = about.iter().filter(|a| corner(a.1));
-    let mut corners: Vec<(u32, usize)> = corners.map(|(v, at)| (*v, at.0)).collect();
+    straight.retain(|(v, _)| about[v].runs_on(STRAIGHT));
+    measure_runs(&mut creases.segments, straight.iter().map(|s| s.1));
+    let corners = about.iter().filter(|a| !a.1.runs_on(BEND));
+    let mut corners: Vec<(u32, usize)> = corners.map(|(v, at)| (*v, at.count)).collect();
     corners.sort_unstable();
     let place = |(v, count): (u32, usize)| (mesh.vertices[v as usize], count);
     creases.corners = corners.into_iter().map(place).collect();
     creases
+}
+
+/// Makes the run of each piece the length of all that go on in a straight line, pair by pair.
+fn measure_runs(segments: &mut [Segment], pairs: impl Iterator<Item = [u32; 2]>) {
+    let mut root: Vec<u32> = (0..segments.len() as u32).collect();
+    for [a, b] in pairs {
+        union::unite(&mut root, a, b);
+    }
+    let mut runs = vec![0.0; segments.len()];
+    for (i, s) in (0..).zip(&*segments) {
+        runs[union::find(&mut root, i) as usize] += s.run;
+    }
+    for (i, s) in (0..).zip(segments) {
+        s.run = runs[union::find(&mut root, i) as usize];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_on_a_straight_edge_leaves_its_run() {
+        // A roof whose ridge is in three pieces, and its mirror image below: the rim bends, the ridges do not.
+        let mesh = Mesh {
+            vertices: vec![
+                [0.0, 0.0, 1.0],
+                [1.0, 0.0, 1.0],
+                [3.0, 0.0, 1.0],
+                [6.0, 0.0, 1.0],
+                [3.0, 2.0, 0.0],
+                [3.0, -2.0, 0.0],
+            ],
+            triangles: vec![
+                [0, 1, 4],
+                [1, 2, 4],
+                [2, 3, 4],
+                [1, 0, 5],
+                [2, 1, 5],
+                [3, 2, 5],
+                [0, 4, 5],
+                [3, 5, 4],
+            ],
+        };
+        let found = creases(&mesh);
+        let of_ridge = |s: &&Segment| s.ends.iter().all(|p| p[1] == 0.0);
+        let runs: Vec<f64> = found
+            .segments
+            .iter()
+            .filter(of_ridge)
+            .map(|s| s.run)
+            .collect();
+        assert_eq!(runs, [6.0; 3]);
+        let other = found.segments.iter().filter(|s| !of_ridge(s));
+        assert!(other.clone().count() > 0);
+        for s in other {
+            assert_eq!(s.run, norm(sub(s.ends[1], s.ends[0])));
+        }
+    }
 }
