@@ -14,6 +14,7 @@ mod levels;
 mod mixed;
 mod near;
 mod quantile;
+mod seen;
 mod simplex;
 mod strand;
 mod table;
@@ -33,6 +34,7 @@ use added::{At, End, HIGH, LOW};
 use joint::Joint;
 use levels::Levels;
 use near::Near;
+use seen::{Seen, zeros};
 use simplex::Place;
 use strand::Strand;
 
@@ -169,19 +171,26 @@ impl Blend {
         self.levels.as_deref().filter(|l| !l.is_uniform())
     }
 
-    /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`.
+    /// Fills a lattice's upper end at points (mm), and the quantiles of both ends where levels vary.
+    fn ends_of(&self, s: usize, points: &[Vec3], high: &mut [f64], quantiles: &mut [[f64; 2]]) {
+        let strand = &self.strands[s];
+        let Some(levels) = self.varied() else {
+            return strand.highs(points, high);
+        };
+        if !strand.ends(points, high, quantiles) {
+            for (q, p) in quantiles.iter_mut().zip(points) {
+                *q = levels.found(&self.strands, *p, s).quantiles;
+            }
+        }
+    }
+
+    /// The value at a point where the lattices with shares `w` make the sum `f`, and their upper ends are `high`; their
+    /// quantiles are there already.
     fn value_at(&self, p: Vec3, f: f64, (w, high): (&[f64], &[f64]), at: &mut At) -> f64 {
         let alone = w.contains(&1.0);
         let levels = self.levels.as_deref().filter(|_| !alone);
         if let Some(levels) = levels {
             levels.grid.place(w, &mut at.place);
-            at.q.clear();
-            if !levels.is_uniform() {
-                at.q.extend((0..w.len()).map(|i| match w[i] > 0.0 {
-                    true => levels.quantiles(&self.strands, p, i, high[i]),
-                    false => [0.0; 2],
-                }));
-            }
         }
         let mut ends = [0.0; 2];
         for &end in self.ends() {
@@ -195,8 +204,8 @@ impl Blend {
         self.value_of([f, ends[LOW], ends[HIGH]])
     }
 
-    /// Values and gradients of N lattices, or of any number if N is 0.
-    fn gradients_of<const N: usize>(
+    /// Values and gradients of N lattices, or of any number if N is 0, with C neighbourhoods about each point.
+    fn gradients_of<const N: usize, const C: usize>(
         &self,
         points: &[Vec3],
         values: &mut [f64],
@@ -204,58 +213,39 @@ impl Blend {
     ) {
         let n = if N > 0 { N } else { self.strands.len() };
         let strands = &self.strands[..n];
-        let zeros = |n: usize| (vec![0.0; n], vec![[0.0; 3]; n]);
         let (mut w, mut dw) = zeros(n * points.len());
         self.weights.gradients(points, &mut w, &mut dw);
-        // The sum F and the upper ends.
-        let (mut f, mut df) = zeros(points.len());
-        let (mut high, mut dhigh) = zeros(n * points.len());
-        for (i, s) in strands.iter().enumerate() {
-            let (mut here, mut at) = (Vec::new(), Vec::new());
-            let all = (0..points.len()).all(|k| w[k * n + i] > 0.0);
-            if !all {
-                here.extend((0..points.len()).filter(|k| w[k * n + i] > 0.0));
-                at.extend(here.iter().map(|k| points[*k]));
-            }
-            let at = if all { points } else { &at };
-            let (mut g, mut dg) = zeros(at.len());
-            let (mut own, mut down) = zeros(at.len());
-            s.gradients(at, &mut g, &mut dg);
-            s.high_gradients(at, &mut own, &mut down);
-            for j in 0..at.len() {
-                let k = if all { j } else { here[j] };
-                let (w, dw) = (w[k * n + i], dw[k * n + i]);
-                f[k] += w * g[j];
-                df[k] = add(df[k], add(scale(dg[j], w), scale(dw, g[j])));
-                (high[k * n + i], dhigh[k * n + i]) = (own[j], down[j]);
-            }
-        }
+        let seen = |i: usize| Seen::where_counted(self, i, points, |k| w[k * n + i] > 0.0);
+        let seen: Vec<Seen> = (0..n).map(seen).collect();
+        let varied = self.varied().is_some();
+        let mut quantiles = vec![End::default(); if varied { n } else { 0 }];
         let mut place = Place::default();
-        let mut near = self.levels.as_deref().map(|l| Near::new(l, strands));
-        let mut quantiles = vec![End::default(); n];
+        let mut near = self.levels.as_deref().map(|l| Near::<C>::new(l, strands));
         for (k, p) in points.iter().enumerate() {
             let (w, dw) = (&w[k * n..][..n], &dw[k * n..][..n]);
-            let (high, dhigh) = (&high[k * n..][..n], &dhigh[k * n..][..n]);
+            let there = || seen.iter().enumerate().filter(|(i, _)| w[*i] > 0.0);
+            let (mut f, mut df) = (0.0, [0.0; 3]);
+            for (i, of) in there() {
+                f += w[i] * of.core[k];
+                let own = add(scale(of.core_slope[k], w[i]), scale(dw[i], of.core[k]));
+                df = add(df, own);
+            }
+            if varied {
+                (quantiles.iter_mut().zip(&seen)).for_each(|(q, of)| *q = of.quantiles[k]);
+            }
             let alone = w.contains(&1.0);
             let levels = self.levels.as_deref().filter(|_| !alone);
             if let (Some(levels), Some(near)) = (levels, &mut near) {
                 levels.grid.place(w, &mut place);
                 near.enter(*p);
             }
-            if let Some(levels) = self.varied().filter(|_| !alone) {
-                for (i, q) in quantiles.iter_mut().enumerate() {
-                    *q = match w[i] > 0.0 {
-                        true => levels.end(strands, *p, i, (high[i], dhigh[i])),
-                        false => End::default(),
-                    };
-                }
-            }
             for (e, &end) in self.ends().iter().enumerate() {
                 let (mut level, mut slope) = (0.0, [0.0; 3]);
-                for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
-                    let v = s.end(end, high[i], alone);
+                for (i, of) in there() {
+                    let s = &strands[i];
+                    let v = s.end(end, of.high[k], alone);
                     level += w[i] * v;
-                    let own = scale(dhigh[i], w[i] * s.end_slope(end));
+                    let own = scale(of.high_slope[k], w[i] * s.end_slope(end));
                     slope = add(slope, add(own, scale(dw[i], v)));
                 }
                 if let (Some(levels), Some(near)) = (levels, &mut near) {
@@ -264,8 +254,8 @@ impl Blend {
                     (level, slope) = (level + more.0, add(slope, more.1));
                 }
                 let (v, g) = match end == HIGH {
-                    true => (f[k] - level, sub(df[k], slope)),
-                    false => (level - f[k], sub(slope, df[k])),
+                    true => (f - level, sub(df, slope)),
+                    false => (level - f, sub(slope, df)),
                 };
                 if e == 0 || v > values[k] {
                     (values[k], gradients[k]) = (v, g);
@@ -329,21 +319,25 @@ impl Field for Blend {
         for (points, out) in points.chunks(BATCH).zip(out.chunks_mut(BATCH)) {
             let all = || vec![0.0; n * points.len()];
             let (mut w, mut high, mut f) = (all(), all(), vec![0.0; points.len()]);
+            let mut quantiles = vec![[0.0; 2]; n * points.len()];
             self.weights.values(points, &mut w);
             for (i, s) in self.strands.iter().enumerate() {
                 let here: Vec<usize> = (0..points.len()).filter(|k| w[k * n + i] > 0.0).collect();
                 let at: Vec<Vec3> = here.iter().map(|k| points[*k]).collect();
                 let (mut g, mut own) = (vec![0.0; at.len()], vec![0.0; at.len()]);
+                let mut q = vec![[0.0; 2]; at.len()];
                 s.values(&at, &mut g);
-                s.highs(&at, &mut own);
-                for (k, (g, own)) in here.into_iter().zip(g.into_iter().zip(own)) {
-                    f[k] += w[k * n + i] * g;
-                    high[k * n + i] = own;
+                self.ends_of(i, &at, &mut own, &mut q);
+                for (j, k) in here.into_iter().enumerate() {
+                    f[k] += w[k * n + i] * g[j];
+                    (high[k * n + i], quantiles[k * n + i]) = (own[j], q[j]);
                 }
             }
             for (k, (o, p)) in out.iter_mut().zip(points).enumerate() {
                 let w = &w[k * n..][..n];
                 let own = (w, &high[k * n..][..n]);
+                at.q.clear();
+                at.q.extend_from_slice(&quantiles[k * n..][..n]);
                 *o = self.value_at(*p, f[k], own, &mut at);
             }
         }
@@ -351,11 +345,16 @@ impl Field for Blend {
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         // The same each time; of few it is told how many they are.
-        match self.strands.len() {
-            2 => self.gradients_of::<2>(points, values, gradients),
-            3 => self.gradients_of::<3>(points, values, gradients),
-            _ => self.gradients_of::<0>(points, values, gradients),
-        }
+        let one = self.levels.as_deref().is_none_or(|l| l.joint.len() == 1);
+        let of = match (self.strands.len(), one) {
+            (2, false) => Blend::gradients_of::<2, 8>,
+            (3, false) => Blend::gradients_of::<3, 8>,
+            (_, false) => Blend::gradients_of::<0, 8>,
+            (2, true) => Blend::gradients_of::<2, 1>,
+            (3, true) => Blend::gradients_of::<3, 1>,
+            (_, true) => Blend::gradients_of::<0, 1>,
+        };
+        of(self, points, values, gradients);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {

@@ -218,7 +218,7 @@ impl Lattice {
     }
 
     /// The level t of the core where the level's number is `v`, and its slope.
-    fn iso(&self, v: f64) -> (f64, f64) {
+    pub fn iso(&self, v: f64) -> (f64, f64) {
         match self.level {
             Level::Iso(_) => (v, 1.0),
             Level::Fraction(_) => self.cell.iso(self.part, v),

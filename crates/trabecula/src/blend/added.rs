@@ -42,16 +42,24 @@ struct Term {
 
 /// What is known of a row along x, so that its points need not ask all neighbourhoods anew.
 pub(super) struct Row {
-    /// The first neighbourhood along x.
-    first: usize,
     /// For each node along x: between which neighbourhoods it lies, counted from the first, and the share of the second.
     along: Vec<([usize; 2], f64)>,
-    /// Between which neighbourhoods along y and z the row lies; none before the first row.
-    across: Option<[(usize, f64); 2]>,
+    beside: Beside,
     /// For each neighbourhood along x what is added to the ends at each node of the table, NaN where nobody has asked; or,
     /// where levels vary, quantile functions.
     ends: Vec<[f32; 2]>,
     curves: Vec<Table>,
+}
+
+/// The neighbourhoods beside a row.
+struct Beside {
+    /// The first along x.
+    first: usize,
+    /// Between which along y and z the row lies; none before the first row.
+    across: Option<[(usize, f64); 2]>,
+    /// What those of one number along y say at the row's z, for each along x; and that number. Even ones and odd ones, as rows
+    /// lie between one of each.
+    sides: [(Option<usize>, Vec<Table>); 2],
 }
 
 impl Row {
@@ -70,12 +78,16 @@ impl Row {
             true => (columns * levels.grid.len(), 0),
             false => (0, columns),
         };
+        let tables = |n: usize| (0..n).map(|_| levels.table()).collect::<Vec<_>>();
         Row {
-            first,
             along,
-            across: None,
+            beside: Beside {
+                first,
+                across: None,
+                sides: [0, 1].map(|_| (None, tables(columns))),
+            },
             ends: vec![[f32::NAN; 2]; ends],
-            curves: (0..curves).map(|_| levels.table()).collect(),
+            curves: tables(curves),
         }
     }
 
@@ -85,11 +97,45 @@ impl Row {
             let (n, share, _) = levels.joint.along(a + 1, at[a]);
             (n, share)
         });
+        let beside = &mut self.beside;
         // Of one neighbourhood that serves all, everything is known already.
-        if self.across != Some(across) {
-            self.across = Some(across);
-            self.ends.fill([f32::NAN; 2]);
-            self.curves.iter_mut().for_each(Table::clear);
+        if beside.across == Some(across) {
+            return;
+        }
+        if beside.across.is_none_or(|a| a[1] != across[1]) {
+            beside.sides.iter_mut().for_each(|side| side.0 = None);
+        }
+        beside.across = Some(across);
+        self.ends.fill([f32::NAN; 2]);
+        self.curves.iter_mut().for_each(Table::clear);
+    }
+}
+
+impl Beside {
+    /// Adds a node's numbers at a neighbourhood along x, between those along y and z.
+    fn between(
+        &mut self,
+        levels: &Levels,
+        strands: &[Strand],
+        (column, node): (usize, usize),
+        out: &mut [f32],
+    ) {
+        let [nx, ny, _] = levels.joint.shape;
+        let Some(across) = self.across else { return };
+        let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
+        for (j, share) in y.into_iter().filter(|y| y.1 > 0.0) {
+            let (number, tables) = &mut self.sides[j % 2];
+            if *number != Some(j) {
+                *number = Some(j);
+                tables.iter_mut().for_each(Table::clear);
+            }
+            let of_side = tables[column].get_or(node, |out| {
+                for (k, share) in z.into_iter().filter(|z| z.1 > 0.0) {
+                    let i = (k * ny + j) * nx + self.first + column;
+                    add_times(out, share as f32, levels.numbers(i, strands, node));
+                }
+            });
+            add_times(out, share as f32, of_side);
         }
     }
 }
@@ -156,7 +202,7 @@ impl Levels {
                     let known = &mut row.ends[columns[c] * self.grid.len() + node];
                     if near[c] > 0.0 && known[end].is_nan() {
                         *known = [0.0; 2];
-                        self.between(strands, row.first + columns[c], node, row.across, known);
+                        row.beside.between(self, strands, (columns[c], node), known);
                     }
                     if near[c] > 0.0 {
                         f64::from(known[end])
@@ -181,13 +227,14 @@ impl Levels {
     ) -> f64 {
         let (columns, share) = row.along[i];
         let columns = || (columns.into_iter().zip([1.0 - share, share])).filter(|c| c.1 > 0.0);
-        let (first, across) = (row.first, row.across);
+        let Row { beside, curves, .. } = row;
         // A quantile function's value at a spot, between the two neighbourhoods.
         let mut ask = |node: usize, spot: Spot| -> f64 {
             let each = columns().map(|(column, near)| {
-                let find =
-                    |out: &mut [f32]| self.between(strands, first + column, node, across, out);
-                near * spot.ask(row.curves[column].get_or(node, find)).0
+                let curve = curves[column].get_or(node, |out| {
+                    beside.between(self, strands, (column, node), out);
+                });
+                near * spot.ask(curve).0
             });
             each.sum()
         };
@@ -204,26 +251,6 @@ impl Levels {
             sum -= w[s] * base;
         }
         sum
-    }
-
-    /// Adds a node's numbers at the i-th neighbourhood along x, between those along y and z.
-    fn between(
-        &self,
-        strands: &[Strand],
-        i: usize,
-        node: usize,
-        across: Option<[(usize, f64); 2]>,
-        out: &mut [f32],
-    ) {
-        let [nx, ny, _] = self.joint.shape;
-        let Some(across) = across else { return };
-        let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
-        for (k, share_z) in z.into_iter().filter(|z| z.1 > 0.0) {
-            for (j, share_y) in y.into_iter().filter(|y| y.1 > 0.0) {
-                let numbers = self.numbers((k * ny + j) * nx + i, strands, node);
-                add_times(out, (share_y * share_z) as f32, numbers);
-            }
-        }
     }
 
     /// What is added to an end by the numbers of a node (at the share q), and how it changes with that.
@@ -267,49 +294,71 @@ impl Levels {
     }
 
     /// The same with its gradient (per mm); `near` is what is known about the point, `dw` are the gradients of the shares.
+    /// Tables are added up at each neighbourhood first, each as often as it counts there; between the neighbourhoods
+    /// everything is linear.
     #[inline(always)]
-    pub fn added_gradients(
+    pub fn added_gradients<const C: usize>(
         &self,
         strands: &[Strand],
-        near: &mut Near,
+        near: &mut Near<C>,
         (w, dw, place): (&[f64], &[Vec3], &Place),
         ends: &[End],
         end: usize,
     ) -> (f64, Vec3) {
-        let mut sum = |node: usize, q: f64| near.ask(node, end, q);
-        let (q, dq) = match self.is_uniform() {
-            true => (0.0, [0.0; 3]),
-            false => blended_gradient(w, dw, ends, end),
+        let uniform = self.is_uniform();
+        let (own, dq) = match uniform {
+            true => (Spot::of(0.0), [0.0; 3]),
+            false => {
+                let (q, dq) = blended_gradient(w, dw, ends, end);
+                (Spot::of(q), dq)
+            }
         };
-        let (mut out, mut gradient, mut before) = (0.0, [0.0; 3], 0.0);
+        let (mut sum, mut steep) = ([0.0; C], [0.0; C]);
+        let (mut low, mut gradient, mut before) = (0.0, [0.0; 3], [0.0; C]);
         for (l, (node, share)) in place.nodes.iter().zip(&place.shares).enumerate() {
-            let (v, d, steep) = sum(*node, q);
-            out += share * v;
-            gradient = add(gradient, scale(add(d, scale(dq, steep)), *share));
+            let v = match uniform {
+                true => near.end(*node, end),
+                false => {
+                    let (v, slope) = near.curve(*node, own);
+                    add_to(&mut steep, *share, &slope);
+                    v
+                }
+            };
+            add_to(&mut sum, *share, &v);
             if l > 0 {
                 // ∇y of the axis on which this node follows the last: m Σ ∇w from it on.
                 let from = place.axes[l - 1] + 1;
                 let dy = dw[from..].iter().fold([0.0; 3], |a, b| add(a, *b));
-                let rise = self.grid.steps() as f64 * (v - before);
+                let rise = core::array::from_fn(|c| v[c] - before[c]);
+                let rise = self.grid.steps() as f64 * near.value(&rise);
                 gradient = add(gradient, scale(dy, rise));
             }
             before = v;
         }
-        if self.is_uniform() {
-            return (out, gradient);
+        if !uniform {
+            gradient = add(gradient, scale(dq, near.value(&steep)));
+            for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
+                if end == HIGH || s.is_sheet() {
+                    let spot = Spot::of(ends[i].quantiles[end]);
+                    let (v, slope) = near.curve(self.alone[i], spot);
+                    add_to(&mut sum, -w[i], &v);
+                    let own = scale(ends[i].slopes[end], w[i] * near.value(&slope));
+                    gradient = sub(gradient, add(scale(dw[i], near.value(&v)), own));
+                } else {
+                    low -= w[i] * s.low(0.0);
+                    gradient = sub(gradient, scale(dw[i], s.low(0.0)));
+                }
+            }
         }
-        for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
-            let (v, d) = if end == HIGH || s.is_sheet() {
-                let (v, d, steep) = sum(self.alone[i], ends[i].quantiles[end]);
-                (v, add(d, scale(ends[i].slopes[end], steep)))
-            } else {
-                (s.low(0.0), [0.0; 3])
-            };
-            out -= w[i] * v;
-            gradient = sub(gradient, add(scale(dw[i], v), scale(d, w[i])));
-        }
-        (out, gradient)
+        let (v, d) = near.gradient(&sum);
+        (low + v, add(gradient, d))
     }
+}
+
+/// Adds so many times each number.
+#[inline(always)]
+fn add_to<const C: usize>(sum: &mut [f64; C], times: f64, v: &[f64; C]) {
+    sum.iter_mut().zip(v).for_each(|(s, v)| *s += times * v);
 }
 
 /// One end of `blended` and its gradient (per mm).

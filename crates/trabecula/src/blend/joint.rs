@@ -139,12 +139,18 @@ impl Joint {
         some.iter().map(place).collect()
     }
 
+    /// How many neighbourhoods a coordinate lies past the first along an axis.
+    #[inline]
+    pub fn steps(&self, a: usize, v: f64) -> f64 {
+        (v - self.origin[a]) * self.per
+    }
+
     /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
     /// that (per mm).
     #[inline]
     pub fn along(&self, a: usize, v: f64) -> (usize, f64, f64) {
         let last = (self.shape[a] - 1) as f64;
-        let s = (v - self.origin[a]) * self.per;
+        let s = self.steps(a, v);
         let inside = s.clamp(0.0, last);
         let i = (inside as usize).min(self.shape[a].saturating_sub(2));
         let within = s == inside && last > 0.0;

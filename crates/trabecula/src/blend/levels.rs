@@ -239,23 +239,6 @@ impl Levels {
         })
     }
 
-    /// The quantiles of the i-th lattice at a point where its upper end is `high`.
-    pub fn quantiles(&self, strands: &[Strand], p: Vec3, i: usize, high: f64) -> [f64; 2] {
-        let found = || self.found(strands, p, i).quantiles;
-        strands[i].quantiles(high).unwrap_or_else(found)
-    }
-
-    /// The same with gradients (per mm), the upper end's being given.
-    pub fn end(&self, strands: &[Strand], p: Vec3, i: usize, (high, slope): (f64, Vec3)) -> End {
-        match strands[i].quantiles(high) {
-            Some(quantiles) => {
-                let slopes = strands[i].quantile_slopes(high).map(|by| scale(slope, by));
-                End { quantiles, slopes }
-            }
-            None => self.found(strands, p, i),
-        }
-    }
-
     /// Intervals that contain what is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ in a box, where shares are within `w` and upper ends
     /// within `highs`: everything is between what its tables have at the neighbourhoods and nodes about.
     pub fn bound(

@@ -102,7 +102,9 @@ impl Mixed {
                 }
                 if end == HIGH { f - level } else { level - f }
             };
-            row[i] = wanted.iter().map(value).fold(f64::NEG_INFINITY, f64::max) as f32;
+            // Both are numbers, which `max` does not know.
+            let greater = |a: f64, b: f64| if b > a { b } else { a };
+            row[i] = wanted.iter().map(value).reduce(greater).unwrap_or(-1.0) as f32;
         }
     }
 }
@@ -127,13 +129,9 @@ impl Blend {
 
     /// Fills a lattice's upper end at points (mm), and the quantiles of both ends where levels vary.
     fn ends_at(&self, s: usize, points: &[Vec3], out: &mut [f64]) {
-        let mut high = vec![0.0; points.len()];
-        self.strands[s].highs(points, &mut high);
-        for ((out, p), high) in out.chunks_exact_mut(3).zip(points).zip(high) {
-            let q = self
-                .varied()
-                .map(|l| l.quantiles(&self.strands, *p, s, high));
-            let [a, b] = q.unwrap_or_default();
+        let (mut high, mut q) = (vec![0.0; points.len()], vec![[0.0; 2]; points.len()]);
+        self.ends_of(s, points, &mut high, &mut q);
+        for (out, (high, [a, b])) in out.chunks_exact_mut(3).zip(high.into_iter().zip(q)) {
             out.copy_from_slice(&[high, a, b]);
         }
     }

@@ -9,39 +9,44 @@ use crate::math::Vec3;
 const KEPT: usize = 32;
 const NOBODY: usize = usize::MAX;
 
-/// The neighbourhoods about points, and what they say at nodes of the table.
-pub(super) struct Near<'a> {
+/// The neighbourhoods about points, and what they say at nodes of the table: C about each point, eight, or one that serves all.
+pub(super) struct Near<'a, const C: usize> {
     levels: &'a Levels,
     strands: &'a [Strand],
     /// Cubes that were entered, each where its name says; and that of the point.
-    kept: Vec<Cube<'a>>,
+    kept: Vec<Cube<'a, C>>,
     at: usize,
+    /// Its first neighbourhood along each axis; NaN where points beyond the outermost share it.
+    first: Vec3,
     /// The shares of the upper ones along each axis, and their slopes (per mm).
     share: Vec3,
     slope: Vec3,
 }
 
-/// Eight neighbourhoods with points between them; one and the same where one serves all.
-struct Cube<'a> {
+/// Neighbourhoods with points between them.
+struct Cube<'a, const C: usize> {
     name: usize,
-    corners: [usize; 8],
-    /// Their numbers at the nodes that were asked for.
-    numbers: Vec<Option<[&'a [f32]; 8]>>,
+    corners: [usize; C],
+    /// What they say at the nodes that were asked for: what is added to the ends, or quantile functions where levels vary.
+    ends: Vec<Option<[[f32; C]; 2]>>,
+    curves: Vec<Option<[&'a [f32]; C]>>,
 }
 
-impl<'a> Near<'a> {
+impl<'a, const C: usize> Near<'a, C> {
     /// About no point yet.
-    pub fn new(levels: &'a Levels, strands: &'a [Strand]) -> Near<'a> {
+    pub fn new(levels: &'a Levels, strands: &'a [Strand]) -> Near<'a, C> {
         let none = || Cube {
             name: NOBODY,
-            corners: [0; 8],
-            numbers: Vec::new(),
+            corners: [0; C],
+            ends: Vec::new(),
+            curves: Vec::new(),
         };
         Near {
             levels,
             strands,
             kept: (0..KEPT).map(|_| none()).collect(),
             at: 0,
+            first: [f64::NAN; 3],
             share: [0.0; 3],
             slope: [0.0; 3],
         }
@@ -50,7 +55,13 @@ impl<'a> Near<'a> {
     /// Goes to a point.
     pub fn enter(&mut self, p: Vec3) {
         let joint = &self.levels.joint;
-        if joint.len() == 1 && self.kept[self.at].name != NOBODY {
+        if C == 1 && self.kept[self.at].name != NOBODY {
+            return;
+        }
+        // Most points lie where the one before them does.
+        let past: Vec3 = core::array::from_fn(|a| joint.steps(a, p[a]) - self.first[a]);
+        if past.iter().all(|s| (0.0..1.0).contains(s)) {
+            self.share = past;
             return;
         }
         let (mut name, mut between) = (0, [[0; 2]; 3]);
@@ -64,6 +75,7 @@ impl<'a> Near<'a> {
                 (true, true) => (1, [i, i]),
                 (true, false) => (2, [next, next]),
             };
+            self.first[a] = if slope == 0.0 { f64::NAN } else { i as f64 };
             between[a] = ends;
             name = (name * joint.shape[a] + i) * 3 + which;
         }
@@ -76,48 +88,59 @@ impl<'a> Near<'a> {
                 let [x, y, z] = [0, 1, 2].map(|a| between[a][c >> a & 1]);
                 (z * ny + y) * nx + x
             });
-            cube.numbers.clear();
-            cube.numbers.resize(self.levels.grid.len(), None);
+            let nodes = self.levels.grid.len();
+            cube.ends.clear();
+            cube.curves.clear();
+            match self.levels.is_uniform() {
+                true => cube.ends.resize(nodes, None),
+                false => cube.curves.resize(nodes, None),
+            }
         }
     }
 
-    /// What the neighbourhoods about the point have at a node of the table.
+    /// What is added to an end at a node of the table, where no level varies.
     #[inline]
-    fn numbers(&mut self, node: usize) -> [&'a [f32]; 8] {
+    pub fn end(&mut self, node: usize, end: usize) -> [f64; C] {
+        let (levels, strands) = (self.levels, self.strands);
+        let Cube { corners, ends, .. } = &mut self.kept[self.at];
+        let ends = ends[node].get_or_insert_with(|| {
+            let numbers = corners.map(|i| levels.numbers(i, strands, node));
+            [0, 1].map(|e| numbers.map(|of| of[e]))
+        });
+        ends[end].map(f64::from)
+    }
+
+    /// The quantile functions of a node of the table at a share, where levels vary; and their slopes.
+    #[inline]
+    pub fn curve(&mut self, node: usize, spot: Spot) -> ([f64; C], [f64; C]) {
         let (levels, strands) = (self.levels, self.strands);
         let Cube {
-            corners, numbers, ..
+            corners, curves, ..
         } = &mut self.kept[self.at];
-        *numbers[node].get_or_insert_with(|| corners.map(|i| levels.numbers(i, strands, node)))
+        let of = curves[node]
+            .get_or_insert_with(|| corners.map(|i| levels.numbers(i, strands, node)))
+            .map(|knots| spot.ask(knots));
+        (of.map(|f| f.0), of.map(|f| f.1))
     }
 
-    /// What is said at a node of the table (of an end, or at the share q), how that changes per mm, and with q.
-    #[inline(always)]
-    pub fn ask(&mut self, node: usize, end: usize, q: f64) -> (f64, Vec3, f64) {
-        let numbers = self.numbers(node);
-        let one = self.levels.joint.len() == 1;
-        let per_mm = |rise: Vec3, slope: Vec3| [0, 1, 2].map(|a| rise[a] * slope[a]);
-        if self.levels.is_uniform() {
-            if one {
-                return (f64::from(numbers[0][end]), [0.0; 3], 0.0);
-            }
-            let (v, rise) = self.linear(numbers.map(|n| f64::from(n[end])));
-            return (v, per_mm(rise, self.slope), 0.0);
-        }
-        let spot = Spot::of(q);
-        if one {
-            let (v, steep) = spot.ask(numbers[0]);
-            return (v, [0.0; 3], steep);
-        }
-        let found = numbers.map(|n| spot.ask(n));
-        let (v, rise) = self.linear(found.map(|f| f.0));
-        let (steep, _) = self.linear(found.map(|f| f.1));
-        (v, per_mm(rise, self.slope), steep)
-    }
-
-    /// Linear between the corners along each axis: the value, and how it rises from the lower to the upper ones.
+    /// What a number at each of them makes at the point: linear between them along each axis.
     #[inline]
-    fn linear(&self, v: [f64; 8]) -> (f64, Vec3) {
+    pub fn value(&self, v: &[f64; C]) -> f64 {
+        if C == 1 {
+            return v[0];
+        }
+        let [x, y, z] = self.share;
+        let along_x: [f64; 4] = core::array::from_fn(|i| v[2 * i] + x * (v[2 * i + 1] - v[2 * i]));
+        let along_y = [0, 2].map(|i| along_x[i] + y * (along_x[i + 1] - along_x[i]));
+        along_y[0] + z * (along_y[1] - along_y[0])
+    }
+
+    /// The same, and how it changes per mm.
+    #[inline]
+    pub fn gradient(&self, v: &[f64; C]) -> (f64, Vec3) {
+        if C == 1 {
+            return (v[0], [0.0; 3]);
+        }
         let [x, y, z] = self.share;
         let between = |a: f64, b: f64, share: f64| a + share * (b - a);
         let rise_x = [0, 1, 2, 3].map(|i| v[2 * i + 1] - v[2 * i]);
@@ -131,6 +154,7 @@ impl<'a> Near<'a> {
             between(rise_y[0], rise_y[1], z),
             dz,
         ];
-        (along_y[0] + z * dz, rise)
+        let per_mm = [0, 1, 2].map(|a| rise[a] * self.slope[a]);
+        (along_y[0] + z * dz, per_mm)
     }
 }

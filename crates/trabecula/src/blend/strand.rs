@@ -1,11 +1,11 @@
 //! What a blend is made of: a function and the interval of it that is solid.
 
-use super::added::HIGH;
+use super::added::{End, HIGH, LOW};
 use super::constituent::{Constituent, gradients_of, values_of};
 use crate::cell::Part;
 use crate::field::{Block, Field};
-use crate::lattice::{self, Lattice};
-use crate::math::{Aabb, Interval, Vec3, scale};
+use crate::lattice::{self, Lattice, Level};
+use crate::math::{Aabb, Interval, Vec3, add, scale};
 
 /// How far below all its values the lower end of a network's interval lies, in shares of its range; also how far below
 /// zero its quantile is counted.
@@ -272,10 +272,7 @@ impl Strand {
     }
 
     /// How the quantiles change with `high`.
-    pub fn quantile_slopes(&self, high: f64) -> [f64; 2] {
-        let Some(l) = self.lattice() else {
-            return [0.0; 2];
-        };
+    fn quantile_slopes(&self, l: &Lattice, high: f64) -> [f64; 2] {
         let h = self.fine;
         let t = high / self.factor;
         let slope = |t: f64| (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor;
@@ -283,6 +280,84 @@ impl Strand {
             Part::Lower => [0.0, slope(t)],
             Part::Upper => [0.0, -slope(t)],
             Part::Sheet => [-slope(-t), slope(t)],
+        }
+    }
+
+    /// Fills the upper end at points (mm) and the quantiles of both; the latter not, and says so, where they are known by
+    /// looking only.
+    pub fn ends(&self, points: &[Vec3], high: &mut [f64], quantiles: &mut [[f64; 2]]) -> bool {
+        let Some(l) = self.lattice() else {
+            self.highs(points, high);
+            return false;
+        };
+        let both = |high: f64| self.quantiles(high).unwrap_or_default();
+        match (&l.level, l.uniform()) {
+            (_, Some(t)) => {
+                high.fill(self.factor * t);
+                quantiles.fill(both(self.factor * t));
+            }
+            (Level::Fraction(grade), None) => {
+                grade.values(points, high);
+                for (t, q) in high.iter_mut().zip(quantiles) {
+                    let p = *t;
+                    *t = self.factor * l.iso(p).0;
+                    *q = self.holding(l, *t, p);
+                }
+            }
+            _ => {
+                self.highs(points, high);
+                (quantiles.iter_mut().zip(high)).for_each(|(q, high)| *q = both(*high));
+            }
+        }
+        true
+    }
+
+    /// The same with gradients (per mm).
+    pub fn end_gradients(
+        &self,
+        points: &[Vec3],
+        high: &mut [f64],
+        slopes: &mut [Vec3],
+        quantiles: &mut [End],
+    ) -> bool {
+        let Some(l) = self.lattice() else {
+            self.high_gradients(points, high, slopes);
+            return false;
+        };
+        let (Level::Fraction(grade), None) = (&l.level, l.uniform()) else {
+            self.high_gradients(points, high, slopes);
+            for ((high, slope), q) in high.iter().zip(slopes).zip(quantiles) {
+                q.quantiles = self.quantiles(*high).unwrap_or_default();
+                q.slopes = self.quantile_slopes(l, *high).map(|by| scale(*slope, by));
+            }
+            return true;
+        };
+        grade.gradients(points, high, slopes);
+        for ((t, dt), q) in high.iter_mut().zip(slopes).zip(quantiles) {
+            let (p, dp) = (*t, *dt);
+            let (iso, slope) = l.iso(p);
+            (*t, *dt) = (self.factor * iso, scale(dp, self.factor * slope));
+            q.quantiles = self.holding(l, *t, p);
+            q.slopes = match l.part {
+                Part::Sheet => {
+                    let low = scale(*dt, self.quantile_slopes(l, *t)[LOW]);
+                    [low, add(low, dp)]
+                }
+                Part::Lower | Part::Upper => [[0.0; 3], dp],
+            };
+        }
+        true
+    }
+
+    /// The quantiles where a lattice's fraction is p and its upper end `high`: no table need be asked for both.
+    fn holding(&self, l: &Lattice, high: f64, p: f64) -> [f64; 2] {
+        let p = p.clamp(0.0, 1.0);
+        match l.part {
+            Part::Sheet => {
+                let low = l.below(-high / self.factor);
+                [low, low + p]
+            }
+            Part::Lower | Part::Upper => [-BELOW, p],
         }
     }
 
