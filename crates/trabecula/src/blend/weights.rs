@@ -149,8 +149,11 @@ fn normalise(w: &mut [f64]) {
 fn normalise_gradients(w: &mut [f64], g: &mut [Vec3]) {
     // The gradient of r / Σr, twice: before and after the faint ones are left out.
     let divide = |w: &mut [f64], g: &mut [Vec3], sum: f64| {
-        let per = 1.0 / sum;
         let whole = g.iter().fold([0.0; 3], |a, b| add(a, *b));
+        if sum == 1.0 && whole == [0.0; 3] {
+            return;
+        }
+        let per = 1.0 / sum;
         for (w, g) in w.iter_mut().zip(g) {
             *w /= sum;
             *g = scale(sub(*g, scale(whole, *w)), per);
