@@ -16,4 +16,5 @@ mod surface;
 mod tets;
 mod thickness;
 mod tiling;
+mod tiling_fields;
 mod walls;
