@@ -89,9 +89,9 @@ struct Root {
 }
 
 impl Root {
-    /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess.
+    /// Takes the value at the guess, and its slope along the edge; gives the step to the next guess, or halves what is left.
     #[inline]
-    fn narrow(&mut self, value: f64, slope: f64) -> f64 {
+    fn narrow(&mut self, value: f64, slope: f64, halve: bool) -> f64 {
         // A surface may run along the edge: then there is no slope, and no step to either side.
         if value == 0.0 {
             return 0.0;
@@ -103,7 +103,9 @@ impl Root {
         }) = (self.t, value);
         let ((lo, a), (hi, b)) = (self.solid, self.void);
         let newton = self.t - value / slope;
-        let next = if newton >= lo && newton <= hi {
+        let next = if halve {
+            0.5 * (lo + hi)
+        } else if newton >= lo && newton <= hi {
             newton
         } else {
             lo - (hi - lo) * a / (b - a)
@@ -116,8 +118,11 @@ impl Root {
 
 /// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
 const SETTLED: f64 = 1e-3;
-/// Most rounds of the iteration.
-const ROUNDS: usize = 6;
+/// Rounds in which a smooth function's root is found. Those left cross an edge of the face, where slopes say little: every
+/// other round halves what is left of these.
+const SMOOTH: usize = 6;
+/// Most rounds of the iteration: by halves alone the last come as near as those that settle.
+const ROUNDS: usize = SMOOTH + 20;
 
 /// Finds where a face crosses the edges of its vertices, and its normals there.
 pub(super) fn solve(
@@ -168,7 +173,8 @@ pub(super) fn solve(
                 let mut r = roots[n];
                 let v = &mut vertices[r.vertex as usize];
                 let slope = gradients[n][usize::from(v.axis)] * v.reach(nodes);
-                if r.narrow(values[n], slope) > SETTLED && round + 1 < ROUNDS {
+                let halve = round >= SMOOTH && round % 2 == 0;
+                if r.narrow(values[n], slope, halve) > SETTLED && round + 1 < ROUNDS {
                     roots[open] = r;
                     open += 1;
                 } else {
