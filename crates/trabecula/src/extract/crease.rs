@@ -2,10 +2,11 @@
 //! others.
 //!
 //! The line in which a face meets the side of a cell runs straight from one grid edge to another. Where an edge of the
-//! face pierces the side it gets a corner there, if it lies nearer to the face with it. A grid edge that the face
-//! crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its rim from a point
-//! of the face's edge inside the cell. A rim is a simple curve on the boundary of a convex cell, so the cone cannot meet
-//! itself. What a side or a grid edge gets depends on nothing but what all cells around it see alike.
+//! face pierces the side it gets a corner there, if it lies nearer to the face and its edges with it. A grid edge that the
+//! face crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its rim from a
+//! point of the face's edge inside the cell, or several where edges divide it. A rim is a simple curve on the boundary of a
+//! convex cell, so one cone cannot meet itself; several are looked at. What a side or a grid edge gets depends on nothing but
+//! what all cells around it see alike.
 //!
 //! Source: corners in the sides of cells after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares,
 //! Comput. Graph. Forum 24 (2005) 537.
@@ -13,21 +14,22 @@
 mod chord;
 mod fill;
 mod fit;
+mod patch;
 mod rim;
 mod side;
 mod twice;
 mod wall;
+mod web;
 
 use std::collections::HashMap;
 
 use crate::face::Creases;
 use crate::field::Field;
-use crate::math::{Vec3, add, dot, norm, scale, sub};
+use crate::math::{Vec3, add, dot, scale, sub};
 
 use super::by::By;
 use super::grid::{Grid, Local, TILE};
 use super::key::Key;
-use super::knot::middle;
 use super::signs::{Signs, bits};
 use super::tile::Nodes;
 pub(super) use chord::Chord;
@@ -277,61 +279,6 @@ impl Edges {
                 self.pieces.entry(here).or_default().push(ends);
             }
         }
-    }
-
-    /// The point of a cell over which its patch becomes a cone: on the face's edges there, if any; or `beyond`, where a
-    /// corner in a cell beside it is nearer. `rim` are the points
-    /// of its rim, `corners` those of them that are corners of sides.
-    fn apex(
-        &self,
-        grid: &Grid,
-        nodes: &Nodes,
-        (cell, beyond): (usize, Option<Vec3>),
-        (face, field): (usize, &dyn Field),
-        rim: &[Vec3],
-        corners: &[Vec3],
-    ) -> Vec3 {
-        let center = middle(if corners.is_empty() { rim } else { corners });
-        let far = |p: &Vec3| norm(sub(*p, center));
-        let mut tried = Vec::with_capacity(4);
-        if let Some(pieces) = self.pieces.get(&(face, cell)) {
-            let near = pieces.iter().map(|s| nearest(*s, center));
-            tried.extend(near.min_by(|a, b| far(a).total_cmp(&far(b))));
-        }
-        tried.extend(
-            self.corners
-                .get(&(face, cell))
-                .into_iter()
-                .flatten()
-                .map(|c| c.0),
-        );
-        // An edge that runs through needs no other choice.
-        let through = corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * grid.step;
-        if !through {
-            tried.push(center);
-        }
-        let at = nodes.at(cell);
-        for p in &mut tried {
-            for a in 0..3 {
-                p[a] = within(grid, nodes.axes[a], at[a], p[a]);
-            }
-        }
-        tried.extend(beyond);
-        if tried.len() == 1 {
-            return tried[0];
-        }
-        let spokes: Vec<Vec3> = tried
-            .iter()
-            .flat_map(|p| rim.iter().map(|r| scale(add(*p, *r), 0.5)))
-            .collect();
-        let mut off = vec![0.0; spokes.len()];
-        field.values(&spokes, &mut off);
-        let worst = |i: usize| {
-            let of = &off[i * rim.len()..(i + 1) * rim.len()];
-            of.iter().fold(0.0f64, |m, d| m.max(d.abs()))
-        };
-        let best = (0..tried.len()).min_by(|a, b| worst(*a).total_cmp(&worst(*b)));
-        tried[best.unwrap_or(0)]
     }
 }
 

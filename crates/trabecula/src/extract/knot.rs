@@ -291,6 +291,11 @@ impl Knots<'_> {
 
     /// Whether the triangles from the `first` on touch where they should not, once rounded to single precision.
     pub fn muddled(&self, first: usize) -> bool {
+        self.touch(first, |x| f64::from(x as f32))
+    }
+
+    /// Whether the triangles from the `first` on touch where they should not, once rounded somehow.
+    pub fn touch(&self, first: usize, rounded: impl Fn(f64) -> f64) -> bool {
         let triangles = &self.extra.triangles[first..];
         let mut mesh = Mesh::default();
         let mut names: Vec<u32> = Vec::with_capacity(32);
@@ -298,8 +303,7 @@ impl Knots<'_> {
             mesh.triangles.push(t.map(|v| {
                 let at = names.iter().position(|n| *n == v).unwrap_or_else(|| {
                     names.push(v);
-                    mesh.vertices
-                        .push(self.places[v as usize].map(|x| f64::from(x as f32)));
+                    mesh.vertices.push(self.places[v as usize].map(&rounded));
                     names.len() - 1
                 });
                 at as u32

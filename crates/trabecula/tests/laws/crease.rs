@@ -261,8 +261,9 @@ fn polyhedra_keep_their_edges() {
                     off.map(|x| x / edge),
                     before.map(|x| x / edge)
                 );
-                // Points keep 1/4096 of a step away from nodes, and a corner sees three of them.
-                let exact = turn == [0.0; 3] && ["block", "angle", "notched"].contains(&name);
+                // Points keep 1/4096 of a step away from nodes, and a corner sees three of them. Of the notched
+                // block, in which convex and concave edges meet, a cell or two are rounded.
+                let exact = turn == [0.0; 3] || name != "notched";
                 assert!(
                     !exact || off.iter().all(|x| *x < edge * 3.0 / 4096.0),
                     "{name}: {off:?}"
@@ -271,7 +272,7 @@ fn polyhedra_keep_their_edges() {
                     off[0] <= before[0] && off[1] <= before[1] + 1e-9 * edge,
                     "{name}"
                 );
-                assert!(share < 0.2 && rounded > 0.7, "{name}: {share}, {rounded}");
+                assert!(share < 0.01 && rounded > 0.7, "{name}: {share}, {rounded}");
             }
         }
     }
@@ -327,7 +328,7 @@ fn edges_are_kept_where_a_lattice_meets_them() {
             let [kept, rounded] = [&s, &round].map(share);
             println!("{name}, {cell}: {kept:.3} of the edges are off, {rounded:.3} rounded");
             assert!(
-                kept < 0.06 && rounded > 0.7,
+                kept < 0.01 && rounded > 0.7,
                 "{name}, {cell}: {kept}, {rounded}"
             );
         }

@@ -32,6 +32,17 @@ struct Way {
     off: f64,
 }
 
+/// The chords of a side that are looked for: those nearest to the face, and to the points in which its edges pierce the side.
+struct Choice<'a> {
+    points: &'a [Point],
+    pierced: &'a [Vec3],
+    axis: usize,
+    /// How near chords may come to each other.
+    apart: f64,
+    /// The best so far, and how far off they are.
+    best: Option<(f64, Vec<&'a Way>)>,
+}
+
 impl Edges {
     /// The chords of a side that edges of the face pierce, or with grid edges that are crossed twice; none if they are no
     /// other than those of plain cells.
@@ -43,34 +54,30 @@ impl Edges {
     ) -> Option<Vec<Chord>> {
         let points = self.boundary(seen, side)?;
         let ways = self.ways(seen, side, &points, pierced);
-        let mut best: Option<(f64, Vec<Way>)> = None;
+        let mut choice = Choice {
+            points: &points,
+            pierced,
+            axis: side.1,
+            apart: seen.grid.margin * seen.grid.step / 4.0,
+            best: None,
+        };
+        let mut plain: Option<(f64, Vec<&Way>)> = None;
         matchings(&points, &mut |pairs| {
-            let mut taken: Vec<Vec3> = Vec::new();
-            let mut found: Vec<Way> = Vec::new();
-            for pair in pairs {
-                let of = ways.iter().filter(|w| w.ends == *pair);
-                let free = of.filter(|w| !w.via.iter().any(|v| taken.contains(v)));
-                let Some(way) = free.min_by(|a, b| a.off.total_cmp(&b.off)) else {
-                    return;
-                };
-                taken.extend(&way.via);
-                found.push(way.clone());
+            let of = |pair| ways.iter().filter(|w| w.ends == pair).collect();
+            let mut all: Vec<Vec<&Way>> = pairs.iter().map(|p| of(*p)).collect();
+            // Without corners, chords of points that do not alternate keep apart.
+            let last: Option<Vec<&Way>> = all.iter().map(|w| w.last().copied()).collect();
+            let Some(last) = last else { return };
+            let off = last.iter().fold(0.0f64, |m, w| m.max(w.off));
+            if plain.as_ref().is_none_or(|p| off < p.0) {
+                plain = Some((off, last));
             }
-            let apart = seen.grid.margin * seen.grid.step / 4.0;
-            let corners: usize = found.iter().map(|w| w.via.len()).sum();
-            if corners > Key::CORNERS || crossing(&points, &found, side.1, apart) {
-                // Without corners, chords of points that do not alternate keep apart.
-                for w in &mut found {
-                    let plain = ways.iter().rfind(|v| v.ends == w.ends);
-                    *w = plain.unwrap_or(w).clone();
-                }
+            for w in &mut all {
+                w.sort_by(|a, b| a.off.total_cmp(&b.off));
             }
-            let off = found.iter().fold(0.0f64, |m, w| m.max(w.off));
-            if best.as_ref().is_none_or(|b| off < b.0) {
-                best = Some((off, found));
-            }
+            choice.add(&all, &mut Vec::new());
         });
-        let (_, ways) = best?;
+        let (_, ways) = choice.best.or(plain)?;
         let single = points.iter().all(|p| p.key.index() == 0);
         if single && points.len() < 4 && ways.iter().all(|w| w.via.is_empty()) {
             return None;
@@ -86,7 +93,7 @@ impl Edges {
             to: points[w.ends[1]].key,
             via: w.via.iter().map(&mut name).collect(),
         };
-        Some(ways.iter().map(chord).collect())
+        Some(ways.into_iter().map(chord).collect())
     }
 
     /// The points of the boundary of a side, counter-clockwise about its axis; none if cells beside it cannot follow.
@@ -252,40 +259,79 @@ fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
     rest(points, &all, &mut Vec::new(), found, &mut Vec::new());
 }
 
-/// Whether chords of a side come as near to each other as points come to nodes, or one turns back.
-fn crossing(points: &[Point], ways: &[Way], axis: usize, apart: f64) -> bool {
-    let flat = |p: Vec3| drop_axis(p, axis);
-    let pieces = |w: &Way| {
-        let mut path = vec![flat(points[w.ends[0]].place)];
-        path.extend(w.via.iter().map(|p| flat(*p)));
-        path.push(flat(points[w.ends[1]].place));
+impl<'a> Choice<'a> {
+    /// Adds a way of each of the rest to those taken, nearest first, while they may be better than the best.
+    fn add(&mut self, rest: &[Vec<&'a Way>], taken: &mut Vec<&'a Way>) {
+        let Some((first, rest)) = rest.split_first() else {
+            let off = taken.iter().fold(self.missed(taken), |m, w| m.max(w.off));
+            let better = self.best.as_ref().is_none_or(|b| off < b.0);
+            if better && !self.is_crossing(taken) {
+                self.best = Some((off, taken.clone()));
+            }
+            return;
+        };
+        for w in first {
+            if self.best.as_ref().is_some_and(|b| w.off >= b.0) {
+                break;
+            }
+            let corners: usize = taken.iter().map(|t| t.via.len()).sum();
+            let used = |v: &Vec3| taken.iter().any(|t| t.via.contains(v));
+            if corners + w.via.len() <= Key::CORNERS && !w.via.iter().any(used) {
+                taken.push(w);
+                self.add(rest, taken);
+                taken.pop();
+            }
+        }
+    }
+
+    fn path(&self, w: &Way) -> Vec<Vec3> {
+        let [from, to] = w.ends.map(|e| self.points[e].place);
+        let mut path = vec![from];
+        path.extend(&w.via);
+        path.push(to);
         path
-    };
-    let meet = |a: &[[f64; 2]], b: &[[f64; 2]]| {
-        let side = |p: &[[f64; 2]], q: [f64; 2]| orient2d(p[0], p[1], q);
-        let cross = side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0;
+    }
+
+    /// How far the farthest point in which an edge pierces the side is from some chords.
+    fn missed(&self, ways: &[&Way]) -> f64 {
+        let paths: Vec<Vec<Vec3>> = ways.iter().map(|w| self.path(w)).collect();
+        let from = |p: &Vec3| {
+            let pieces = paths.iter().flat_map(|path| path.windows(2));
+            let away = pieces.map(|s| norm(sub(*p, nearest([s[0], s[1]], *p))));
+            away.fold(f64::INFINITY, f64::min)
+        };
+        self.pierced.iter().map(from).fold(0.0, f64::max)
+    }
+
+    /// Whether chords come too near to each other, or one to itself.
+    fn is_crossing(&self, ways: &[&Way]) -> bool {
+        let flat = |p: Vec3| drop_axis(p, self.axis);
         let near = |p: [f64; 2], s: &[[f64; 2]]| {
             let [p, q, r] = [p, s[0], s[1]].map(|p| [p[0], p[1], 0.0]);
-            norm(sub(p, nearest([q, r], p))) < apart
+            norm(sub(p, nearest([q, r], p))) < self.apart
         };
-        cross || a.iter().any(|p| near(*p, b)) || b.iter().any(|p| near(*p, a))
-    };
-    let paths: Vec<_> = ways.iter().map(pieces).collect();
-    // A path with two corners may cross itself, and any may turn back.
-    let bent = |p: &Vec<[f64; 2]>| {
-        (p.len() == 4 && meet(&p[..2], &p[2..]))
-            || p.windows(3).any(|w| {
-                let [u, v] = [[w[1], w[0]], [w[2], w[1]]].map(|[a, b]| [a[0] - b[0], a[1] - b[1]]);
-                let (cross, dot) = (u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]);
-                dot < 0.0 && cross.abs() < -1e-3 * dot
+        let meet = |a: &[[f64; 2]], b: &[[f64; 2]]| {
+            let side = |p: &[[f64; 2]], q: [f64; 2]| orient2d(p[0], p[1], q);
+            let cross = side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0;
+            cross || a.iter().any(|p| near(*p, b)) || b.iter().any(|p| near(*p, a))
+        };
+        let paths: Vec<Vec<[f64; 2]>> = ways
+            .iter()
+            .map(|w| self.path(w).into_iter().map(flat).collect())
+            .collect();
+        // A path with two corners may cross itself, and any may turn back.
+        let bent = |p: &Vec<[f64; 2]>| {
+            (p.len() == 4 && meet(&p[..2], &p[2..]))
+                || p.windows(3)
+                    .any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]))
+        };
+        paths.iter().any(bent)
+            || paths.iter().enumerate().any(|(i, a)| {
+                let meets = |s: &[[f64; 2]]| {
+                    let others = paths[..i].iter().flat_map(|b| b.windows(2));
+                    others.into_iter().any(|t| meet(s, t))
+                };
+                a.windows(2).any(meets)
             })
-    };
-    paths.iter().any(bent)
-        || paths.iter().enumerate().any(|(i, a)| {
-            let meets = |s: &[[f64; 2]]| {
-                let others = paths[..i].iter().flat_map(|b| b.windows(2));
-                others.into_iter().any(|t| meet(s, t))
-            };
-            a.windows(2).any(meets)
-        })
+    }
 }

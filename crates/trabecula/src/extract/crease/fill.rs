@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::rim::Step;
+use super::rim::{Step, rims};
 use super::side::{Part, Side};
 use crate::extract::by::By;
 use crate::extract::key::Key;
@@ -51,20 +51,14 @@ impl Knots<'_> {
         let bases = self.bases(cell, face);
         let steps = self.steps(cell, face);
         let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let mut rim: Vec<Vec3> = Vec::new();
-        for key in rims.iter().flatten() {
-            let v = self.vertex(*key);
-            rim.push(self.places[v as usize]);
-        }
-        let in_sides = rims
-            .iter()
-            .flatten()
-            .filter(|k| k.spans().count_ones() == 2);
-        let corners: Vec<Vec3> = in_sides.filter_map(|k| self.edges.place(*k)).collect();
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
         let center = self.center_of(cell);
         let field = self.grid.faces[self.local.live[face]].field.clone();
-        let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
+        let rim = match &rims[..] {
+            [keys] => Some(self.rim(cell, keys)),
+            _ => None,
+        };
+        let (edges, of) = (self.edges, self.cell_of(cell, face));
         let (mut solid, mut shares) = (false, INNER);
         if rims.len() > 1 {
             solid = field.value(center) <= 0.0;
@@ -75,10 +69,10 @@ impl Knots<'_> {
             let tets = if rims.len() > 1 {
                 self.apart(cell, &bases, center, solid, shares[attempt])
             } else {
-                let apex = match attempt {
-                    0 if rim.is_empty() => center,
-                    0 => edges.apex(grid, nodes, (node, None), (face, &*field), &rim, &corners),
-                    1 if !rim.is_empty() => scale(add(middle(&rim), center), 0.5),
+                let apex = match (attempt, &rim) {
+                    (0, None) => center,
+                    (0, Some(rim)) => edges.apex(of, rim, None).0,
+                    (1, Some(rim)) => scale(add(middle(&rim.places), center), 0.5),
                     _ => {
                         let by = [0, 1, 2].map(|a| self.chance(3 * attempt + a, node));
                         let size = sub(ends[1], ends[0]);
@@ -337,26 +331,4 @@ impl Knots<'_> {
         inner.push((name, v));
         v
     }
-}
-
-/// The closed lines that some paths make.
-fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
-    let mut used = vec![false; paths.len()];
-    let mut rims = Vec::new();
-    for first in 0..paths.len() {
-        let (mut rim, mut at) = (Vec::new(), first);
-        while !used[at] {
-            used[at] = true;
-            let path = &paths[at];
-            rim.extend(&path[..path.len() - 1]);
-            match paths.iter().rposition(|p| p[0] == path[path.len() - 1]) {
-                Some(n) => at = n,
-                None => break,
-            }
-        }
-        if !rim.is_empty() {
-            rims.push(rim);
-        }
-    }
-    rims
 }

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
+use super::patch::Patch;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
-use crate::math::{Vec3, add, scale, sub};
+use crate::math::{add, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d};
 
 /// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
@@ -33,61 +34,36 @@ impl Knots<'_> {
     /// Fills a cell in which a face has an edge.
     pub fn edged(&mut self, cell: [usize; 3], face: usize) {
         let steps = self.steps(cell, face);
-        let mut next: HashMap<Key, usize> = HashMap::new();
-        for (i, s) in steps.iter().enumerate() {
-            next.insert(s.from, i);
-        }
-        let mut used = vec![false; steps.len()];
-        let mut rims: Vec<(Vec<Key>, Vec<Key>)> = Vec::new();
-        for first in 0..steps.len() {
-            let (mut rim, mut corners) = (Vec::new(), Vec::new());
-            let mut at = first;
-            while !used[at] {
-                used[at] = true;
-                rim.push(steps[at].from);
-                rim.extend(&steps[at].via);
-                corners.extend(steps[at].via.iter().filter(|k| k.spans().count_ones() == 2));
-                match next.get(&steps[at].to) {
-                    Some(n) => at = *n,
-                    None => break,
-                }
-            }
-            if !rim.is_empty() {
-                rims.push((rim, corners));
-            }
-        }
-        let cut = self.grid.faces[self.local.live[face]].cut;
+        let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
+        let (node, cut) = (
+            self.nodes.index(cell),
+            self.grid.faces[self.local.live[face]].cut,
+        );
+        let (edges, of) = (self.edges, self.cell_of(cell, face));
+        let patches: Vec<(Option<Patch>, Patch)> = rims
+            .iter()
+            .map(|keys| edges.patches(of, &self.rim(cell, keys), rims.len() == 1))
+            .collect();
+        let any = patches.iter().any(|p| p.0.is_some());
         let first = self.extra.triangles.len();
-        for (rim, corners) in &rims {
-            let names: Vec<u32> = rim.iter().map(|k| self.vertex(*k)).collect();
-            let places: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
-            let corners: Vec<Vec3> = corners
-                .iter()
-                .filter_map(|k| self.edges.place(*k))
-                .collect();
-            let field = &*self.grid.faces[self.local.live[face]].field;
-            let node = self.nodes.index(cell);
-            let (edges, grid, nodes) = (self.edges, self.grid, self.nodes);
-            let beyond = if rims.len() == 1 {
-                edges.beyond.get(&node).copied()
-            } else {
-                None
-            };
-            let apex = edges.apex(
-                grid,
-                nodes,
-                (node, beyond),
-                (face, field),
-                &places,
-                &corners,
-            );
-            self.cone(Key::center(node, 7), apex, &names, cut);
-        }
-        // One cone cannot meet itself, but several may meet each other.
-        if rims.len() > 1 && self.muddled(first) {
+        for divided in [true, false].into_iter().skip(usize::from(!any)) {
+            for (keys, (best, cone)) in rims.iter().zip(&patches) {
+                let patch = best.as_ref().filter(|_| divided).unwrap_or(cone);
+                let mut names: Vec<u32> = keys.iter().map(|k| self.vertex(*k)).collect();
+                let inner = patch.inner.iter();
+                names.extend(inner.map(|p| self.push(Key::center(node, 7), *p)));
+                let triangles = patch.triangles.iter();
+                let named = triangles.map(|t| (t.map(|i| names[i]), cut));
+                self.extra.triangles.extend(named);
+            }
+            // One cone cannot meet itself, but several may meet each other.
+            let single = !divided && rims.len() == 1;
+            if single || !(self.muddled(first) || self.touch(first, |x| x)) {
+                return;
+            }
             self.extra.triangles.truncate(first);
-            self.hollow(cell, face, &steps, cut);
         }
+        self.hollow(cell, face, &steps, cut);
     }
 
     /// The ways of all rims through the sides of a cell: counter-clockwise seen from the void.
@@ -299,6 +275,28 @@ impl Knots<'_> {
         }
         all
     }
+}
+
+/// The closed lines that some paths make.
+pub(super) fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
+    let mut used = vec![false; paths.len()];
+    let mut rims = Vec::new();
+    for first in 0..paths.len() {
+        let (mut rim, mut at) = (Vec::new(), first);
+        while !used[at] {
+            used[at] = true;
+            let path = &paths[at];
+            rim.extend(&path[..path.len() - 1]);
+            match paths.iter().rposition(|p| p[0] == path[path.len() - 1]) {
+                Some(n) => at = n,
+                None => break,
+            }
+        }
+        if !rim.is_empty() {
+            rims.push(rim);
+        }
+    }
+    rims
 }
 
 /// The triangles of a simple polygon, by clipping its best ear again and again; the first one is not the best but one of
