@@ -10,6 +10,9 @@ use crate::extract::knot::{Knots, middle};
 use crate::field::Field;
 use crate::math::{Vec3, add, norm, scale, sub};
 
+/// More pieces of edges than this in one cell are not looked at one by one: they are far shorter than a step.
+const MOST: usize = 32;
+
 /// A cell, and the face whose patch is in it.
 #[derive(Clone, Copy)]
 pub(super) struct Cell<'a> {
@@ -108,9 +111,10 @@ impl Edges {
         self.best(cell, rim, self.pieces_in(cell), beyond)
     }
 
+    /// The pieces of edges in a cell; none if there are too many.
     fn pieces_in(&self, cell: Cell) -> &[[Vec3; 2]] {
-        let here = (cell.face, cell.node);
-        self.pieces.get(&here).map_or(&[], |p| p)
+        let here = self.pieces.get(&(cell.face, cell.node));
+        here.filter(|p| p.len() <= MOST).map_or(&[], |p| p)
     }
 
     /// The apex where only some pieces of edges belong to the patch.

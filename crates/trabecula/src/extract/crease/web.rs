@@ -7,8 +7,6 @@ use crate::math::{Vec3, add, cross, dot, norm, sub, unit};
 /// Ends of edges and points of rims are the same if they are this many times as near to each other as points come to nodes:
 /// corners are moved into their sides by as much.
 const SAME: f64 = 2.0;
-/// Pieces of edges in a cell beyond which nothing is divided: they are far shorter than a step.
-const MOST: usize = 64;
 
 /// A piece of an edge, by the numbers of its ends.
 type Link = [usize; 2];
@@ -31,9 +29,6 @@ impl Web {
             rim: n,
             trees: Vec::new(),
         };
-        if pieces.len() > MOST {
-            return web;
-        }
         let mut links: Vec<Link> = Vec::with_capacity(pieces.len());
         for piece in pieces {
             let [a, b] = piece.map(|p| web.number(p, close));
