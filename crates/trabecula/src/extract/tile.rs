@@ -277,12 +277,19 @@ pub(super) fn extract<'a>(
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
-    if s.edges.any() && s.signs.is_any_knotted() {
+    let settled = s.edges.any() && s.signs.is_any_knotted();
+    if settled {
         // Chords are laid between the points that stay.
         let (mut knots, vertices, _) = knots(s, grid, &local, &nodes);
         settle(&mut knots, vertices);
     }
     edges(s, grid, &local, &nodes);
+    if settled {
+        // What is balanced are points as they were found: which of them stay a tile knows in its own cells only.
+        for (place, v) in s.places.iter_mut().zip(&s.vertices) {
+            *place = v.at(&nodes, f64::from(v.t));
+        }
+    }
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes);
     finish(s, grid, &local, &nodes, &own);

@@ -1,11 +1,12 @@
 //! Edges of meshes: how near the surface comes to them, and that every guarantee holds whatever the mesh.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
+use std::io::Cursor;
 use std::sync::Arc;
 
 use trabecula::cell::Part;
-use trabecula::extract::{Silent, Surface, surface};
+use trabecula::extract::{Islands, Silent, Surface, stream_stl, surface};
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
@@ -304,6 +305,17 @@ fn in_lattice(truth: &MeshRegion, field: &dyn Field, mesh: &Mesh, edge: f64) -> 
     within.map(|p| found.value(p).abs()).collect()
 }
 
+/// The places in a streamed surface: tiles that see a vertex each by itself must put it in the same one.
+fn streamed(solid: &Solid, edge: f64) -> HashSet<[u32; 3]> {
+    let mut stl = Cursor::new(Vec::new());
+    stream_stl(solid, edge, Islands::Keep, &mut stl, &Silent).expect("stl");
+    let bytes = stl.into_inner();
+    let corners = bytes[84..].chunks(50).flat_map(|t| t[12..48].chunks(12));
+    let place =
+        |c: &[u8]| [0, 4, 8].map(|i| u32::from_le_bytes([c[i], c[i + 1], c[i + 2], c[i + 3]]));
+    corners.map(place).collect()
+}
+
 #[test]
 fn edges_are_kept_where_a_lattice_meets_them() {
     for (name, mesh) in [
@@ -321,6 +333,13 @@ fn edges_are_kept_where_a_lattice_meets_them() {
             };
             let (s, round) = (of(truth.clone()), of(Arc::new(Rounded(truth.clone()))));
             check(&format!("{name}, {cell}"), &s);
+            let solid = Solid::new(truth.clone(), Some(field.clone()), 0.6);
+            let all = s
+                .mesh
+                .vertices
+                .iter()
+                .map(|v| v.map(|x| (x as f32).to_bits()));
+            assert!(streamed(&solid, edge) == all.collect(), "{name}, {cell}");
             let share = |s: &Surface| {
                 let off = in_lattice(&truth, &*field, &s.mesh, edge);
                 off.iter().filter(|d| **d > edge / 20.0).count() as f64 / off.len() as f64
