@@ -65,6 +65,14 @@ pub(super) struct Edges {
     corners: By<(usize, usize), Vec<(Vec3, usize)>>,
     /// The corner that the patch of a cell has in a cell beside it, likewise.
     beyond: By<usize, Vec3>,
+    /// For each row of nodes: those within two cells of a piece of an edge.
+    near: Vec<u64>,
+}
+
+/// The nodes of a block and one more on every side, and how many there are before the block's.
+pub(super) struct Wide<'a> {
+    pub axes: [&'a [f64]; 3],
+    pub before: [isize; 3],
 }
 
 /// A block, and a face in it.
@@ -96,6 +104,8 @@ impl Edges {
         self.pieces.clear();
         self.corners.clear();
         self.beyond.clear();
+        self.near.clear();
+        self.near.resize(shape[1] * shape[2], 0);
     }
 
     /// Whether a live face has edges here.
@@ -106,6 +116,12 @@ impl Edges {
     /// Whether there are any.
     pub fn any(&self) -> bool {
         !self.face.is_empty()
+    }
+
+    /// Whether a piece of an edge of some face lies within two cells of a node: chords that end on grid edges farther away
+    /// are all known in every tile that has these.
+    pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
+        self.near[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 
     /// The ends of all chords.
@@ -120,9 +136,16 @@ impl Edges {
     }
 
     /// Follows the edges of a live face through the cells of the block.
-    pub fn follow(&mut self, nodes: &Nodes, of: &Creases, face: usize, segments: &[u32]) {
+    pub fn follow(
+        &mut self,
+        nodes: &Nodes,
+        wide: &Wide,
+        of: &Creases,
+        face: usize,
+        segments: &[u32],
+    ) {
         for &i in segments {
-            self.walk(nodes, face, of.segments[i as usize].ends);
+            self.walk(nodes, wide, face, of.segments[i as usize].ends);
         }
     }
 
@@ -191,7 +214,7 @@ impl Edges {
         }
         if self.any() {
             for p in &of.corners {
-                if let Some(cell) = cell_of(nodes, p.0) {
+                if let Some(cell) = cell_of(nodes.axes, p.0) {
                     let here = (seen.face, nodes.index(cell));
                     self.corners.entry(here).or_default().push(*p);
                 }
@@ -253,20 +276,19 @@ impl Edges {
         }
     }
 
-    /// Follows a piece of an edge through the cells of the block.
-    fn walk(&mut self, nodes: &Nodes, face: usize, [p, q]: [Vec3; 2]) {
+    /// Follows a piece of an edge through the cells of the block, and those around it.
+    fn walk(&mut self, nodes: &Nodes, wide: &Wide, face: usize, [p, q]: [Vec3; 2]) {
         let along = sub(q, p);
         let mut stops = vec![0.0, 1.0];
         for a in 0..3 {
-            let axis = nodes.axes[a];
+            let axis = wide.axes[a];
             let [from, to] = [p, q].map(|x| axis.partition_point(|n| *n < x[a]));
             for n in from.min(to)..from.max(to) {
                 let t = (axis[n] - p[a]) / along[a];
                 stops.push(t);
                 let mut at = add(p, scale(along, t));
                 at[a] = axis[n];
-                if let Some(mut cell) = cell_of(nodes, at) {
-                    cell[a] = n;
+                if let Some(cell) = cell_of(nodes.axes, at) {
                     self.pierced.push((face, (nodes.index(cell), a), at));
                 }
             }
@@ -274,9 +296,28 @@ impl Edges {
         stops.sort_by(f64::total_cmp);
         for w in stops.windows(2).filter(|w| w[0] < w[1]) {
             let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
-            if let Some(cell) = cell_of(nodes, scale(add(ends[0], ends[1]), 0.5)) {
+            let middle = scale(add(ends[0], ends[1]), 0.5);
+            if let Some(cell) = cell_of(nodes.axes, middle) {
                 let here = (face, nodes.index(cell));
                 self.pieces.entry(here).or_default().push(ends);
+            }
+            if let Some(cell) = cell_of(wide.axes, middle) {
+                self.mark(nodes, [0, 1, 2].map(|a| cell[a] as isize - wide.before[a]));
+            }
+        }
+    }
+
+    /// Marks the nodes within two cells of one that an edge passes.
+    fn mark(&mut self, nodes: &Nodes, cell: [isize; 3]) {
+        let reach = [0, 1, 2].map(|a| {
+            let last = nodes.shape[a] as isize - 1;
+            ((cell[a] - 1).max(0) as usize)..=((cell[a] + 2).min(last) as usize)
+        });
+        let [x, y, z] = reach;
+        let mask = x.fold(0, |m, i| m | 1u64 << i);
+        for k in z {
+            for j in y.clone() {
+                self.near[k * nodes.shape[1] + j] |= mask;
             }
         }
     }
@@ -394,12 +435,12 @@ fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
     add(p, scale(along, t))
 }
 
-/// The cell of the block that a place lies in.
-fn cell_of(nodes: &Nodes, p: Vec3) -> Option<[usize; 3]> {
+/// The cell between nodes that a place lies in.
+fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
     let mut cell = [0; 3];
     for a in 0..3 {
-        let above = nodes.axes[a].partition_point(|n| *n <= p[a]);
-        if above == 0 || above == nodes.axes[a].len() {
+        let above = axes[a].partition_point(|n| *n <= p[a]);
+        if above == 0 || above == axes[a].len() {
             return None;
         }
         cell[a] = above - 1;

@@ -281,6 +281,19 @@ impl Grid {
         }
     }
 
+    /// The same with one node more on each side, where there is one.
+    pub(super) fn wide(&self, tile: [usize; 3]) -> crease::Wide<'_> {
+        let n = self.nodes(tile);
+        let from = n.each_ref().map(|n| n.start.saturating_sub(1));
+        crease::Wide {
+            axes: [0, 1, 2].map(|a| {
+                let axis = &self.axes[a];
+                &axis[from[a]..(n[a].end + 1).min(axis.len())]
+            }),
+            before: [0, 1, 2].map(|a| (n[a].start - from[a]) as isize),
+        }
+    }
+
     /// What bounds and places say of the solid in a block; `None` if no surface crosses it.
     pub(super) fn local(&self, nodes: &[std::ops::Range<usize>; 3], b: &Aabb) -> Option<Local> {
         let (mut live, mut flat) = (Vec::new(), Vec::new());

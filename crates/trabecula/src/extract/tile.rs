@@ -291,7 +291,7 @@ pub(super) fn extract<'a>(
         }
     }
     list_triangles(s, grid, &local, &own);
-    balance(s, grid, &local, &nodes, &own);
+    balance(s, grid, &local, &nodes);
     finish(s, grid, &local, &nodes, &own);
     let own_triangles =
         s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
@@ -338,10 +338,11 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block, nodes: &No
 /// Follows the edges that faces have of their own.
 fn follow(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
     s.edges.clear(nodes.shape);
+    let wide = grid.wide(tile);
     for (face, &id) in local.live.iter().enumerate() {
         if let Some(segments) = grid.creases(id, tile) {
-            s.edges
-                .follow(nodes, &grid.faces[id].creases, face, segments);
+            let of = &grid.faces[id].creases;
+            s.edges.follow(nodes, &wide, of, face, segments);
         }
     }
 }

@@ -1,7 +1,5 @@
 //! The moves that cancel the volume errors of triangles.
 
-use std::ops::Range;
-
 use multiversion::multiversion;
 
 use super::{Nodes, Scratch, numbered};
@@ -20,13 +18,7 @@ const CREASE: f32 = 0.906;
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what faces its edge can move without running far along it.
-pub(super) fn balance(
-    s: &mut Scratch,
-    grid: &Grid,
-    local: &Local,
-    nodes: &Nodes,
-    own: &[Range<usize>; 3],
-) {
+pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];
@@ -58,16 +50,11 @@ pub(super) fn balance(
             s.moments[v as usize] = (0.0, 0.0);
         }
     }
-    // Nor are all chords around a tile's border known in it: beside edges its neighbour may lay others there.
-    let creased = local.live.iter().map(|id| grid.has_creases(*id));
-    let creased: Vec<bool> = creased.collect();
+    // A tile does not know all the chords that its neighbour lays at the border: near edges no vertex moves.
+    let creased: Vec<bool> = local.live.iter().map(|id| grid.has_creases(*id)).collect();
     if creased.contains(&true) {
         for (v, m) in s.vertices.iter().zip(&mut s.moments) {
-            let on_border = (0..3).filter(|a| *a != usize::from(v.axis)).any(|a| {
-                let at = usize::from(v.node[a]);
-                at == own[a].start || at == own[a].end
-            });
-            if on_border && creased[usize::from(v.face)] {
+            if creased[usize::from(v.face)] && s.edges.are_near(nodes, v.node.map(usize::from)) {
                 *m = (0.0, 0.0);
             }
         }
