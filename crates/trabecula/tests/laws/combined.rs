@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use trabecula::cell::Part;
-use trabecula::extract::{Silent, surface};
+use trabecula::extract::{Islands, Silent, surface};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
@@ -16,7 +16,7 @@ use trabecula::region::{
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
-use super::common::{Random, cases, check, cuboid, fault, lattice};
+use super::common::{Random, cases, check, cuboid, fault_of, lattice, stl, stream};
 use super::crease::{angle, ball, block, boxes, creases, cylinder, far, moved, notched, of, star};
 
 /// A random polyhedron about the origin.
@@ -106,6 +106,93 @@ fn other(some: &mut Random) -> (&'static str, Region) {
     }
 }
 
+/// A polyhedron with another shape, and what is in it.
+struct Design {
+    mesh: Arc<MeshRegion>,
+    beside: Region,
+    kind: &'static str,
+    way: usize,
+    region: Region,
+    field: Option<Arc<dyn Field>>,
+    skinned: bool,
+    solid: Solid,
+    edge: f64,
+}
+
+/// None where the skin is refused.
+fn design(case: u64) -> Option<Design> {
+    let some = &mut Random(31 * case + 5);
+    let mesh = polyhedron(some);
+    let (mut kind, mut beside) = other(some);
+    let way = some.below(5);
+    if way == 0 && kind == "half" {
+        (kind, beside) = ("box", cuboid([0.0; 3], [0.7, 0.9, 0.6]));
+    }
+    let way = if way > 2 && kind == "half" { 1 } else { way };
+    let own = mesh.clone() as Region;
+    let (first, second) = if way == 3 {
+        (beside.clone(), own.clone())
+    } else {
+        (own.clone(), beside.clone())
+    };
+    let pair = vec![first, second];
+    let region: Region = match way {
+        0 => Arc::new(Union::new(pair).expect("union")),
+        1 | 3 => Arc::new(Difference::new(pair).expect("cut")),
+        2 => Arc::new(Intersection::new(pair).expect("cut")),
+        _ => own,
+    };
+    let edge = some.between(0.03, 0.07);
+    let inside = some.below(4);
+    let gyroid = lattice("gyroid", Part::Sheet, 0.4, [0.5; 3], some.point(90.0));
+    let diamond = lattice("diamond", Part::Lower, 0.4, [0.5; 3], some.point(90.0));
+    let field = [None, Some(gyroid.clone()), Some(diamond), Some(gyroid)][inside].clone();
+    let mut solid = Solid::new(region.clone(), field.clone(), 0.5);
+    if inside == 3 {
+        let thickness = Grade::Constant(edge * some.between(0.6, 3.0));
+        let skin = skin(&solid.region, &thickness, &[]).ok()?;
+        solid = solid.with(skin);
+    }
+    if way == 4 {
+        let mut faces = Vec::new();
+        let tree = beside.clone().faces(0.0, &mut faces);
+        solid = solid.with(Body { faces, tree });
+    }
+    Some(Design {
+        mesh,
+        beside,
+        kind,
+        way,
+        region,
+        field,
+        skinned: inside == 3,
+        solid,
+        edge,
+    })
+}
+
+impl Design {
+    fn name(&self) -> String {
+        let verbs = [
+            "union",
+            "difference",
+            "intersection",
+            "taken from",
+            "kept in it",
+        ];
+        format!("{} {}", verbs[self.way], self.kind)
+    }
+
+    /// Whether the mesh makes the surface at a place, farther from the other shape than a distance.
+    fn shows(&self, p: Vec3, by: f64) -> bool {
+        match self.way {
+            0 | 1 => self.beside.value(p) > by,
+            4 => true,
+            _ => self.beside.value(p) < -by,
+        }
+    }
+}
+
 /// The shares of samples of edges that are farther from the surface than a twentieth and a half of a step.
 #[derive(Default)]
 struct Tally {
@@ -121,80 +208,29 @@ fn combined_meshes_keep_every_guarantee_and_their_edges() {
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
     let mut wrong = Vec::new();
     for case in 0..cases(6) {
-        let some = &mut Random(31 * case + 5);
-        let mesh = polyhedron(some);
-        let (mut kind, mut beside) = other(some);
-        let way = some.below(5);
-        if way == 0 && kind == "half" {
-            (kind, beside) = ("box", cuboid([0.0; 3], [0.7, 0.9, 0.6]));
-        }
-        let way = if way > 2 && kind == "half" { 1 } else { way };
-        let pair = |a: &Region, b: &Region| vec![a.clone(), b.clone()];
-        let own = mesh.clone() as Region;
-        let (verb, region): (_, Region) = match way {
-            0 => (
-                "union",
-                Arc::new(Union::new(pair(&own, &beside)).expect("union")),
-            ),
-            1 => (
-                "difference",
-                Arc::new(Difference::new(pair(&own, &beside)).expect("cut")),
-            ),
-            2 => (
-                "intersection",
-                Arc::new(Intersection::new(pair(&own, &beside)).expect("cut")),
-            ),
-            3 => (
-                "taken from",
-                Arc::new(Difference::new(pair(&beside, &own)).expect("cut")),
-            ),
-            _ => ("kept in it", own),
-        };
-        // Where the mesh makes the surface.
-        let shows = |p: Vec3, by: f64| match way {
-            0 => beside.value(p) > by,
-            1 => beside.value(p) > by,
-            4 => true,
-            _ => beside.value(p) < -by,
-        };
-        let edge = some.between(0.03, 0.07);
-        let inside = some.below(4);
-        let gyroid = lattice("gyroid", Part::Sheet, 0.4, [0.5; 3], some.point(90.0));
-        let diamond = lattice("diamond", Part::Lower, 0.4, [0.5; 3], some.point(90.0));
-        let field = [None, Some(gyroid.clone()), Some(diamond), Some(gyroid)][inside].clone();
-        let mut solid = Solid::new(region.clone(), field.clone(), 0.5);
-        if inside == 3 {
-            let thickness = Grade::Constant(edge * some.between(0.6, 3.0));
-            let Ok(skin) = skin(&solid.region, &thickness, &[]) else {
-                continue;
-            };
-            solid = solid.with(skin);
-        }
-        if way == 4 {
-            let mut faces = Vec::new();
-            let tree = beside.clone().faces(0.0, &mut faces);
-            solid = solid.with(Body { faces, tree });
-        }
-        let Ok(s) = surface(&solid, edge, &Silent) else {
+        let Some(d) = design(case) else {
             continue;
         };
-        let name = ["full", "gyroid", "diamond", "gyroid, skin"][inside];
-        let tally = tallies.entry(format!("{verb} {kind}")).or_default();
+        let Ok(s) = surface(&d.solid, d.edge, &Silent) else {
+            continue;
+        };
+        let tally = tallies.entry(d.name()).or_default();
         tally.parts += 1;
-        if let Some(why) = fault(&s.mesh) {
-            println!("case {case}: {verb} {kind}, {name}, {edge:.4}: {why}");
+        if let Some(why) = fault_of(&d.solid, d.edge, &s) {
+            println!("case {case}: {}, {:.4}: {why}", d.name(), d.edge);
             wrong.push(case);
             tally.faults += 1;
             continue;
         }
         let found = MeshRegion::new(s.mesh, Repair::Auto).expect("a surface");
         // Meshes alone make one, with the curves in which they meet.
-        let truth = region.as_mesh().unwrap_or(&mesh);
-        let whole = region.as_mesh().is_some();
-        for p in creases(truth.mesh(), 30.0, edge / 4.0) {
-            let within = field.as_ref().is_none_or(|f| f.value(p) <= -1e-9) || inside == 3;
-            if within && (whole || shows(p, edge / 2.0)) {
-                let off = found.value(p).abs() / edge;
+        let truth = d.region.as_mesh().unwrap_or(&d.mesh);
+        let whole = d.region.as_mesh().is_some();
+        for p in creases(truth.mesh(), 30.0, d.edge / 4.0) {
+            let field = d.field.as_ref();
+            let within = field.is_none_or(|f| f.value(p) <= -1e-9) || d.skinned;
+            if within && (whole || d.shows(p, d.edge / 2.0)) {
+                let off = found.value(p).abs() / d.edge;
                 tally.samples += 1;
                 tally.off[0] += usize::from(off > 0.05);
                 tally.off[1] += usize::from(off > 0.5);
@@ -222,6 +258,25 @@ fn combined_meshes_keep_every_guarantee_and_their_edges() {
     assert!(wrong.is_empty(), "{wrong:?}");
     // Rounded, 40 % of them would be.
     assert!(share < 0.01, "{share} of the edges are off");
+}
+
+/// A finer grid, over several tiles along each axis: what they have in common they must find alike.
+#[test]
+fn tiles_agree_on_combined_meshes() {
+    let mut all = 0;
+    for case in 0..cases(6) {
+        let Some(d) = design(case) else {
+            continue;
+        };
+        let edge = d.edge / 4.0;
+        let Ok(s) = surface(&d.solid, edge, &Silent) else {
+            continue;
+        };
+        let (streamed, _) = stream(&d.solid, edge, Islands::Keep).expect("stl");
+        assert!(streamed == stl(&s), "case {case}: {}, {edge}", d.name());
+        all += 1;
+    }
+    println!("{all} parts, streamed as they are held in memory");
 }
 
 /// Boxes of a grid, those of one and of another body: all that is made of both is known exactly.

@@ -1,11 +1,12 @@
 //! What several suites need: regions, lattices, the judge of a surface, random numbers.
 
 use std::collections::HashSet;
+use std::io::Cursor;
 use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::Surface;
+use trabecula::extract::{Islands, Silent, Stopped, Summary, Surface, stream_stl};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
@@ -151,6 +152,36 @@ pub fn check(what: &str, s: &Surface) {
     if let Some(why) = fault(&s.mesh) {
         panic!("{what}: {why}");
     }
+}
+
+/// What keeps a solid's surface from bounding one, in memory or streamed: tiles that a vertex is common to must each put
+/// it in the same place.
+pub fn fault_of(solid: &Solid, edge: f64, s: &Surface) -> Option<&'static str> {
+    fault(&s.mesh).or_else(|| match stream(solid, edge, Islands::Keep) {
+        Ok((bytes, _)) if bytes == stl(s) => None,
+        _ => Some("streamed otherwise"),
+    })
+}
+
+/// Every guarantee, in memory and streamed.
+pub fn check_both(what: &str, solid: &Solid, edge: f64, s: &Surface) {
+    if let Some(why) = fault_of(solid, edge, s) {
+        panic!("{what}: {why}");
+    }
+}
+
+/// A solid as a streamed STL.
+pub fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Summary), Stopped> {
+    let mut stl = Cursor::new(Vec::new());
+    let summary = stream_stl(solid, edge, islands, &mut stl, &Silent)?;
+    Ok((stl.into_inner(), summary))
+}
+
+/// The mesh as a file of its triangles in their order.
+pub fn stl(s: &Surface) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    trabecula::io::write_mesh(&s.mesh, "stl", &Default::default(), &mut bytes).expect("memory");
+    bytes
 }
 
 /// Random designs in one run: `make campaign` asks for more.

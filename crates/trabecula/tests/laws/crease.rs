@@ -1,12 +1,11 @@
 //! Edges of meshes: how near the surface comes to them, and that every guarantee holds whatever the mesh.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::io::Cursor;
 use std::sync::Arc;
 
 use trabecula::cell::Part;
-use trabecula::extract::{Islands, Silent, Surface, stream_stl, surface};
+use trabecula::extract::{Silent, Surface, surface};
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
@@ -18,7 +17,7 @@ use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
-use super::common::{Random, cases, check, cuboid, lattice};
+use super::common::{Random, cases, check, check_both, cuboid, lattice};
 
 fn region(mesh: Mesh) -> Arc<MeshRegion> {
     Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("clean"))
@@ -212,7 +211,11 @@ pub fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
 }
 
 pub fn of(region: Region, edge: f64) -> Surface {
-    surface(&Solid::new(region, None, 1.0), edge, &Silent).expect("surface")
+    surface(&full(region), edge, &Silent).expect("surface")
+}
+
+fn full(region: Region) -> Solid {
+    Solid::new(region, None, 1.0)
 }
 
 /// A cylinder about z as a mesh of many facets.
@@ -251,7 +254,7 @@ fn polyhedra_keep_their_edges() {
             for edge in [0.1, 0.04] {
                 let truth = region(moved(mesh.clone(), turn, [0.11, -0.07, 0.05]));
                 let s = of(truth.clone(), edge);
-                check(name, &s);
+                check_both(name, &full(truth.clone()), edge, &s);
                 let round = of(Arc::new(Rounded(truth.clone())), edge);
                 let [off, before] = [&s, &round].map(|s| apart(&truth, &s.mesh, edge));
                 let volume = s.mesh.volume() / truth.mesh().volume() - 1.0;
@@ -285,7 +288,7 @@ fn rims_come_to_second_order() {
     let barrel = region(moved(barrel, [17.0, 31.0, 47.0], [0.11, -0.07, 0.05]));
     let errors = [10.0, 20.0, 40.0].map(|n| {
         let s = of(barrel.clone(), 1.0 / n);
-        check("cylinder", &s);
+        check_both("cylinder", &full(barrel.clone()), 1.0 / n, &s);
         let found = region(s.mesh);
         let points = creases(barrel.mesh(), 30.0, 0.25 / n);
         let mut off: Vec<f64> = points.iter().map(|p| found.value(*p).abs()).collect();
@@ -305,17 +308,6 @@ fn in_lattice(truth: &MeshRegion, field: &dyn Field, mesh: &Mesh, edge: f64) -> 
     within.map(|p| found.value(p).abs()).collect()
 }
 
-/// The places in a streamed surface: tiles that see a vertex each by itself must put it in the same one.
-fn streamed(solid: &Solid, edge: f64) -> HashSet<[u32; 3]> {
-    let mut stl = Cursor::new(Vec::new());
-    stream_stl(solid, edge, Islands::Keep, &mut stl, &Silent).expect("stl");
-    let bytes = stl.into_inner();
-    let corners = bytes[84..].chunks(50).flat_map(|t| t[12..48].chunks(12));
-    let place =
-        |c: &[u8]| [0, 4, 8].map(|i| u32::from_le_bytes([c[i], c[i + 1], c[i + 2], c[i + 3]]));
-    corners.map(place).collect()
-}
-
 #[test]
 fn edges_are_kept_where_a_lattice_meets_them() {
     for (name, mesh) in [
@@ -332,14 +324,8 @@ fn edges_are_kept_where_a_lattice_meets_them() {
                 surface(&solid, edge, &Silent).expect("surface")
             };
             let (s, round) = (of(truth.clone()), of(Arc::new(Rounded(truth.clone()))));
-            check(&format!("{name}, {cell}"), &s);
             let solid = Solid::new(truth.clone(), Some(field.clone()), 0.6);
-            let all = s
-                .mesh
-                .vertices
-                .iter()
-                .map(|v| v.map(|x| (x as f32).to_bits()));
-            assert!(streamed(&solid, edge) == all.collect(), "{name}, {cell}");
+            check_both(&format!("{name}, {cell}"), &solid, edge, &s);
             let share = |s: &Surface| {
                 let off = in_lattice(&truth, &*field, &s.mesh, edge);
                 off.iter().filter(|d| **d > edge / 20.0).count() as f64 / off.len() as f64
@@ -362,7 +348,7 @@ fn rims_with_a_lattice_come_to_second_order() {
     let errors = [15.0, 30.0, 60.0].map(|n| {
         let solid = Solid::new(barrel.clone(), Some(field.clone()), 0.6);
         let s = surface(&solid, 1.0 / n, &Silent).expect("surface");
-        check("cylinder, gyroid", &s);
+        check_both("cylinder, gyroid", &solid, 1.0 / n, &s);
         let mut off = in_lattice(&barrel, &*field, &s.mesh, 1.0 / n);
         off.sort_by(f64::total_cmp);
         off[off.len() * 19 / 20]
@@ -413,7 +399,7 @@ fn random_boxes_with_thin_walls_and_gaps_keep_every_guarantee() {
 /// with its edges rounded.
 fn both(what: &str, truth: Arc<MeshRegion>, edge: f64, some: &mut Random) -> f64 {
     let s = of(truth.clone(), edge);
-    check(what, &s);
+    check_both(what, &full(truth.clone()), edge, &s);
     let round = of(Arc::new(Rounded(truth.clone())), edge);
     let [off, before] = [&s, &round].map(|s| {
         let [a, b] = apart(&truth, &s.mesh, edge);
@@ -430,14 +416,15 @@ fn both(what: &str, truth: Arc<MeshRegion>, edge: f64, some: &mut Random) -> f64
         let filled = Solid::new(truth.clone(), Some(field), 0.5);
         if all || !skinned {
             let s = surface(&filled, edge.min(0.05), &Silent).expect("surface");
-            check(&format!("{what}, {cell}"), &s);
+            check_both(&format!("{what}, {cell}"), &filled, edge.min(0.05), &s);
         }
         // A skin thinner than a step: its inner side crosses the same cells.
         let thickness = Grade::Constant(edge * some.between(0.4, 3.0));
         if all || skinned {
             let skin = skin(&filled.region, &thickness, &[]).expect("skin");
-            let s = surface(&filled.with(skin), edge.min(0.05), &Silent).expect("surface");
-            check(&format!("{what}, {cell} and skin"), &s);
+            let (filled, edge) = (filled.with(skin), edge.min(0.05));
+            let s = surface(&filled, edge, &Silent).expect("surface");
+            check_both(&format!("{what}, {cell} and skin"), &filled, edge, &s);
         }
     }
     let center = truth.bounds().center();

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use crate::common::{Random, cases, fault, lattice};
+use crate::common::{Random, cases, fault_of, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
@@ -392,7 +392,7 @@ fn judge(victim: Victim) -> Result<End, String> {
         let full = field.is_none();
         let solid = Solid::new(shared.clone(), field, wavelength);
         let s = surface(&solid, edge, &Silent).map_err(|e| format!("{what}: {e:?}"))?;
-        if let Some(fault) = fault(&s.mesh) {
+        if let Some(fault) = fault_of(&solid, edge, &s) {
             return Err(format!("{what} at {edge}: {fault}"));
         }
         // The surface stays in the cells that the boundary passes, and their middles are half a step off it on average.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::common::{Random, cases, fault, lattice};
+use crate::common::{Random, cases, fault_of, lattice};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{Silent, surface};
@@ -144,13 +144,9 @@ fn run(seed: u64) -> Result<bool, String> {
     ];
     for field in filling {
         let full = field.is_none();
-        let s = surface(
-            &Solid::new(region.clone(), field, wavelength),
-            edge,
-            &Silent,
-        );
-        let s = s.map_err(|e| format!("edge {edge}: {e:?}"))?;
-        if let Some(fault) = fault(&s.mesh) {
+        let solid = Solid::new(region.clone(), field, wavelength);
+        let s = surface(&solid, edge, &Silent).map_err(|e| format!("edge {edge}: {e:?}"))?;
+        if let Some(fault) = fault_of(&solid, edge, &s) {
             return Err(format!("full {full}, edge {edge}: {fault}"));
         }
         if !full {
@@ -212,6 +208,6 @@ fn meshes_with_small_common_faces() {
     let solid = Solid::new(region, None, 1.0);
     for edge in [0.18595632115820984, 0.31, 0.11] {
         let s = surface(&solid, edge, &Silent).expect("surface");
-        assert_eq!(fault(&s.mesh), None, "edge {edge}");
+        assert_eq!(fault_of(&solid, edge, &s), None, "edge {edge}");
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{
-    Islands, Pieces, Progress, Silent, Stopped, Summary, Surface, stream_stl, surface, surface_of,
+    Islands, Pieces, Progress, Silent, Stopped, stream_stl, surface, surface_of,
 };
 use trabecula::io::read_mesh;
 use trabecula::measure::size;
@@ -14,7 +14,7 @@ use trabecula::mesh::Mesh;
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
 
-use crate::common::{ball, check, lattice, solid};
+use crate::common::{ball, check, lattice, solid, stl, stream};
 
 const WAVELENGTH: [f64; 3] = [1.0, 1.1, 0.9];
 
@@ -25,12 +25,6 @@ fn shell(center: [f64; 3], outer: f64, inner: f64) -> Region {
 
 fn union(parts: Vec<Region>) -> Region {
     Arc::new(Union::new(parts).expect("union"))
-}
-
-fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Summary), Stopped> {
-    let mut stl = Cursor::new(Vec::new());
-    let summary = stream_stl(solid, edge, islands, &mut stl, &Silent)?;
-    Ok((stl.into_inner(), summary))
 }
 
 /// Solid angle of a mesh about a point, in turns: 1 inside, 0 outside.
@@ -147,13 +141,6 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
         Err(e) => panic!("{what}: {e:?}"),
     }
     found
-}
-
-/// The mesh as a file of its triangles in their order.
-fn stl(s: &Surface) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    trabecula::io::write_mesh(&s.mesh, "stl", &Default::default(), &mut bytes).expect("memory");
-    bytes
 }
 
 #[test]

@@ -17,7 +17,7 @@ use trabecula::region::{
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
-use crate::common::{ball, check, cuboid, drawn, lattice};
+use crate::common::{ball, check, check_both, cuboid, drawn, lattice};
 
 /// A lattice with nothing solid.
 struct Nothing;
@@ -70,7 +70,7 @@ fn shell(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Solid {
 
 fn volume(solid: &Solid, edge: f64, what: &str) -> f64 {
     let s = surface(solid, edge, &Silent).expect("surface");
-    check(what, &s);
+    check_both(what, solid, edge, &s);
     s.mesh.volume()
 }
 
@@ -319,7 +319,7 @@ fn faces_that_coincide_do_no_harm() {
             let skin = skin(&region, &w, &[]).expect("skin");
             let solid = filled(&region, gyroid(0.2, 2.0), vec![skin, zone(zone_)]);
             let s = surface(&solid, edge, &Silent).expect("surface");
-            check(&format!("flush zone {i}, edge {edge}"), &s);
+            check_both(&format!("flush zone {i}, edge {edge}"), &solid, edge, &s);
         }
     }
 }
@@ -538,7 +538,8 @@ proptest! {
             bodies.push(zone(&shape(boss.0, boss.1, boss.2, boss.3).0));
         }
         let field = drawn.lattice();
-        let s = surface(&filled(&region, field, bodies), edge, &Silent).expect("surface");
-        check(&what, &s);
+        let solid = filled(&region, field, bodies);
+        let s = surface(&solid, edge, &Silent).expect("surface");
+        check_both(&what, &solid, edge, &s);
     }
 }

@@ -16,7 +16,7 @@ use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
 };
 
-use crate::common::{ball, cases, check, drawn, lattice_at, region, solid};
+use crate::common::{ball, cases, check, check_both, drawn, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
@@ -430,9 +430,10 @@ proptest! {
             }
             made => made.expect("surface"),
         };
-        check(&format!("{drawn:?} {text} edge {edge}"), &s);
-        let full = surface(&solid(region, None), edge, &Silent).expect("surface");
-        check(&format!("full {text} edge {edge}"), &full);
+        check_both(&format!("{drawn:?} {text} edge {edge}"), &design, edge, &s);
+        let design = solid(region, None);
+        let full = surface(&design, edge, &Silent).expect("surface");
+        check_both(&format!("full {text} edge {edge}"), &design, edge, &full);
         prop_assert!(s.mesh.volume() <= full.mesh.volume() * (1.0 + 0.5 * edge) + 1e-9);
     }
 }
