@@ -126,6 +126,14 @@ def sound(mesh):
     return volume(vertices, triangles)
 
 
+def of_stl(path):
+    """Vertices and triangles of a binary STL: places that are the same to the last bit are one vertex."""
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+    corners = np.fromfile(path, record, offset=84)["corners"].reshape(-1, 3)
+    vertices, which = np.unique(corners, axis=0, return_inverse=True)
+    return vertices.astype(np.float64), which.reshape(-1, 3)
+
+
 def distance(vertices, triangles, points):
     """Signed distances of points from a closed mesh, negative inside: every triangle is asked."""
     out = np.empty(len(points))

@@ -6,6 +6,7 @@ TRABECULA_PARTS names a folder of parts to be judged as well; TRABECULA_CAMPAIGN
 import functools
 import os
 import tempfile
+from itertools import product
 from pathlib import Path
 
 import judges
@@ -86,6 +87,22 @@ def test_parts_are_filled(tmp_path, name):
         assert volumes[1] > volumes[0]
 
 
+def streams_whole(made, folder, **spacing):
+    """A part that many tiles make, each by itself, is closed and has the volume that was told."""
+    told = made.save_stl(folder / "part.stl", **spacing)
+    mesh = judges.of_stl(folder / "part.stl")
+    assert len(mesh[1]) == told["triangles"]
+    assert judges.status(*mesh) == judges.manifold3d.Error.NoError
+    assert judges.volume(*mesh) == pytest.approx(told["volume"], rel=1e-6)
+
+
+@quiet
+@pytest.mark.parametrize(("name", "cell", "skin"), [(*c, i % 3 > 0) for i, c in enumerate(product(parts.PARTS, LATTICES))])
+def test_parts_are_streamed_whole(tmp_path, name, cell, skin):
+    """Over several tiles along each axis."""
+    streams_whole(solid(tmp_path, parts.PARTS[name](), cell, skin), tmp_path, edge=STEP / 2)
+
+
 def slack(name, part, damaged):
     """By how much a repair of this damage may miss the volume: caps of single triangles, and nothing else, guess."""
     if name != "holes":
@@ -143,7 +160,7 @@ FILES = sorted(p for p in FOLDER.iterdir() if p.suffix.lower() in (".stl", ".obj
 
 @quiet
 @pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
-def test_given_parts_are_filled_or_refused(path):
+def test_given_parts_are_filled_or_refused(path, tmp_path):
     """Every file of a folder of the user's: judged alike, or refused with numbers."""
     try:
         region = lt.Design(lt.region.mesh(str(path)), solid_core(1.0)).build().report()["region"]
@@ -157,8 +174,9 @@ def test_given_parts_are_filled_or_refused(path):
     for cell in LATTICES:
         volumes = []
         for skin in (False, True):
-            mesh = solid(path.parent, path.name, cell, skin, wavelength).mesh(per_cell=10)
-            volumes.append(judges.sound(mesh))
+            made = solid(path.parent, path.name, cell, skin, wavelength)
+            volumes.append(judges.sound(made.mesh(per_cell=10)))
+            streams_whole(made, tmp_path, per_cell=24)
         assert volumes[0] / region["volume"] == pytest.approx(FRACTION, abs=0.01)
         assert volumes[0] < volumes[1] < region["volume"]
     assert (low < high).all()
