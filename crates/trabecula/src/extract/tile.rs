@@ -291,7 +291,7 @@ pub(super) fn extract<'a>(
         }
     }
     list_triangles(s, grid, &local, &own);
-    balance(s, grid, &local, &nodes);
+    balance(s, grid, &local, &nodes, &own);
     finish(s, grid, &local, &nodes, &own);
     let own_triangles =
         s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();

@@ -1,5 +1,7 @@
 //! The moves that cancel the volume errors of triangles.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 
 use super::{Nodes, Scratch, numbered};
@@ -18,7 +20,13 @@ const CREASE: f32 = 0.906;
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what faces its edge can move without running far along it.
-pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
+pub(super) fn balance(
+    s: &mut Scratch,
+    grid: &Grid,
+    local: &Local,
+    nodes: &Nodes,
+    own: &[Range<usize>; 3],
+) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];
@@ -50,11 +58,15 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
             s.moments[v as usize] = (0.0, 0.0);
         }
     }
-    // A tile does not know all the chords that its neighbour lays at the border: near edges no vertex moves.
+    // The chords around its border a tile knows only where no edge is near: its neighbour may lay others there.
     let creased: Vec<bool> = local.live.iter().map(|id| grid.has_creases(*id)).collect();
     if creased.contains(&true) {
         for (v, m) in s.vertices.iter().zip(&mut s.moments) {
-            if creased[usize::from(v.face)] && s.edges.are_near(nodes, v.node.map(usize::from)) {
+            let node = v.node.map(usize::from);
+            let on_border = (0..3)
+                .filter(|a| *a != usize::from(v.axis))
+                .any(|a| node[a] == own[a].start || node[a] == own[a].end);
+            if on_border && creased[usize::from(v.face)] && s.edges.are_near(nodes, node) {
                 *m = (0.0, 0.0);
             }
         }
