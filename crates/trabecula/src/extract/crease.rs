@@ -15,12 +15,14 @@ mod chord;
 mod fill;
 mod fit;
 mod patch;
+mod polygon;
 mod rim;
 mod side;
 mod twice;
 mod wall;
 mod web;
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use crate::face::Creases;
@@ -40,6 +42,10 @@ const LONG: f64 = 3.0;
 /// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
 /// step.
 const SHARP: f64 = 0.436;
+
+/// Edges of a face that come this near to a grid edge, in shares of a step as points keep from nodes, may miss it on the side
+/// on which they pierce it: a wedge of 15° whose tip is as far beyond it meets it in two points that are as near.
+const BESIDE: f64 = 8.0;
 
 /// Edges of faces in the cells of a block.
 #[derive(Default)]
@@ -188,15 +194,17 @@ impl Edges {
             }
         }
         for &(_, node, axis) in self.twice.keys().filter(|t| t.0 == seen.face) {
-            for other in (0..3).filter(|a| *a != axis) {
-                // The side is normal to the third axis.
-                let normal = 3 - axis - other;
-                at.entry((node, normal)).or_default();
-                at.entry((node - nodes.stride[other], normal)).or_default();
+            for side in sides_around(nodes, (node, axis)) {
+                at.entry(side).or_default();
             }
         }
+        let beside = self.beside(seen, &at);
+        for side in beside.keys() {
+            at.entry(*side).or_default();
+        }
         for (&side, pierced) in &at {
-            let Some(chords) = self.chords(seen, side, pierced) else {
+            let also = beside.get(&side).map_or(&[][..], |p| p);
+            let Some(chords) = self.chords(seen, side, pierced, also) else {
                 continue;
             };
             let mut cell = nodes.at(side.0);
@@ -221,6 +229,40 @@ impl Edges {
             }
             self.find_beyond(seen, &at);
         }
+    }
+
+    /// The points in which edges pierce sides so near to a grid edge that the face does not cross it twice: the sides around
+    /// that one may have their corners there too, or instead.
+    fn beside<P: Fn(usize, usize) -> Option<Vec3>>(
+        &self,
+        seen: &Seen<P>,
+        pierced: &By<(usize, usize), Vec<Vec3>>,
+    ) -> By<(usize, usize), Vec<Vec3>> {
+        let nodes = seen.nodes;
+        let mut found: By<(usize, usize), Vec<Vec3>> = By::default();
+        for (&side, places) in pierced {
+            for line in lines_of(nodes, side) {
+                let (node, along) = line;
+                if !seen.misses(line) || self.twice.contains_key(&(seen.face, node, along)) {
+                    continue;
+                }
+                let (from, across) = (nodes.place(node), 3 - along - side.1);
+                let near = BESIDE * seen.grid.margin * seen.length(node, across);
+                let is_near = |p: &&Vec3| (p[across] - from[across]).abs() < near;
+                for p in places.iter().filter(is_near) {
+                    for other in sides_around(nodes, line).into_iter().filter(|s| *s != side) {
+                        let mut q = *p;
+                        q[other.1] = from[other.1];
+                        found.entry(other).or_default().push(seen.inside(other, q));
+                    }
+                }
+            }
+        }
+        // In an order that is the same in all tiles.
+        for places in found.values_mut() {
+            places.sort_by(|p, q| p.partial_cmp(q).unwrap_or(Ordering::Equal));
+        }
+        found
     }
 
     /// Finds the corners that lie in cells without any other surface, all their edges coming through one side: the patch
@@ -346,6 +388,16 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         decides(self.local, signs, self.face, cell)
     }
 
+    /// Whether a grid edge that is not on the border of the block has both ends on the same side of the face.
+    fn misses(&self, (node, along): (usize, usize)) -> bool {
+        let (at, shape) = (self.nodes.at(node), self.nodes.shape);
+        let ends = [node, node + self.nodes.stride[along]];
+        (0..3).all(|a| at[a] > 0 && at[a] + 2 <= shape[a]) && {
+            let [p, q] = ends.map(|n| self.signs.is_negative(self.face, n));
+            p == q
+        }
+    }
+
     /// A point of a side kept within it.
     fn inside(&self, (low, axis): (usize, usize), mut p: Vec3) -> Vec3 {
         let at = self.nodes.at(low);
@@ -433,6 +485,20 @@ fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
         0.0
     };
     add(p, scale(along, t))
+}
+
+/// The grid edges of a side: each by its lower node and its axis.
+fn lines_of(nodes: &Nodes, (low, axis): (usize, usize)) -> [(usize, usize); 4] {
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (du, dv) = (nodes.stride[u], nodes.stride[v]);
+    [(low, u), (low + du, v), (low + dv, u), (low, v)]
+}
+
+/// The sides around a grid edge that is not on the border of the block.
+fn sides_around(nodes: &Nodes, (node, along): (usize, usize)) -> [(usize, usize); 4] {
+    let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+    let (du, dv) = (nodes.stride[u], nodes.stride[v]);
+    [(node, u), (node - dv, u), (node, v), (node - du, v)]
 }
 
 /// The cell between nodes that a place lies in.

@@ -265,11 +265,9 @@ fn polyhedra_keep_their_edges() {
                     off.map(|x| x / edge),
                     before.map(|x| x / edge)
                 );
-                // Points keep 1/4096 of a step away from nodes, and a corner sees three of them. Of the notched
-                // block, in which convex and concave edges meet, a cell or two are rounded.
-                let exact = turn == [0.0; 3] || name != "notched";
+                // Points keep 1/4096 of a step away from nodes, and a corner sees three of them.
                 assert!(
-                    !exact || off.iter().all(|x| *x < edge * 3.0 / 4096.0),
+                    off.iter().all(|x| *x < edge * 3.0 / 4096.0),
                     "{name}: {off:?}"
                 );
                 assert!(

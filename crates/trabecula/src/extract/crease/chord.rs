@@ -4,6 +4,9 @@ use super::{Edges, Key, Seen, nearest};
 use crate::math::{self, Vec3, norm, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d};
 
+/// Most corners of a chord: few corners of meshes have more than three edges that all run through one side.
+const BENDS: usize = 3;
+
 /// A line in a side, from where the side's boundary enters the solid to where it leaves it: the boundary counter-clockwise
 /// about the side's axis; over some corners.
 #[derive(Clone, Debug)]
@@ -45,15 +48,19 @@ struct Choice<'a> {
 
 impl Edges {
     /// The chords of a side that edges of the face pierce, or with grid edges that are crossed twice; none if they are no
-    /// other than those of plain cells.
+    /// other than those of plain cells. `beside`: where they may have corners as well.
     pub(super) fn chords<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         seen: &Seen<P>,
         side: (usize, usize),
         pierced: &[Vec3],
+        beside: &[Vec3],
     ) -> Option<Vec<Chord>> {
         let points = self.boundary(seen, side)?;
-        let ways = self.ways(seen, side, &points, pierced);
+        let all = [pierced, beside].concat();
+        let corners = [&all[..], pierced];
+        let few = corners.into_iter().find(|c| c.len() <= Key::CORNERS);
+        let ways = self.ways(seen, side, &points, few.unwrap_or(&[]));
         let mut choice = Choice {
             points: &points,
             pierced,
@@ -157,16 +164,11 @@ impl Edges {
         seen: &Seen<P>,
         side: (usize, usize),
         points: &[Point],
-        pierced: &[Vec3],
+        corners: &[Vec3],
     ) -> Vec<Way> {
         let mut ways: Vec<Way> = Vec::new();
         let mut places = Vec::new();
         let mut counts = Vec::new();
-        let pierced = if pierced.len() > Key::CORNERS {
-            &[]
-        } else {
-            pierced
-        };
         for (i, from) in points.iter().enumerate().filter(|p| p.1.enters) {
             for (j, to) in points.iter().enumerate().filter(|p| !p.1.enters) {
                 let mut add = |via: Vec<Vec3>| {
@@ -182,13 +184,7 @@ impl Edges {
                         off: 0.0,
                     });
                 };
-                for (n, p) in pierced.iter().enumerate() {
-                    add(vec![*p]);
-                    for q in &pierced[..n] {
-                        add(vec![*p, *q]);
-                        add(vec![*q, *p]);
-                    }
-                }
+                orders(corners, &mut Vec::new(), &mut add);
                 if from.edge == to.edge {
                     for by in [0.25, 0.0] {
                         add(vec![seen.beside(side, from, to, by)]);
@@ -221,6 +217,21 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         let (across, way) = [(v, 1.0), (u, -1.0), (v, -1.0), (u, 1.0)][from.edge];
         p[across] += way * share * distance;
         self.inside(side, p)
+    }
+}
+
+/// Calls `found` with some of the corners of a side in every order.
+fn orders(corners: &[Vec3], taken: &mut Vec<Vec3>, found: &mut impl FnMut(Vec<Vec3>)) {
+    if taken.len() == BENDS {
+        return;
+    }
+    for p in corners {
+        if !taken.contains(p) {
+            taken.push(*p);
+            found(taken.clone());
+            orders(corners, taken, found);
+            taken.pop();
+        }
     }
 }
 
@@ -319,11 +330,13 @@ impl<'a> Choice<'a> {
             .iter()
             .map(|w| self.path(w).into_iter().map(flat).collect())
             .collect();
-        // A path with two corners may cross itself, and any may turn back.
+        // A path may cross itself, or turn back.
         let bent = |p: &Vec<[f64; 2]>| {
-            (p.len() == 4 && meet(&p[..2], &p[2..]))
-                || p.windows(3)
-                    .any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]))
+            let turns = p
+                .windows(3)
+                .any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]));
+            let of = |i: usize| &p[i..i + 2];
+            turns || (3..p.len()).any(|j| (0..j - 2).any(|i| meet(of(i), of(j - 1))))
         };
         paths.iter().any(bent)
             || paths.iter().enumerate().any(|(i, a)| {

@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 
 use super::patch::Patch;
+use super::polygon::triangles;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::math::{add, scale, sub};
-use crate::mesh::exact::{drop_axis, orient2d};
+use crate::mesh::exact::drop_axis;
 
 /// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
 const INNER: f64 = 0.5;
@@ -192,7 +193,7 @@ impl Knots<'_> {
             .iter()
             .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
             .collect();
-        for t in ears(&flat, 0) {
+        for t in triangles(&flat, 0) {
             self.extra.triangles.push((t.map(|i| names[i]), cut));
         }
     }
@@ -297,51 +298,4 @@ pub(super) fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
         }
     }
     rims
-}
-
-/// The triangles of a simple polygon, by clipping its best ear again and again; the first one is not the best but one of
-/// those after it, as `other` says, if there are as many.
-pub(super) fn ears(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
-    if ring.len() == 3 {
-        return vec![[0, 1, 2]];
-    }
-    let mut left: Vec<usize> = (0..ring.len()).collect();
-    let area: f64 = (0..ring.len())
-        .map(|i| {
-            let (p, q) = (ring[i], ring[(i + 1) % ring.len()]);
-            p[0] * q[1] - p[1] * q[0]
-        })
-        .sum();
-    let way = if area > 0.0 { 1 } else { -1 };
-    let turn = |a: usize, b: usize, c: usize| orient2d(ring[a], ring[b], ring[c]) * way;
-    let mut found = Vec::with_capacity(ring.len());
-    while left.len() > 3 {
-        let n = left.len();
-        let corner = |i: usize| (left[(i + n - 1) % n], left[i], left[(i + 1) % n]);
-        let is_ear = |i: &usize| {
-            let (a, b, c) = corner(*i);
-            let holds = |p: usize| turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
-            turn(a, b, c) > 0 && !left.iter().any(|p| ![a, b, c].contains(p) && holds(*p))
-        };
-        let height = |i: &usize| {
-            let (a, b, c) = corner(*i);
-            lowest([a, b, c].map(|i| ring[i]))
-        };
-        let mut ears: Vec<usize> = (0..n).filter(is_ear).collect();
-        ears.sort_by(|i, j| height(j).total_cmp(&height(i)));
-        let skip = if found.is_empty() { other } else { 0 };
-        let best = ears.get(skip % ears.len().max(1)).copied().unwrap_or(0);
-        let (a, b, c) = corner(best);
-        found.push([a, b, c]);
-        left.remove(best);
-    }
-    found.push([left[0], left[1], left[2]]);
-    found
-}
-
-/// The height of a triangle above its longest side, as a share of that.
-fn lowest([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    let side = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
-    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    area.abs() / side(a, b).max(side(b, c)).max(side(c, a))
 }

@@ -7,6 +7,7 @@
 use std::ops::Range;
 use std::rc::Rc;
 
+use super::polygon::triangles;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot};
 use crate::extract::signs::bits;
@@ -252,7 +253,7 @@ impl Knots<'_> {
         let mut parts = Vec::new();
         let mut add = |polygon: &[usize], inside: bool| {
             let places: Vec<[f64; 2]> = polygon.iter().map(|c| flat[*c]).collect();
-            for t in super::rim::ears(&places, tries) {
+            for t in triangles(&places, tries) {
                 let t = t.map(|i| polygon[i]);
                 let mut sorted = t;
                 sorted.sort_by_key(|c| corners[*c].code);
@@ -381,9 +382,7 @@ impl Knots<'_> {
         }
         let faces = &faces[..met];
         if line != 0 {
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
-            let lines = [(low, u), (low + du, v), (low + dv, u), (low, v)];
+            let lines = super::lines_of(self.nodes, (low, axis));
             let (node, along) = lines[line.trailing_zeros() as usize];
             return Key::new(node, &[1 << along], faces);
         }

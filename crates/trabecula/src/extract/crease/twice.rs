@@ -104,7 +104,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         (p == q && a + b < 1.0 - CLOSE * self.grid.margin).then_some([a, b])
     }
 
-    fn length(&self, node: usize, axis: usize) -> f64 {
+    pub(super) fn length(&self, node: usize, axis: usize) -> f64 {
         let (axis, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
         axis[at + 1] - axis[at]
     }

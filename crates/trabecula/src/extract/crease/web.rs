@@ -11,6 +11,13 @@ const SAME: f64 = 2.0;
 /// A piece of an edge, by the numbers of its ends.
 type Link = [usize; 2];
 
+/// The point from which a polygon is filled.
+enum Apex {
+    /// One of its own, by its number.
+    Own(usize),
+    New(Vec3),
+}
+
 /// The edges that divide a patch: trees whose ends lie on its rim.
 pub(super) struct Web {
     /// The points of the rim, and those inside.
@@ -88,10 +95,13 @@ impl Web {
         let (mut sum, mut count) = (0.0, 0);
         for part in &parts {
             let (apex, off) = self.fan(cell, part)?;
-            let apex = apex.unwrap_or_else(|place| {
-                inner.push(place);
-                self.rim + inner.len() - 1
-            });
+            let apex = match apex {
+                Apex::Own(i) => i,
+                Apex::New(place) => {
+                    inner.push(place);
+                    self.rim + inner.len() - 1
+                }
+            };
             let sides = part.iter().zip(part.iter().cycle().skip(1));
             let across = sides.filter(|(a, b)| **a != apex && **b != apex);
             triangles.extend(across.map(|(a, b)| [apex, *a, *b]));
@@ -151,9 +161,9 @@ impl Web {
         (trees.is_empty() && walked == 2 * tree.len()).then_some(())
     }
 
-    /// The point from which a polygon is best filled, one of its own inside the cell or a new one, and the sum of squares of
-    /// how far the face is from it; none if it is seen whole from none of them.
-    fn fan(&self, cell: Cell, part: &[usize]) -> Option<(Result<usize, Vec3>, f64)> {
+    /// The point from which a polygon is best filled, and the sum of squares of how far the face is from it; none if it is seen
+    /// whole from none of those inside the cell.
+    fn fan(&self, cell: Cell, part: &[usize]) -> Option<(Apex, f64)> {
         let places: Vec<Vec3> = part.iter().map(|i| self.places[*i]).collect();
         let center = middle(&places);
         let sides = || places.iter().zip(places.iter().cycle().skip(1));
@@ -170,12 +180,12 @@ impl Web {
         };
         if let [a, b, c] = places[..] {
             let off = cell.off(a, &[b, c]) + cell.off(b, &[c]);
-            return is_seen(a).then_some((Ok(part[0]), off));
+            return is_seen(a).then_some((Apex::Own(part[0]), off));
         }
         let inside = part.iter().filter(|i| **i >= self.rim);
-        let own = inside.map(|i| (Ok(*i), self.places[*i]));
+        let own = inside.map(|i| (Apex::Own(*i), self.places[*i]));
         let new = cell.within(center);
-        let seen = own.chain([(Err(new), new)]).filter(|t| is_seen(t.1));
+        let seen = own.chain([(Apex::New(new), new)]).filter(|t| is_seen(t.1));
         let all = seen.map(|(name, apex)| (name, cell.off(apex, &places)));
         all.min_by(|a, b| a.1.total_cmp(&b.1))
     }
