@@ -11,7 +11,7 @@ use crate::field::Field;
 use crate::math::{Vec3, add, norm, scale, sub};
 
 /// More pieces of edges than this in one cell are not looked at one by one: they are far shorter than a step.
-const MOST: usize = 32;
+const MOST: usize = 128;
 
 /// A cell, and the face whose patch is in it.
 #[derive(Clone, Copy)]

@@ -46,14 +46,11 @@ impl Web {
             }
         }
         // Edges that end inside divide nothing.
-        let single =
-            |links: &[Link], i: usize| links.iter().flatten().filter(|e| **e == i).count() == 1;
-        let loose = |links: &Vec<Link>| {
-            let ends = |l: &Link| l.iter().any(|i| *i >= n && single(links, *i));
-            links.iter().position(ends)
-        };
-        while let Some(i) = loose(&links) {
-            links.swap_remove(i);
+        let mut count = vec![0; web.places.len()];
+        links.iter().flatten().for_each(|i| count[*i] += 1);
+        let is_loose = |l: &Link, count: &[usize]| l.iter().any(|i| *i >= n && count[*i] == 1);
+        while let Some(i) = links.iter().position(|l| is_loose(l, &count)) {
+            links.swap_remove(i).iter().for_each(|i| count[*i] -= 1);
         }
         for p in &mut web.places[n..] {
             *p = cell.within(*p);
