@@ -14,6 +14,7 @@
 mod chord;
 mod fill;
 mod fit;
+mod follow;
 mod patch;
 mod polygon;
 mod rim;
@@ -23,28 +24,22 @@ mod wall;
 mod web;
 
 use std::cmp::Ordering;
-use std::collections::HashMap;
 
-use crate::face::Creases;
 use crate::field::Field;
 use crate::math::{Vec3, add, dot, scale, sub};
 
 use super::by::By;
-use super::grid::{Grid, Local, TILE};
+use super::grid::{Grid, Local};
 use super::key::Key;
 use super::signs::{Signs, bits};
 use super::tile::Nodes;
 pub(super) use chord::Chord;
 pub(super) use fit::Fits;
+use follow::cell_of;
+pub(super) use follow::{Wide, by_tile};
 
-/// Straight edges that are this many steps long or more are shown, however little the face turns there.
-const LONG: f64 = 3.0;
-/// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
-/// step.
-const SHARP: f64 = 0.436;
-
-/// Edges of a face that come this near to a grid edge, in shares of a step as points keep from nodes, may miss it on the side
-/// on which they pierce it: a wedge of 15° whose tip is as far beyond it meets it in two points that are as near.
+/// An edge of a face that passes a grid edge this near may pierce a side in which the face does not show, in multiples of what
+/// points keep from nodes: a wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to keep.
 const BESIDE: f64 = 8.0;
 
 /// Edges of faces in the cells of a block.
@@ -73,12 +68,6 @@ pub(super) struct Edges {
     beyond: By<usize, Vec3>,
     /// For each row of nodes: those within two cells of a piece of an edge.
     near: Vec<u64>,
-}
-
-/// The nodes of a block and one more on every side, and how many there are before the block's.
-pub(super) struct Wide<'a> {
-    pub axes: [&'a [f64]; 3],
-    pub before: [isize; 3],
 }
 
 /// A block, and a face in it.
@@ -124,12 +113,6 @@ impl Edges {
         !self.face.is_empty()
     }
 
-    /// Whether a piece of an edge of some face lies within two cells of a node: chords that end on grid edges farther away
-    /// are all known in every tile that has these.
-    pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
-        self.near[k * nodes.shape[1] + j] >> i & 1 == 1
-    }
-
     /// The ends of all chords.
     pub fn chord_ends(&self) -> impl Iterator<Item = Key> {
         let chords = self.sides.values().flatten();
@@ -139,20 +122,6 @@ impl Edges {
     /// The place of a point that is none of a plain or a knotted cell.
     pub fn place(&self, key: Key) -> Option<Vec3> {
         self.points.get(&key).copied()
-    }
-
-    /// Follows the edges of a live face through the cells of the block.
-    pub fn follow(
-        &mut self,
-        nodes: &Nodes,
-        wide: &Wide,
-        of: &Creases,
-        face: usize,
-        segments: &[u32],
-    ) {
-        for &i in segments {
-            self.walk(nodes, wide, face, of.segments[i as usize].ends);
-        }
     }
 
     /// Takes the cells that a face with edges alone crosses, in several patches, out of those to be cut up: such are
@@ -317,52 +286,6 @@ impl Edges {
             }
         }
     }
-
-    /// Follows a piece of an edge through the cells of the block, and those around it.
-    fn walk(&mut self, nodes: &Nodes, wide: &Wide, face: usize, [p, q]: [Vec3; 2]) {
-        let along = sub(q, p);
-        let mut stops = vec![0.0, 1.0];
-        for a in 0..3 {
-            let axis = wide.axes[a];
-            let [from, to] = [p, q].map(|x| axis.partition_point(|n| *n < x[a]));
-            for n in from.min(to)..from.max(to) {
-                let t = (axis[n] - p[a]) / along[a];
-                stops.push(t);
-                let mut at = add(p, scale(along, t));
-                at[a] = axis[n];
-                if let Some(cell) = cell_of(nodes.axes, at) {
-                    self.pierced.push((face, (nodes.index(cell), a), at));
-                }
-            }
-        }
-        stops.sort_by(f64::total_cmp);
-        for w in stops.windows(2).filter(|w| w[0] < w[1]) {
-            let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
-            let middle = scale(add(ends[0], ends[1]), 0.5);
-            if let Some(cell) = cell_of(nodes.axes, middle) {
-                let here = (face, nodes.index(cell));
-                self.pieces.entry(here).or_default().push(ends);
-            }
-            if let Some(cell) = cell_of(wide.axes, middle) {
-                self.mark(nodes, [0, 1, 2].map(|a| cell[a] as isize - wide.before[a]));
-            }
-        }
-    }
-
-    /// Marks the nodes within two cells of one that an edge passes.
-    fn mark(&mut self, nodes: &Nodes, cell: [isize; 3]) {
-        let reach = [0, 1, 2].map(|a| {
-            let last = nodes.shape[a] as isize - 1;
-            ((cell[a] - 1).max(0) as usize)..=((cell[a] + 2).min(last) as usize)
-        });
-        let [x, y, z] = reach;
-        let mask = x.fold(0, |m, i| m | 1u64 << i);
-        for k in z {
-            for j in y.clone() {
-                self.near[k * nodes.shape[1] + j] |= mask;
-            }
-        }
-    }
 }
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
@@ -501,53 +424,11 @@ fn sides_around(nodes: &Nodes, (node, along): (usize, usize)) -> [(usize, usize)
     [(node, u), (node - dv, u), (node, v), (node - du, v)]
 }
 
-/// The cell between nodes that a place lies in.
-fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
-    let mut cell = [0; 3];
-    for a in 0..3 {
-        let above = axes[a].partition_point(|n| *n <= p[a]);
-        if above == 0 || above == axes[a].len() {
-            return None;
-        }
-        cell[a] = above - 1;
-    }
-    Some(cell)
-}
-
 /// A coordinate kept within a step of the grid, away from its ends.
 fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
     let (low, high) = (axis[at], axis[at + 1]);
     let margin = grid.margin * (high - low);
     x.clamp(low + margin, high - margin)
-}
-
-/// The pieces of a face's edges that the grid shows, by the numbers of the tiles that they come near.
-pub(super) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
-    let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
-    let tiles = grid.tiles();
-    for (i, s) in (0..).zip(&creases.segments) {
-        let [p, q] = s.ends;
-        if s.turn < SHARP && s.run < LONG * grid.step {
-            continue;
-        }
-        let range = [0, 1, 2].map(|a| {
-            let axis = &grid.axes[a];
-            // The cells it lies in, and more on either side: tiles look one cell beyond themselves.
-            let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
-            let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
-            let tile = |c: usize| (c / TILE).min(tiles[a] - 1);
-            tile(low.saturating_sub(2))..tile(high + 2) + 1
-        });
-        for k in range[2].clone() {
-            for j in range[1].clone() {
-                for t in range[0].clone() {
-                    let tile = t + tiles[0] * (j + tiles[1] * k);
-                    found.entry(tile).or_default().push(i);
-                }
-            }
-        }
-    }
-    found
 }
 
 /// The cells that have edges, among some.
