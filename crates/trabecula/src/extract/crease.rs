@@ -20,6 +20,7 @@ mod polygon;
 mod rim;
 mod side;
 mod twice;
+mod volume;
 mod wall;
 mod web;
 

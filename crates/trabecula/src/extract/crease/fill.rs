@@ -2,43 +2,82 @@
 
 use std::rc::Rc;
 
+use super::patch::{Patch, Patches, Rim};
 use super::rim::{Step, rims};
 use super::side::{Part, Side};
-use crate::extract::by::By;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
-use crate::field::Field;
-use crate::math::{Vec3, add, scale, sub};
+use crate::math::{Vec3, add, scale};
 
-/// What is between patches that are kept apart is smaller than the cell by one of these.
-const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
 /// How often a cell is filled anew from another point inside, if single precision muddles it.
-const TRIES: usize = INNER.len();
+const TRIES: usize = 6;
 
 /// A tetrahedron of a fitted cell.
-struct Tet {
-    /// Nodes and points: those of a side of the cell first.
+pub(super) struct Tet<'b> {
+    /// Nodes and points: last that inside the volume.
     simplex: Simplex,
     right: bool,
     /// Whether the face is negative in it.
     inside: bool,
     /// Which of its sides, each across from a corner, lie on the face.
     walls: [bool; 4],
-    /// The corners that lie in the side, as bits.
-    outer: u8,
-    /// The side, and its corners among the side's if it is divided.
-    side: (usize, usize),
-    divided: Option<(Rc<Side>, [usize; 3])>,
+    /// The triangle of a side that it is over, if it is.
+    base: Option<&'b Base>,
 }
 
 /// A triangle of a side of a cell, seen from outside.
-struct Base {
-    ids: [usize; 3],
-    left: bool,
-    inside: bool,
+pub(super) struct Base {
+    pub ids: [usize; 3],
+    pub left: bool,
+    pub inside: bool,
     walls: [bool; 3],
     side: (usize, usize),
-    divided: Option<(Rc<Side>, [usize; 3])>,
+    /// The side and the corners among its own, if it is divided.
+    pub divided: Option<(Rc<Side>, [usize; 3])>,
+}
+
+impl<'b> Tet<'b> {
+    /// From a point to a triangle of a side.
+    pub fn over(b: &'b Base, apex: usize) -> Tet<'b> {
+        Tet {
+            simplex: Simplex {
+                nodes: [b.ids[0], b.ids[1], b.ids[2], apex],
+                count: 4,
+            },
+            right: !b.left,
+            inside: b.inside,
+            walls: [false; 4],
+            base: Some(b),
+        }
+    }
+
+    /// The same, where the patch is the cone from the point.
+    fn of_cone(b: &'b Base, apex: usize) -> Tet<'b> {
+        let [p, q, r] = b.walls;
+        Tet {
+            walls: [p, q, r, false].map(|w| w && b.inside),
+            ..Tet::over(b, apex)
+        }
+    }
+
+    /// From a point to a triangle inside the cell, counter-clockwise seen from beyond it; `wall`: whether it lies on the face.
+    pub fn inner(ids: [usize; 3], inside: bool, apex: usize, wall: bool) -> Tet<'b> {
+        // The same order on both sides of it.
+        let mut sorted = ids;
+        sorted.sort_unstable();
+        let [a, b, c] = sorted;
+        let left = [[a, b, c], [b, c, a], [c, a, b]].contains(&ids);
+        Tet {
+            simplex: Simplex {
+                nodes: [a, b, c, apex],
+                count: 4,
+            },
+            right: !left,
+            inside,
+            walls: [false, false, false, wall],
+            base: None,
+        }
+    }
 }
 
 /// The name of a spot inside a cell: the nodes and points that it lies between, and the faces that meet there.
@@ -47,48 +86,85 @@ type Inner = ([usize; 4], u64);
 impl Knots<'_> {
     /// Fills a cell in which a face with edges meets others.
     pub fn fitted(&mut self, cell: [usize; 3], face: usize) {
-        let node = self.nodes.index(cell);
         let bases = self.bases(cell, face);
         let steps = self.steps(cell, face);
         let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
-        let center = self.center_of(cell);
-        let field = self.grid.faces[self.local.live[face]].field.clone();
-        let rim = match &rims[..] {
-            [keys] => Some(self.rim(cell, keys)),
-            _ => None,
-        };
+        let rims: Vec<(Rim, Vec<usize>)> = rims
+            .iter()
+            .map(|keys| self.bare_rim(cell, &bases, keys))
+            .collect();
         let (edges, of) = (self.edges, self.cell_of(cell, face));
-        let (mut solid, mut shares) = (false, INNER);
-        if rims.len() > 1 {
-            solid = field.value(center) <= 0.0;
-            shares = self.shares_by_fit(&bases, center, solid, &*field);
-        }
-        let first = self.extra.triangles.len();
-        for attempt in 0..TRIES {
-            let tets = if rims.len() > 1 {
-                self.apart(cell, &bases, center, solid, shares[attempt])
-            } else {
-                let apex = match (attempt, &rim) {
-                    (0, None) => center,
-                    (0, Some(rim)) => edges.apex(of, rim, None).0,
-                    (1, Some(rim)) => scale(add(middle(&rim.places), center), 0.5),
-                    _ => {
-                        let by = [0, 1, 2].map(|a| self.chance(3 * attempt + a, node));
-                        let size = sub(ends[1], ends[0]);
-                        [0, 1, 2].map(|a| center[a] + 0.3 * by[a] * size[a])
-                    }
-                };
-                self.cone_of(cell, &bases, apex)
-            };
-            self.extra.triangles.truncate(first);
-            self.fill(cell, face, &tets);
-            if !self.muddled(first) {
+        let patches: Vec<Patches> = match &rims[..] {
+            [(rim, _)] => vec![edges.patches(of, rim, None)],
+            _ => rims.iter().map(|r| edges.patches_among(of, &r.0)).collect(),
+        };
+        // The only cone of a cell bounds tetrahedra of its own.
+        let any = patches.iter().any(|p| p.divided.is_some());
+        let ways = [(true, any), (false, rims.len() > 1)];
+        for (divided, _) in ways.into_iter().filter(|w| w.1) {
+            let patches = patches.iter().map(|p| p.best(divided));
+            let ids = rims.iter().map(|r| &r.1[..]);
+            let all: Vec<(&[usize], &Patch)> = ids.zip(patches).collect();
+            let tets = self.volumes(cell, &bases, &all);
+            if tets.is_some_and(|t| self.is_filled(cell, face, &bases, &t)) {
                 return;
             }
         }
-        self.extra.triangles.truncate(first);
-        self.walled(cell, &INNER);
+        let apexes = match (&rims[..], &patches[..]) {
+            ([], _) => self.apexes(cell, None),
+            ([rim], [patches]) => {
+                let center = middle(&rim.0.places);
+                self.apexes(cell, Some([patches.cone.inner[0], center]))
+            }
+            _ => Vec::new(),
+        };
+        for apex in apexes {
+            let apex = self.inner_point(cell, apex);
+            let tets: Vec<Tet> = bases.iter().map(|b| Tet::of_cone(b, apex)).collect();
+            if self.is_filled(cell, face, &bases, &tets) {
+                return;
+            }
+        }
+        self.walled(cell);
+    }
+
+    /// The points from which a cell is filled with a single cone, one after the other, as long as single precision muddles it.
+    /// `rim`: the best point and the middle of the only rim.
+    fn apexes(&self, cell: [usize; 3], rim: Option<[Vec3; 2]>) -> Vec<Vec3> {
+        let node = self.nodes.index(cell);
+        let [low, high] = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
+        let center = self.center_of(cell);
+        let first = match rim {
+            Some([best, middle]) => vec![best, scale(add(middle, center), 0.5)],
+            None => vec![center],
+        };
+        let by_chance = (2..TRIES).map(|n| {
+            let by = |a: usize| 0.3 * self.chance(3 * n + a, node) * (high[a] - low[a]);
+            [0, 1, 2].map(|a| center[a] + by(a))
+        });
+        first.into_iter().chain(by_chance).collect()
+    }
+
+    /// Adds the surface in some tetrahedra of a cell, unless single precision muddles it.
+    fn is_filled(&mut self, cell: [usize; 3], face: usize, bases: &[Base], tets: &[Tet]) -> bool {
+        let first = self.extra.triangles.len();
+        self.fill(cell, face, bases, tets);
+        let is_muddled = self.muddled(first);
+        if is_muddled {
+            self.extra.triangles.truncate(first);
+        }
+        !is_muddled
+    }
+
+    /// The rim of a patch without the points where other faces cross it, and the numbers of its points.
+    fn bare_rim(&mut self, cell: [usize; 3], bases: &[Base], rim: &[Key]) -> (Rim, Vec<usize>) {
+        let sides = || bases.iter().filter_map(|b| b.divided.as_ref());
+        let number = |key: &Key| {
+            let corner = sides().find_map(|(s, _)| s.corners.iter().find(|c| c.key == *key));
+            corner.map(|c| (*key, c.id))
+        };
+        let (keys, ids): (Vec<Key>, Vec<usize>) = rim.iter().filter_map(number).unzip();
+        (self.rim(cell, &keys), ids)
     }
 
     /// The triangles of the sides of a cell.
@@ -125,137 +201,15 @@ impl Knots<'_> {
     }
 
     /// A new point inside a cell.
-    fn inner_point(&mut self, cell: [usize; 3], place: Vec3) -> usize {
+    pub(super) fn inner_point(&mut self, cell: [usize; 3], place: Vec3) -> usize {
         let node = self.nodes.index(cell);
         let around = [0, 1, 2, 3, 4, 5, 6, 7].map(|c| node + self.offset(c));
         let values = self.values_between(place, &around);
         self.add_point(place, None, values)
     }
 
-    /// The tetrahedra from a point to all sides of a cell.
-    fn cone_of(&mut self, cell: [usize; 3], bases: &[Base], apex: Vec3) -> Vec<Tet> {
-        let apex = self.inner_point(cell, apex);
-        let tet = |b: &Base| Tet {
-            simplex: Simplex {
-                nodes: [b.ids[0], b.ids[1], b.ids[2], apex],
-                count: 4,
-            },
-            right: !b.left,
-            inside: b.inside,
-            walls: [b.walls[0], b.walls[1], b.walls[2], false].map(|w| w && b.inside),
-            outer: 7,
-            side: b.side,
-            divided: b.divided.clone(),
-        };
-        bases.iter().map(tet).collect()
-    }
-
-    /// How much smaller than the cell the one between its patches may be, those first with which these are nearest to the
-    /// face.
-    fn shares_by_fit(
-        &self,
-        bases: &[Base],
-        center: Vec3,
-        solid: bool,
-        field: &dyn Field,
-    ) -> [f64; TRIES] {
-        let other = bases.iter().filter(|b| b.inside != solid);
-        let rays: Vec<Vec3> = other
-            .flat_map(|b| b.ids.map(|id| sub(self.place_of(id), center)))
-            .collect();
-        let mut off = vec![0.0; rays.len()];
-        let mut all = INNER.map(|share| {
-            let places: Vec<Vec3> = rays.iter().map(|r| add(center, scale(*r, share))).collect();
-            field.values(&places, &mut off);
-            (share, off.iter().fold(0.0f64, |m, d| m.max(d.abs())))
-        });
-        all.sort_by(|a, b| a.1.total_cmp(&b.1));
-        all.map(|a| a.0)
-    }
-
-    /// The tetrahedra of a cell in which several patches keep apart: between its sides and those of a smaller cell in it,
-    /// all of which is `solid` or not.
-    fn apart(
-        &mut self,
-        cell: [usize; 3],
-        bases: &[Base],
-        center: Vec3,
-        solid: bool,
-        share: f64,
-    ) -> Vec<Tet> {
-        let mut inner: By<usize, usize> = By::default();
-        let middle = self.inner_point(cell, center);
-        let mut tets = Vec::with_capacity(4 * bases.len());
-        for b in bases {
-            let mut order = [0, 1, 2];
-            let ids = b.ids.map(|id| self.first_of(id));
-            order.sort_by_key(|i| ids[*i]);
-            let even = (0..3).any(|k| order == [k, (k + 1) % 3, (k + 2) % 3]);
-            let left = b.left == even;
-            let out = order.map(|i| b.ids[i]);
-            let within = out.map(|id| {
-                let first = self.first_of(id);
-                if let Some(at) = inner.get(&first) {
-                    return *at;
-                }
-                let place = add(center, scale(sub(self.place_of(id), center), share));
-                let at = self.inner_point(cell, place);
-                inner.insert(first, at);
-                at
-            });
-            // Corners of the three tetrahedra: how many are outer ones, and from where on the others run.
-            for (n, odd) in [(3, false), (2, true), (1, false)] {
-                // Outer corners 0..n, inner ones n-1..3.
-                let mut corners: Vec<(usize, bool)> = (0..n).map(|i| (i, true)).collect();
-                corners.extend((n - 1..3).map(|i| (i, false)));
-                let wall = |across: usize| {
-                    let rest: Vec<(usize, bool)> = (0..4)
-                        .filter(|c| *c != across)
-                        .map(|c| corners[c])
-                        .collect();
-                    if rest.iter().all(|c| !c.1) {
-                        return !solid;
-                    }
-                    let mut of: Vec<usize> = rest.iter().map(|c| c.0).collect();
-                    of.sort_unstable();
-                    of.dedup();
-                    match of[..] {
-                        [i, j] => b.walls[order[3 - i - j]],
-                        _ => false,
-                    }
-                };
-                let nodes = [0, 1, 2, 3].map(|c| match corners[c] {
-                    (i, true) => out[i],
-                    (i, false) => within[i],
-                });
-                tets.push(Tet {
-                    simplex: Simplex { nodes, count: 4 },
-                    right: left == odd,
-                    inside: b.inside,
-                    walls: [0, 1, 2, 3].map(|c| b.inside && wall(c)),
-                    outer: (1 << n) - 1,
-                    side: b.side,
-                    divided: (b.divided.as_ref()).map(|(s, c)| (s.clone(), order.map(|i| c[i]))),
-                });
-            }
-            tets.push(Tet {
-                simplex: Simplex {
-                    nodes: [within[0], within[1], within[2], middle],
-                    count: 4,
-                },
-                right: !left,
-                inside: solid,
-                walls: [false, false, false, solid && !b.inside],
-                outer: 0,
-                side: b.side,
-                divided: None,
-            });
-        }
-        tets
-    }
-
     /// Adds the surface in some tetrahedra of a cell.
-    fn fill(&mut self, cell: [usize; 3], face: usize, tets: &[Tet]) {
+    fn fill(&mut self, cell: [usize; 3], face: usize, bases: &[Base], tets: &[Tet]) {
         let node = self.nodes.index(cell);
         let mut names: Vec<(Inner, u32)> = Vec::with_capacity(16);
         for tet in tets {
@@ -267,7 +221,7 @@ impl Knots<'_> {
             }
             if mixed == 0 {
                 if !self.holds(cell, negative & !(1 << face)) {
-                    self.fill_walls(node, face, tet, &mut names);
+                    self.fill_walls(node, face, bases, tet, &mut names);
                 }
                 continue;
             }
@@ -283,7 +237,7 @@ impl Knots<'_> {
                     let ring: Vec<u32> = side
                         .ring
                         .iter()
-                        .map(|s| self.spot_name(node, tet, *s, &mut names))
+                        .map(|s| self.spot_name(node, bases, tet, *s, &mut names))
                         .collect();
                     let cut = self.grid.faces[self.local.live[f]].cut;
                     self.fan(&ring, cut);
@@ -293,11 +247,18 @@ impl Knots<'_> {
     }
 
     /// Adds the sides of a tetrahedron that lie on the face, where no other crosses it.
-    fn fill_walls(&mut self, node: usize, face: usize, tet: &Tet, names: &mut Vec<(Inner, u32)>) {
+    fn fill_walls(
+        &mut self,
+        node: usize,
+        face: usize,
+        bases: &[Base],
+        tet: &Tet,
+        names: &mut Vec<(Inner, u32)>,
+    ) {
         let cut = self.grid.faces[self.local.live[face]].cut;
         let sides = Simplex::sides(tet.right);
         for (ring, _) in sides.iter().zip(tet.walls).filter(|s| s.1) {
-            let ring = ring.map(|s| self.spot_name(node, tet, s, names));
+            let ring = ring.map(|s| self.spot_name(node, bases, tet, s, names));
             self.fan(&ring, cut);
         }
     }
@@ -306,19 +267,25 @@ impl Knots<'_> {
     fn spot_name(
         &mut self,
         node: usize,
+        bases: &[Base],
         tet: &Tet,
         spot: Spot,
         inner: &mut Vec<(Inner, u32)>,
     ) -> u32 {
-        if spot.corners & !tet.outer == 0 {
-            let key = match &tet.divided {
-                Some((side, corners)) => self.side_key(tet.side, side, corners, spot),
-                None => self.key(&tet.simplex, spot),
+        let corners = (0..4).filter(|c| spot.corners >> c & 1 == 1);
+        if spot.corners & 8 == 0 {
+            let holds = |b: &&Base| {
+                corners
+                    .clone()
+                    .all(|c| b.ids.contains(&tet.simplex.nodes[c]))
             };
-            return self.vertex(key);
+            if let Some(base) = tet.base.or_else(|| bases.iter().find(holds)) {
+                let key = self.base_key(base, &tet.simplex, spot);
+                return self.vertex(key);
+            }
         }
         let mut ids = [usize::MAX; 4];
-        for c in (0..4).filter(|c| spot.corners >> c & 1 == 1) {
+        for c in corners {
             ids[c] = self.first_of(tet.simplex.nodes[c]);
         }
         ids.sort_unstable();
@@ -330,5 +297,22 @@ impl Knots<'_> {
         let v = self.push(Key::center(node, 7), place);
         inner.push((name, v));
         v
+    }
+
+    /// The name of a spot of a triangle in a side.
+    fn base_key(&self, base: &Base, simplex: &Simplex, spot: Spot) -> Key {
+        let Some((side, corners)) = &base.divided else {
+            return self.key(simplex, spot);
+        };
+        let is_of = |c: &usize| {
+            let mut of = (0..4).filter(|i| spot.corners >> i & 1 == 1);
+            of.any(|i| simplex.nodes[i] == base.ids[*c])
+        };
+        let corners_of = (0..3).filter(is_of).fold(0, |w, c| w | 1 << c);
+        let spot = Spot {
+            corners: corners_of,
+            ..spot
+        };
+        self.side_key(base.side, side, corners, spot)
     }
 }

@@ -36,6 +36,32 @@ pub(super) struct Rim {
 pub(super) struct Patch {
     pub inner: Vec<Vec3>,
     pub triangles: Vec<[usize; 3]>,
+    /// Along the edges that divide it from one point of the rim to another.
+    pub ways: Vec<Vec<usize>>,
+}
+
+/// What may be over a rim.
+pub(super) struct Patches {
+    /// Where edges divide it, if that is nearer to the face than a single cone.
+    pub divided: Option<Patch>,
+    pub cone: Patch,
+}
+
+impl Patches {
+    pub fn best(&self, divided: bool) -> &Patch {
+        (self.divided.as_ref().filter(|_| divided)).unwrap_or(&self.cone)
+    }
+}
+
+impl Patch {
+    fn cone(rim: &Rim, apex: Vec3) -> Patch {
+        let n = rim.places.len();
+        Patch {
+            inner: vec![apex],
+            triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(),
+            ways: Vec::new(),
+        }
+    }
 }
 
 impl Cell<'_> {
@@ -81,28 +107,33 @@ impl<'a> Knots<'a> {
 }
 
 impl Edges {
-    /// The patches over a rim: one that edges divide, if that is nearer to the face, and a single cone. `alone`: whether the
-    /// cell has no other rim.
-    pub(super) fn patches(&self, cell: Cell, rim: &Rim, alone: bool) -> (Option<Patch>, Patch) {
-        let n = rim.places.len();
-        let cone = |apex: Vec3| Patch {
-            inner: vec![apex],
-            triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(),
-        };
-        let beyond = self.beyond.get(&cell.node).copied();
-        let only = alone.then(|| self.apex(cell, rim, beyond));
-        if let Some((apex, off)) = only
-            && off < (cell.grid.margin * cell.grid.step).powi(2)
-        {
-            return (None, cone(apex));
+    /// The patches over the only rim of a cell. `beyond`: as for [`Edges::apex`].
+    pub(super) fn patches(&self, cell: Cell, rim: &Rim, beyond: Option<Vec3>) -> Patches {
+        let (apex, off) = self.apex(cell, rim, beyond);
+        let is_exact = off < (cell.grid.margin * cell.grid.step).powi(2);
+        let web = (!is_exact).then(|| Web::new(cell, rim, self.pieces_in(cell)));
+        let divided = web.and_then(|w| w.patch(cell)).filter(|d| d.1 < off);
+        Patches {
+            divided: divided.map(|d| d.0),
+            cone: Patch::cone(rim, apex),
         }
+    }
+
+    /// The same over one of several rims.
+    pub(super) fn patches_among(&self, cell: Cell, rim: &Rim) -> Patches {
         let web = Web::new(cell, rim, self.pieces_in(cell));
-        let (apex, off) = only.unwrap_or_else(|| {
-            let own: Vec<[Vec3; 2]> = web.pieces().collect();
-            self.best(cell, rim, &own, None)
-        });
-        let nearer = web.patch(cell).filter(|d| d.1 < off);
-        (nearer.map(|d| d.0), cone(apex))
+        let own: Vec<[Vec3; 2]> = web.pieces().collect();
+        let (apex, off) = self.best(cell, rim, &own, None);
+        let divided = web.patch(cell).filter(|d| d.1 < off);
+        Patches {
+            divided: divided.map(|d| d.0),
+            cone: Patch::cone(rim, apex),
+        }
+    }
+
+    /// Where a corner in a cell beside this one is nearer to the face than any point of this.
+    pub(super) fn beyond(&self, cell: Cell) -> Option<Vec3> {
+        self.beyond.get(&cell.node).copied()
     }
 
     /// The point over which the only patch of a cell becomes a cone: on the face's edges there, if any; or `beyond`, where a

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::patch::Patch;
+use super::patch::Patches;
 use super::polygon::triangles;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
@@ -41,15 +41,18 @@ impl Knots<'_> {
             self.grid.faces[self.local.live[face]].cut,
         );
         let (edges, of) = (self.edges, self.cell_of(cell, face));
-        let patches: Vec<(Option<Patch>, Patch)> = rims
+        let patches: Vec<Patches> = rims
             .iter()
-            .map(|keys| edges.patches(of, &self.rim(cell, keys), rims.len() == 1))
+            .map(|keys| match (self.rim(cell, keys), rims.len()) {
+                (rim, 1) => edges.patches(of, &rim, edges.beyond(of)),
+                (rim, _) => edges.patches_among(of, &rim),
+            })
             .collect();
-        let any = patches.iter().any(|p| p.0.is_some());
+        let any = patches.iter().any(|p| p.divided.is_some());
         let first = self.extra.triangles.len();
         for divided in [true, false].into_iter().skip(usize::from(!any)) {
-            for (keys, (best, cone)) in rims.iter().zip(&patches) {
-                let patch = best.as_ref().filter(|_| divided).unwrap_or(cone);
+            for (keys, patches) in rims.iter().zip(&patches) {
+                let patch = patches.best(divided);
                 let mut names: Vec<u32> = keys.iter().map(|k| self.vertex(*k)).collect();
                 let inner = patch.inner.iter();
                 names.extend(inner.map(|p| self.push(Key::center(node, 7), *p)));

@@ -11,6 +11,9 @@ use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::math::{Vec3, add, scale, sub};
 
+/// How much smaller than the cell the one is in which walls end.
+const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
+
 /// A polygon of a side, counter-clockwise seen from outside; the side's axis, and whether the polygon is solid.
 struct Polygon {
     ring: Vec<Key>,
@@ -20,13 +23,13 @@ struct Polygon {
 
 impl Knots<'_> {
     /// Fills a cell with walls, as long as single precision muddles them for one smaller cell after the other.
-    pub(super) fn walled(&mut self, cell: [usize; 3], shares: &[f64]) {
+    pub(super) fn walled(&mut self, cell: [usize; 3]) {
         let polygons = self.polygons(cell);
         let solid = self.is_solid_at(cell, self.center_of(cell));
         let first = self.extra.triangles.len();
-        for share in shares {
+        for share in INNER {
             self.extra.triangles.truncate(first);
-            self.walls(cell, &polygons, solid, *share);
+            self.walls(cell, &polygons, solid, share);
             if !self.muddled(first) {
                 return;
             }

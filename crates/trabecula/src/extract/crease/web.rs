@@ -110,7 +110,27 @@ impl Web {
         let mut edges: Vec<Link> = triangles.iter().flat_map(ways).collect();
         edges.sort_unstable();
         let once = edges.windows(2).all(|w| w[0] != w[1]);
-        once.then(|| (Patch { inner, triangles }, sum / f64::from(count as u32)))
+        let patch = || Patch {
+            inner,
+            triangles,
+            ways: self.ways(),
+        };
+        once.then(|| (patch(), sum / f64::from(count as u32)))
+    }
+
+    /// The ways along trees between the ends that follow each other on the rim.
+    fn ways(&self) -> Vec<Vec<usize>> {
+        let of = |tree: &Vec<Link>| {
+            let ends = self.ends(tree);
+            let next = ends.iter().cycle().skip(1);
+            let pairs = ends
+                .iter()
+                .zip(next)
+                .take(if ends.len() == 2 { 1 } else { ends.len() });
+            let ways = pairs.filter_map(|(a, b)| path(tree, *a, *b));
+            ways.collect::<Vec<_>>()
+        };
+        self.trees.iter().flat_map(of).collect()
     }
 
     /// The points of the rim at which a tree ends.

@@ -1,0 +1,358 @@
+//! Cells that patches divide into volumes: tetrahedra in all of them.
+
+use std::collections::VecDeque;
+
+use super::fill::{Base, Tet};
+use super::patch::Patch;
+use crate::extract::by::By;
+use crate::extract::knot::{Knots, middle};
+use crate::math::{Vec3, cross, dot, scale, sub, unit};
+
+/// A point that is behind all that bounds a volume by so many steps is taken at once.
+const DEEP: f64 = 0.1;
+/// How often a point is moved to come farther behind.
+const MOVES: u32 = 200;
+/// Where more edges than this cross a cell, volumes are not divided along them.
+const MOST: usize = 8;
+
+/// A triangle that bounds a volume: counter-clockwise seen from outside of it.
+#[derive(Clone, Copy)]
+struct Facet<'b> {
+    ids: [usize; 3],
+    of: Of<'b>,
+}
+
+#[derive(Clone, Copy)]
+enum Of<'b> {
+    Side(&'b Base),
+    Patch,
+    /// What divides a volume that is not seen whole from any point.
+    Wall,
+}
+
+/// A volume, and whether the face is negative in it.
+struct Volume<'b> {
+    facets: Vec<Facet<'b>>,
+    inside: bool,
+}
+
+/// A line between two points, the same in both directions.
+type Line = [usize; 2];
+
+fn line(a: usize, b: usize) -> Line {
+    [a.min(b), a.max(b)]
+}
+
+fn lines_of([a, b, c]: [usize; 3]) -> [Line; 3] {
+    [line(a, b), line(b, c), line(c, a)]
+}
+
+/// The lines of a closed way.
+fn around(ring: &[usize]) -> Vec<Line> {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| line(*a, *b)).collect()
+}
+
+/// A triangle, turned over unless it is to stay.
+fn turned([a, b, c]: [usize; 3], stays: bool) -> [usize; 3] {
+    if stays { [a, b, c] } else { [a, c, b] }
+}
+
+impl Knots<'_> {
+    /// The tetrahedra from points in the volumes between patches to all that bounds each; none if that cannot be had. `patches`:
+    /// with the numbers of their rims' points.
+    pub(super) fn volumes<'b>(
+        &mut self,
+        cell: [usize; 3],
+        bases: &'b [Base],
+        patches: &[(&[usize], &Patch)],
+    ) -> Option<Vec<Tet<'b>>> {
+        // Points of sides that were divided anew have other values there than elsewhere.
+        let is_shaken = |b: &Base| b.divided.as_ref().is_some_and(|(s, _)| s.tries > 0);
+        if bases.iter().any(is_shaken) {
+            return None;
+        }
+        let side = |b: &'b Base| Facet {
+            ids: turned(b.ids, b.left),
+            of: Of::Side(b),
+        };
+        let sides: Vec<Facet> = bases.iter().map(side).collect();
+        let rims: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
+        let mut volumes: Vec<Volume> = Vec::with_capacity(patches.len() + 1);
+        for facets in parts(&sides, &rims) {
+            let inside = matches!(facets[0].of, Of::Side(b) if b.inside);
+            volumes.push(Volume { facets, inside });
+        }
+        let mut ways: Vec<Vec<usize>> = Vec::new();
+        for (rim, patch) in patches {
+            let mut ids = rim.to_vec();
+            ids.extend(patch.inner.iter().map(|p| self.inner_point(cell, *p)));
+            let ids_of = |way: &Vec<usize>| way.iter().map(|i| ids[*i]).collect();
+            ways.extend(patch.ways.iter().map(ids_of));
+            let start = line(rim[0], rim[1]);
+            let meets = |v: &&mut Volume| v.facets.iter().any(|f| lines_of(f.ids).contains(&start));
+            for volume in volumes.iter_mut().filter(meets) {
+                let stays = volume.inside;
+                let facet = |t: &[usize; 3]| Facet {
+                    ids: turned(t.map(|i| ids[i]), stays),
+                    of: Of::Patch,
+                };
+                volume.facets.extend(patch.triangles.iter().map(facet));
+            }
+        }
+        if ways.len() > MOST {
+            ways.clear();
+        }
+        let mut tets = Vec::with_capacity(2 * bases.len());
+        for volume in volumes {
+            self.divide(cell, volume, ways.clone(), &mut tets)?;
+        }
+        Some(tets)
+    }
+
+    /// Adds the tetrahedra of a volume; of its parts, where it is not seen whole from any point. `ways`: those it may be divided
+    /// along.
+    fn divide<'b>(
+        &mut self,
+        cell: [usize; 3],
+        mut volume: Volume<'b>,
+        mut ways: Vec<Vec<usize>>,
+        tets: &mut Vec<Tet<'b>>,
+    ) -> Option<()> {
+        // One part after the other is cut off.
+        while !self.is_seen(cell, &volume, tets) {
+            let (rest, taken) = ways.iter().enumerate().find_map(|(n, way)| {
+                let [one, other] = self.walled_off(cell, &volume, way)?;
+                if self.is_seen(cell, &one, tets) {
+                    return Some((other, n));
+                }
+                self.is_seen(cell, &other, tets).then_some((one, n))
+            })?;
+            volume = rest;
+            ways.swap_remove(taken);
+        }
+        Some(())
+    }
+
+    /// Adds the tetrahedra of a volume, if it is seen whole from a point.
+    fn is_seen<'b>(
+        &mut self,
+        cell: [usize; 3],
+        volume: &Volume<'b>,
+        tets: &mut Vec<Tet<'b>>,
+    ) -> bool {
+        let facets = volume.facets.iter();
+        let places: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.place_of(i))).collect();
+        let step = self.grid.step;
+        let Some(apex) = behind(&places, step, self.grid.margin * step) else {
+            return false;
+        };
+        let apex = self.inner_point(cell, apex);
+        tets.extend(volume.facets.iter().map(|f| match f.of {
+            Of::Side(b) => Tet::over(b, apex),
+            Of::Patch => Tet::inner(f.ids, volume.inside, apex, volume.inside),
+            Of::Wall => Tet::inner(f.ids, volume.inside, apex, false),
+        }));
+        true
+    }
+
+    /// The halves of a volume that is divided by a wall between a way along its patches and one along its sides.
+    fn walled_off<'b>(
+        &mut self,
+        cell: [usize; 3],
+        volume: &Volume<'b>,
+        way: &[usize],
+    ) -> Option<[Volume<'b>; 2]> {
+        let mut ring = way.to_vec();
+        ring.extend(back(&volume.facets, way)?);
+        let lines = around(&ring);
+        let [one, other] = <[_; 2]>::try_from(parts(&volume.facets, &lines)).ok()?;
+        let wall: Vec<[usize; 3]> = match ring[..] {
+            [a, b, c] => vec![[a, b, c]],
+            _ => {
+                let places: Vec<Vec3> = ring.iter().map(|i| self.place_of(*i)).collect();
+                let apex = self.inner_point(cell, middle(&places));
+                let next = ring.iter().cycle().skip(1);
+                let sides = ring.iter().zip(next);
+                sides.map(|(a, b)| [apex, *a, *b]).collect()
+            }
+        };
+        Some([one, other].map(|half| Volume {
+            facets: closed(half, &wall, [ring[0], ring[1]]),
+            inside: volume.inside,
+        }))
+    }
+}
+
+/// Half of a surface, closed by a wall. `line`: one of those they share, as the wall has it.
+fn closed<'b>(mut half: Vec<Facet<'b>>, wall: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
+    let runs = |ids: [usize; 3]| (0..3).any(|k| [ids[k], ids[(k + 1) % 3]] == line);
+    let stays = !half.iter().any(|f| runs(f.ids));
+    half.extend(wall.iter().map(|t| Facet {
+        ids: turned(*t, stays),
+        of: Of::Wall,
+    }));
+    half
+}
+
+/// The parts that some lines divide a surface into.
+fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
+    let mut beside: By<Line, Vec<usize>> = By::default();
+    for (i, f) in facets.iter().enumerate() {
+        for l in lines_of(f.ids) {
+            beside.entry(l).or_default().push(i);
+        }
+    }
+    let mut all = Vec::new();
+    let mut seen = vec![false; facets.len()];
+    for first in 0..facets.len() {
+        let (mut open, mut part) = (vec![first], Vec::new());
+        while let Some(i) = open.pop() {
+            if std::mem::replace(&mut seen[i], true) {
+                continue;
+            }
+            part.push(facets[i]);
+            let inner = lines_of(facets[i].ids)
+                .into_iter()
+                .filter(|l| !lines.contains(l));
+            open.extend(inner.flat_map(|l| beside[&l].iter().copied()));
+        }
+        if !part.is_empty() {
+            all.push(part);
+        }
+    }
+    all
+}
+
+/// The points between the end of a way along patches and its start on the shortest way back along sides, by the count of lines,
+/// that meets no patch.
+fn back(facets: &[Facet], way: &[usize]) -> Option<Vec<usize>> {
+    let (start, end) = (way[way.len() - 1], way[0]);
+    let is_side = |f: &&Facet| matches!(f.of, Of::Side(_));
+    let others = facets.iter().filter(|f| !is_side(f));
+    let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
+    let lines: Vec<Line> = (facets.iter().filter(is_side))
+        .flat_map(|f| lines_of(f.ids))
+        .collect();
+    let mut from: By<usize, usize> = By::default();
+    let mut open = VecDeque::from([start]);
+    while let Some(at) = open.pop_front() {
+        for l in lines.iter().filter(|l| l.contains(&at)) {
+            let next = l[usize::from(l[0] == at)];
+            if next == end && at != start {
+                let mut ring = vec![at];
+                while let Some(before) = from.get(&ring[ring.len() - 1]).filter(|b| **b != start) {
+                    ring.push(*before);
+                }
+                ring.reverse();
+                return Some(ring);
+            }
+            if !taken.contains(&next) && !from.contains_key(&next) {
+                from.insert(next, at);
+                open.push_back(next);
+            }
+        }
+    }
+    None
+}
+
+/// A point that is farther than so much behind all of some triangles, counter-clockwise seen from the front.
+fn behind(triangles: &[[Vec3; 3]], step: f64, least: f64) -> Option<Vec3> {
+    let plane = |t: &[Vec3; 3]| (unit(cross(sub(t[1], t[0]), sub(t[2], t[0]))), t[0]);
+    let planes: Vec<(Vec3, Vec3)> = triangles.iter().map(plane).collect();
+    let corners: Vec<Vec3> = triangles.iter().flatten().copied().collect();
+    let mut at = middle(&corners);
+    let mut best = (at, f64::NEG_INFINITY);
+    // Away from the nearest plane by less and less: how far the nearest one is, is a concave function.
+    for moves in 1..=MOVES {
+        let depths = planes.iter().map(|p| (dot(p.0, sub(p.1, at)), p.0));
+        let (depth, normal) = depths.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        if best.1 < depth {
+            best = (at, depth);
+        }
+        if depth > DEEP * step {
+            break;
+        }
+        at = sub(at, scale(normal, 0.5 * step / f64::from(moves)));
+    }
+    (best.1 > least).then_some(best.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sides of a prism over a polygon in the unit square, whose ends are triangles of its corners.
+    fn prism(polygon: &[[f64; 2]], ends: &[[usize; 3]]) -> (Vec<Facet<'static>>, Vec<Vec3>) {
+        let n = polygon.len();
+        let mut ids: Vec<[usize; 3]> = Vec::new();
+        for t in ends {
+            ids.push(turned(*t, false));
+            ids.push(t.map(|i| i + n));
+        }
+        for i in 0..n {
+            let next = (i + 1) % n;
+            ids.push([i, next, next + n]);
+            ids.push([i, next + n, i + n]);
+        }
+        let facets = ids.iter().map(|ids| Facet {
+            ids: *ids,
+            of: Of::Patch,
+        });
+        let at = |z: f64| polygon.iter().map(move |p| [p[0], p[1], z]);
+        (facets.collect(), at(0.0).chain(at(1.0)).collect())
+    }
+
+    fn places(facets: &[Facet], places: &[Vec3]) -> Vec<[Vec3; 3]> {
+        facets.iter().map(|f| f.ids.map(|i| places[i])).collect()
+    }
+
+    const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    /// A square with a slot that ends before its far side.
+    const SLOT: [[f64; 2]; 8] = [
+        [0.0, 0.0],
+        [0.4, 0.0],
+        [0.4, 0.8],
+        [0.6, 0.8],
+        [0.6, 0.0],
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+    ];
+    const SLOT_ENDS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [0, 2, 7],
+        [2, 3, 7],
+        [3, 6, 7],
+        [3, 5, 6],
+        [3, 4, 5],
+    ];
+
+    #[test]
+    fn a_point_behind_all_sides_is_found_where_there_is_one() {
+        let (facets, at) = prism(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
+        let p = behind(&places(&facets, &at), 1.0, 1e-3).expect("a cube");
+        assert!(p.iter().all(|x| (0.05..0.95).contains(x)), "{p:?}");
+        let (facets, at) = prism(&SLOT, &SLOT_ENDS);
+        assert_eq!(behind(&places(&facets, &at), 1.0, 1e-3), None);
+    }
+
+    #[test]
+    fn a_closed_line_divides_a_surface_in_two() {
+        let (facets, at) = prism(&SLOT, &SLOT_ENDS);
+        // Along the foot of the slot's left flank, through to the far side.
+        let ring = [2, 10, 15, 7];
+        let halves = parts(&facets, &around(&ring));
+        assert_eq!(halves.len(), 2);
+        assert_eq!(halves[0].len() + halves[1].len(), facets.len());
+        for half in halves {
+            let half = closed(half, &[[2, 10, 15], [2, 15, 7]], [2, 10]);
+            let ways = |f: &Facet| [0, 1, 2].map(|k| (f.ids[k], f.ids[(k + 1) % 3]));
+            let ways: Vec<(usize, usize)> = half.iter().flat_map(ways).collect();
+            assert!(ways.iter().all(|(a, b)| ways.contains(&(*b, *a))));
+            // The left leg is convex; all of the rest is seen from the far right.
+            assert!(behind(&places(&half, &at), 1.0, 1e-3).is_some());
+        }
+        assert_eq!(parts(&facets, &[line(2, 10)]).len(), 1);
+    }
+}
