@@ -89,10 +89,8 @@ impl Knots<'_> {
         let bases = self.bases(cell, face);
         let steps = self.steps(cell, face);
         let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let rims: Vec<(Rim, Vec<usize>)> = rims
-            .iter()
-            .map(|keys| self.bare_rim(cell, &bases, keys))
-            .collect();
+        let rims: Vec<(Rim, Vec<usize>)> =
+            rims.iter().map(|keys| self.bare_rim(cell, keys)).collect();
         let (edges, of) = (self.edges, self.cell_of(cell, face));
         let patches: Vec<Patches> = match &rims[..] {
             [(rim, _)] => vec![edges.patches(of, rim, None)],
@@ -157,12 +155,8 @@ impl Knots<'_> {
     }
 
     /// The rim of a patch without the points where other faces cross it, and the numbers of its points.
-    fn bare_rim(&mut self, cell: [usize; 3], bases: &[Base], rim: &[Key]) -> (Rim, Vec<usize>) {
-        let sides = || bases.iter().filter_map(|b| b.divided.as_ref());
-        let number = |key: &Key| {
-            let corner = sides().find_map(|(s, _)| s.corners.iter().find(|c| c.key == *key));
-            corner.map(|c| (*key, c.id))
-        };
+    fn bare_rim(&mut self, cell: [usize; 3], rim: &[Key]) -> (Rim, Vec<usize>) {
+        let number = |key: &Key| Some((*key, *self.fits.numbers.get(key)?));
         let (keys, ids): (Vec<Key>, Vec<usize>) = rim.iter().filter_map(number).unzip();
         (self.rim(cell, &keys), ids)
     }
