@@ -14,7 +14,7 @@ const TRIES: usize = 6;
 
 /// A tetrahedron of a fitted cell.
 pub(super) struct Tet<'b> {
-    /// Nodes and points: last that inside the volume.
+    /// Nodes and points: last that inside the volume, the others in the same order in both tetrahedra that share them.
     simplex: Simplex,
     right: bool,
     /// Whether the face is negative in it.

@@ -1,8 +1,8 @@
 //! Cells in which a face with edges meets others: which they are, and the points that they have beside nodes.
 //!
 //! Such a cell is divided into tetrahedra so that the patch of the face with edges is made of sides of them: each side of
-//! the cell is cut along its chords and into triangles, and the tetrahedra run from these to a point inside. So the face
-//! needs no values there. Every other face is the plane of its values at a tetrahedron's corners, as in a knot, but these
+//! the cell is cut along its chords and into triangles, and the tetrahedra run from these to a point inside; or, from these
+//! and from patches that edges divide, to one in each volume between patches. So the face needs no values there. Every other face is the plane of its values at a tetrahedron's corners, as in a knot, but these
 //! corners are points of the edges as well as nodes.
 //!
 //! On a grid edge the other faces stay what their values at its two nodes make of them, and at points inside a side or

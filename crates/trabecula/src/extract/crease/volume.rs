@@ -8,11 +8,11 @@ use crate::extract::by::By;
 use crate::extract::knot::{Knots, middle};
 use crate::math::{Vec3, cross, dot, scale, sub, unit};
 
-/// A point that is behind all that bounds a volume by so many steps is taken at once.
+/// A point that is behind all that bounds a volume by so many steps is taken at once, if that is more than it must be.
 const DEEP: f64 = 0.1;
 /// How often a point is moved to come farther behind.
 const MOVES: u32 = 200;
-/// Where more edges than this cross a cell, volumes are not divided along them.
+/// Where edges cross a cell in more ways than this, volumes are not divided along them.
 const MOST: usize = 8;
 
 /// A triangle that bounds a volume: counter-clockwise seen from outside of it.
@@ -82,6 +82,10 @@ impl Knots<'_> {
         for facets in parts(&sides, &rims) {
             let inside = matches!(facets[0].of, Of::Side(b) if b.inside);
             volumes.push(Volume { facets, inside });
+        }
+        // A closed line divides the cell's boundary in two.
+        if volumes.len() != patches.len() + 1 {
+            return None;
         }
         let mut ways: Vec<Vec<usize>> = Vec::new();
         for (rim, patch) in patches {
@@ -225,7 +229,7 @@ fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
 }
 
 /// The points between the end of a way along patches and its start on the shortest way back along sides, by the count of lines,
-/// that meets no patch.
+/// that meets no patch or wall.
 fn back(facets: &[Facet], way: &[usize]) -> Option<Vec<usize>> {
     let (start, end) = (way[way.len() - 1], way[0]);
     let is_side = |f: &&Facet| matches!(f.of, Of::Side(_));
@@ -270,7 +274,7 @@ fn behind(triangles: &[[Vec3; 3]], step: f64, least: f64) -> Option<Vec3> {
         if best.1 < depth {
             best = (at, depth);
         }
-        if depth > DEEP * step {
+        if depth > least.max(DEEP * step) {
             break;
         }
         at = sub(at, scale(normal, 0.5 * step / f64::from(moves)));

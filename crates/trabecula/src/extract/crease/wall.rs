@@ -1,8 +1,8 @@
 //! Fitted cells that nothing else fills: walls between what is solid and what is void of their sides.
 //!
-//! Where single precision muddles a cell from whatever point inside it is filled, nothing is asked of the faces any more
-//! but what they say of the cell's sides, which neighbours share: the lines there between solid and void run inwards as
-//! walls, up to a smaller cell that is all solid or all void. Between the two cells there is a copy of the sides for every
+//! Where single precision muddles a cell from whatever points inside it is filled, or no point sees one of its volumes whole,
+//! nothing is asked of the faces any more but what they say of the cell's sides, which neighbours share: the lines there
+//! between solid and void run inwards as walls, up to a smaller cell that is all solid or all void. Between the two cells there is a copy of the sides for every
 //! depth, so walls meet no more than lines of the sides do.
 
 use std::collections::{HashMap, HashSet};
