@@ -35,10 +35,8 @@ impl Loader for Folder {
         let names = found.filter_map(|f| f.ok()?.file_name().into_string().ok());
         let long = before.len() + after.len();
         let fits = |n: &String| n.len() >= long && n.starts_with(before) && n.ends_with(after);
-        let found: Vec<String> = names
-            .filter(fits)
-            .map(|n| format!("{folder}{}{n}", if folder.is_empty() { "" } else { "/" }))
-            .collect();
+        let found: Vec<String> =
+            names.filter(fits).map(|n| format!("{folder}{}{n}", if folder.is_empty() { "" } else { "/" })).collect();
         if found.is_empty() {
             return Err(format!("no file is named {pattern}"));
         }
@@ -49,13 +47,7 @@ impl Loader for Folder {
         crate::tets::elements(&self.0.join(Path::new(path)).to_string_lossy())
     }
 
-    fn tetrahedra(
-        &self,
-        name: &str,
-        surface: &Mesh,
-        size: f64,
-        limit: f64,
-    ) -> Result<TetMesh, String> {
+    fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
         crate::tets::tetrahedra(name, surface, size, limit)
     }
 }
@@ -66,11 +58,7 @@ impl Design {
     #[staticmethod]
     #[pyo3(signature = (text, json=false, file=None))]
     fn from_text(py: Python<'_>, text: &str, json: bool, file: Option<String>) -> PyResult<Design> {
-        let read = if json {
-            design::Design::from_json(text)
-        } else {
-            design::Design::from_toml(text)
-        };
+        let read = if json { design::Design::from_json(text) } else { design::Design::from_toml(text) };
         match read {
             Ok(design) => Ok(Design { design, file }),
             Err(e) => Err(named(py, e, &file)),
@@ -80,8 +68,7 @@ impl Design {
     /// Reads dictionaries, lists, numbers, texts.
     #[staticmethod]
     fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>) -> PyResult<Design> {
-        let design =
-            design::Design::from_node(&node(data, 0)?).map_err(|e| error::design(py, &e))?;
+        let design = design::Design::from_node(&node(data, 0)?).map_err(|e| error::design(py, &e))?;
         Ok(Design { design, file: None })
     }
 
@@ -99,11 +86,7 @@ impl Design {
     fn build(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Solid> {
         let built = run(py, None, None, |_| {
             let built = self.design.build(&Folder(folder))?;
-            let warnings = built
-                .warnings
-                .iter()
-                .map(|w| (w.path.clone(), w.message.clone()))
-                .collect();
+            let warnings = built.warnings.iter().map(|w| (w.path.clone(), w.message.clone())).collect();
             Ok((built, warnings))
         })?;
         match built {
@@ -131,10 +114,7 @@ pub fn node(data: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
         ));
     }
     let items = |items: &mut dyn Iterator<Item = Bound<'_, PyAny>>| {
-        items
-            .map(|i| node(&i, depth + 1))
-            .collect::<PyResult<Vec<Node>>>()
-            .map(Value::List)
+        items.map(|i| node(&i, depth + 1)).collect::<PyResult<Vec<Node>>>().map(Value::List)
     };
     let value = if data.is_instance_of::<PyBool>() {
         Value::Bool(data.extract()?)
@@ -160,11 +140,7 @@ pub fn node(data: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
     } else if data.hasattr("__fspath__")? {
         Value::Text(data.call_method0("__fspath__")?.extract()?)
     } else {
-        Value::Other(format!(
-            "{} of type {}",
-            data.repr()?,
-            data.get_type().name()?
-        ))
+        Value::Other(format!("{} of type {}", data.repr()?, data.get_type().name()?))
     };
     Ok(value.into())
 }

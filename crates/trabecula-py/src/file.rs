@@ -19,20 +19,14 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
         Err(e) => return wrong(e.kind(), format!("{name} cannot be read: {e}")),
     };
     if about.is_dir() {
-        return wrong(
-            ErrorKind::IsADirectory,
-            format!("{name} is a directory, not a file"),
-        );
+        return wrong(ErrorKind::IsADirectory, format!("{name} is a directory, not a file"));
     }
     if !about.is_file() {
         let message = format!("{name} is a device or a pipe; only files are read");
         return wrong(ErrorKind::InvalidInput, message);
     }
     if machine::free_memory(Path::new("/")).is_some_and(|free| about.len() as f64 > 0.5 * free) {
-        let message = format!(
-            "{name} has {:.3e} bytes, too many for the memory that is free",
-            about.len() as f64
-        );
+        let message = format!("{name} has {:.3e} bytes, too many for the memory that is free", about.len() as f64);
         return wrong(ErrorKind::OutOfMemory, message);
     }
     std::fs::read(path).or_else(|e| wrong(e.kind(), format!("{name} cannot be read: {e}")))

@@ -7,11 +7,8 @@ use trabecula::extract::{Islands, Pieces};
 
 /// What a word stands for.
 pub fn named(word: &str) -> PyResult<Islands> {
-    Islands::named(word).ok_or_else(|| {
-        PyValueError::new_err(format!(
-            r#"islands is "{word}"; it must be "keep", "drop" or "error""#
-        ))
-    })
+    Islands::named(word)
+        .ok_or_else(|| PyValueError::new_err(format!(r#"islands is "{word}"; it must be "keep", "drop" or "error""#)))
 }
 
 /// The figures of the result, under `islands` those of all pieces but the largest; and these in words.

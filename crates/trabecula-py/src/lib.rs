@@ -63,10 +63,7 @@ mod _core {
 
     /// The bytes of a file; what is no regular file, or more than memory can hold, is refused.
     #[pyfunction]
-    fn read_file(
-        py: Python<'_>,
-        path: std::path::PathBuf,
-    ) -> PyResult<Bound<'_, pyo3::types::PyBytes>> {
+    fn read_file(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Bound<'_, pyo3::types::PyBytes>> {
         let bytes = py.detach(|| crate::file::read(&path))?;
         Ok(pyo3::types::PyBytes::new(py, &bytes))
     }
@@ -90,13 +87,7 @@ mod _core {
         let bytes = crate::run::run(py, None, None, |_| {
             let charts: Vec<Chart> = charts
                 .into_iter()
-                .map(|(title, edges, share, wanted, marks)| Chart {
-                    title,
-                    edges,
-                    share,
-                    wanted,
-                    marks,
-                })
+                .map(|(title, edges, share, wanted, marks)| Chart { title, edges, share, wanted, marks })
                 .collect();
             let size = [width, height];
             render::png(&render::charts(&charts, size), size)
@@ -121,17 +112,8 @@ mod _core {
 
     /// The named cells: (name, title, formula, group, source).
     #[pyfunction]
-    fn cells() -> Vec<(
-        &'static str,
-        &'static str,
-        &'static str,
-        &'static str,
-        &'static str,
-    )> {
-        trabecula::cell::catalogue()
-            .iter()
-            .map(|n| (n.name, n.title, n.formula, n.group, n.source))
-            .collect()
+    fn cells() -> Vec<(&'static str, &'static str, &'static str, &'static str, &'static str)> {
+        trabecula::cell::catalogue().iter().map(|n| (n.name, n.title, n.formula, n.group, n.source)).collect()
     }
 
     /// The cells of beams: name, title, group, aspect, nodes, beams (two nodes and the second one's cell), the valence of
@@ -143,9 +125,7 @@ mod _core {
             let links = net.beams.iter().map(|b| (b.ends, b.shift)).collect();
             let length = net.lengths(u.aspect).iter().sum();
             let (valences, maxwell) = (net.valences(), net.maxwell());
-            Ok((
-                u.name, u.title, u.group, u.aspect, net.nodes, links, valences, maxwell, length,
-            ))
+            Ok((u.name, u.title, u.group, u.aspect, net.nodes, links, valences, maxwell, length))
         };
         trabecula::graph::catalogue().iter().map(told).collect()
     }
@@ -154,23 +134,15 @@ mod _core {
     #[pyfunction]
     fn cell_facts(py: Python<'_>, name: &str) -> PyResult<((f64, f64), Connected)> {
         use trabecula::cell::{Cell, Part, Series};
-        let known = trabecula::cell::named(name).ok_or_else(|| {
-            pyo3::exceptions::PyKeyError::new_err(format!("no cell is named {name}"))
-        })?;
+        let known = trabecula::cell::named(name)
+            .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no cell is named {name}")))?;
         let series = Series::new(known.terms())
             .map_err(|f| pyo3::exceptions::PyRuntimeError::new_err(format!("cell {name}: {f}")))?;
         crate::run::run(py, None, None, |_| {
             let cell = Cell::new(series);
             let range = cell.range();
-            let parts = [
-                ("sheet", Part::Sheet),
-                ("lower", Part::Lower),
-                ("upper", Part::Upper),
-            ];
-            (
-                (range.lo, range.hi),
-                parts.map(|(n, p)| (n, cell.connected_fraction(p))).to_vec(),
-            )
+            let parts = [("sheet", Part::Sheet), ("lower", Part::Lower), ("upper", Part::Upper)];
+            ((range.lo, range.hi), parts.map(|(n, p)| (n, cell.connected_fraction(p))).to_vec())
         })
     }
 
@@ -185,23 +157,18 @@ mod _core {
     /// which it is one piece that reaches all faces.
     #[pyfunction]
     fn tet_cell_facts(py: Python<'_>, name: &str) -> PyResult<String> {
-        let ready = trabecula::cell::tet::ready(name).ok_or_else(|| {
-            pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}"))
-        })?;
+        let ready = trabecula::cell::tet::ready(name)
+            .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}")))?;
         let told = crate::run::run(py, None, None, |_| ready.facts())?;
-        told.map(|json| json.to_string())
-            .map_err(crate::error::fault)
+        told.map(|json| json.to_string()).map_err(crate::error::fault)
     }
 
     /// The surface of a ready tetrahedral cell in the regular tetrahedron of edge 1 mm, in `steps` steps.
     #[pyfunction]
     fn tet_cell_mesh(py: Python<'_>, name: &str, steps: usize) -> PyResult<Mesh> {
-        let ready = trabecula::cell::tet::ready(name).ok_or_else(|| {
-            pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}"))
-        })?;
-        let made = crate::run::run(py, None, None, |p| {
-            trabecula::extract::stencil(ready, steps, p)
-        })?;
+        let ready = trabecula::cell::tet::ready(name)
+            .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}")))?;
+        let made = crate::run::run(py, None, None, |p| trabecula::extract::stencil(ready, steps, p))?;
         let surface = made.map_err(crate::error::stopped)?;
         Ok(Mesh::new(surface, String::new()))
     }
@@ -226,32 +193,18 @@ mod _core {
             }
         };
         let bad = |v: &&f64| {
-            if to_iso {
-                !(**v > 0.0 && **v < 1.0)
-            } else {
-                !v.is_finite()
-            }
+            if to_iso { !(**v > 0.0 && **v < 1.0) } else { !v.is_finite() }
         };
         if let Some(v) = values.iter().find(bad) {
             let name = if to_iso { "fraction" } else { "iso" };
-            let allowed = if to_iso {
-                "greater than 0 and less than 1"
-            } else {
-                "a finite number"
-            };
-            return Err(pyo3::exceptions::PyValueError::new_err(format!(
-                "{name} is {v}; it must be {allowed}"
-            )));
+            let allowed = if to_iso { "greater than 0 and less than 1" } else { "a finite number" };
+            return Err(pyo3::exceptions::PyValueError::new_err(format!("{name} is {v}; it must be {allowed}")));
         }
         let node = crate::design::node(cell, 0)?;
         let done = crate::run::run(py, None, None, |_| {
             let cell = trabecula::design::cell(&node)?;
             let one = |v: &f64| {
-                if to_iso {
-                    cell.iso(part, *v).0
-                } else {
-                    cell.fraction(part, *v)
-                }
+                if to_iso { cell.iso(part, *v).0 } else { cell.fraction(part, *v) }
             };
             Ok(values.iter().map(one).collect())
         })?;

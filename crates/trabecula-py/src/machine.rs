@@ -9,10 +9,7 @@ pub fn free_memory(root: &Path) -> Option<f64> {
     let of_system = field(&root.join("proc/meminfo"), "MemAvailable:").map(|kb| 1024.0 * kb);
     let groups = fs::read_to_string(root.join("proc/self/cgroup")).unwrap_or_default();
     let of_groups = groups.lines().filter_map(|line| group(root, line));
-    of_groups
-        .chain(of_system)
-        .chain(address_space(root))
-        .reduce(f64::min)
+    of_groups.chain(of_system).chain(address_space(root)).reduce(f64::min)
 }
 
 /// What a line `number:controllers:path` of the process's control groups leaves.
@@ -24,12 +21,7 @@ fn group(root: &Path, line: &str) -> Option<f64> {
         (mounted, "memory.max", "memory.current", "inactive_file")
     } else if controllers.split(',').any(|c| c == "memory") {
         let names = ("memory.limit_in_bytes", "memory.usage_in_bytes");
-        (
-            mounted.join("memory"),
-            names.0,
-            names.1,
-            "total_inactive_file",
-        )
+        (mounted.join("memory"), names.0, names.1, "total_inactive_file")
     } else {
         return None;
     };
@@ -49,9 +41,7 @@ fn group(root: &Path, line: &str) -> Option<f64> {
 /// What the limit of address space (ulimit -v) leaves.
 fn address_space(root: &Path) -> Option<f64> {
     let limits = fs::read_to_string(root.join("proc/self/limits")).ok()?;
-    let line = limits
-        .lines()
-        .find_map(|l| l.strip_prefix("Max address space"))?;
+    let line = limits.lines().find_map(|l| l.strip_prefix("Max address space"))?;
     let most: f64 = line.split_whitespace().next()?.parse().ok()?;
     let now = field(&root.join("proc/self/status"), "VmSize:")? * 1024.0;
     Some((most - now).max(0.0))

@@ -32,21 +32,13 @@ pub struct Mesh {
 
 impl Mesh {
     pub fn new(surface: Surface, design: String) -> Self {
-        Mesh {
-            surface,
-            split: true,
-            design,
-        }
+        Mesh { surface, split: true, design }
     }
 
     /// A mesh of which nothing more is known.
     fn bare(mesh: trabecula::mesh::Mesh) -> Self {
         let cut = vec![false; mesh.triangles.len()];
-        Mesh {
-            surface: Surface { mesh, cut },
-            split: false,
-            design: String::new(),
-        }
+        Mesh { surface: Surface { mesh, cut }, split: false, design: String::new() }
     }
 }
 
@@ -61,8 +53,7 @@ impl Mesh {
             Ok(loaded) => Ok(loaded.mesh),
             Err(f) => Err(f),
         })?;
-        read.map(Mesh::bare)
-            .map_err(|f| PyValueError::new_err(f.to_string()))
+        read.map(Mesh::bare).map_err(|f| PyValueError::new_err(f.to_string()))
     }
 
     /// The mesh of vertices (n, 3), mm, and triangles (m, 3) by index; which of them are cuts, and the design, if known.
@@ -78,16 +69,11 @@ impl Mesh {
         let (points, corners) = (vertices.as_array(), triangles.as_array());
         if points.ncols() != 3 || corners.ncols() != 3 {
             let (points, corners) = (points.shape(), corners.shape());
-            return wrong(format!(
-                "expected vertices (n, 3) and triangles (m, 3), found {points:?} and {corners:?}"
-            ));
+            return wrong(format!("expected vertices (n, 3) and triangles (m, 3), found {points:?} and {corners:?}"));
         }
         let mut places = points.rows().into_iter().enumerate();
         if let Some((i, p)) = places.find(|(_, p)| !p.iter().all(|x| x.is_finite())) {
-            return wrong(format!(
-                "expected finite vertices, found {:?} as vertex {i}",
-                p.to_vec()
-            ));
+            return wrong(format!("expected finite vertices, found {:?} as vertex {i}", p.to_vec()));
         }
         let known = 0..points.nrows().min(u32::MAX as usize) as i64;
         let mut named = corners.rows().into_iter().enumerate();
@@ -102,10 +88,7 @@ impl Mesh {
         let vertices = rows.map(|p| [p[0], p[1], p[2]]).collect();
         let rows = corners.rows().into_iter();
         let triangles = rows.map(|t| [t[0], t[1], t[2]].map(|v| v as u32)).collect();
-        let mut made = Mesh::bare(trabecula::mesh::Mesh {
-            vertices,
-            triangles,
-        });
+        let mut made = Mesh::bare(trabecula::mesh::Mesh { vertices, triangles });
         if let Some(cut) = cut.filter(|c| c.len() == made.surface.cut.len()) {
             (made.surface.cut, made.split) = (cut, true);
         }
@@ -120,15 +103,9 @@ impl Mesh {
     /// The same mesh, its triangles that lie on the region's boundary marked as cuts.
     fn split_by(&self, py: Python<'_>, region: &Region) -> PyResult<Mesh> {
         let (mesh, region) = (&self.surface.mesh, &region.region);
-        let surface = run(py, None, None, |_| Surface {
-            cut: measure::cut_triangles(mesh, &**region),
-            mesh: mesh.clone(),
-        })?;
-        Ok(Mesh {
-            surface,
-            split: true,
-            design: self.design.clone(),
-        })
+        let surface =
+            run(py, None, None, |_| Surface { cut: measure::cut_triangles(mesh, &**region), mesh: mesh.clone() })?;
+        Ok(Mesh { surface, split: true, design: self.design.clone() })
     }
 
     /// The triangles that are no cuts.
@@ -171,10 +148,7 @@ impl Mesh {
     /// Numbers of vertices and triangles.
     #[getter]
     fn counts(&self) -> (usize, usize) {
-        (
-            self.surface.mesh.vertices.len(),
-            self.surface.mesh.triangles.len(),
-        )
+        (self.surface.mesh.vertices.len(), self.surface.mesh.triangles.len())
     }
 
     /// A lighter mesh within `tolerance` (mm) or of at most `triangles`, and what was done.
@@ -186,12 +160,9 @@ impl Mesh {
         triangles: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Mesh, Bound<'py, PyDict>)> {
-        let goal = Goal {
-            tolerance,
-            triangles,
-        };
-        let (surface, report) = run(py, None, progress, |p| simplify(&self.surface, &goal, p))?
-            .map_err(error::stopped)?;
+        let goal = Goal { tolerance, triangles };
+        let (surface, report) =
+            run(py, None, progress, |p| simplify(&self.surface, &goal, p))?.map_err(error::stopped)?;
         let d = PyDict::new(py);
         d.set_item("triangles_before", report.triangles[0])?;
         d.set_item("triangles", report.triangles[1])?;
@@ -200,11 +171,7 @@ impl Mesh {
         d.set_item("volume", report.volume[1])?;
         d.set_item("area_before", report.area[0])?;
         d.set_item("area", report.area[1])?;
-        let mesh = Mesh {
-            surface,
-            split: self.split,
-            design: self.design.clone(),
-        };
+        let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
         Ok((mesh, d))
     }
 
@@ -216,10 +183,7 @@ impl Mesh {
                 let [a, b, c] = surface.mesh.corners(i);
                 norm(cross(sub(b, a), sub(c, a))) / 2.0
             };
-            let cut: f64 = (0..surface.cut.len())
-                .filter(|i| surface.cut[*i])
-                .map(area)
-                .sum();
+            let cut: f64 = (0..surface.cut.len()).filter(|i| surface.cut[*i]).map(area).sum();
             (measure::size(&surface.mesh), cut)
         })?;
         let d = PyDict::new(py);
@@ -258,16 +222,13 @@ impl Mesh {
 
     /// The pairs of triangles that meet elsewhere than in common corners or edges, or `limit` if there are as many.
     fn self_intersections(&self, py: Python<'_>, limit: usize) -> PyResult<usize> {
-        run(py, None, None, |_| {
-            measure::self_intersections(&self.surface.mesh, limit)
-        })
+        run(py, None, None, |_| measure::self_intersections(&self.surface.mesh, limit))
     }
 
     /// Smallest angle and its 5th percentile (degrees), largest aspect ratio; None without triangles.
     fn quality(&self, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
         run(py, None, None, |_| {
-            measure::quality(&self.surface.mesh)
-                .map(|q| (q.smallest_angle, q.smallest_angle_p05, q.largest_aspect))
+            measure::quality(&self.surface.mesh).map(|q| (q.smallest_angle, q.smallest_angle_p05, q.largest_aspect))
         })
     }
 
@@ -310,10 +271,8 @@ impl Mesh {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>)> {
         let region = region.map(|r| r.region.clone());
-        let found = run(py, threads, progress, |p| {
-            measure::thickness(&self.surface, region.as_ref(), step, p)
-        })?
-        .map_err(error::stopped)?;
+        let found = run(py, threads, progress, |p| measure::thickness(&self.surface, region.as_ref(), step, p))?
+            .map_err(error::stopped)?;
         let dict = |s: &measure::Spread| -> PyResult<Bound<'py, PyDict>> {
             let d = PyDict::new(py);
             d.set_item("min", s.min)?;
@@ -336,11 +295,7 @@ impl Mesh {
     /// Writes the mesh to `path` in the format `extension`.
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
         let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
-        let meta = io::Metadata {
-            title,
-            design: self.design.clone(),
-            application,
-        };
+        let meta = io::Metadata { title, design: self.design.clone(), application };
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
             io::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;
@@ -361,17 +316,9 @@ impl Mesh {
         tint: Option<(String, Vec<f64>, [f64; 2])>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let size = [width, height];
-        let tint = tint.map(|(title, values, span)| Tint {
-            title,
-            values,
-            span,
-        });
+        let tint = tint.map(|(title, values, span)| Tint { title, values, span });
         let bytes = run(py, None, None, |_| {
-            let view = View {
-                size,
-                azimuth,
-                elevation,
-            };
+            let view = View { size, azimuth, elevation };
             png(&render(&self.surface, &view, tint.as_ref()), size)
         })?;
         Ok(PyBytes::new(py, &bytes))

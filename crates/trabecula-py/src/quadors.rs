@@ -23,18 +23,10 @@ pub struct Quadors {
 }
 
 /// Distance, normals, hubs.
-type Hits<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<i64>>,
-);
+type Hits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>);
 /// Places, normals, distances, hubs.
-type Feet<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i64>>,
-);
+type Feet<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
 
 fn rows<'py, const D: usize>(
     py: Python<'py>,
@@ -51,18 +43,13 @@ type Curves<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>);
 fn curves<'py, const D: usize>(py: Python<'py>, of: &[Bezier<D>]) -> PyResult<Curves<'py>> {
     let flat: Vec<f64> = of.iter().flat_map(|b| b.points).flatten().collect();
     let weights: Vec<f64> = of.iter().map(|b| b.weight).collect();
-    Ok((
-        flat.into_pyarray(py).reshape([of.len(), 3, D])?,
-        weights.into_pyarray(py),
-    ))
+    Ok((flat.into_pyarray(py).reshape([of.len(), 3, D])?, weights.into_pyarray(py)))
 }
 
 /// The beams that a set of stubs belongs to.
 fn beams(core: &Core, hub: usize, stubs: u64) -> Vec<u32> {
     let all = core.hub(hub).stubs.iter().enumerate();
-    all.filter(|(i, _)| *i < 64 && stubs >> i & 1 == 1)
-        .map(|(_, s)| s.beam)
-        .collect()
+    all.filter(|(i, _)| *i < 64 && stubs >> i & 1 == 1).map(|(_, s)| s.beam).collect()
 }
 
 #[pymethods]
@@ -118,14 +105,8 @@ impl Quadors {
             let each = origins.par_iter().zip(&ways).with_min_len(64);
             each.map(|(o, w)| self.quadors.ray(*o, *w)).collect()
         })?;
-        let distance: Vec<f64> = hits
-            .iter()
-            .map(|h| h.map_or(f64::INFINITY, |h| h.distance))
-            .collect();
-        let hubs: Vec<i64> = hits
-            .iter()
-            .map(|h| h.map_or(-1, |h| h.hub as i64))
-            .collect();
+        let distance: Vec<f64> = hits.iter().map(|h| h.map_or(f64::INFINITY, |h| h.distance)).collect();
+        let hubs: Vec<i64> = hits.iter().map(|h| h.map_or(-1, |h| h.hub as i64)).collect();
         Ok((
             distance.into_pyarray(py),
             rows(py, hits.iter().map(|h| h.map_or([0.0; 3], |h| h.normal)))?,
@@ -134,17 +115,12 @@ impl Quadors {
     }
 
     /// The nearest places of the surface to points (n, 3): place, normal, signed distance, hub.
-    fn closest<'py>(
-        &self,
-        py: Python<'py>,
-        points: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Feet<'py>> {
+    fn closest<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Feet<'py>> {
         let points = self::points(&points)?;
         let feet = run(py, None, None, |_| {
             let nearest = self.quadors.nearest();
             let each = points.par_iter().with_min_len(16);
-            each.map(|p| nearest.closest(*p))
-                .collect::<Result<Vec<_>, _>>()
+            each.map(|p| nearest.closest(*p)).collect::<Result<Vec<_>, _>>()
         })?
         .map_err(error::fault)?;
         let distance: Vec<f64> = feet.iter().map(|f| f.distance).collect();
@@ -161,9 +137,7 @@ impl Quadors {
     fn slice(&self, py: Python<'_>, point: [f64; 3], normal: [f64; 3]) -> PyResult<Slice> {
         let plane = Plane::new(point, normal).map_err(error::fault)?;
         let cut = run(py, None, None, |_| self.quadors.slice(&plane))?;
-        Ok(Slice {
-            cut: cut.map_err(error::fault)?,
-        })
+        Ok(Slice { cut: cut.map_err(error::fault)? })
     }
 
     /// The surface of a hub: centre, vertices, arcs, faces; and its rational patches.
@@ -297,11 +271,7 @@ impl Slice {
     }
 
     /// The loops as polygons (n, 2) no further than `chord` (mm) from them.
-    fn polygons<'py>(
-        &self,
-        py: Python<'py>,
-        chord: f64,
-    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+    fn polygons<'py>(&self, py: Python<'py>, chord: f64) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
         if !(chord > 0.0 && chord.is_finite()) {
             return Err(PyValueError::new_err(format!(
                 "chord is {chord}; it must be a finite number greater than 0, mm"

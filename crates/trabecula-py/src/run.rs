@@ -40,14 +40,10 @@ pub fn run<T: Send>(
         None => None,
         Some(n @ 1..=4096) => {
             let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();
-            Some(built.map_err(|e| {
-                PyValueError::new_err(format!("threads: {n} cannot be started: {e}"))
-            })?)
+            Some(built.map_err(|e| PyValueError::new_err(format!("threads: {n} cannot be started: {e}")))?)
         }
         Some(n) => {
-            return Err(PyValueError::new_err(format!(
-                "threads is {n}; it must be from 1 to 4096"
-            )));
+            return Err(PyValueError::new_err(format!("threads is {n}; it must be from 1 to 4096")));
         }
     };
     let shared = Shared::default();

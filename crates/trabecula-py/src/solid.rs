@@ -34,11 +34,7 @@ pub struct Solid {
 
 impl Solid {
     pub fn built(built: Built, warnings: Vec<(String, String)>, design: String) -> Self {
-        Solid {
-            built,
-            warnings,
-            design,
-        }
+        Solid { built, warnings, design }
     }
 }
 
@@ -46,21 +42,13 @@ impl Solid {
 type Bits = (usize, f64, Option<(f64, [f64; 3])>, f64, f64);
 
 /// Name, centres (n, 3), radii (n,), ends (m, 2).
-type Graph<'py> = (
-    String,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<u32>>,
-);
+type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u32>>);
 
 /// Points of Python (n, 3) as the core's.
 pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
     let a = p.as_array();
     if a.ncols() != 3 {
-        return Err(PyValueError::new_err(format!(
-            "points must have shape (n, 3), found {:?}",
-            a.shape()
-        )));
+        return Err(PyValueError::new_err(format!("points must have shape (n, 3), found {:?}", a.shape())));
     }
     let points: Vec<[f64; 3]> = a.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect();
     match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
@@ -72,17 +60,11 @@ pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
     }
 }
 
-fn values<'py>(
-    py: Python<'py>,
-    field: &dyn Field,
-    points: Vec<[f64; 3]>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+fn values<'py>(py: Python<'py>, field: &dyn Field, points: Vec<[f64; 3]>) -> PyResult<Bound<'py, PyArray1<f64>>> {
     const BATCH: usize = 4096;
     let out = run(py, None, None, |_| {
         let mut out = vec![0.0; points.len()];
-        out.par_chunks_mut(BATCH)
-            .zip(points.par_chunks(BATCH))
-            .for_each(|(o, p)| field.values(p, o));
+        out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
         out
     })?;
     Ok(out.into_pyarray(py))
@@ -150,9 +132,7 @@ impl Solid {
     /// The region.
     #[getter]
     fn region(&self) -> Region {
-        Region {
-            region: self.built.solid.region.clone(),
-        }
+        Region { region: self.built.solid.region.clone() }
     }
 
     /// The figures of the design without meshing it, as JSON text.
@@ -175,17 +155,9 @@ impl Solid {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bits> {
-        let found = run(py, threads, progress, |p| {
-            measure::dangling(&self.built.solid, neck, p)
-        })?
-        .map_err(error::stopped)?;
-        Ok((
-            found.count,
-            found.volume,
-            found.largest,
-            found.neck,
-            found.step,
-        ))
+        let found =
+            run(py, threads, progress, |p| measure::dangling(&self.built.solid, neck, p))?.map_err(error::stopped)?;
+        Ok((found.count, found.volume, found.largest, found.neck, found.step))
     }
 
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
@@ -223,29 +195,18 @@ impl Solid {
     /// The beams of a name as quadrics.
     fn quadors(&self, py: Python<'_>, name: &str) -> PyResult<Quadors> {
         match self.built.beams.iter().find(|b| b.0 == name) {
-            Some((_, Beams::Truss(truss))) => Ok(Quadors {
-                quadors: truss.quadors.clone(),
-            }),
+            Some((_, Beams::Truss(truss))) => Ok(Quadors { quadors: truss.quadors.clone() }),
             Some((_, Beams::Pattern(laid))) => {
                 let written = run(py, None, None, |_| laid.written())?;
-                let written =
-                    written.map_err(|f| error::fault(f.under(&format!("beams.{name}"))))?;
-                Ok(Quadors {
-                    quadors: written.into(),
-                })
+                let written = written.map_err(|f| error::fault(f.under(&format!("beams.{name}"))))?;
+                Ok(Quadors { quadors: written.into() })
             }
-            None => Err(PyValueError::new_err(format!(
-                "there are no beams named {name}"
-            ))),
+            None => Err(PyValueError::new_err(format!("there are no beams named {name}"))),
         }
     }
 
     /// Values at points (n, 3): negative in the solid.
-    fn field<'py>(
-        &self,
-        py: Python<'py>,
-        points: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn field<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         values(py, &self.built.solid, self::points(&points)?)
     }
 
@@ -279,10 +240,7 @@ impl Solid {
 
     /// What a spacing will take: cells along each axis, triangles, bytes in memory, bytes of a binary STL.
     fn estimate<'py>(&self, py: Python<'py>, edge: f64) -> PyResult<Bound<'py, PyDict>> {
-        let e = run(py, None, None, |_| {
-            extract::estimate(&self.built.solid, edge)
-        })?
-        .map_err(error::fault)?;
+        let e = run(py, None, None, |_| extract::estimate(&self.built.solid, edge))?.map_err(error::fault)?;
         let d = PyDict::new(py);
         d.set_item("cells", e.cells)?;
         d.set_item("triangles", e.triangles)?;
@@ -302,9 +260,7 @@ impl Solid {
         islands: &str,
     ) -> PyResult<(Mesh, Bound<'py, PyDict>, String)> {
         let islands = islands::named(islands)?;
-        let made = run(py, threads, progress, |p| {
-            extract::surface_of(&self.built.solid, edge, islands, p)
-        })?;
+        let made = run(py, threads, progress, |p| extract::surface_of(&self.built.solid, edge, islands, p))?;
         let (surface, pieces) = made.map_err(error::stopped)?;
         let mesh = Mesh::new(surface, self.design.clone());
         let (told, words) = islands::told(py, &pieces)?;
@@ -333,8 +289,7 @@ impl Solid {
             let drawn = beams.drawn(chord).map_err(Stopped::Refused)?;
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
             let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
-            io::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out)
-                .map_err(Stopped::Io)?;
+            io::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out).map_err(Stopped::Io)?;
             Ok((drawn.figures(), drawn.error()))
         })?;
         let (f, error) = made.map_err(error::stopped)?;
@@ -361,9 +316,7 @@ impl Solid {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Mesh, f64)> {
-        let made = run(py, threads, progress, |_| {
-            self.built.lone_beams()?.mesh(chord)
-        })?;
+        let made = run(py, threads, progress, |_| self.built.lone_beams()?.mesh(chord))?;
         let (mesh, error) = made.map_err(error::fault)?;
         let cut = vec![false; mesh.triangles.len()];
         let surface = extract::Surface { mesh, cut };
@@ -409,12 +362,8 @@ impl Solid {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Voxels> {
-        let voxels = run(py, threads, progress, |p| {
-            extract::voxels(&self.built.solid, step, p)
-        })?;
-        Ok(Voxels {
-            voxels: voxels.map_err(error::stopped)?,
-        })
+        let voxels = run(py, threads, progress, |p| extract::voxels(&self.built.solid, step, p))?;
+        Ok(Voxels { voxels: voxels.map_err(error::stopped)? })
     }
 }
 
@@ -428,24 +377,12 @@ pub struct Region {
 impl Region {
     /// The region of a design, or of a file with the key `region` alone, as text; `folder` is where paths start.
     #[staticmethod]
-    fn from_text(
-        py: Python<'_>,
-        text: &str,
-        json: bool,
-        file: String,
-        folder: PathBuf,
-    ) -> PyResult<Region> {
+    fn from_text(py: Python<'_>, text: &str, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
         let region = run(py, None, None, |_| {
-            let node = if json {
-                Node::from_json(text)?
-            } else {
-                Node::from_toml(text)?
-            };
+            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
             design::region(&node, &Folder(folder))
         })?;
-        region
-            .map(|region| Region { region })
-            .map_err(|e| error::design(py, &e.in_file(&file)))
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e.in_file(&file)))
     }
 
     /// The region under the key `region` of a dictionary.
@@ -453,9 +390,7 @@ impl Region {
     fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>, folder: PathBuf) -> PyResult<Region> {
         let node = crate::design::node(data, 0)?;
         let region = run(py, None, None, |_| design::region(&node, &Folder(folder)))?;
-        region
-            .map(|region| Region { region })
-            .map_err(|e| error::design(py, &e))
+        region.map(|region| Region { region }).map_err(|e| error::design(py, &e))
     }
 
     /// Signed distance at points (n, 3), mm, negative inside.
@@ -516,11 +451,7 @@ impl Voxels {
     #[getter]
     fn solid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let [nx, ny, nz] = self.voxels.shape;
-        self.voxels
-            .solid
-            .clone()
-            .into_pyarray(py)
-            .reshape([nz, ny, nx])
+        self.voxels.solid.clone().into_pyarray(py).reshape([nz, ny, nx])
     }
 
     /// Writes the voxels to `path` as `npy` (indexed [x, y, z]) or `vti`.

@@ -48,11 +48,7 @@ impl TetMesh {
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
         let made = run(py, threads, None, |_| {
-            let node = if json {
-                Node::from_json(text)?
-            } else {
-                Node::from_toml(text)?
-            };
+            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
             Tets::in_design(&node, lattice, &Folder(folder))
         })?;
         of(py, made.map_err(|e: DesignError| e.in_file(&file)))
@@ -69,22 +65,14 @@ impl TetMesh {
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
         let node = crate::design::node(data, 0)?;
-        let made = run(py, threads, None, |_| {
-            Tets::in_design(&node, lattice, &Folder(folder))
-        })?;
+        let made = run(py, threads, None, |_| Tets::in_design(&node, lattice, &Folder(folder)))?;
         of(py, made)
     }
 
     /// The tetrahedral mesh in a file; hexahedra, wedges and pyramids are cut up with `split`, else refused.
     #[staticmethod]
     #[pyo3(signature = (path, folder, unit=None, split=false))]
-    fn read(
-        py: Python<'_>,
-        path: String,
-        folder: PathBuf,
-        unit: Option<&str>,
-        split: bool,
-    ) -> PyResult<TetMesh> {
+    fn read(py: Python<'_>, path: String, folder: PathBuf, unit: Option<&str>, split: bool) -> PyResult<TetMesh> {
         let unit = match unit {
             None => None,
             Some(word) => match Unit::ALL.iter().find(|u| u.0 == word) {
@@ -96,12 +84,7 @@ impl TetMesh {
                 }
             },
         };
-        let spec = TetFileSpec {
-            path,
-            unit,
-            split,
-            joined: Joined::default(),
-        };
+        let spec = TetFileSpec { path, unit, split, joined: Joined::default() };
         let made = run(py, None, None, |_| Tets::in_file(&spec, &Folder(folder)))?;
         of(py, made)
     }
@@ -164,11 +147,7 @@ impl TetMesh {
         let done = run(py, None, None, |_| {
             let (angles, sizes) = self.tets.mesh.shapes();
             let mut out = BufWriter::new(file::anew(&path)?);
-            io::write_vtu(
-                &self.tets.mesh,
-                &[("least_dihedral", angles), ("size", sizes)],
-                &mut out,
-            )?;
+            io::write_vtu(&self.tets.mesh, &[("least_dihedral", angles), ("size", sizes)], &mut out)?;
             out.flush()
         })?;
         Ok(done?)
@@ -189,10 +168,7 @@ fn words(py: Python<'_>, e: &PyErr) -> String {
 pub fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
     Python::attach(|py| {
         let read = || -> PyResult<(Elements, Vec<u32>)> {
-            let read = py
-                .import("trabecula.elements")?
-                .getattr("read")?
-                .call1((path,))?;
+            let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
             let (points, connectivity, ends, kinds, zones): Read<'_> = read.extract()?;
             let elements = Elements {
                 points: rows(&points),
@@ -207,12 +183,7 @@ pub fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
 }
 
 /// The tetrahedra that a mesher of Python's makes of a surface.
-pub fn tetrahedra(
-    name: &str,
-    surface: &trabecula::mesh::Mesh,
-    size: f64,
-    limit: f64,
-) -> Result<Core, String> {
+pub fn tetrahedra(name: &str, surface: &trabecula::mesh::Mesh, size: f64, limit: f64) -> Result<Core, String> {
     Python::attach(|py| {
         let make = || -> PyResult<Core> {
             let flat = surface.vertices.clone().into_flattened().into_pyarray(py);
@@ -221,16 +192,11 @@ pub fn tetrahedra(
             let triangles = flat.reshape([surface.triangles.len(), 3])?;
             let call = py.import("trabecula.meshers")?.getattr("tetrahedra")?;
             let made = call.call1((name, points, triangles, size, limit))?;
-            let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) =
-                made.extract()?;
+            let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) = made.extract()?;
             let tets = tets.as_array();
             Ok(Core {
                 nodes: rows(&nodes),
-                tets: tets
-                    .rows()
-                    .into_iter()
-                    .map(|r| [r[0], r[1], r[2], r[3]])
-                    .collect(),
+                tets: tets.rows().into_iter().map(|r| [r[0], r[1], r[2], r[3]]).collect(),
                 zones: Vec::new(),
             })
         };
@@ -239,9 +205,5 @@ pub fn tetrahedra(
 }
 
 fn rows(of: &PyReadonlyArray2<'_, f64>) -> Vec<[f64; 3]> {
-    of.as_array()
-        .rows()
-        .into_iter()
-        .map(|r| [r[0], r[1], r[2]])
-        .collect()
+    of.as_array().rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect()
 }

@@ -79,12 +79,7 @@ impl Blend {
     ///
     /// # Errors
     /// Fewer than two lattices, or another number of them than of weights.
-    pub fn new(
-        of: Vec<Constituent>,
-        weights: Weights,
-        by: By,
-        bounds: &Aabb,
-    ) -> Result<Blend, Fault> {
+    pub fn new(of: Vec<Constituent>, weights: Weights, by: By, bounds: &Aabb) -> Result<Blend, Fault> {
         if of.len() < 2 || of.len() != weights.len() || of.len() > fill::MOST {
             let message = format!(
                 "{} lattices and {} weights; a blend is of 2 to {} lattices with a weight each",
@@ -100,14 +95,7 @@ impl Blend {
         let levels = unit.then(|| Arc::new(Levels::new(&strands, joint, &weights)));
         // Shares move no faster than a cell is long, or the blend is no blend: half as much again for them.
         let slope = strands.iter().map(Strand::slope).fold(0.0, f64::max) * 1.5;
-        Ok(Blend {
-            two_sided: strands.iter().any(Strand::is_sheet),
-            strands,
-            weights,
-            levels,
-            side: None,
-            slope,
-        })
+        Ok(Blend { two_sided: strands.iter().any(Strand::is_sheet), strands, weights, levels, side: None, slope })
     }
 
     /// The shares.
@@ -137,11 +125,7 @@ impl Blend {
             match (s.lattice(), &self.levels) {
                 (Some(l), _) => l.fractions(points, &mut own),
                 (None, Some(levels)) => {
-                    for (k, o) in own
-                        .iter_mut()
-                        .enumerate()
-                        .filter(|(k, _)| w[k * n + i] > 0.0)
-                    {
+                    for (k, o) in own.iter_mut().enumerate().filter(|(k, _)| w[k * n + i] > 0.0) {
                         let [a, b] = levels.found(&self.strands, points[k], i).quantiles;
                         *o = b - a.max(0.0);
                     }
@@ -285,12 +269,7 @@ fn looked(of: Vec<Constituent>, unit: bool, joint: &Joint, bounds: &Aabb) -> Vec
         let each = LOOKS.div_ceil(joint.len()).max(64);
         // Neighbourhoods spread over all of them.
         let some = (LOOKS / each).min(joint.len()).max(1);
-        let near = (0..some).flat_map(|i| {
-            joint
-                .places((2 * i + 1) * joint.len() / (2 * some))
-                .into_iter()
-                .take(each)
-        });
+        let near = (0..some).flat_map(|i| joint.places((2 * i + 1) * joint.len() / (2 * some)).into_iter().take(each));
         points.extend(near);
     } else {
         points.truncate(LOOKS);
@@ -301,11 +280,7 @@ fn looked(of: Vec<Constituent>, unit: bool, joint: &Joint, bounds: &Aabb) -> Vec
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        let size = if unit && square > 0.0 {
-            square.sqrt()
-        } else {
-            1.0
-        };
+        let size = if unit && square > 0.0 { square.sqrt() } else { 1.0 };
         Strand::new(c, size, &values, bounds)
     });
     each.collect()
@@ -369,18 +344,10 @@ impl Field for Blend {
         let ends = |s: &Strand, alone: bool| {
             let hi = s.high_bound(b);
             let low = |high: f64| {
-                if alone {
-                    s.low_alone(high)
-                } else {
-                    s.low(high)
-                }
+                if alone { s.low_alone(high) } else { s.low(high) }
             };
             let ends = [low(hi.lo), low(hi.hi)];
-            (
-                s.bound(b),
-                Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1])),
-                hi,
-            )
+            (s.bound(b), Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1])), hi)
         };
         let mut here = (0..w.len()).filter(|i| w[*i].hi > 0.0);
         if let (Some(i), None) = (here.next(), here.next()) {
@@ -394,12 +361,7 @@ impl Field for Blend {
         let zero = Interval::new(0.0, 0.0);
         let mut highs = vec![zero; w.len()];
         let (mut f, mut lo, mut hi) = (zero, zero, zero);
-        for (i, s) in self
-            .strands
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| w[*i].hi > 0.0)
-        {
+        for (i, s) in self.strands.iter().enumerate().filter(|(i, _)| w[*i].hi > 0.0) {
             let of = ends(s, false);
             highs[i] = of.2;
             f = f + w[i].times(of.0);
@@ -423,12 +385,7 @@ impl Field for Blend {
         if !self.two_sided || self.side.is_some() {
             return Vec::new();
         }
-        let side = |side| {
-            Arc::new(Blend {
-                side: Some(side),
-                ..self.clone()
-            }) as Arc<dyn Field>
-        };
+        let side = |side| Arc::new(Blend { side: Some(side), ..self.clone() }) as Arc<dyn Field>;
         vec![side(Side::High), side(Side::Low)]
     }
 

@@ -89,9 +89,7 @@ impl Cell {
         *self.range.get_or_init(|| {
             let (u, v, g) = torus(&self.plain, 48);
             let climb = |sign: f64| {
-                let best = (0..v.len())
-                    .max_by(|&a, &b| (sign * v[a]).total_cmp(&(sign * v[b])))
-                    .unwrap_or(0);
+                let best = (0..v.len()).max_by(|&a, &b| (sign * v[a]).total_cmp(&(sign * v[b]))).unwrap_or(0);
                 let (mut p, mut top, mut slope) = (u[best], sign * v[best], g[best]);
                 // A step along the gradient of length |g| / curvature never overshoots a maximum.
                 let step = sign / self.plain.curvature();
@@ -137,8 +135,7 @@ impl Cell {
     }
 
     fn table(&self) -> &quantile::Quantile {
-        self.table
-            .get_or_init(|| quantile::Quantile::new(&self.plain))
+        self.table.get_or_init(|| quantile::Quantile::new(&self.plain))
     }
 
     /// The level at which the part has this solid fraction (0 < fraction < 1), as exactly as a single level can be
@@ -168,10 +165,7 @@ impl Cell {
         let found = || self.connected[part as usize].get_or_init(|| connected(&f, part));
         // The table is asked for next: both at once.
         let (intervals, _) = rayon::join(found, || (self.range(), self.table()));
-        intervals
-            .iter()
-            .map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0)))
-            .collect()
+        intervals.iter().map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0))).collect()
     }
 
     /// [`necks`] of the part: phases (turns) and levels.
@@ -226,26 +220,11 @@ mod tests {
     fn levels_meet_the_exact_table() {
         let mut worst = 0.0f64;
         for (name, exact) in [
-            (
-                "primitive",
-                [1.621288768, 0.699339635, -0.350257343, -1.621288768],
-            ),
-            (
-                "gyroid",
-                [1.197145736, 0.616271908, -0.310118842, -1.197145736],
-            ),
-            (
-                "diamond",
-                [0.956046064, 0.486154728, -0.244025551, -0.956046064],
-            ),
-            (
-                "iwp",
-                [2.690253869, 1.616965106, -0.536676981, -3.004409420],
-            ),
-            (
-                "neovius",
-                [4.85675248, 0.97441010, -0.45917736, -4.85675248],
-            ),
+            ("primitive", [1.621288768, 0.699339635, -0.350257343, -1.621288768]),
+            ("gyroid", [1.197145736, 0.616271908, -0.310118842, -1.197145736]),
+            ("diamond", [0.956046064, 0.486154728, -0.244025551, -0.956046064]),
+            ("iwp", [2.690253869, 1.616965106, -0.536676981, -3.004409420]),
+            ("neovius", [4.85675248, 0.97441010, -0.45917736, -4.85675248]),
             ("frd", [1.84234279, 1.12393167, -0.15343933, -2.15672535]),
             ("fischer_koch_s", [0.785258, 0.403888, -0.203414, -0.785258]),
         ] {
@@ -254,10 +233,7 @@ mod tests {
                 let error = (cell.fraction(Part::Lower, t) - (1.0 - p)).abs();
                 println!("{name} {p} {error:.2e}");
                 worst = worst.max(error);
-                assert!(
-                    error < 1e-4,
-                    "{name} at porosity {p}: fraction off by {error:.2e}"
-                );
+                assert!(error < 1e-4, "{name} at porosity {p}: fraction off by {error:.2e}");
             }
         }
         // The promise is 1e-4; cubes of 1/96 cell do several times better.
@@ -301,17 +277,12 @@ mod tests {
                 let p = f64::from(i) / 50.0;
                 for part in [Part::Sheet, Part::Lower, Part::Upper] {
                     let (t, slope) = cell.iso(part, p);
-                    assert!(
-                        (cell.fraction(part, t) - p).abs() < 1e-9,
-                        "{} {part:?} {p}",
-                        n.name
-                    );
+                    assert!((cell.fraction(part, t) - p).abs() < 1e-9, "{} {part:?} {p}", n.name);
                     assert!(slope.is_finite() && slope != 0.0);
                 }
                 let t = cell.iso(Part::Sheet, p).0;
-                let sum = cell.fraction(Part::Sheet, t)
-                    + cell.fraction(Part::Lower, -t)
-                    + cell.fraction(Part::Upper, t);
+                let sum =
+                    cell.fraction(Part::Sheet, t) + cell.fraction(Part::Lower, -t) + cell.fraction(Part::Upper, t);
                 assert!((sum - 1.0).abs() < 1e-6, "{} {p}: {sum}", n.name);
             }
         }
@@ -331,10 +302,7 @@ mod tests {
             ("fischer_koch_s", Part::Lower, 0.1148),
         ] {
             let found = cell(name).connected_fraction(part);
-            assert!(
-                (found[0][0] - limit).abs() < 1e-4,
-                "{name} {part:?}: {found:?}, expected from {limit}"
-            );
+            assert!((found[0][0] - limit).abs() < 1e-4, "{name} {part:?}: {found:?}, expected from {limit}");
             assert!((found[found.len() - 1][1] - 1.0).abs() < 1e-12);
         }
     }
@@ -350,10 +318,7 @@ mod tests {
             ("frd", -7.0, 2.0),
         ] {
             let r = cell(name).range();
-            assert!(
-                (r.lo - lo).abs() < 1e-6 && (r.hi - hi).abs() < 1e-6,
-                "{name} {r:?}"
-            );
+            assert!((r.lo - lo).abs() < 1e-6 && (r.hi - hi).abs() < 1e-6, "{name} {r:?}");
         }
     }
 }

@@ -122,13 +122,7 @@ pub trait Loader {
 
     /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this
     /// time (s); or one sentence why not.
-    fn tetrahedra(
-        &self,
-        name: &str,
-        surface: &Mesh,
-        size: f64,
-        limit: f64,
-    ) -> Result<TetMesh, String> {
+    fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
         let _ = (surface, size, limit);
         Err(format!("the mesher {name} is not available here"))
     }
@@ -219,8 +213,7 @@ impl Design {
 
     /// The design as TOML.
     pub fn to_toml(&self) -> Result<String, DesignError> {
-        toml::to_string(self)
-            .map_err(|e| DesignError::new("", format!("cannot be written as TOML: {e}")))
+        toml::to_string(self).map_err(|e| DesignError::new("", format!("cannot be written as TOML: {e}")))
     }
 
     /// The design as JSON.
@@ -242,9 +235,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
     let found = match read::region_in(node)? {
         RegionIn::Design(design) => build::space(&design, loader),
-        RegionIn::Alone(spec) => {
-            region::region(&spec, "region", loader, &mut region::Notes::default())
-        }
+        RegionIn::Alone(spec) => region::region(&spec, "region", loader, &mut region::Notes::default()),
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));
@@ -257,9 +248,7 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
     struct Nothing;
     impl Loader for Nothing {
         fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-            Err(format!(
-                "{path}: a cell from a file needs a design that says where the file is"
-            ))
+            Err(format!("{path}: a cell from a file needs a design that says where the file is"))
         }
     }
     Ok(cell::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)

@@ -80,11 +80,7 @@ impl Surface {
     /// The lattice alone, without its cuts: open where the region ends.
     pub fn uncapped(&self) -> Surface {
         let mut runs: Vec<std::ops::Range<u64>> = Vec::new();
-        for i in (0u64..)
-            .zip(&self.cut)
-            .filter(|(_, cut)| !**cut)
-            .map(|(i, _)| i)
-        {
+        for i in (0u64..).zip(&self.cut).filter(|(_, cut)| !**cut).map(|(i, _)| i) {
             match runs.last_mut() {
                 Some(r) if r.end == i => r.end += 1,
                 _ => runs.push(i..i + 1),
@@ -154,10 +150,7 @@ pub fn estimate(solid: &Solid, edge: f64) -> Result<Estimate, Fault> {
 
 /// A used buffer, or a new one. Memory that is not returned to the system need not be cleared by it again.
 fn borrow<T: Default>(pool: &Mutex<Vec<T>>) -> T {
-    pool.lock()
-        .ok()
-        .and_then(|mut p| p.pop())
-        .unwrap_or_default()
+    pool.lock().ok().and_then(|mut p| p.pop()).unwrap_or_default()
 }
 
 fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
@@ -215,14 +208,7 @@ fn each_tile<T: Send>(
         scratch: Mutex::default(),
         cook,
         take: Mutex::new(take),
-        queue: Mutex::new(Queue {
-            next: 0,
-            turn: 0,
-            ready: HashMap::new(),
-            taking: false,
-            resting: 0,
-            ended: Ok(()),
-        }),
+        queue: Mutex::new(Queue { next: 0, turn: 0, ready: HashMap::new(), taking: false, resting: 0, ended: Ok(()) }),
     };
     rayon::scope(|scope| (0..threads).for_each(|_| scope.spawn(|scope| work.run(scope))));
     let queue = work.queue.into_inner();
@@ -297,11 +283,7 @@ where
             q = self.queue();
             q.turn += 1;
             if q.ended.is_ok() {
-                q.ended = taken.and(if go_on {
-                    Ok(())
-                } else {
-                    Err(Stopped::Interrupted)
-                });
+                q.ended = taken.and(if go_on { Ok(()) } else { Err(Stopped::Interrupted) });
             }
             if q.resting > 0 {
                 q.resting -= 1;
@@ -346,10 +328,7 @@ pub fn surface_of(
         for (v, shared) in patch.vertices.iter().zip(&patch.shared) {
             let vertices = &mut out.mesh.vertices;
             let new = u32::try_from(vertices.len()).map_err(|_| {
-                Stopped::Refused(Fault::new(
-                    "edge",
-                    "more than 2^32 vertices; use a larger edge, or STL",
-                ))
+                Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL"))
             })?;
             let name = match shared {
                 Some(key) => *border.entry(*key).or_insert(new),
@@ -360,9 +339,7 @@ pub fn surface_of(
             }
             names.push(name);
         }
-        out.mesh
-            .triangles
-            .extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+        out.mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| names[v as usize])));
         out.cut.extend_from_slice(&patch.cut);
         census.add(bodies).map_err(Stopped::Refused)
     })?;
@@ -390,9 +367,7 @@ fn only(all: &Surface, runs: &[std::ops::Range<u64>]) -> Surface {
     }
     for run in runs() {
         let triangles = all.mesh.triangles[run.clone()].iter();
-        out.mesh
-            .triangles
-            .extend(triangles.map(|t| t.map(|v| names[v as usize])));
+        out.mesh.triangles.extend(triangles.map(|t| t.map(|v| names[v as usize])));
         out.cut.extend_from_slice(&all.cut[run]);
     }
     out
@@ -408,8 +383,7 @@ impl Sifting<'_> {
     fn moved(&self, share: f64) -> bool {
         const FINE: f64 = 1000.0;
         let tiles = FINE * SIFTED as f64;
-        self.0
-            .step((tiles + share * FINE) as u64, (tiles + FINE) as u64)
+        self.0.step((tiles + share * FINE) as u64, (tiles + FINE) as u64)
     }
 }
 
@@ -474,12 +448,7 @@ pub fn stream_stl<W: Store>(
 }
 
 /// Takes out of a stream of records what is not to stay, and writes its header.
-fn finish<W: Store>(
-    found: Found,
-    triangles: u64,
-    sifting: Option<&Sifting>,
-    out: &mut W,
-) -> Result<Summary, Stopped> {
+fn finish<W: Store>(found: Found, triangles: u64, sifting: Option<&Sifting>, out: &mut W) -> Result<Summary, Stopped> {
     let moved = |share: f64| sifting.is_none_or(|s| s.moved(share));
     if found.pieces.dropped > 0 {
         let runs = sift::runs(&found.parts);
@@ -510,11 +479,7 @@ fn finish<W: Store>(
 ///
 /// # Errors
 /// Steps below 4 or above 64.
-pub fn stencil(
-    ready: &crate::cell::tet::Ready,
-    steps: usize,
-    progress: &dyn Progress,
-) -> Result<Surface, Stopped> {
+pub fn stencil(ready: &crate::cell::tet::Ready, steps: usize, progress: &dyn Progress) -> Result<Surface, Stopped> {
     tets::stencil(ready, steps, progress)
 }
 
@@ -538,9 +503,7 @@ pub struct Voxels {
 pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxels, Stopped> {
     Grid::new(solid, step).map_err(|f| Stopped::Refused(Fault::new("step", f.message)))?;
     let bounds = solid.region.bounds();
-    let shape = bounds
-        .size()
-        .map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
+    let shape = bounds.size().map(|s| (s / step - 1e-9).ceil().max(1.0) as usize);
     let count = shape.iter().map(|&n| n as f64).product::<f64>();
     if count > (1u64 << 33) as f64 {
         let message = format!(
@@ -551,34 +514,20 @@ pub fn voxels(solid: &Solid, step: f64, progress: &dyn Progress) -> Result<Voxel
     }
     let extent = shape.map(|n| n as f64 * step);
     let origin = [0, 1, 2].map(|a| bounds.center()[a] - extent[a] / 2.0);
-    let axes = [0, 1, 2].map(|a| {
-        (0..shape[a])
-            .map(|i| origin[a] + (i as f64 + 0.5) * step)
-            .collect::<Vec<f64>>()
-    });
-    let mut out = Voxels {
-        origin,
-        step,
-        shape,
-        solid: vec![0; shape.iter().product()],
-    };
+    let axes = [0, 1, 2].map(|a| (0..shape[a]).map(|i| origin[a] + (i as f64 + 0.5) * step).collect::<Vec<f64>>());
+    let mut out = Voxels { origin, step, shape, solid: vec![0; shape.iter().product()] };
     let layer = shape[0] * shape[1];
     let slab = (layer * rayon::current_num_threads()).max(1);
     for (n, layers) in out.solid.chunks_mut(slab).enumerate() {
-        layers
-            .par_chunks_mut(layer)
-            .enumerate()
-            .for_each(|(i, layer)| {
-                let z = n * rayon::current_num_threads() + i;
-                let block = Block {
-                    axes: [&axes[0], &axes[1], &axes[2][z..=z]],
-                };
-                let mut samples = vec![0f32; layer.len()];
-                solid.fill(&block, &mut samples);
-                for (o, v) in layer.iter_mut().zip(&samples) {
-                    *o = u8::from(*v <= 0.0);
-                }
-            });
+        layers.par_chunks_mut(layer).enumerate().for_each(|(i, layer)| {
+            let z = n * rayon::current_num_threads() + i;
+            let block = Block { axes: [&axes[0], &axes[1], &axes[2][z..=z]] };
+            let mut samples = vec![0f32; layer.len()];
+            solid.fill(&block, &mut samples);
+            for (o, v) in layer.iter_mut().zip(&samples) {
+                *o = u8::from(*v <= 0.0);
+            }
+        });
         if !progress.step((n + 1) as u64, shape[2].div_ceil(slab / layer) as u64) {
             return Err(Stopped::Interrupted);
         }

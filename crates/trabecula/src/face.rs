@@ -104,9 +104,7 @@ impl Tree {
         for (n, t) in of.iter().enumerate() {
             // The others must be able to leave it to this one: all solid, or none.
             let others = of.iter().enumerate().filter(|(m, _)| *m != n);
-            let open = others.fold(here, |w, (_, o)| {
-                w & if join { o.solid(some) } else { !o.solid(all) }
-            });
+            let open = others.fold(here, |w, (_, o)| w & if join { o.solid(some) } else { !o.solid(all) });
             if open != 0 {
                 t.deciding(open, some, all, found);
             }
@@ -124,11 +122,7 @@ impl Tree {
             Tree::All(of) => (of, true),
             Tree::Any(of) => (of, false),
         };
-        let (deciding, idle) = if all {
-            (Tree::EMPTY, Tree::FULL)
-        } else {
-            (Tree::FULL, Tree::EMPTY)
-        };
+        let (deciding, idle) = if all { (Tree::EMPTY, Tree::FULL) } else { (Tree::FULL, Tree::EMPTY) };
         let mut kept = Vec::new();
         for t in of.iter().map(|t| t.given(face)) {
             if t == deciding {
@@ -162,17 +156,11 @@ impl Tree {
         match self {
             Tree::Face(i) => (value(*i), Some(*i)),
             Tree::All(of) => {
-                of.iter()
-                    .map(|t| t.value(value))
-                    .fold(
-                        nothing(f64::NEG_INFINITY),
-                        |a, b| if b.0 > a.0 { b } else { a },
-                    )
+                of.iter().map(|t| t.value(value)).fold(nothing(f64::NEG_INFINITY), |a, b| if b.0 > a.0 { b } else { a })
             }
-            Tree::Any(of) => of
-                .iter()
-                .map(|t| t.value(value))
-                .fold(nothing(f64::INFINITY), |a, b| if b.0 < a.0 { b } else { a }),
+            Tree::Any(of) => {
+                of.iter().map(|t| t.value(value)).fold(nothing(f64::INFINITY), |a, b| if b.0 < a.0 { b } else { a })
+            }
         }
     }
 
@@ -180,14 +168,13 @@ impl Tree {
     pub fn bound(&self, bound: &impl Fn(usize) -> Interval) -> Interval {
         match self {
             Tree::Face(i) => bound(*i),
-            Tree::All(of) => of.iter().map(|t| t.bound(bound)).fold(
-                Interval::new(f64::NEG_INFINITY, f64::NEG_INFINITY),
-                Interval::max,
-            ),
-            Tree::Any(of) => of
+            Tree::All(of) => of
                 .iter()
                 .map(|t| t.bound(bound))
-                .fold(Interval::new(f64::INFINITY, f64::INFINITY), Interval::min),
+                .fold(Interval::new(f64::NEG_INFINITY, f64::NEG_INFINITY), Interval::max),
+            Tree::Any(of) => {
+                of.iter().map(|t| t.bound(bound)).fold(Interval::new(f64::INFINITY, f64::INFINITY), Interval::min)
+            }
         }
     }
 
@@ -249,27 +236,12 @@ pub enum Sign {
 impl Face {
     /// A curved or slanted face of a region, by its signed distance.
     pub fn distance(field: Arc<dyn Field>) -> Face {
-        Face {
-            field,
-            slope: 1.0,
-            plane: None,
-            cut: true,
-            edged: true,
-            creases: Arc::default(),
-            flush: false,
-        }
+        Face { field, slope: 1.0, plane: None, cut: true, edged: true, creases: Arc::default(), flush: false }
     }
 
     /// The same face with the solid on its other side.
     pub fn turned(self) -> Face {
-        Face {
-            field: Arc::new(Turned(self.field)),
-            plane: self.plane.map(|p| Plane {
-                below: !p.below,
-                ..p
-            }),
-            ..self
-        }
+        Face { field: Arc::new(Turned(self.field)), plane: self.plane.map(|p| Plane { below: !p.below, ..p }), ..self }
     }
 }
 

@@ -12,10 +12,7 @@ pub struct Fault {
 impl Fault {
     /// A fault at `at`.
     pub fn new(at: impl Into<String>, message: impl Into<String>) -> Self {
-        Fault {
-            at: at.into(),
-            message: message.into(),
-        }
+        Fault { at: at.into(), message: message.into() }
     }
 
     /// The same fault, its place moved under `key`.
@@ -41,11 +38,7 @@ pub fn number(v: f64) -> String {
         Ok(rounded) if long => rounded,
         _ => v,
     };
-    if (1e-5..1e15).contains(&v.abs()) {
-        v.to_string()
-    } else {
-        format!("{v:e}")
-    }
+    if (1e-5..1e15).contains(&v.abs()) { v.to_string() } else { format!("{v:e}") }
 }
 
 /// "1 value", "2 values".
@@ -79,9 +72,7 @@ fn distance(a: &str, b: &str) -> usize {
     for i in 1..=a.len() {
         for j in 1..=b.len() {
             let change = usize::from(a[i - 1] != b[j - 1]);
-            d[i][j] = (d[i - 1][j] + 1)
-                .min(d[i][j - 1] + 1)
-                .min(d[i - 1][j - 1] + change);
+            d[i][j] = (d[i - 1][j] + 1).min(d[i][j - 1] + 1).min(d[i - 1][j - 1] + change);
             if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
                 d[i][j] = d[i][j].min(d[i - 2][j - 2] + 1);
             }
@@ -92,11 +83,7 @@ fn distance(a: &str, b: &str) -> usize {
 
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        if self.at.is_empty() {
-            f.write_str(&self.message)
-        } else {
-            write!(f, "{}: {}", self.at, self.message)
-        }
+        if self.at.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.at, self.message) }
     }
 }
 
@@ -122,10 +109,7 @@ mod tests {
         ] {
             assert_eq!(number(v), text);
         }
-        assert_eq!(
-            (counted(1, "value"), counted(0, "value")),
-            ("1 value".into(), "0 values".into())
-        );
+        assert_eq!((counted(1, "value"), counted(0, "value")), ("1 value".into(), "0 values".into()));
     }
 
     #[test]
@@ -144,12 +128,7 @@ mod tests {
         ] {
             assert_eq!(nearest(slip, keys), want, "{slip}");
         }
-        for (slip, want) in [
-            ("ü", None),
-            ("X", Some("x")),
-            ("xx", Some("x")),
-            ("p", Some("pi")),
-        ] {
+        for (slip, want) in [("ü", None), ("X", Some("x")), ("xx", Some("x")), ("p", Some("pi"))] {
             assert_eq!(nearest(slip, ["x", "pi"]), want, "{slip}");
         }
         assert_eq!(distance("abcd", "acbd"), 1);

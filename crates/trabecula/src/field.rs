@@ -30,10 +30,7 @@ impl Block<'_> {
     /// The box spanned by the nodes.
     pub fn bounds(&self) -> Aabb {
         let end = |a: &[f64]| a[a.len() - 1];
-        Aabb {
-            min: self.axes.map(|a| a[0]),
-            max: self.axes.map(end),
-        }
+        Aabb { min: self.axes.map(|a| a[0]), max: self.axes.map(end) }
     }
 }
 

@@ -27,10 +27,7 @@ pub(crate) fn apart(body: &mut Body, others: &[Face], bounds: &Aabb, moved: &mut
     let size = norm(bounds.size());
     for face in &mut body.faces {
         let places = places(&*face.field, bounds);
-        if others
-            .iter()
-            .any(|o| flush(&*o.field, &places, size).is_some())
-        {
+        if others.iter().any(|o| flush(&*o.field, &places, size).is_some()) {
             *moved += 1;
             *face = outwards(face.clone(), *moved as f64 * APART * size);
             face.flush = true;
@@ -53,25 +50,15 @@ pub(crate) fn parted(body: &mut Body, bounds: &Aabb, moved: &mut usize) {
         let Some(first) = along.next() else { continue };
         let all: Vec<(usize, Along)> = std::iter::once(first).chain(along).collect();
         let one = |a: &&(usize, Along)| a.1 == Along::One && !is_moved[a.0];
-        if let (Some((i, _)), true) = (
-            all.iter().find(one),
-            all.iter().all(|a| a.1 != Along::Against),
-        ) {
+        if let (Some((i, _)), true) = (all.iter().find(one), all.iter().all(|a| a.1 != Along::Against)) {
             same[j] = same[*i];
             continue;
         }
         // What faces it decides, for there is a wall or a gap without thickness.
-        let (i, _) = *all
-            .iter()
-            .find(|a| a.1 == Along::Against)
-            .unwrap_or(&all[0]);
+        let (i, _) = *all.iter().find(|a| a.1 == Along::Against).unwrap_or(&all[0]);
         *moved += 1;
         is_moved[j] = true;
-        let way = if body.tree.both_must([i, j]) {
-            -1.0
-        } else {
-            1.0
-        };
+        let way = if body.tree.both_must([i, j]) { -1.0 } else { 1.0 };
         body.faces[j] = outwards(given[j].clone(), way * *moved as f64 * APART * size);
         body.faces[j].flush = true;
     }
@@ -101,12 +88,7 @@ enum Along {
     Against,
 }
 
-fn meets(
-    faces: &[Face],
-    places: &[Vec<(Vec3, Vec3)>],
-    [i, j]: [usize; 2],
-    size: f64,
-) -> Option<Along> {
+fn meets(faces: &[Face], places: &[Vec<(Vec3, Vec3)>], [i, j]: [usize; 2], size: f64) -> Option<Along> {
     let (f, g) = (&faces[i], &faces[j]);
     if let (Some(p), Some(q)) = (f.plane, g.plane) {
         let here = p.axis == q.axis && (p.at - q.at).abs() <= FLUSH * size;
@@ -117,8 +99,7 @@ fn meets(
         });
     }
     // Of a face that ends, such as that of a mesh, the other one's places may lie beyond.
-    let alike =
-        flush(&*f.field, &places[j], size).or_else(|| flush(&*g.field, &places[i], size))?;
+    let alike = flush(&*f.field, &places[j], size).or_else(|| flush(&*g.field, &places[i], size))?;
     if !alike {
         return Some(Along::Against);
     }
@@ -132,21 +113,14 @@ fn meets(
         g.field.values(&moved, &mut b);
         everywhere &= a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= FLUSH * size);
     }
-    Some(if everywhere {
-        Along::One
-    } else {
-        Along::Partly
-    })
+    Some(if everywhere { Along::One } else { Along::Partly })
 }
 
 /// The same face with the solid reaching farther by `by` (mm).
 pub(crate) fn outwards(face: Face, by: f64) -> Face {
     Face {
         field: Arc::new(Moved(face.field, by)),
-        plane: face.plane.map(|p| crate::face::Plane {
-            at: p.at + if p.below { by } else { -by },
-            ..p
-        }),
+        plane: face.plane.map(|p| crate::face::Plane { at: p.at + if p.below { by } else { -by }, ..p }),
         ..face
     }
 }
@@ -154,15 +128,9 @@ pub(crate) fn outwards(face: Face, by: f64) -> Face {
 /// Places on a face within the bounds, and its unit normals there.
 fn places(face: &dyn Field, bounds: &Aabb) -> Vec<(Vec3, Vec3)> {
     // The fractional parts of multiples of these fill a cube evenly: powers of the root of x⁴ = x + 1.
-    const STEPS: Vec3 = [
-        0.819_172_513_396_164,
-        0.671_043_606_703_789,
-        0.549_700_477_901_97,
-    ];
+    const STEPS: Vec3 = [0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_97];
     let size = bounds.size();
-    let place = |i: usize| {
-        core::array::from_fn(|a| bounds.min[a] + size[a] * (STEPS[a] * (i + 1) as f64).fract())
-    };
+    let place = |i: usize| core::array::from_fn(|a| bounds.min[a] + size[a] * (STEPS[a] * (i + 1) as f64).fract());
     let mut points: Vec<Vec3> = (0..LOOKS).map(place).collect();
     let (mut values, mut gradients) = (vec![0.0; LOOKS], vec![[0.0; 3]; LOOKS]);
     for _ in 0..4 {

@@ -64,10 +64,7 @@ impl Grade {
     /// **Errors** where `along` is zero or not finite, or the stops are none, not finite or not ascending in s.
     pub fn linear(along: Vec3, stops: Vec<[f64; 2]>) -> Result<Grade, Fault> {
         if along.iter().any(|v| !v.is_finite()) || along == [0.0; 3] {
-            return Err(Fault::new(
-                "along",
-                format!("found {along:?}; give three finite numbers, not all zero"),
-            ));
+            return Err(Fault::new("along", format!("found {along:?}; give three finite numbers, not all zero")));
         }
         check_stops(&stops, "s")?;
         Ok(Grade::Linear { along, stops })
@@ -116,11 +113,7 @@ impl Grade {
             }
             Grade::Formula(f) => f.values(points, out),
             Grade::Function(f) => f.values(points, out),
-            Grade::Radial {
-                center,
-                axis,
-                stops,
-            } => {
+            Grade::Radial { center, axis, stops } => {
                 for (o, p) in out.iter_mut().zip(points) {
                     *o = interpolate(stops, norm(off(*p, *center, *axis))).0;
                 }
@@ -157,11 +150,7 @@ impl Grade {
             }
             Grade::Formula(f) => f.gradients(points, values, gradients),
             Grade::Function(f) => f.gradients(points, values, gradients),
-            Grade::Radial {
-                center,
-                axis,
-                stops,
-            } => {
+            Grade::Radial { center, axis, stops } => {
                 for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
                     let off = off(*p, *center, *axis);
                     let (value, slope) = interpolate(stops, norm(off));
@@ -199,11 +188,7 @@ impl Grade {
             Grade::Depth { region, stops } => range(stops, -region.bound(b)),
             Grade::Formula(f) => f.bound(b),
             Grade::Function(f) => f.bound(b),
-            Grade::Radial {
-                center,
-                axis,
-                stops,
-            } => {
+            Grade::Radial { center, axis, stops } => {
                 if !b.is_finite() {
                     return range(stops, Interval::new(0.0, f64::INFINITY));
                 }
@@ -231,35 +216,23 @@ fn off(p: Vec3, center: Vec3, axis: Option<Vec3>) -> Vec3 {
 
 /// What a number stands for, and the slope.
 fn remapped(remap: &[[f64; 2]], v: f64) -> (f64, f64) {
-    if remap.is_empty() {
-        (v, 1.0)
-    } else {
-        interpolate(remap, v)
-    }
+    if remap.is_empty() { (v, 1.0) } else { interpolate(remap, v) }
 }
 
 /// Refuses stops that are no function of their first number.
 fn check_stops(stops: &[[f64; 2]], name: &str) -> Result<(), Fault> {
     if stops.is_empty() {
-        return Err(Fault::new(
-            "stops",
-            format!("found none; give at least one [{name}, value]"),
-        ));
+        return Err(Fault::new("stops", format!("found none; give at least one [{name}, value]")));
     }
     for (i, [s, v]) in stops.iter().enumerate() {
         if !s.is_finite() || !v.is_finite() {
-            return Err(Fault::new(
-                format!("stops[{i}]"),
-                format!("found [{s}, {v}]; both numbers must be finite"),
-            ));
+            return Err(Fault::new(format!("stops[{i}]"), format!("found [{s}, {v}]; both numbers must be finite")));
         }
         if i > 0 && *s <= stops[i - 1][0] {
             let before = stops[i - 1][0];
             return Err(Fault::new(
                 format!("stops[{i}]"),
-                format!(
-                    "{name} = {s} follows {name} = {before}; {name} must grow from stop to stop"
-                ),
+                format!("{name} = {s} follows {name} = {before}; {name} must grow from stop to stop"),
             ));
         }
     }
@@ -272,10 +245,7 @@ fn interpolate(stops: &[[f64; 2]], s: f64) -> (f64, f64) {
     match (i.checked_sub(1).and_then(|j| stops.get(j)), stops.get(i)) {
         (Some([s0, v0]), Some([s1, v1])) => {
             let slope = (v1 - v0) / (s1 - s0);
-            (
-                (v0 + slope * (s - s0)).clamp(v0.min(*v1), v0.max(*v1)),
-                slope,
-            )
+            ((v0 + slope * (s - s0)).clamp(v0.min(*v1), v0.max(*v1)), slope)
         }
         (Some([_, v]), None) | (None, Some([_, v])) => (*v, 0.0),
         (None, None) => (f64::NAN, 0.0),
@@ -320,10 +290,7 @@ mod tests {
             }
         }
         fn bound(&self, b: &Aabb) -> Interval {
-            let far = (0..3)
-                .map(|a| b.min[a].abs().max(b.max[a].abs()).powi(2))
-                .sum::<f64>()
-                .sqrt();
+            let far = (0..3).map(|a| b.min[a].abs().max(b.max[a].abs()).powi(2)).sum::<f64>().sqrt();
             Interval::new(b.distance([0.0; 3]) - 1.0 - 1e-12, far - 1.0 + 1e-12)
         }
     }
@@ -334,11 +301,7 @@ mod tests {
             Grade::linear([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap(),
             Grade::depth(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap(),
             Grade::Formula(Formula::parse("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)").unwrap()),
-            Grade::Radial {
-                center: [0.2, 0.1, 0.0],
-                axis: None,
-                stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]],
-            },
+            Grade::Radial { center: [0.2, 0.1, 0.0], axis: None, stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]] },
             Grade::Radial {
                 center: [0.2, 0.1, 0.0],
                 axis: Some([0.6, 0.0, 0.8]),
@@ -356,20 +319,14 @@ mod tests {
                 ),
                 remap: vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]],
             },
-            Grade::Function(Arc::new(Sigmoid::new(
-                Grade::Formula(Formula::parse("x + y*z").unwrap()),
-                0.2,
-                1.5,
-            ))),
+            Grade::Function(Arc::new(Sigmoid::new(Grade::Formula(Formula::parse("x + y*z").unwrap()), 0.2, 1.5))),
         ]
     }
 
     fn samples(n: usize) -> impl Iterator<Item = f64> {
         let mut s = 12345u64;
         (0..n).map(move |_| {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 11) as f64 / (1u64 << 53) as f64
         })
     }
@@ -378,16 +335,7 @@ mod tests {
     fn linear_is_exact_at_stops_between_and_beyond() {
         let g = Grade::linear([0.0, 0.0, 2.0], vec![[0.0, 1.0], [4.0, 3.0]]).unwrap();
         let mut v = [0.0; 5];
-        g.values(
-            &[
-                [9.0, 9.0, -1.0],
-                [0.0; 3],
-                [0.0, 0.0, 1.0],
-                [0.0, 0.0, 2.0],
-                [0.0, 0.0, 7.0],
-            ],
-            &mut v,
-        );
+        g.values(&[[9.0, 9.0, -1.0], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 7.0]], &mut v);
         assert_eq!(v, [1.0, 1.0, 2.0, 3.0, 3.0]);
     }
 
@@ -395,15 +343,7 @@ mod tests {
     fn depth_counts_from_the_surface_inwards() {
         let g = Grade::depth(Arc::new(Ball), vec![[0.0, 0.6], [0.5, 0.2]]).unwrap();
         let mut v = [0.0; 4];
-        g.values(
-            &[
-                [2.0, 0.0, 0.0],
-                [1.0, 0.0, 0.0],
-                [0.0, 0.75, 0.0],
-                [0.0, 0.0, 0.1],
-            ],
-            &mut v,
-        );
+        g.values(&[[2.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.75, 0.0], [0.0, 0.0, 0.1]], &mut v);
         for (v, want) in v.iter().zip([0.6, 0.6, 0.4, 0.2]) {
             assert!((v - want).abs() < 1e-15);
         }
@@ -422,17 +362,10 @@ mod tests {
                 g.values(&[p], &mut plain);
                 assert_eq!(plain, v);
                 let size = next() * 0.5;
-                let b = Aabb {
-                    min: p,
-                    max: p.map(|c| c + size),
-                };
+                let b = Aabb { min: p, max: p.map(|c| c + size) };
                 let bound = g.bound(&b);
                 for _ in 0..5 {
-                    let q = [
-                        p[0] + size * next(),
-                        p[1] + size * next(),
-                        p[2] + size * next(),
-                    ];
+                    let q = [p[0] + size * next(), p[1] + size * next(), p[2] + size * next()];
                     g.values(&[q], &mut plain);
                     assert!(
                         bound.lo <= plain[0] && plain[0] <= bound.hi,
@@ -448,10 +381,7 @@ mod tests {
                     g.gradients(&[lo, hi], &mut w, &mut e);
                     // Across a crease the one-sided slopes differ: skip it.
                     if (e[0][a] - e[1][a]).abs() < 1e-2 {
-                        assert!(
-                            (d[0][a] - (w[1] - w[0]) / (2.0 * h)).abs() < 1e-4,
-                            "grade {k} at {p:?}, axis {a}"
-                        );
+                        assert!((d[0][a] - (w[1] - w[0]) / (2.0 * h)).abs() < 1e-4, "grade {k} at {p:?}, axis {a}");
                     }
                 }
             }
@@ -462,39 +392,20 @@ mod tests {
     fn an_unbounded_box_gives_the_whole_range() {
         let g = Grade::linear([0.0, 0.0, 1.0], vec![[0.0, 0.2], [1.0, 0.7], [2.0, 0.1]]).unwrap();
         let b = g.bound(&Aabb::ALL);
-        assert!(
-            (b.lo - 0.1).abs() < 1e-14 && (b.hi - 0.7).abs() < 1e-14,
-            "{b:?}"
-        );
+        assert!((b.lo - 0.1).abs() < 1e-14 && (b.hi - 0.7).abs() < 1e-14, "{b:?}");
     }
 
     #[test]
     fn bad_stops_are_refused_where_they_stand() {
         let at = |r: Result<Grade, Fault>| r.err().map(|f| f.at);
-        assert_eq!(
-            at(Grade::linear([0.0; 3], vec![[0.0, 1.0]])).as_deref(),
-            Some("along")
-        );
-        assert_eq!(
-            at(Grade::linear([f64::NAN, 0.0, 1.0], vec![[0.0, 1.0]])).as_deref(),
-            Some("along")
-        );
+        assert_eq!(at(Grade::linear([0.0; 3], vec![[0.0, 1.0]])).as_deref(), Some("along"));
+        assert_eq!(at(Grade::linear([f64::NAN, 0.0, 1.0], vec![[0.0, 1.0]])).as_deref(), Some("along"));
         let z = [0.0, 0.0, 1.0];
         assert_eq!(at(Grade::linear(z, vec![])).as_deref(), Some("stops"));
+        assert_eq!(at(Grade::linear(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(), Some("stops[1]"));
+        assert_eq!(at(Grade::linear(z, vec![[0.0, f64::NAN]])).as_deref(), Some("stops[0]"));
         assert_eq!(
-            at(Grade::linear(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(),
-            Some("stops[1]")
-        );
-        assert_eq!(
-            at(Grade::linear(z, vec![[0.0, f64::NAN]])).as_deref(),
-            Some("stops[0]")
-        );
-        assert_eq!(
-            at(Grade::depth(
-                Arc::new(Ball),
-                vec![[0.0, 1.0], [f64::INFINITY, 2.0]]
-            ))
-            .as_deref(),
+            at(Grade::depth(Arc::new(Ball), vec![[0.0, 1.0], [f64::INFINITY, 2.0]])).as_deref(),
             Some("stops[1]")
         );
     }

@@ -45,11 +45,7 @@ pub struct Loaded {
 }
 
 fn unknown(extension: &str, known: &[&str]) -> String {
-    let found = if extension.is_empty() {
-        "no extension".to_string()
-    } else {
-        format!("extension \"{extension}\"")
-    };
+    let found = if extension.is_empty() { "no extension".to_string() } else { format!("extension \"{extension}\"") };
     format!("{found}: known mesh formats are {}", known.join(", "))
 }
 
@@ -85,10 +81,7 @@ pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
     if mesh.triangles.is_empty() {
         return Err(Fault::new("", "the file holds no triangle"));
     }
-    Ok(Loaded {
-        mesh,
-        in_mm: kind == "3mf",
-    })
+    Ok(Loaded { mesh, in_mm: kind == "3mf" })
 }
 
 /// Facts written into formats that carry metadata.
@@ -108,33 +101,18 @@ pub struct Metadata {
 ///
 /// **Errors**: whatever `out` reports, unchanged; `InvalidInput` for an unknown extension, an index out of range, a
 /// coordinate that is not finite in single precision, or more triangles or vertices than the format can count.
-pub fn write_mesh<W: io::Write>(
-    mesh: &Mesh,
-    extension: &str,
-    meta: &Metadata,
-    out: &mut W,
-) -> io::Result<()> {
+pub fn write_mesh<W: io::Write>(mesh: &Mesh, extension: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
     let kind = extension.to_ascii_lowercase();
     if !WRITABLE.contains(&kind.as_str()) {
         return Err(invalid(unknown(extension, &WRITABLE)));
     }
     let count = mesh.vertices.len();
-    if let Some(i) = mesh
-        .triangles
-        .par_iter()
-        .position_first(|t| t.iter().any(|&v| v as usize >= count))
-    {
-        return Err(invalid(format!(
-            "triangle {i} is {:?}, but there are {count} vertices",
-            mesh.triangles[i]
-        )));
+    if let Some(i) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= count)) {
+        return Err(invalid(format!("triangle {i} is {:?}, but there are {count} vertices", mesh.triangles[i])));
     }
     let outside = |p: &[f64; 3]| p.iter().any(|x| !(*x as f32).is_finite());
     if let Some(i) = mesh.vertices.par_iter().position_first(outside) {
-        return Err(invalid(format!(
-            "vertex {i} at {:?} is not finite in single precision",
-            mesh.vertices[i]
-        )));
+        return Err(invalid(format!("vertex {i} at {:?} is not finite in single precision", mesh.vertices[i])));
     }
     match kind.as_str() {
         "stl" => stl::write(mesh, out),
@@ -160,10 +138,7 @@ fn in_order<T: Send>(
     let batch = 4 * rayon::current_num_threads();
     for first in (0..chunks).step_by(batch) {
         let piece = |i: usize| make(i * chunk..count.min((i + 1) * chunk));
-        let made: Vec<T> = (first..chunks.min(first + batch))
-            .into_par_iter()
-            .map(piece)
-            .collect();
+        let made: Vec<T> = (first..chunks.min(first + batch)).into_par_iter().map(piece).collect();
         made.into_iter().try_for_each(&mut take)?;
     }
     Ok(())
@@ -176,12 +151,7 @@ mod tests {
     /// A corner of a cube, outward.
     pub fn tetrahedron() -> Mesh {
         Mesh {
-            vertices: vec![
-                [0.0; 3],
-                [1.5, 0.0, 0.0],
-                [0.0, 2.25, 0.0],
-                [0.0, 0.0, 3.125],
-            ],
+            vertices: vec![[0.0; 3], [1.5, 0.0, 0.0], [0.0, 2.25, 0.0], [0.0, 0.0, 3.125]],
             triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
         }
     }
@@ -190,17 +160,11 @@ mod tests {
     pub fn refuses_damage(extension: &str, bytes: &[u8], whole: usize) {
         for n in 0..whole {
             let r = read_mesh(&bytes[..n], extension);
-            assert!(
-                r.is_err(),
-                "{extension} cut at {n} of {} was taken",
-                bytes.len()
-            );
+            assert!(r.is_err(), "{extension} cut at {n} of {} was taken", bytes.len());
         }
         let mut seed = 3u64;
         let mut next = || {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 33) as usize
         };
         for _ in 0..3000 {
@@ -231,16 +195,10 @@ mod tests {
             assert_eq!(back.in_mm, kind == "3mf");
         }
         let fault = read_mesh(b"x", "step").unwrap_err();
-        assert_eq!(
-            fault.message,
-            "extension \"step\": known mesh formats are stl, obj, ply, off, 3mf"
-        );
+        assert_eq!(fault.message, "extension \"step\": known mesh formats are stl, obj, ply, off, 3mf");
         assert!(write_mesh(&mesh, "", &Metadata::default(), &mut Vec::new()).is_err());
         for kind in READABLE {
-            assert_eq!(
-                read_mesh(b"", kind).unwrap_err().message,
-                "the file is empty (0 bytes)"
-            );
+            assert_eq!(read_mesh(b"", kind).unwrap_err().message, "the file is empty (0 bytes)");
         }
     }
 
@@ -248,10 +206,7 @@ mod tests {
     fn a_byte_order_mark_is_passed_over() {
         let text = b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert_eq!(read_mesh(text, "obj").unwrap().mesh.area(), 0.5);
-        let wide: Vec<u8> = "\u{feff}v 0 0 0\n"
-            .encode_utf16()
-            .flat_map(u16::to_le_bytes)
-            .collect();
+        let wide: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         for kind in ["obj", "ply", "off", "stl"] {
             let message = read_mesh(&wide, kind).unwrap_err().message;
             assert!(message.contains("UTF-16"), "{message}");
@@ -260,11 +215,7 @@ mod tests {
 
     #[test]
     fn meshes_that_no_file_can_hold_are_refused() {
-        for (v, t) in [
-            ([0.0, 0.0, 1e40], [0, 1, 2]),
-            ([0.0, f64::NAN, 0.0], [0, 1, 2]),
-            ([0.0; 3], [0, 1, 7]),
-        ] {
+        for (v, t) in [([0.0, 0.0, 1e40], [0, 1, 2]), ([0.0, f64::NAN, 0.0], [0, 1, 2]), ([0.0; 3], [0, 1, 7])] {
             let mut mesh = tetrahedron();
             mesh.vertices[1] = v;
             mesh.triangles[2] = t;

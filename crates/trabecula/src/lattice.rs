@@ -10,8 +10,7 @@ use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::Map;
 use crate::math::{
-    Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm,
-    transpose,
+    Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm, transpose,
 };
 
 /// How much of the cell is solid.
@@ -82,16 +81,7 @@ impl Lattice {
             Level::Fraction(g) => g.constant().map(|p| cell.level(part, p)),
             Level::Thickness(g) => g.constant().map(|w| 0.5 * w),
         };
-        Lattice {
-            cell,
-            map,
-            part,
-            level,
-            distance,
-            steepness,
-            uniform,
-            cut: Cut::new(part),
-        }
+        Lattice { cell, map, part, level, distance, steepness, uniform, cut: Cut::new(part) }
     }
 
     /// The signed distance to the mid-surface, where the level is a thickness.
@@ -181,9 +171,8 @@ impl Lattice {
     /// An interval that contains the core's values in the box.
     pub fn core_bound(&self, b: &Aabb) -> Interval {
         let reach = norm(b.size()) / 2.0;
-        let around = |v: f64, reach: f64, all: Interval| {
-            Interval::new((v - reach).max(all.lo), (v + reach).min(all.hi))
-        };
+        let around =
+            |v: f64, reach: f64, all: Interval| Interval::new((v - reach).max(all.lo), (v + reach).min(all.hi));
         let most = self.cell.series().amplitude();
         let waves = Interval::new(-most, most);
         let mut v = [0.0];
@@ -204,16 +193,8 @@ impl Lattice {
         // No gradient is lengthened by more than this, so no distance is multiplied by less than its inverse.
         let longest = self.map.stretch(b) * spectral_norm(&inverse(&self.map.typical()));
         let least = (1.0 / longest).min(1.0);
-        let lo = if r.lo > 0.0 {
-            r.lo * least
-        } else {
-            r.lo * STRETCHED
-        };
-        let hi = if r.hi < 0.0 {
-            r.hi * least
-        } else {
-            r.hi * STRETCHED
-        };
+        let lo = if r.lo > 0.0 { r.lo * least } else { r.lo * STRETCHED };
+        let hi = if r.hi < 0.0 { r.hi * least } else { r.hi * STRETCHED };
         Interval::new(lo, hi)
     }
 
@@ -336,10 +317,7 @@ impl Field for Lattice {
     }
 
     fn parts(&self) -> Vec<Arc<dyn Field>> {
-        self.cut.sides(|cut| Lattice {
-            cut,
-            ..self.clone()
-        })
+        self.cut.sides(|cut| Lattice { cut, ..self.clone() })
     }
 
     fn slope(&self) -> f64 {
@@ -382,11 +360,7 @@ impl Lattice {
             cores.fill(j, k, word, row);
             if self.uniform.is_none() {
                 points.clear();
-                points.extend(
-                    (0..xs.len())
-                        .filter(|&i| here(i))
-                        .map(|i| [xs[i], ys[j], zs[k]]),
-                );
+                points.extend((0..xs.len()).filter(|&i| here(i)).map(|i| [xs[i], ys[j], zs[k]]));
                 found.resize(points.len(), 0.0);
                 self.isos(&points, &mut found);
                 for (i, t) in (0..xs.len()).filter(|&i| here(i)).zip(&found) {
@@ -407,14 +381,7 @@ impl Lattice {
 pub fn sample_points(b: &Aabb, n: usize) -> Vec<Vec3> {
     let step = scale(b.size(), 1.0 / n as f64);
     let node = |i: usize, a: usize| (i as f64 + 0.5) * step[a];
-    (0..n * n * n)
-        .map(|i| {
-            add(
-                b.min,
-                [node(i % n, 0), node(i / n % n, 1), node(i / n / n, 2)],
-            )
-        })
-        .collect()
+    (0..n * n * n).map(|i| add(b.min, [node(i % n, 0), node(i / n % n, 1), node(i / n / n, 2)])).collect()
 }
 
 #[cfg(test)]
@@ -430,14 +397,11 @@ mod tests {
 
     #[test]
     fn block_equals_points_and_bounds_hold() {
-        let map = Affine::rigid([4.0, 5.0, 6.0], [10.0, 20.0, 30.0], [0.1, 0.2, 0.3], &[])
-            .expect("valid");
+        let map = Affine::rigid([4.0, 5.0, 6.0], [10.0, 20.0, 30.0], [0.1, 0.2, 0.3], &[]).expect("valid");
         for part in [Part::Sheet, Part::Lower, Part::Upper] {
             let l = lattice(part, Level::Fraction(Grade::Constant(0.3)), map);
             let axis: Vec<f64> = (0..17).map(|i| 0.21 * f64::from(i) - 1.3).collect();
-            let block = Block {
-                axes: [&axis, &axis, &axis],
-            };
+            let block = Block { axes: [&axis, &axis, &axis] };
             let mut out = vec![0f32; block.len()];
             l.fill(&block, &mut out);
             let b = l.bound(&block.bounds());

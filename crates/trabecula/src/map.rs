@@ -24,8 +24,7 @@ use std::sync::Arc;
 use crate::fault::Fault;
 use crate::field::Block;
 use crate::math::{
-    Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, inverse, product, rotation, scale,
-    spectral_norm, transpose,
+    Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, inverse, product, rotation, scale, spectral_norm, transpose,
 };
 
 /// An affine map u = M x + b.
@@ -48,12 +47,7 @@ impl Affine {
     ///
     /// # Errors
     /// Wavelengths that are not positive and finite, angles that are not finite, shears that flatten space.
-    pub fn rigid(
-        wavelength: Vec3,
-        rotate: Vec3,
-        offset: Vec3,
-        skew: &[Skew],
-    ) -> Result<Affine, Fault> {
+    pub fn rigid(wavelength: Vec3, rotate: Vec3, offset: Vec3, skew: &[Skew]) -> Result<Affine, Fault> {
         let d = per_wavelength(wavelength)?;
         finite("rotate", &rotate)?;
         let mut shear = IDENTITY;
@@ -76,10 +70,7 @@ impl Affine {
                 ),
             ));
         }
-        let matrix = product(
-            &d,
-            &product(&transpose(&rotation(rotate)), &inverse(&shear)),
-        );
+        let matrix = product(&d, &product(&transpose(&rotation(rotate)), &inverse(&shear)));
         Self::about(matrix, offset, wavelength)
     }
 
@@ -91,11 +82,7 @@ impl Affine {
     pub fn spartan(wavelength: Vec3, rotate: Vec3, offset: Vec3) -> Result<Affine, Fault> {
         let d = per_wavelength(wavelength)?;
         finite("rotate", &rotate)?;
-        Self::about(
-            product(&transpose(&rotation(rotate)), &d),
-            offset,
-            wavelength,
-        )
+        Self::about(product(&transpose(&rotation(rotate)), &d), offset, wavelength)
     }
 
     fn about(matrix: Mat3, offset: Vec3, wavelength: Vec3) -> Result<Affine, Fault> {
@@ -108,20 +95,13 @@ impl Affine {
                 format!("{o:e} mm; an offset is at most 1e9 wavelengths, {far:e} mm here"),
             ));
         }
-        Ok(Affine {
-            matrix,
-            shift: scale(apply(&matrix, offset), -1.0),
-            wavelength,
-        })
+        Ok(Affine { matrix, shift: scale(apply(&matrix, offset), -1.0), wavelength })
     }
 }
 
 fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
     if key == "rotate" && v.iter().any(|d| d.abs() > 1e6) {
-        return Err(Fault::new(
-            key,
-            format!("{v:?} degrees; an angle is at most 1e6 degrees either way"),
-        ));
+        return Err(Fault::new(key, format!("{v:?} degrees; an angle is at most 1e6 degrees either way")));
     }
     match v.iter().find(|c| !c.is_finite()) {
         Some(c) => Err(Fault::new(key, format!("{c} is not a finite number"))),
@@ -132,10 +112,7 @@ fn finite(key: &str, v: &Vec3) -> Result<(), Fault> {
 fn per_wavelength(wavelength: Vec3) -> Result<Mat3, Fault> {
     for w in wavelength {
         if !(w > 0.0 && w.is_finite() && (1.0 / w).is_finite()) {
-            return Err(Fault::new(
-                "wavelength",
-                format!("{w} mm; a wavelength is a positive, finite length"),
-            ));
+            return Err(Fault::new("wavelength", format!("{w} mm; a wavelength is a positive, finite length")));
         }
     }
     let mut d = IDENTITY;
@@ -339,18 +316,13 @@ mod tests {
 
     #[test]
     fn offset_moves_the_lattice_and_skew_shears_it() {
-        let plain =
-            Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("valid"));
-        let moved = Map::Affine(
-            Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.3, -0.2, 5.0], &[]).expect("valid"),
-        );
+        let plain = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.0; 3], &[]).expect("valid"));
+        let moved = Map::Affine(Affine::rigid([2.0; 3], [10.0, 20.0, 30.0], [0.3, -0.2, 5.0], &[]).expect("valid"));
         let (mut u, mut v) = ([[0.0; 3]], [[0.0; 3]]);
         plain.phases(&[[1.0, 2.0, 3.0]], &mut u);
         moved.phases(&[[1.3, 1.8, 8.0]], &mut v);
         assert!(norm(sub(u[0], v[0])) < 1e-14);
-        let skewed = Map::Affine(
-            Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 2, 45.0)]).expect("valid"),
-        );
+        let skewed = Map::Affine(Affine::rigid([1.0; 3], [0.0; 3], [0.0; 3], &[(0, 2, 45.0)]).expect("valid"));
         skewed.phases(&[[3.0, 0.0, 3.0]], &mut u);
         assert!(norm(sub(u[0], [0.0, 0.0, 3.0])) < 1e-14);
     }

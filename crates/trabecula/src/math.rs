@@ -35,11 +35,7 @@ pub fn dot(a: Vec3, b: Vec3) -> f64 {
 /// a × b.
 #[inline]
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// |a|.
@@ -145,9 +141,7 @@ pub fn eigen(m: &Mat3) -> (Vec3, Mat3) {
             }
         }
     }
-    debug_assert!(
-        (norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs())
-    );
+    debug_assert!((norm(apply(m, vectors[0])) - a[0][0].abs()).abs() <= 1e-6 * (1.0 + a[0][0].abs()));
     let mut order = [0, 1, 2];
     order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
     (order.map(|i| a[i][i]), order.map(|i| vectors[i]))
@@ -190,16 +184,14 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
                 + w * (1.0 / 120.0
                     + w * (-1.0 / 5040.0
                         + w * (1.0 / 362880.0
-                            + w * (-1.0 / 39916800.0
-                                + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
+                            + w * (-1.0 / 39916800.0 + w * (1.0 / 6227020800.0 - w / 1307674368000.0)))))));
     let c = 1.0
         + w * (-0.5
             + w * (1.0 / 24.0
                 + w * (-1.0 / 720.0
                     + w * (1.0 / 40320.0
                         + w * (-1.0 / 3628800.0
-                            + w * (1.0 / 479001600.0
-                                + w * (-1.0 / 87178291200.0 + w / 20922789888000.0)))))));
+                            + w * (1.0 / 479001600.0 + w * (-1.0 / 87178291200.0 + w / 20922789888000.0)))))));
     // The quadrant modulo 4, as a float, so that no integer conversion breaks the vector loop.
     let k = q - 4.0 * ((q * 0.25 - 0.375 + ROUND) - ROUND);
     let odd = k == 1.0 || k == 3.0;
@@ -220,15 +212,9 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing; growing it by points gives their bounds.
-    pub const EMPTY: Aabb = Aabb {
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
+    pub const EMPTY: Aabb = Aabb { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     /// The box that contains everything.
-    pub const ALL: Aabb = Aabb {
-        min: [f64::NEG_INFINITY; 3],
-        max: [f64::INFINITY; 3],
-    };
+    pub const ALL: Aabb = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
 
     /// The smallest box that holds this one and `p`.
     pub fn with(mut self, p: Vec3) -> Aabb {
@@ -255,10 +241,7 @@ impl Aabb {
 
     /// The box grown by `by` on every side.
     pub fn grown(self, by: f64) -> Aabb {
-        Aabb {
-            min: self.min.map(|v| v - by),
-            max: self.max.map(|v| v + by),
-        }
+        Aabb { min: self.min.map(|v| v - by), max: self.max.map(|v| v + by) }
     }
 
     /// Its middle.
@@ -338,12 +321,7 @@ impl Interval {
 impl Interval {
     /// The range of a product.
     pub fn times(self, o: Self) -> Self {
-        let ends = [
-            self.lo * o.lo,
-            self.lo * o.hi,
-            self.hi * o.lo,
-            self.hi * o.hi,
-        ];
+        let ends = [self.lo * o.lo, self.lo * o.hi, self.hi * o.lo, self.hi * o.hi];
         Interval::new(
             ends.into_iter().fold(f64::INFINITY, f64::min),
             ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
@@ -374,13 +352,7 @@ impl core::ops::Neg for Interval {
 
 /// The root in [a, b] of a function whose signs at a and b differ, which has the sign of `rising` at b: Newton's method from
 /// `x`, kept between the ends. `f` gives value and slope; steps end below `near[0]` + `near[1]` · |x|.
-pub fn root(
-    [mut a, mut b]: [f64; 2],
-    mut x: f64,
-    rising: bool,
-    near: [f64; 2],
-    f: impl Fn(f64) -> [f64; 2],
-) -> f64 {
+pub fn root([mut a, mut b]: [f64; 2], mut x: f64, rising: bool, near: [f64; 2], f: impl Fn(f64) -> [f64; 2]) -> f64 {
     for _ in 0..100 {
         let [v, slope] = f(x);
         if v == 0.0 {
@@ -392,11 +364,7 @@ pub fn root(
             a = x;
         }
         let newton = x - v / slope;
-        let next = if newton > a && newton < b {
-            newton
-        } else {
-            0.5 * (a + b)
-        };
+        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
         let done = (next - x).abs() <= near[0] + near[1] * x.abs();
         x = next;
         if done {
@@ -422,10 +390,7 @@ mod tests {
             let (s, c) = sin_cos_turns(u);
             let (ls, lc) = (core::f64::consts::TAU * (u - u.floor())).sin_cos();
             // The library's own argument 2πu is rounded by up to 4e-16.
-            assert!(
-                (s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15,
-                "{u}: {s} {ls} {c} {lc}"
-            );
+            assert!((s - ls).abs() < 1e-15 && (c - lc).abs() < 1e-15, "{u}: {s} {ls} {c} {lc}");
         }
     }
 

@@ -128,10 +128,7 @@ pub fn defects(mesh: &Mesh) -> Defects {
         crowded_edges: edges.crowded,
         flipped_edges: edges.flipped,
         duplicate_triangles: keys.windows(2).filter(|w| w[0] == w[1]).count(),
-        degenerate_triangles: (0..mesh.triangles.len())
-            .into_par_iter()
-            .filter(|&i| degenerate(mesh, i))
-            .count(),
+        degenerate_triangles: (0..mesh.triangles.len()).into_par_iter().filter(|&i| degenerate(mesh, i)).count(),
         bodies: Bodies::of(mesh).count,
     }
 }
@@ -148,17 +145,8 @@ mod tests {
         assert!((s.area - (1.5 + 0.75f64.sqrt())).abs() < 1e-15);
         assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (2, 1, 0, true));
         let s = size(&cube([1.0, 2.0, 3.0], 2.0));
-        assert_eq!(
-            (s.volume, s.area, s.euler, s.pieces, s.closed),
-            (8.0, 24.0, 2, 1, true)
-        );
-        assert_eq!(
-            s.bounds,
-            Aabb {
-                min: [1.0, 2.0, 3.0],
-                max: [3.0, 4.0, 5.0]
-            }
-        );
+        assert_eq!((s.volume, s.area, s.euler, s.pieces, s.closed), (8.0, 24.0, 2, 1, true));
+        assert_eq!(s.bounds, Aabb { min: [1.0, 2.0, 3.0], max: [3.0, 4.0, 5.0] });
         let s = size(&torus(40, 30));
         assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (0, 1, 0, true));
         // An inscribed torus: below 2π²Rr², within the error of its polygons.
@@ -169,22 +157,14 @@ mod tests {
     #[test]
     fn nothing_measures_as_nothing() {
         let s = size(&Mesh::default());
-        assert_eq!(
-            (s.volume, s.area, s.euler, s.pieces, s.cavities, s.closed),
-            (0.0, 0.0, 0, 0, 0, true)
-        );
+        assert_eq!((s.volume, s.area, s.euler, s.pieces, s.cavities, s.closed), (0.0, 0.0, 0, 0, 0, true));
         assert!(s.bounds.is_empty());
         assert_eq!(defects(&Mesh::default()), Defects::default());
     }
 
     #[test]
     fn cavities_pieces_and_unused_vertices() {
-        let nested = join(&[
-            cube([0.0; 3], 4.0),
-            flipped(cube([1.0; 3], 2.0)),
-            cube([1.5; 3], 1.0),
-            tetrahedron(),
-        ]);
+        let nested = join(&[cube([0.0; 3], 4.0), flipped(cube([1.0; 3], 2.0)), cube([1.5; 3], 1.0), tetrahedron()]);
         let s = size(&nested);
         assert_eq!((s.euler, s.pieces, s.cavities, s.closed), (8, 3, 1, true));
         assert!((s.volume - (64.0 - 8.0 + 1.0 + 1.0 / 6.0)).abs() < 1e-12);
@@ -192,13 +172,7 @@ mod tests {
         stray.vertices.push([99.0; 3]);
         let s = size(&stray);
         assert_eq!((s.euler, s.bounds.max), (2, [1.0; 3]));
-        assert_eq!(
-            defects(&nested),
-            Defects {
-                bodies: 4,
-                ..Defects::default()
-            }
-        );
+        assert_eq!(defects(&nested), Defects { bodies: 4, ..Defects::default() });
     }
 
     #[test]
@@ -209,12 +183,7 @@ mod tests {
         assert_eq!(non_manifold_vertices(&apart), 0);
         // The corner (1, 1, 1) made common: vertex 7 of the first, 8 of both.
         let mut joined = apart;
-        joined
-            .triangles
-            .iter_mut()
-            .flatten()
-            .filter(|v| **v == 8)
-            .for_each(|v| *v = 7);
+        joined.triangles.iter_mut().flatten().filter(|v| **v == 8).for_each(|v| *v = 7);
         let s = size(&joined);
         assert_eq!((s.pieces, s.closed, s.euler), (2, true, 3));
         assert_eq!(non_manifold_vertices(&joined), 1);
@@ -231,10 +200,7 @@ mod tests {
             }
         });
         let d = defects(&m);
-        assert_eq!(
-            (d.crowded_edges, d.open_edges, d.flipped_edges, d.bodies),
-            (1, 0, 0, 1)
-        );
+        assert_eq!((d.crowded_edges, d.open_edges, d.flipped_edges, d.bodies), (1, 0, 0, 1));
         assert!(!size(&m).closed);
     }
 
@@ -267,17 +233,11 @@ mod tests {
         let mut open = cube([0.0; 3], 1.0);
         open.triangles.pop();
         let d = defects(&open);
-        assert_eq!(
-            (d.open_edges, d.flipped_edges, size(&open).closed),
-            (3, 0, false)
-        );
+        assert_eq!((d.open_edges, d.flipped_edges, size(&open).closed), (3, 0, false));
         let mut turned = cube([0.0; 3], 1.0);
         turned.triangles[0].swap(0, 1);
         let d = defects(&turned);
-        assert_eq!(
-            (d.open_edges, d.flipped_edges, size(&turned).closed),
-            (0, 3, false)
-        );
+        assert_eq!((d.open_edges, d.flipped_edges, size(&turned).closed), (0, 3, false));
         let mut twice = cube([0.0; 3], 1.0);
         twice.triangles.push([3, 0, 2]);
         let d = defects(&twice);
@@ -296,23 +256,15 @@ mod tests {
             for i in 8..16 {
                 if let Some(j) = (0..8).find(|j| two.vertices[*j] == two.vertices[i]) {
                     let corners = two.triangles.iter_mut().flatten();
-                    corners
-                        .filter(|c| **c == i as u32)
-                        .for_each(|c| *c = j as u32);
+                    corners.filter(|c| **c == i as u32).for_each(|c| *c = j as u32);
                 }
             }
             let s = size(&two);
             assert_eq!((s.pieces, s.cavities, s.volume), (2, 0, 2.0));
-            assert_eq!(
-                (s.closed, defects(&two).crowded_edges),
-                (crowded == 0, crowded)
-            );
+            assert_eq!((s.closed, defects(&two).crowded_edges), (crowded == 0, crowded));
             assert_eq!(s.euler, vertices - (36 - crowded as i64) + 24);
             let inverted = size(&flipped(two));
-            assert_eq!(
-                (inverted.pieces, inverted.cavities, inverted.volume),
-                (0, 2, -2.0)
-            );
+            assert_eq!((inverted.pieces, inverted.cavities, inverted.volume), (0, 2, -2.0));
         }
     }
 
@@ -324,18 +276,14 @@ mod tests {
             let t = f64::from(i) / f64::from(n) * core::f64::consts::TAU;
             for side in [-0.3, 0.3] {
                 let r = 1.0 + side * (t / 2.0).cos();
-                m.vertices
-                    .push([r * t.cos(), r * t.sin(), side * (t / 2.0).sin()]);
+                m.vertices.push([r * t.cos(), r * t.sin(), side * (t / 2.0).sin()]);
             }
             let (a, b) = (2 * i, 2 * i + 1);
             let (c, d) = if i + 1 < n { (a + 2, b + 2) } else { (1, 0) };
             m.triangles.extend([[a, c, d], [a, d, b]]);
         }
         let d = defects(&m);
-        assert_eq!(
-            (d.open_edges, d.flipped_edges, d.bodies),
-            (2 * n as usize, 1, 1)
-        );
+        assert_eq!((d.open_edges, d.flipped_edges, d.bodies), (2 * n as usize, 1, 1));
         assert_eq!((size(&m).euler, size(&m).closed), (0, false));
         assert_eq!(non_manifold_vertices(&m), 0);
     }

@@ -26,22 +26,11 @@ pub struct Mesh {
 impl Mesh {
     /// The box from `min` to `max` of twelve triangles.
     pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
-        let corner =
-            |i: usize| core::array::from_fn(|a| if i >> a & 1 == 1 { max[a] } else { min[a] });
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
+        let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 1 { max[a] } else { min[a] });
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         Mesh {
             vertices: (0..8).map(corner).collect(),
-            triangles: quads
-                .iter()
-                .flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-                .collect(),
+            triangles: quads.iter().flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect(),
         }
     }
 
@@ -78,21 +67,14 @@ impl Mesh {
 
     /// Bounds of the vertices that triangles use.
     pub fn bounds(&self) -> Aabb {
-        self.triangles
-            .iter()
-            .flatten()
-            .fold(Aabb::EMPTY, |b, &v| b.with(self.vertices[v as usize]))
+        self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &v| b.with(self.vertices[v as usize]))
     }
 
     /// The rounding that single precision gives coordinates of this size, mm: what a file of `f32` leaves between
     /// two readings of one point.
     pub fn single_rounding(&self) -> f64 {
         let b = self.bounds();
-        let largest = b
-            .min
-            .iter()
-            .chain(&b.max)
-            .fold(0.0f64, |m, x| m.max(x.abs()));
+        let largest = b.min.iter().chain(&b.max).fold(0.0f64, |m, x| m.max(x.abs()));
         largest * f64::from(f32::EPSILON)
     }
 
@@ -106,11 +88,7 @@ impl Mesh {
             return self;
         }
         let joined = self.joined(self.single_rounding());
-        if Edges::count(&joined).open < open {
-            joined
-        } else {
-            self
-        }
+        if Edges::count(&joined).open < open { joined } else { self }
     }
 
     /// The mesh with vertices closer than `tolerance` (mm) made one, triangles that collapse left out.
@@ -129,9 +107,8 @@ impl Mesh {
         for &p in &self.vertices {
             let lo = p.map(|x| index(x - tolerance));
             let hi = p.map(|x| index(x + tolerance));
-            let cells = (lo[0]..=hi[0]).flat_map(|x| {
-                (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z]))
-            });
+            let cells = (lo[0]..=hi[0])
+                .flat_map(|x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])));
             let near = cells
                 .filter_map(|c| kept.get(&c))
                 .flatten()
@@ -148,13 +125,8 @@ impl Mesh {
             });
         }
         let moved = self.triangles.iter().map(|t| t.map(|v| to[v as usize]));
-        let triangles = moved
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect();
-        Mesh {
-            vertices,
-            triangles,
-        }
+        let triangles = moved.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        Mesh { vertices, triangles }
     }
 }
 

@@ -27,20 +27,12 @@ pub struct Similarity {
 
 impl Similarity {
     /// What leaves everything where it is.
-    pub const STILL: Similarity = Similarity {
-        scale: 1.0,
-        turn: IDENTITY,
-        shift: [0.0; 3],
-    };
+    pub const STILL: Similarity = Similarity { scale: 1.0, turn: IDENTITY, shift: [0.0; 3] };
 
     /// Scaled by s and turned (degrees about x, y, z; z is turned first) about a point, then moved (mm).
     pub fn new(s: f64, rotate: Vec3, about: Vec3, by: Vec3) -> Similarity {
         let turn = rotation(rotate);
-        Similarity {
-            scale: s,
-            turn,
-            shift: add(by, sub(about, scale(apply(&turn, about), s))),
-        }
+        Similarity { scale: s, turn, shift: add(by, sub(about, scale(apply(&turn, about), s))) }
     }
 
     /// Whether it only moves.
@@ -66,19 +58,13 @@ impl Similarity {
     pub fn inverse(&self) -> Similarity {
         let turn = transpose(&self.turn);
         let s = 1.0 / self.scale;
-        Similarity {
-            scale: s,
-            turn,
-            shift: scale(apply(&turn, self.shift), -s),
-        }
+        Similarity { scale: s, turn, shift: scale(apply(&turn, self.shift), -s) }
     }
 
     /// The identity and its powers up to, not including, `count`.
     pub fn powers(&self, count: usize) -> Vec<Similarity> {
         let next = |p: &Similarity| Some(self.after(p));
-        std::iter::successors(Some(Similarity::STILL), next)
-            .take(count)
-            .collect()
+        std::iter::successors(Some(Similarity::STILL), next).take(count).collect()
     }
 
     /// Whether the order of the two does not matter, to within rounding at points `size` (mm) from the origin.
@@ -133,33 +119,22 @@ impl Pattern {
     pub fn check(&self) -> Result<(), Fault> {
         for (a, (step, count)) in self.steps.iter().enumerate() {
             if !(step.scale > 0.0 && step.scale.is_finite()) || *count == 0 {
-                let message = format!(
-                    "{count} repeats, scaled by {}; both must be greater than 0",
-                    number(step.scale)
-                );
+                let message = format!("{count} repeats, scaled by {}; both must be greater than 0", number(step.scale));
                 return Err(Fault::new(format!("repeat[{a}]"), message));
             }
         }
         for (i, s) in self.struts.iter().enumerate() {
             if let Some(n) = s.ends.iter().find(|n| **n as usize >= self.nodes.len()) {
-                let message = format!(
-                    "there is no node {n}; there are {}, counted from 0",
-                    counted(self.nodes.len(), "node")
-                );
+                let message =
+                    format!("there is no node {n}; there are {}, counted from 0", counted(self.nodes.len(), "node"));
                 return Err(Fault::new(format!("struts[{i}]"), message));
             }
             if s.ends[0] == s.ends[1] && s.by == [0; 3] {
-                return Err(Fault::new(
-                    format!("struts[{i}]"),
-                    "it joins a node with itself",
-                ));
+                return Err(Fault::new(format!("struts[{i}]"), "it joins a node with itself"));
             }
         }
         if self.counts().1 == 0.0 {
-            return Err(Fault::new(
-                "struts",
-                "no strut has both its ends in the pattern",
-            ));
+            return Err(Fault::new("struts", "no strut has both its ends in the pattern"));
         }
         Ok(())
     }
@@ -194,22 +169,15 @@ impl Pattern {
         let home = self.at(index).inverse();
         let ball = |n: u32, index: [u32; 3]| {
             let (at, h) = (home.after(&self.at(index)), self.nodes[n as usize]);
-            Hub {
-                center: at.apply(h.center),
-                radius: at.scale * h.radius,
-            }
+            Hub { center: at.apply(h.center), radius: at.scale * h.radius }
         };
-        let mut star = Graph {
-            hubs: vec![ball(node, index)],
-            beams: Vec::new(),
-        };
+        let mut star = Graph { hubs: vec![ball(node, index)], beams: Vec::new() };
         for s in &self.struts {
             for (end, sign) in [(0, 1), (1, -1)] {
                 if s.ends[end] != node {
                     continue;
                 }
-                let other: [i64; 3] =
-                    core::array::from_fn(|a| i64::from(index[a]) + i64::from(sign * s.by[a]));
+                let other: [i64; 3] = core::array::from_fn(|a| i64::from(index[a]) + i64::from(sign * s.by[a]));
                 if (0..3).any(|a| other[a] < 0 || other[a] >= i64::from(self.steps[a].1)) {
                     continue;
                 }
@@ -221,10 +189,7 @@ impl Pattern {
                     ends.reverse();
                 }
                 star.hubs.push(ball(s.ends[1 - end], other));
-                star.beams.push(Beam {
-                    ends,
-                    profile: Pattern::grown(s.profile, home.scale * self.at(first).scale),
-                });
+                star.beams.push(Beam { ends, profile: Pattern::grown(s.profile, home.scale * self.at(first).scale) });
             }
         }
         star
@@ -241,28 +206,21 @@ impl Pattern {
             return Err(Fault::new("", message));
         }
         let [u, v, w] = [0, 1, 2].map(|a| self.steps[a].1);
-        let number =
-            |n: u32, [i, j, k]: [u32; 3]| ((k * v + j) * u + i) * self.nodes.len() as u32 + n;
+        let number = |n: u32, [i, j, k]: [u32; 3]| ((k * v + j) * u + i) * self.nodes.len() as u32 + n;
         let mut graph = Graph::default();
-        let indices =
-            || (0..w).flat_map(move |k| (0..v).flat_map(move |j| (0..u).map(move |i| [i, j, k])));
+        let indices = || (0..w).flat_map(move |k| (0..v).flat_map(move |j| (0..u).map(move |i| [i, j, k])));
         for index in indices() {
             let at = self.at(index);
-            graph.hubs.extend(self.nodes.iter().map(|h| Hub {
-                center: at.apply(h.center),
-                radius: at.scale * h.radius,
-            }));
+            graph
+                .hubs
+                .extend(self.nodes.iter().map(|h| Hub { center: at.apply(h.center), radius: at.scale * h.radius }));
         }
         for index in indices() {
             for s in &self.struts {
-                let other: [i64; 3] =
-                    core::array::from_fn(|a| i64::from(index[a]) + i64::from(s.by[a]));
+                let other: [i64; 3] = core::array::from_fn(|a| i64::from(index[a]) + i64::from(s.by[a]));
                 if (0..3).all(|a| (0..i64::from(self.steps[a].1)).contains(&other[a])) {
                     graph.beams.push(Beam {
-                        ends: [
-                            number(s.ends[0], index),
-                            number(s.ends[1], other.map(|v| v as u32)),
-                        ],
+                        ends: [number(s.ends[0], index), number(s.ends[1], other.map(|v| v as u32))],
                         profile: Pattern::grown(s.profile, self.at(index).scale),
                     });
                 }

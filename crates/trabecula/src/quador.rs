@@ -64,22 +64,13 @@ impl Fillet {
 
     fn check(self) -> Result<(), Fault> {
         let refuse = |name: &str, v: f64, range: &str| {
-            Err(Fault::new(
-                "fillet",
-                format!("{name} {} makes no fillet: it must lie {range}", number(v)),
-            ))
+            Err(Fault::new("fillet", format!("{name} {} makes no fillet: it must lie {range}", number(v))))
         };
         match self {
-            Fillet::Tau(t) if !(0.0..1.0).contains(&t) => {
-                refuse("tau", t, "from 0 up to, not including, 1")
-            }
-            Fillet::Alpha(a) if !(a > 0.0 && a <= 0.5) => {
-                refuse("alpha", a, "above 0 and up to 0.5")
-            }
+            Fillet::Tau(t) if !(0.0..1.0).contains(&t) => refuse("tau", t, "from 0 up to, not including, 1"),
+            Fillet::Alpha(a) if !(a > 0.0 && a <= 0.5) => refuse("alpha", a, "above 0 and up to 0.5"),
             Fillet::Beta(b) if !(b >= 0.5 && b.is_finite()) => refuse("beta", b, "from 0.5 on"),
-            Fillet::Radius(r) if !(r > 0.0 && r.is_finite()) => {
-                refuse("a radius of", r, "above zero, mm")
-            }
+            Fillet::Radius(r) if !(r > 0.0 && r.is_finite()) => refuse("a radius of", r, "above zero, mm"),
             _ => Ok(()),
         }
     }
@@ -148,10 +139,7 @@ impl Quadors {
     pub fn new(graph: &Graph, fillet: Fillet) -> Result<Quadors, Fault> {
         fillet.check()?;
         if graph.hubs.is_empty() {
-            return Err(Fault::new(
-                "",
-                "a graph without hubs has no solid: give at least one",
-            ));
+            return Err(Fault::new("", "a graph without hubs has no solid: give at least one"));
         }
         for (i, h) in graph.hubs.iter().enumerate() {
             if !h.center.iter().all(|v| v.is_finite()) {
@@ -163,10 +151,7 @@ impl Quadors {
             if !(h.radius > 0.0 && h.radius.is_finite()) {
                 return Err(Fault::new(
                     format!("hubs[{i}]"),
-                    format!(
-                        "a hub of radius {} mm is no ball: give a finite number above zero",
-                        number(h.radius)
-                    ),
+                    format!("a hub of radius {} mm is no ball: give a finite number above zero", number(h.radius)),
                 ));
             }
         }
@@ -187,24 +172,15 @@ impl Quadors {
                         ),
                     ));
                 };
-                Pencil::new(
-                    norm(sub(z.center, a.center)),
-                    [a.radius, z.radius],
-                    b.profile,
-                )
-                .map_err(|f| f.under(&at()))
+                Pencil::new(norm(sub(z.center, a.center)), [a.radius, z.radius], b.profile).map_err(|f| f.under(&at()))
             })
             .collect::<Result<_, _>>()?;
         let ends: Vec<[u32; 2]> = graph.beams.iter().map(|b| b.ends).collect();
         let (mut firsts, stubs) = stubs(graph, &pencils);
         let mut out = Quadors {
             balls: Vec::new(),
-            scale: typical(
-                pencils
-                    .iter()
-                    .map(|p| p.squared(p.length / 2.0).max(0.0).sqrt()),
-            )
-            .unwrap_or_else(|| typical(graph.hubs.iter().map(|h| h.radius)).unwrap_or(1.0)),
+            scale: typical(pencils.iter().map(|p| p.squared(p.length / 2.0).max(0.0).sqrt()))
+                .unwrap_or_else(|| typical(graph.hubs.iter().map(|h| h.radius)).unwrap_or(1.0)),
             cap: 0.0,
             sharp: fillet == Fillet::None,
             stubs,
@@ -233,26 +209,13 @@ impl Quadors {
             .map(|(i, stubs)| {
                 let h = &graph.hubs[i];
                 let (shortfall, overlaps) = round(i, h.radius, stubs, fillet);
-                let hub = Hub {
-                    radius: h.radius,
-                    stubs,
-                    sharp,
-                };
+                let hub = Hub { radius: h.radius, stubs, sharp };
                 let local = hub.bounds();
-                let bounds = Aabb {
-                    min: crate::math::add(h.center, local.min),
-                    max: crate::math::add(h.center, local.max),
-                };
+                let bounds =
+                    Aabb { min: crate::math::add(h.center, local.min), max: crate::math::add(h.center, local.max) };
                 let (first, last) = (firsts[i], firsts[i + 1]);
                 (
-                    Ball {
-                        center: h.center,
-                        radius: h.radius,
-                        first,
-                        last,
-                        bounds,
-                        bend: hub.bend(),
-                    },
+                    Ball { center: h.center, radius: h.radius, first, last, bounds, bend: hub.bend() },
                     shortfall,
                     overlaps,
                 )
@@ -280,11 +243,7 @@ impl Quadors {
     /// A hub, in its own frame.
     pub fn hub(&self, i: usize) -> Hub<'_> {
         let b = &self.balls[i];
-        Hub {
-            radius: b.radius,
-            stubs: &self.stubs[b.first..b.last],
-            sharp: self.sharp,
-        }
+        Hub { radius: b.radius, stubs: &self.stubs[b.first..b.last], sharp: self.sharp }
     }
 
     /// A hub's centre, mm.
@@ -314,9 +273,7 @@ impl Quadors {
 
     /// Bounds of the solid, mm.
     pub fn bounds(&self) -> Aabb {
-        self.balls
-            .iter()
-            .fold(Aabb::EMPTY, |b, ball| b.union(ball.bounds))
+        self.balls.iter().fold(Aabb::EMPTY, |b, ball| b.union(ball.bounds))
     }
 
     /// The fillets' radius in the tightest crotch of a hub, mm: zero in creases, infinite where nothing is hollow.
@@ -374,29 +331,19 @@ fn stubs(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<Stub>) {
         .map(|(beam, end)| {
             let (p, ends) = (&pencils[beam as usize], graph.beams[beam as usize].ends);
             // The axis is computed once for both ends, so that they are opposite to the bit.
-            let along = sub(
-                graph.hubs[ends[1] as usize].center,
-                graph.hubs[ends[0] as usize].center,
-            );
+            let along = sub(graph.hubs[ends[1] as usize].center, graph.hubs[ends[0] as usize].center);
             let toward = if end == 0 { 1.0 } else { -1.0 };
             let axis = scale(along, toward / p.length);
             let steep = p.lambda.sqrt();
             let contact = p.contact(end);
-            let split = if end == 0 {
-                p.split()
-            } else {
-                p.length - p.split()
-            };
+            let split = if end == 0 { p.split() } else { p.length - p.split() };
             // Followed halfway on to where the other ball takes over.
             let cut = (split + p.length - p.contact(1 - end)) / 2.0;
             Stub {
                 beam,
                 end,
                 axis,
-                g: Affine {
-                    a: scale(axis, steep),
-                    b: -steep * contact,
-                },
+                g: Affine { a: scale(axis, steep), b: -steep * contact },
                 contact,
                 section: p.section(end),
                 split,
@@ -413,18 +360,9 @@ fn stubs(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<Stub>) {
 ///
 /// Reach asks t_i t_j ≥ the least τ of each pair. `t_i = √(max_j τ_ij)` always does; what slack that leaves is taken up by all
 /// stubs alike, half of the least slack of each at a time, so that the order of beams does not matter.
-fn round(
-    index: usize,
-    radius: f64,
-    stubs: &mut [Stub],
-    fillet: Fillet,
-) -> (Option<Shortfall>, Vec<Overlap>) {
+fn round(index: usize, radius: f64, stubs: &mut [Stub], fillet: Fillet) -> (Option<Shortfall>, Vec<Overlap>) {
     let n = stubs.len();
-    let hub = Hub {
-        radius,
-        stubs,
-        sharp: fillet == Fillet::None,
-    };
+    let hub = Hub { radius, stubs, sharp: fillet == Fillet::None };
     let mut least = vec![0.0f64; n * n];
     let mut overlaps = Vec::new();
     for i in 0..n {
@@ -434,22 +372,11 @@ fn round(
             }
             let s = &hub.stubs[i];
             let early = hub.least_tau(i, j, s.contact + REACH * (s.split - s.contact));
-            let tau = if early < TAU_MOST {
-                early
-            } else {
-                hub.least_tau(i, j, s.split).max(TAU_MOST)
-            };
+            let tau = if early < TAU_MOST { early } else { hub.least_tau(i, j, s.split).max(TAU_MOST) };
             if tau >= 1.0 || s.split <= s.contact {
-                overlaps.push(Overlap {
-                    hub: index,
-                    beams: [s.beam, hub.stubs[j].beam],
-                });
+                overlaps.push(Overlap { hub: index, beams: [s.beam, hub.stubs[j].beam] });
             }
-            let tau = if tau.is_nan() {
-                1.0
-            } else {
-                tau.clamp(0.0, TAU_MOST)
-            };
+            let tau = if tau.is_nan() { 1.0 } else { tau.clamp(0.0, TAU_MOST) };
             least[i * n + j] = least[i * n + j].max(tau);
             least[j * n + i] = least[j * n + i].max(tau);
         }
@@ -458,15 +385,12 @@ fn round(
         stubs.iter_mut().for_each(|s| s.share = 1.0);
         return (None, overlaps);
     }
-    let mut t: Vec<f64> = (0..n)
-        .map(|i| (0..n).map(|j| least[i * n + j]).fold(0.0, f64::max).sqrt())
-        .collect();
+    let mut t: Vec<f64> = (0..n).map(|i| (0..n).map(|j| least[i * n + j]).fold(0.0, f64::max).sqrt()).collect();
     for _ in 0..8 {
         let slack: Vec<f64> = (0..n)
             .map(|i| {
                 let each = (0..n).filter(|&j| j != i && least[i * n + j] > 0.0);
-                each.map(|j| least[i * n + j] / (t[i] * t[j]))
-                    .fold(0.0, f64::max)
+                each.map(|j| least[i * n + j] / (t[i] * t[j])).fold(0.0, f64::max)
             })
             .collect();
         for i in 0..n {
@@ -476,10 +400,7 @@ fn round(
     let wanted = match fillet {
         Fillet::Radius(r) => {
             let pairs = hub.neighbours();
-            pairs
-                .iter()
-                .map(|&(i, j)| tau_of(&hub, i, j, r))
-                .fold(TAU_MOST, f64::min)
+            pairs.iter().map(|&(i, j)| tau_of(&hub, i, j, r)).fold(TAU_MOST, f64::min)
         }
         _ => fillet.tau().unwrap_or(0.0),
     };
@@ -487,19 +408,11 @@ fn round(
     for (s, t) in stubs.iter_mut().zip(&t) {
         s.set_share(t.max(wanted.min(TAU_MOST).sqrt()));
     }
-    let hub = Hub {
-        radius,
-        stubs,
-        sharp: false,
-    };
+    let hub = Hub { radius, stubs, sharp: false };
     let shortfall = short.then(|| {
         let shares = || stubs.iter().map(|s| s.share);
         let most = shares().fold(0.0, f64::max);
-        Shortfall {
-            hub: index,
-            radius: tightest(&hub),
-            tau: most * most,
-        }
+        Shortfall { hub: index, radius: tightest(&hub), tau: most * most }
     });
     let shortfall = match fillet {
         // A slack elsewhere in the hub may have left every crotch as wide as asked.
@@ -526,20 +439,13 @@ fn tau_of(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
 /// The radius in the tightest crotch of a hub.
 fn tightest(hub: &Hub) -> f64 {
     if hub.sharp {
-        return if hub.neighbours().is_empty() {
-            f64::INFINITY
-        } else {
-            0.0
-        };
+        return if hub.neighbours().is_empty() { f64::INFINITY } else { 0.0 };
     }
     let of = |(i, j): (usize, usize)| {
         let tau = hub.stubs[i].share * hub.stubs[j].share;
         hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1)
     };
-    hub.neighbours()
-        .into_iter()
-        .map(of)
-        .fold(f64::INFINITY, f64::min)
+    hub.neighbours().into_iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

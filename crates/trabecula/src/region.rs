@@ -90,9 +90,7 @@ pub(crate) mod tests {
 
     /// A number in [-1, 1) from a linear congruential generator.
     pub fn random(seed: &mut u64) -> f64 {
-        *seed = seed
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
@@ -108,21 +106,12 @@ pub(crate) mod tests {
         for _ in 0..4000 {
             let (p, q) = (point(&mut seed, reach), point(&mut seed, reach));
             let (vp, vq) = (s.value(p), s.value(q));
-            assert!(
-                (vp - vq).abs() <= norm(sub(p, q)) * (1.0 + 1e-12) + 1e-12,
-                "{name}: Lipschitz"
-            );
-            assert!(
-                vp > 0.0 || s.bounds().distance(p) == 0.0,
-                "{name}: solid outside its bounds at {p:?}"
-            );
+            assert!((vp - vq).abs() <= norm(sub(p, q)) * (1.0 + 1e-12) + 1e-12, "{name}: Lipschitz");
+            assert!(vp > 0.0 || s.bounds().distance(p) == 0.0, "{name}: solid outside its bounds at {p:?}");
             let (mut v, mut g) = ([0.0], [[0.0; 3]]);
             s.gradients(&[p], &mut v, &mut g);
             assert_eq!(v[0], vp);
-            assert!(
-                (norm(g[0]) - 1.0).abs() < 1e-9 || exact == 0.0,
-                "{name}: |gradient| {g:?} at {p:?}"
-            );
+            assert!((norm(g[0]) - 1.0).abs() < 1e-9 || exact == 0.0, "{name}: |gradient| {g:?} at {p:?}");
             // Central differences agree away from creases, which are rare.
             let h = 1e-5;
             let diff = [0, 1, 2].map(|a| {
@@ -132,40 +121,21 @@ pub(crate) mod tests {
             });
             smooth += usize::from(norm(sub(diff, g[0])) < 1e-3);
 
-            let half = scale(
-                [random(&mut seed), random(&mut seed), random(&mut seed)].map(f64::abs),
-                0.4,
-            );
-            let b = Aabb {
-                min: sub(p, half),
-                max: add(p, half),
-            };
+            let half = scale([random(&mut seed), random(&mut seed), random(&mut seed)].map(f64::abs), 0.4);
+            let b = Aabb { min: sub(p, half), max: add(p, half) };
             let range = s.bound(&b);
             for _ in 0..8 {
                 let w = add(p, [0, 1, 2].map(|a| random(&mut seed) * half[a]));
                 let v = s.value(w);
-                assert!(
-                    range.lo <= v && v <= range.hi,
-                    "{name}: {v} outside {range:?}"
-                );
+                assert!(range.lo <= v && v <= range.hi, "{name}: {v} outside {range:?}");
             }
-            assert!(
-                range.hi - range.lo <= 2.0 * norm(b.size()) * (1.0 + 1e-9),
-                "{name}: loose bound"
-            );
+            assert!(range.hi - range.lo <= 2.0 * norm(b.size()) * (1.0 + 1e-9), "{name}: loose bound");
         }
-        assert!(
-            smooth > 3900,
-            "{name}: the gradient agrees with differences at {smooth} of 4000 points"
-        );
+        assert!(smooth > 3900, "{name}: the gradient agrees with differences at {smooth} of 4000 points");
 
         for level in [0.0, 0.17, -0.23] {
-            let axis: Vec<f64> = (0..23)
-                .map(|i| -reach + 2.0 * reach * f64::from(i) / 22.0)
-                .collect();
-            let block = Block {
-                axes: [&axis, &axis[2..20], &axis[..17]],
-            };
+            let axis: Vec<f64> = (0..23).map(|i| -reach + 2.0 * reach * f64::from(i) / 22.0).collect();
+            let block = Block { axes: [&axis, &axis[2..20], &axis[..17]] };
             let mut out = vec![f32::NAN; block.len()];
             s.fill_level(&block, level, &mut out);
             let cell = 3f64.sqrt() * 2.0 * reach / 22.0;
@@ -175,12 +145,8 @@ pub(crate) mod tests {
                     for x in block.axes[0] {
                         let (v, o) = (s.value([*x, *y, *z]) - level, f64::from(out[i]));
                         let near = (v - o).abs() < 1e-6 * (1.0 + v.abs());
-                        let far =
-                            v.abs() > cell && o.abs() >= cell * 0.999 && o.abs() <= v.abs() + 1e-6;
-                        assert!(
-                            near || (far && (v < 0.0) == (o < 0.0)),
-                            "{name}: filled {o} for {v}"
-                        );
+                        let far = v.abs() > cell && o.abs() >= cell * 0.999 && o.abs() <= v.abs() + 1e-6;
+                        assert!(near || (far && (v < 0.0) == (o < 0.0)), "{name}: filled {o} for {v}");
                         i += 1;
                     }
                 }
@@ -200,10 +166,7 @@ pub(crate) mod tests {
             let sampled = x * y * z * inside as f64 / n as f64;
             // Five standard deviations of a binomial at its widest.
             let tolerance = 5.0 * x * y * z * 0.5 / f64::from(n).sqrt();
-            assert!(
-                (sampled - volume).abs() < tolerance,
-                "{name}: volume {volume}, sampled {sampled}"
-            );
+            assert!((sampled - volume).abs() < tolerance, "{name}: volume {volume}, sampled {sampled}");
         }
     }
 }

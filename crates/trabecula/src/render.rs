@@ -51,22 +51,14 @@ struct Camera {
 impl Camera {
     /// A camera with a narrow lens, such that the points fill the picture but for a margin.
     fn new(bounds: &Aabb, points: &[Vec3], view: &View, size: [usize; 2]) -> Camera {
-        let (az, el) = (
-            view.azimuth.to_radians(),
-            view.elevation.clamp(-90.0, 90.0).to_radians(),
-        );
+        let (az, el) = (view.azimuth.to_radians(), view.elevation.clamp(-90.0, 90.0).to_radians());
         let out = [az.cos() * el.cos(), az.sin() * el.cos(), el.sin()];
         let right = [-az.sin(), az.cos(), 0.0];
         let axes = [right, cross(out, right), out];
         let radius = (norm(bounds.size()) / 2.0).max(1e-9);
         let distance = radius * 6.0;
-        let mut camera = Camera {
-            center: bounds.center(),
-            axes,
-            distance,
-            focal: 1.0,
-            middle: size.map(|n| n as f64 / 2.0),
-        };
+        let mut camera =
+            Camera { center: bounds.center(), axes, distance, focal: 1.0, middle: size.map(|n| n as f64 / 2.0) };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in points {
             let [x, y, _] = camera.project(*p);
@@ -88,11 +80,7 @@ impl Camera {
         let d = sub(p, self.center);
         let near = 1.0 / (self.distance - dot(d, self.axes[2]));
         let k = self.focal * near;
-        [
-            self.middle[0] + k * dot(d, self.axes[0]),
-            self.middle[1] - k * dot(d, self.axes[1]),
-            near,
-        ]
+        [self.middle[0] + k * dot(d, self.axes[0]), self.middle[1] - k * dot(d, self.axes[1]), near]
     }
 
     /// The point of the scene behind a sample.
@@ -102,13 +90,7 @@ impl Camera {
         let up = (self.middle[1] - y) * k;
         let out = self.distance - 1.0 / near;
         let axes = self.axes;
-        add(
-            self.center,
-            add(
-                scale(axes[0], right),
-                add(scale(axes[1], up), scale(axes[2], out)),
-            ),
-        )
+        add(self.center, add(scale(axes[0], right), add(scale(axes[1], up), scale(axes[2], out))))
     }
 
     /// The direction from a point to the eye.
@@ -128,10 +110,7 @@ pub fn render(surface: &Surface, view: &View, tint: Option<&Tint>) -> Vec<u8> {
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
         return Vec::new();
     }
-    let over = (1..=OVER)
-        .rev()
-        .find(|k| pixels * k * k <= SAMPLES)
-        .unwrap_or(1);
+    let over = (1..=OVER).rev().find(|k| pixels * k * k <= SAMPLES).unwrap_or(1);
     let size = [w * over, h * over];
     let bounds = surface.mesh.bounds();
     let drawn = !bounds.is_empty() && bounds.is_finite();
@@ -176,11 +155,7 @@ fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], over: usize) -> Vec<u8> {
 /// Linear light to an sRGB byte.
 fn encode(v: f32) -> u8 {
     let v = v.clamp(0.0, 1.0);
-    let s = if v <= 0.003_130_8 {
-        12.92 * v
-    } else {
-        1.055 * v.powf(1.0 / 2.4) - 0.055
-    };
+    let s = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     (s * 255.0 + 0.5) as u8
 }
 

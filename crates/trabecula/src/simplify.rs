@@ -64,11 +64,7 @@ pub struct Report {
 /// # Errors
 /// A goal that is none; a mesh that is not closed, manifold and free of self-intersection after rounding to single
 /// precision; an interruption.
-pub fn simplify(
-    surface: &Surface,
-    goal: &Goal,
-    progress: &dyn Progress,
-) -> Result<(Surface, Report), Stopped> {
+pub fn simplify(surface: &Surface, goal: &Goal, progress: &dyn Progress) -> Result<(Surface, Report), Stopped> {
     let (tolerance, target) = checked(goal).map_err(Stopped::Refused)?;
     let mesh = &surface.mesh;
     let size = |m: &Mesh| (m.triangles.len(), m.volume(), m.area());
@@ -95,14 +91,8 @@ pub fn simplify(
     }
     let ordered = in_order(surface);
     let exact = &ordered.mesh.vertices;
-    let places: Vec<Vec3> = exact
-        .iter()
-        .map(|p| p.map(|x| f64::from(x as f32) + 0.0))
-        .collect();
-    let rounded = Mesh {
-        vertices: places,
-        triangles: ordered.mesh.triangles.clone(),
-    };
+    let places: Vec<Vec3> = exact.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
+    let rounded = Mesh { vertices: places, triangles: ordered.mesh.triangles.clone() };
     let links = sound(&rounded).map_err(Stopped::Refused)?;
     let mut work = Work::new(links, rounded.vertices, exact, &ordered.cut, tolerance);
     // Three candidates a vertex, and six more for each one that goes.
@@ -130,27 +120,18 @@ pub fn simplify(
 /// The tolerance and the number of triangles of a goal.
 fn checked(goal: &Goal) -> Result<(f64, usize), Fault> {
     if goal.tolerance.is_none() && goal.triangles.is_none() {
-        return Err(Fault::new(
-            "",
-            "give a tolerance, a number of triangles, or both",
-        ));
+        return Err(Fault::new("", "give a tolerance, a number of triangles, or both"));
     }
     let tolerance = goal.tolerance.unwrap_or(f64::INFINITY);
     if goal.tolerance.is_some_and(|t| !(t.is_finite() && t > 0.0)) {
         return Err(Fault::new(
             "tolerance",
-            format!(
-                "is {}; it must be a finite length greater than 0, mm",
-                number(tolerance)
-            ),
+            format!("is {}; it must be a finite length greater than 0, mm", number(tolerance)),
         ));
     }
     let target = goal.triangles.unwrap_or(0);
     if goal.triangles.is_some() && target < 4 {
-        return Err(Fault::new(
-            "triangles",
-            format!("is {target}; a closed mesh has at least 4"),
-        ));
+        return Err(Fault::new("triangles", format!("is {target}; a closed mesh has at least 4")));
     }
     Ok((tolerance, target))
 }
@@ -172,16 +153,11 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     for &v in mesh.triangles.iter().flatten() {
         used[v as usize] = true;
     }
-    let places: HashSet<[u64; 3]> = (0..used.len())
-        .filter(|v| used[*v])
-        .map(|v| mesh.vertices[v].map(f64::to_bits))
-        .collect();
+    let places: HashSet<[u64; 3]> =
+        (0..used.len()).filter(|v| used[*v]).map(|v| mesh.vertices[v].map(f64::to_bits)).collect();
     let n = used.iter().filter(|u| **u).count();
     if places.len() < n {
-        return refuse(format!(
-            "{} that another vertex has too",
-            counted(n - places.len(), "place")
-        ));
+        return refuse(format!("{} that another vertex has too", counted(n - places.len(), "place")));
     }
     let links = Links::new(mesh.triangles.clone(), mesh.vertices.len());
     let pinched = measure::non_manifold_vertices(mesh);
@@ -200,9 +176,7 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     let flat = measure::defects(mesh).degenerate_triangles;
     if crossings > 0 || flat > 0 {
         let or_more = if crossings == SHOWN { " or more" } else { "" };
-        return refuse(format!(
-            "{crossings}{or_more} pairs of triangles that meet and {flat} triangles without area"
-        ));
+        return refuse(format!("{crossings}{or_more} pairs of triangles that meet and {flat} triangles without area"));
     }
     Ok(links)
 }
@@ -213,11 +187,7 @@ fn in_order(surface: &Surface) -> Surface {
     let mesh = &surface.mesh;
     let b = mesh.bounds();
     let longest = b.size().iter().fold(0.0f64, |m, s| m.max(*s));
-    let scale = if longest > 0.0 {
-        2_097_151.0 / longest
-    } else {
-        0.0
-    };
+    let scale = if longest > 0.0 { 2_097_151.0 / longest } else { 0.0 };
     let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len())
         .map(|t| {
             let [p, q, r] = mesh.corners(t);

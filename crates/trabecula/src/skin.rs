@@ -68,10 +68,7 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<Bo
         let message = "all of the region's surface is open, so there is no skin; leave a face closed, or the skin out";
         return Err(Fault::new("open", message));
     }
-    Ok(Body {
-        faces: kept,
-        tree: hollow.complement(),
-    })
+    Ok(Body { faces: kept, tree: hollow.complement() })
 }
 
 /// Whether a face of the region shrunk by `depth` is the plane of `cut` shrunk by as much.
@@ -107,11 +104,7 @@ fn thickened(face: Face, thickness: &Grade, least: f64, bounds: &Aabb) -> Face {
     Face {
         slope: face.slope + steepness(thickness, bounds),
         plane: None,
-        field: Arc::new(Thickened {
-            face: face.field,
-            thickness: thickness.clone(),
-            least,
-        }),
+        field: Arc::new(Thickened { face: face.field, thickness: thickness.clone(), least }),
         ..face
     }
 }
@@ -120,9 +113,7 @@ fn thickened(face: Face, thickness: &Grade, least: f64, bounds: &Aabb) -> Face {
 fn steepness(thickness: &Grade, b: &Aabb) -> f64 {
     const N: usize = 5;
     let at = |i: usize, a: usize| b.min[a] + b.size()[a] * (i as f64 + 0.5) / N as f64;
-    let points: Vec<Vec3> = (0..N * N * N)
-        .map(|i| [at(i % N, 0), at(i / N % N, 1), at(i / (N * N), 2)])
-        .collect();
+    let points: Vec<Vec3> = (0..N * N * N).map(|i| [at(i % N, 0), at(i / N % N, 1), at(i / (N * N), 2)]).collect();
     let mut values = vec![0.0; points.len()];
     let mut gradients = vec![[0.0; 3]; points.len()];
     thickness.gradients(&points, &mut values, &mut gradients);
@@ -141,9 +132,7 @@ impl Field for Thickened {
         self.face.values(points, out);
         let mut w = vec![0.0; points.len()];
         self.thickness.values(points, &mut w);
-        out.iter_mut()
-            .zip(w)
-            .for_each(|(v, w)| *v -= w - self.least);
+        out.iter_mut().zip(w).for_each(|(v, w)| *v -= w - self.least);
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
@@ -161,10 +150,6 @@ impl Field for Thickened {
         let r = self.face.bound(b) - more;
         // The sums above are rounded at each point in another order.
         let slack = 1e-14 * (r.lo.abs() + r.hi.abs());
-        if slack.is_finite() {
-            Interval::new(r.lo - slack, r.hi + slack)
-        } else {
-            r
-        }
+        if slack.is_finite() { Interval::new(r.lo - slack, r.hi + slack) } else { r }
     }
 }

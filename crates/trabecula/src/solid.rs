@@ -29,14 +29,7 @@ pub struct Solid {
 impl Solid {
     /// A region and the lattice in it.
     pub fn new(region: Region, field: Option<Arc<dyn Field>>, wavelength: f64) -> Solid {
-        Solid {
-            region,
-            field,
-            filled: Vec::new(),
-            wavelength,
-            tiling: None,
-            transition: None,
-        }
+        Solid { region, field, filled: Vec::new(), wavelength, tiling: None, transition: None }
     }
 
     /// The lattice whose surface is made without a grid: the region being its mesh, and nothing else in it.

@@ -32,34 +32,23 @@ impl Operation {
     /// R u + t / 24.
     pub fn apply(&self, u: Vec3) -> Vec3 {
         let part = |i: usize| f64::from(self.translation[i]) / f64::from(WHOLE);
-        let turned = |i: usize| {
-            (0..3)
-                .map(|k| f64::from(self.rotation[i][k]) * u[k])
-                .sum::<f64>()
-        };
+        let turned = |i: usize| (0..3).map(|k| f64::from(self.rotation[i][k]) * u[k]).sum::<f64>();
         [0, 1, 2].map(|i| turned(i) + part(i))
     }
 
     /// This operation after another.
     fn after(&self, first: &Operation) -> Operation {
         let (r, s) = (&self.rotation, &first.rotation);
-        let rotation =
-            [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * s[k][j]).sum()));
+        let rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * s[k][j]).sum()));
         let moved = times(r, first.translation);
-        Operation {
-            rotation,
-            translation: [0, 1, 2].map(|i| (moved[i] + self.translation[i]).rem_euclid(WHOLE)),
-        }
+        Operation { rotation, translation: [0, 1, 2].map(|i| (moved[i] + self.translation[i]).rem_euclid(WHOLE)) }
     }
 
     /// The operation seen from an origin moved by −`shift`.
     fn about(&self, shift: [i32; 3]) -> Operation {
         let turned = times(&self.rotation, shift);
         let moved = |i: usize| self.translation[i] + shift[i] - turned[i];
-        Operation {
-            translation: [0, 1, 2].map(|i| moved(i).rem_euclid(WHOLE)),
-            ..*self
-        }
+        Operation { translation: [0, 1, 2].map(|i| moved(i).rem_euclid(WHOLE)), ..*self }
     }
 }
 
@@ -116,15 +105,10 @@ impl Group {
             Some((symbol, setting)) => (symbol, Some(setting.trim())),
             None => (text, None),
         };
-        let bare: String = symbol
-            .chars()
-            .filter(|c| !c.is_whitespace() && *c != '_')
-            .collect();
+        let bare: String = symbol.chars().filter(|c| !c.is_whitespace() && *c != '_').collect();
         let known: Vec<Row> = rows()
             .filter(|r| {
-                bare.parse() == Ok(r.number)
-                    || bare.eq_ignore_ascii_case(r.short)
-                    || bare.eq_ignore_ascii_case(r.full)
+                bare.parse() == Ok(r.number) || bare.eq_ignore_ascii_case(r.short) || bare.eq_ignore_ascii_case(r.full)
             })
             .collect();
         if known.is_empty() {
@@ -151,11 +135,7 @@ impl Group {
             "" => row.short.to_string(),
             setting => format!("{}:{setting}", row.short),
         };
-        Ok(Group {
-            number: Some(row.number),
-            name,
-            operations: operations(row.hall)?,
-        })
+        Ok(Group { number: Some(row.number), name, operations: operations(row.hall)? })
     }
 
     /// The group of a Hall symbol.
@@ -163,11 +143,7 @@ impl Group {
         let words: Vec<&str> = symbol.split_whitespace().collect();
         let symbol = words.join(" ");
         let row = rows().find(|r| r.hall == symbol);
-        Ok(Group {
-            number: row.map(|r| r.number),
-            operations: operations(&symbol)?,
-            name: symbol,
-        })
+        Ok(Group { number: row.map(|r| r.number), operations: operations(&symbol)?, name: symbol })
     }
 
     /// The symbols of all settings, for listings: number, Hermann–Mauguin symbol with setting, Hall symbol.
@@ -180,8 +156,7 @@ impl Group {
 }
 
 fn operations(hall: &str) -> Result<Vec<Operation>, Fault> {
-    hall::operations(hall)
-        .map_err(|why| Fault::new("", format!("\"{hall}\" is no Hall symbol: {why}")))
+    hall::operations(hall).map_err(|why| Fault::new("", format!("\"{hall}\" is no Hall symbol: {why}")))
 }
 
 /// A symbol that is none of Hermann and Mauguin's: perhaps Hall's.
@@ -219,21 +194,12 @@ mod tests {
             assert_eq!(all.len(), ops.len(), "{}", row.hall);
             // Closed: every product is there; so is every inverse, in a finite set.
             for a in ops.iter().step_by(5) {
-                assert!(
-                    ops.iter().all(|b| all.contains(&a.after(b))),
-                    "{}",
-                    row.hall
-                );
+                assert!(ops.iter().all(|b| all.contains(&a.after(b))), "{}", row.hall);
             }
             // Rhombohedral and hexagonal cells differ in size, but not in rotations.
             let rotations: HashSet<Rotation> = ops.iter().map(|o| o.rotation).collect();
             let known = &mut primitive[usize::from(row.number)];
-            assert_eq!(
-                *known.get_or_insert(rotations.len()),
-                rotations.len(),
-                "{}",
-                row.hall
-            );
+            assert_eq!(*known.get_or_insert(rotations.len()), rotations.len(), "{}", row.hall);
         }
         assert!(primitive[1..].iter().all(Option::is_some));
     }
@@ -241,10 +207,7 @@ mod tests {
     #[test]
     fn orders_are_those_of_the_tables() {
         // International Tables A: order of the point group times centring points.
-        let groups = [
-            "215", "216", "217", "221", "224", "225", "227", "229", "230", "1", "2", "146",
-            "146:R", "194",
-        ];
+        let groups = ["215", "216", "217", "221", "224", "225", "227", "229", "230", "1", "2", "146", "146:R", "194"];
         let orders = [24, 96, 48, 48, 48, 192, 192, 96, 96, 1, 2, 9, 3, 24];
         assert_eq!(groups.map(order), orders);
     }
@@ -258,22 +221,12 @@ mod tests {
             };
             all(a) == all(b)
         };
-        for name in [
-            "227:2",
-            "Fd-3m",
-            "F d -3 m : 2",
-            "F4_1/d-32/m:2",
-            "-F 4vw 2vw 3",
-            "hall: -F 4vw 2vw 3",
-        ] {
+        for name in ["227:2", "Fd-3m", "F d -3 m : 2", "F4_1/d-32/m:2", "-F 4vw 2vw 3", "hall: -F 4vw 2vw 3"] {
             assert!(same("227", name), "{name}");
         }
         assert!(!same("227:1", "227:2"));
         assert!(same("P 1 21/c 1", "14"));
-        assert!(
-            !same("P 2", "hall: P 2"),
-            "the one about b, the other about c"
-        );
+        assert!(!same("P 2", "hall: P 2"), "the one about b, the other about c");
         assert!(same("3:c", "hall: P 2"));
         let wrong = |n| Group::named(n).expect_err("no group").message;
         assert!(wrong("231").contains("1 to 230"));

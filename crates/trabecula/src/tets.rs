@@ -13,14 +13,8 @@ pub use check::Checked;
 pub use quality::{Quality, SLIVER, Spread};
 
 /// A cube as six tetrahedra around a diagonal; bit a of a corner's number says on which side it is along axis a.
-pub(crate) const CUBE: [[usize; 4]; 6] = [
-    [0, 1, 3, 7],
-    [0, 3, 2, 7],
-    [0, 2, 6, 7],
-    [0, 6, 4, 7],
-    [0, 4, 5, 7],
-    [0, 5, 1, 7],
-];
+pub(crate) const CUBE: [[usize; 4]; 6] =
+    [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
 /// A tetrahedral mesh of a domain.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,11 +55,8 @@ impl TetMesh {
     pub fn boundary_faces(&self) -> Vec<[u32; 3]> {
         let mut faces = self.faces();
         faces.sort_unstable();
-        let mut single: Vec<u32> = faces
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter(|same| same.len() == 1)
-            .map(|same| same[0].1)
-            .collect();
+        let mut single: Vec<u32> =
+            faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect();
         single.sort_unstable();
         single.into_iter().map(|f| self.face(f)).collect()
     }
@@ -82,14 +73,8 @@ impl TetMesh {
                 vertices.push(*p);
             }
         }
-        triangles
-            .iter_mut()
-            .flatten()
-            .for_each(|n| *n = to[*n as usize]);
-        Mesh {
-            vertices,
-            triangles,
-        }
+        triangles.iter_mut().flatten().for_each(|n| *n = to[*n as usize]);
+        Mesh { vertices, triangles }
     }
 
     /// Every face of every tetrahedron: its nodes in ascending order, and four times the tetrahedron plus its place.
@@ -146,10 +131,7 @@ impl TetMesh {
             }
         }
         self.nodes = kept;
-        self.tets
-            .iter_mut()
-            .flatten()
-            .for_each(|n| *n = to[*n as usize]);
+        self.tets.iter_mut().flatten().for_each(|n| *n = to[*n as usize]);
         self
     }
 }

@@ -74,11 +74,7 @@ const MOST: usize = 256;
 impl Tiling {
     /// A single cell over a mesh.
     pub fn new(map: Arc<Tets>, stencil: Arc<Stencil>, part: Part, level: Level) -> Tiling {
-        let cell = Share {
-            stencil,
-            scale: 1.0,
-            weights: None,
-        };
+        let cell = Share { stencil, scale: 1.0, weights: None };
         Tiling::of(map, vec![cell], part, level)
     }
 
@@ -87,9 +83,7 @@ impl Tiling {
         // |∇f| ≤ Σ amplitude 2π|h| in phase, times the stretch of the map.
         let steep = cells.iter().map(|c| {
             let waves = c.stencil.series().terms().iter();
-            let sum: f64 = waves
-                .map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from)))
-                .sum();
+            let sum: f64 = waves.map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from))).sum();
             core::f64::consts::TAU * sum / c.scale
         });
         let steep = steep.fold(0.0, f64::max);
@@ -102,9 +96,8 @@ impl Tiling {
         let of = |t: usize| {
             let slopes = map.slopes(t);
             // du/dx = Σ (p_i − p_4) ∇λ_iᵀ.
-            let j = core::array::from_fn(|a| {
-                core::array::from_fn(|b| (0..3).map(|i| along[i][a] * slopes[i][b]).sum())
-            });
+            let j =
+                core::array::from_fn(|a| core::array::from_fn(|b| (0..3).map(|i| along[i][a] * slopes[i][b]).sum()));
             // ∇(Σ w f) = Σ w ∇f + f ∇w.
             let turn = |c: &Share| {
                 let w = c.weights.as_ref()?;
@@ -114,14 +107,7 @@ impl Tiling {
             steep * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let steep: Vec<f64> = (0..map.len()).map(of).collect();
-        Tiling {
-            map,
-            cells,
-            part,
-            level,
-            steep: Arc::new(steep),
-            cut: Cut::new(part),
-        }
+        Tiling { map, cells, part, level, steep: Arc::new(steep), cut: Cut::new(part) }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.
@@ -221,12 +207,7 @@ impl Tiling {
             };
             let (f, slope) = mean(sum.f, sum.slope, crossed[0]);
             let (t, slope_t) = mean(sum.t, sum.slope_t, crossed[1]);
-            Known {
-                f,
-                slope,
-                t,
-                slope_t,
-            }
+            Known { f, slope, t, slope_t }
         };
         ends.iter().map(mean).collect()
     }
@@ -328,11 +309,7 @@ impl Field for Tiling {
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        let most: f64 = self
-            .cells
-            .iter()
-            .map(|c| c.stencil.series().amplitude() / c.scale)
-            .fold(0.0, f64::max);
+        let most: f64 = self.cells.iter().map(|c| c.stencil.series().amplitude() / c.scale).fold(0.0, f64::max);
         // What is linear reaches beyond the nodes' values by the overlap.
         let beyond = 8.0 * self.map.overlap();
         let spread = |i: Interval| {
@@ -349,15 +326,8 @@ impl Field for Tiling {
         if b.is_finite() && self.map.each_in(b, MOST, |t| near.push(t)) {
             near.sort_unstable();
             near.dedup();
-            let at: Vec<(usize, Bary)> = near
-                .iter()
-                .map(|t| (*t, self.map.bary(*t, middle)))
-                .collect();
-            let here = if weighted {
-                Vec::new()
-            } else {
-                self.pieces(&at)
-            };
+            let at: Vec<(usize, Bary)> = near.iter().map(|t| (*t, self.map.bary(*t, middle))).collect();
+            let here = if weighted { Vec::new() } else { self.pieces(&at) };
             for (i, n) in near.iter().enumerate() {
                 f = f.union(match here.get(i) {
                     None => all,
@@ -368,9 +338,7 @@ impl Field for Tiling {
                 });
                 if let Level::Nodes(of) = &self.level {
                     let v = self.map.tet(*n).map(|n| of[n as usize]);
-                    let (lo, hi) = v
-                        .iter()
-                        .fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
+                    let (lo, hi) = v.iter().fold((v[0], v[0]), |(l, h), x| (l.min(*x), h.max(*x)));
                     t = t.union(spread(Interval::new(lo, hi)));
                 }
             }
@@ -386,10 +354,7 @@ impl Field for Tiling {
     }
 
     fn parts(&self) -> Vec<Arc<dyn Field>> {
-        self.cut.sides(|cut| Tiling {
-            cut,
-            ..self.clone()
-        })
+        self.cut.sides(|cut| Tiling { cut, ..self.clone() })
     }
 
     fn slope(&self) -> f64 {

@@ -81,11 +81,7 @@ impl Row {
         let tables = |n: usize| (0..n).map(|_| levels.table()).collect::<Vec<_>>();
         Row {
             along,
-            beside: Beside {
-                first,
-                across: None,
-                sides: [0, 1].map(|_| (None, tables(columns))),
-            },
+            beside: Beside { first, across: None, sides: [0, 1].map(|_| (None, tables(columns))) },
             ends: vec![[f32::NAN; 2]; ends],
             curves: tables(curves),
         }
@@ -113,13 +109,7 @@ impl Row {
 
 impl Beside {
     /// Adds a node's numbers at a neighbourhood along x, between those along y and z.
-    fn between(
-        &mut self,
-        levels: &Levels,
-        strands: &[Strand],
-        (column, node): (usize, usize),
-        out: &mut [f32],
-    ) {
+    fn between(&mut self, levels: &Levels, strands: &[Strand], (column, node): (usize, usize), out: &mut [f32]) {
         let [nx, ny, _] = levels.joint.shape;
         let Some(across) = self.across else { return };
         let [y, z] = across.map(|(n, t)| [(n, 1.0 - t), (n + 1, t)]);
@@ -192,26 +182,18 @@ impl Levels {
         let (columns, share) = row.along[i];
         let near = [1.0 - share, share];
         // What counts nothing need not be known; else the same sum to the last bit.
-        let each = nodes
-            .iter()
-            .zip(times)
-            .filter(|n| *n.1 != 0.0)
-            .map(|(node, times)| {
-                let node = node.to_bits() as usize;
-                let [a, b] = [0, 1].map(|c| {
-                    let known = &mut row.ends[columns[c] * self.grid.len() + node];
-                    if near[c] > 0.0 && known[end].is_nan() {
-                        *known = [0.0; 2];
-                        row.beside.between(self, strands, (columns[c], node), known);
-                    }
-                    if near[c] > 0.0 {
-                        f64::from(known[end])
-                    } else {
-                        0.0
-                    }
-                });
-                times * (near[0] * a + near[1] * b)
+        let each = nodes.iter().zip(times).filter(|n| *n.1 != 0.0).map(|(node, times)| {
+            let node = node.to_bits() as usize;
+            let [a, b] = [0, 1].map(|c| {
+                let known = &mut row.ends[columns[c] * self.grid.len() + node];
+                if near[c] > 0.0 && known[end].is_nan() {
+                    *known = [0.0; 2];
+                    row.beside.between(self, strands, (columns[c], node), known);
+                }
+                if near[c] > 0.0 { f64::from(known[end]) } else { 0.0 }
             });
+            times * (near[0] * a + near[1] * b)
+        });
         each.sum()
     }
 
@@ -271,20 +253,12 @@ impl Levels {
         };
         terms.clear();
         let nodes = place.nodes.iter().zip(&place.shares);
-        terms.extend(nodes.map(|(node, times)| Term {
-            node: *node,
-            times: *times,
-            q: own,
-        }));
+        terms.extend(nodes.map(|(node, times)| Term { node: *node, times: *times, q: own }));
         let mut more = 0.0;
         if !self.is_uniform() {
             for (i, s) in strands.iter().enumerate().filter(|(i, _)| w[*i] > 0.0) {
                 if end == HIGH || s.is_sheet() {
-                    terms.push(Term {
-                        node: self.alone[i],
-                        times: -w[i],
-                        q: q[i][end],
-                    });
+                    terms.push(Term { node: self.alone[i], times: -w[i], q: q[i][end] });
                 } else {
                     more -= w[i] * s.low(0.0);
                 }

@@ -53,20 +53,13 @@ impl Constituent {
     pub fn longest(&self) -> f64 {
         match self {
             Constituent::Lattice(l) => l.map.longest(),
-            Constituent::Field { wavelength, .. } | Constituent::Wall { wavelength, .. } => {
-                *wavelength
-            }
+            Constituent::Field { wavelength, .. } | Constituent::Wall { wavelength, .. } => *wavelength,
         }
     }
 }
 
 /// Fills what two fields make together.
-pub(super) fn values_of(
-    sides: &[Arc<dyn Field>; 2],
-    points: &[Vec3],
-    out: &mut [f64],
-    made: impl Fn([f64; 2]) -> f64,
-) {
+pub(super) fn values_of(sides: &[Arc<dyn Field>; 2], points: &[Vec3], out: &mut [f64], made: impl Fn([f64; 2]) -> f64) {
     let mut other = vec![0.0; points.len()];
     sides[0].values(points, out);
     sides[1].values(points, &mut other);

@@ -26,9 +26,7 @@ impl Cubes {
         let mut bound = vec![Interval::new(0.0, 0.0); blend.strands.len()];
         let mut here = |b: &Aabb| {
             blend.weights.bound(b, &mut bound);
-            (0..bound.len())
-                .filter(|i| bound[*i].hi > 0.0)
-                .fold(0, |m, i| m | 1u64 << i)
+            (0..bound.len()).filter(|i| bound[*i].hi > 0.0).fold(0, |m, i| m | 1u64 << i)
         };
         let shape = block.shape().map(|n| n.div_ceil(CUBE));
         let all = here(&block.bounds());
@@ -37,21 +35,14 @@ impl Cubes {
             return Cubes { shape, here };
         }
         let each = (0..shape.iter().product()).map(|n: usize| {
-            let at = [
-                n % shape[0],
-                n / shape[0] % shape[1],
-                n / shape[0] / shape[1],
-            ];
+            let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
             let nodes: [&[f64]; 3] = core::array::from_fn(|a| {
                 let axis = block.axes[a];
                 &axis[at[a] * CUBE..((at[a] + 1) * CUBE).min(axis.len())]
             });
             here(&Block { axes: nodes }.bounds())
         });
-        Cubes {
-            here: each.collect(),
-            shape,
-        }
+        Cubes { here: each.collect(), shape }
     }
 
     /// The cubes of a row of nodes.
@@ -66,12 +57,8 @@ impl Blend {
         let cubes = Cubes::new(self, block);
         let all = cubes.here.iter().fold(0, |m, c| m | c);
         let [xs, ys, zs] = block.axes;
-        let mut rows: Vec<_> = self
-            .strands
-            .iter()
-            .enumerate()
-            .map(|(i, s)| (all >> i & 1 == 1).then(|| s.rows(block, wanted)))
-            .collect();
+        let mut rows: Vec<_> =
+            self.strands.iter().enumerate().map(|(i, s)| (all >> i & 1 == 1).then(|| s.rows(block, wanted))).collect();
         let mut cores = vec![vec![0f32; xs.len()]; self.strands.len()];
         let mut nodes = Vec::new();
         let mut alone = Alone::default();
@@ -93,13 +80,7 @@ impl Blend {
                         rows.fill(j, k, word, &mut cores[i]);
                     }
                 }
-                let line = Line {
-                    rows: &rows,
-                    cores: &cores,
-                    number: [j, k],
-                    at: [ys[j], zs[k]],
-                    xs,
-                };
+                let line = Line { rows: &rows, cores: &cores, number: [j, k], at: [ys[j], zs[k]], xs };
                 // Runs of cubes: those with one and the same lattice, and those with several.
                 let mut from = 0;
                 for run in of_row.chunk_by(|a, b| a == b || (several(*a) && several(*b))) {

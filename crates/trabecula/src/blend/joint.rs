@@ -63,10 +63,7 @@ pub(super) type Corners = [(usize, f64, Vec3); 8];
 impl Joint {
     pub fn new(of: &[Constituent], bounds: &Aabb) -> Joint {
         let longest = of.iter().map(Constituent::longest).fold(0.0, f64::max);
-        let maps: Option<Vec<Mat3>> = of
-            .iter()
-            .map(|s| Some(s.lattice()?.map.affine()?.matrix))
-            .collect();
+        let maps: Option<Vec<Mat3>> = of.iter().map(|s| Some(s.lattice()?.map.affine()?.matrix)).collect();
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
         let (phases, common) = match (found, &maps) {
             (Some(back), _) => (Phases::Locked, Some(back)),
@@ -82,20 +79,13 @@ impl Joint {
         let size = bounds.size();
         let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
-        let slow = (maps.as_ref())
-            .is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= GONE));
+        let slow = (maps.as_ref()).is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= GONE));
         let mut step = if slow { longest } else { 0.5 * longest };
         while fine(step).iter().product::<f64>() > MOST {
             step *= 1.1;
         }
-        let shape = if common.is_some() {
-            [1; 3]
-        } else {
-            fine(step).map(|n| n as usize)
-        };
-        let origin = core::array::from_fn(|a| {
-            0.5 * (bounds.min[a] + bounds.max[a] - step * (shape[a] - 1) as f64)
-        });
+        let shape = if common.is_some() { [1; 3] } else { fine(step).map(|n| n as usize) };
+        let origin = core::array::from_fn(|a| 0.5 * (bounds.min[a] + bounds.max[a] - step * (shape[a] - 1) as f64));
         Joint {
             phases,
             common,
@@ -173,12 +163,7 @@ impl Joint {
         if self.common.is_some() {
             return Some(1);
         }
-        let ends = |a: usize| {
-            (
-                self.origin[a],
-                self.origin[a] + self.step * (self.shape[a] - 1) as f64,
-            )
-        };
+        let ends = |a: usize| (self.origin[a], self.origin[a] + self.step * (self.shape[a] - 1) as f64);
         let within = (0..3).all(|a| b.min[a] >= ends(a).0 && b.max[a] <= ends(a).1);
         let along = |a: usize| self.along(a, b.max[a]).0 - self.along(a, b.min[a]).0 + 2;
         within.then(|| (0..3).map(along).product())
@@ -225,12 +210,7 @@ impl Joint {
 
 /// The k-th place of an even sequence in the unit cube: multiples of the powers of the root of x⁴ = x + 1.
 fn even(k: usize) -> Vec3 {
-    [
-        0.819_172_513_396_164_4,
-        0.671_043_606_703_789_2,
-        0.549_700_477_901_970_3,
-    ]
-    .map(|a| (0.5 + a * k as f64).fract())
+    [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3].map(|a| (0.5 + a * k as f64).fract())
 }
 
 /// Places of neighbourhoods, one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³.
@@ -238,17 +218,12 @@ fn windows() -> &'static [Vec3] {
     static TABLE: OnceLock<Vec<Vec3>> = OnceLock::new();
     TABLE.get_or_init(|| {
         const N: usize = 512;
-        let below =
-            |s: f64| 0.5 * (1.0 + s + (std::f64::consts::PI * s).sin() / std::f64::consts::PI);
+        let below = |s: f64| 0.5 * (1.0 + s + (std::f64::consts::PI * s).sin() / std::f64::consts::PI);
         let inverse = |share: f64| {
             let (mut lo, mut hi) = (-1.0, 1.0);
             for _ in 0..60 {
                 let mid = 0.5 * (lo + hi);
-                if below(mid) < share {
-                    lo = mid
-                } else {
-                    hi = mid
-                }
+                if below(mid) < share { lo = mid } else { hi = mid }
             }
             0.5 * (lo + hi)
         };
@@ -258,9 +233,7 @@ fn windows() -> &'static [Vec3] {
             let j = (x as usize).min(N - 1);
             table[j] + (table[j + 1] - table[j]) * (x - j as f64)
         };
-        (0..APART.pow(3) * SLOWLY)
-            .map(|k| even(k).map(warp))
-            .collect()
+        (0..APART.pow(3) * SLOWLY).map(|k| even(k).map(warp)).collect()
     })
 }
 
@@ -269,12 +242,7 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     let back = inverse(maps.first()?);
     for size in 1..=4 {
         let cell = back.map(|r| r.map(|v| v * f64::from(size)));
-        let whole = maps.iter().all(|m| {
-            product(m, &cell)
-                .iter()
-                .flatten()
-                .all(|v| (v - v.round()).abs() < 1e-9)
-        });
+        let whole = maps.iter().all(|m| product(m, &cell).iter().flatten().all(|v| (v - v.round()).abs() < 1e-9));
         if whole {
             let long = transpose(&cell).map(norm).into_iter().fold(0.0, f64::max);
             return (long <= most * (1.0 + 1e-9)).then_some(cell);
@@ -295,22 +263,15 @@ fn beats(of: &[Constituent], maps: &[Mat3], longest: f64, meets: impl Fn(f64) ->
         }
         let mut whole: Vec<[i32; 3]> = terms.iter().map(|t| t.hkl).collect();
         whole.extend(terms.iter().map(|t| t.hkl.map(|h| -h)));
-        let pairs = whole
-            .iter()
-            .flat_map(|a| whole.iter().map(|b| [0, 1, 2].map(|i| a[i] + b[i])));
+        let pairs = whole.iter().flat_map(|a| whole.iter().map(|b| [0, 1, 2].map(|i| a[i] + b[i])));
         let mut all: Vec<[i32; 3]> = pairs.chain(whole.iter().copied()).collect();
         all.sort_unstable();
         all.dedup();
         all.retain(|h| *h != [0; 3]);
         let back = transpose(m);
-        waves.push(
-            all.into_iter()
-                .map(|h| apply(&back, h.map(f64::from)))
-                .collect(),
-        );
+        waves.push(all.into_iter().map(|h| apply(&back, h.map(f64::from))).collect());
     }
     // Each list has the opposite of every wave, so differences are all there is.
     let meet = |a: &Vec3, b: &Vec3| meets(norm(sub(*a, *b)) * longest);
-    (0..waves.len())
-        .all(|i| (0..i).all(|j| waves[i].iter().all(|a| waves[j].iter().all(|b| meet(a, b)))))
+    (0..waves.len()).all(|i| (0..i).all(|j| waves[i].iter().all(|a| waves[j].iter().all(|b| meet(a, b)))))
 }

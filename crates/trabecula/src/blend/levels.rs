@@ -31,9 +31,7 @@ pub(super) fn blended(w: &[f64], each: impl Iterator<Item = [f64; 2]>) -> [f64; 
 
 /// The least interval that contains numbers.
 fn hull(of: impl Iterator<Item = f64>) -> Interval {
-    of.fold(Interval::new(f64::INFINITY, f64::NEG_INFINITY), |r, v| {
-        Interval::new(r.lo.min(v), r.hi.max(v))
-    })
+    of.fold(Interval::new(f64::INFINITY, f64::NEG_INFINITY), |r, v| Interval::new(r.lo.min(v), r.hi.max(v)))
 }
 
 /// Most neighbourhoods that are asked for the bound of a box.
@@ -153,10 +151,7 @@ impl Levels {
     #[inline]
     pub fn numbers(&self, i: usize, strands: &[Strand], node: usize) -> &[f32] {
         let station = self.station(i, strands);
-        station
-            .near
-            .get(node)
-            .unwrap_or_else(|| self.far(i, strands, node))
+        station.near.get(node).unwrap_or_else(|| self.far(i, strands, node))
     }
 
     /// The same of a node that shares nearby do not need.
@@ -171,13 +166,7 @@ impl Levels {
     }
 
     /// The table, at some nodes and where each lattice is alone, from the values of the lattices at the same places.
-    fn look(
-        &self,
-        strands: &[Strand],
-        samples: &[Vec<f32>],
-        own: &[[f64; 2]],
-        wanted: &[usize],
-    ) -> Table {
+    fn look(&self, strands: &[Strand], samples: &[Vec<f32>], own: &[[f64; 2]], wanted: &[usize]) -> Table {
         let mut table = self.table();
         let exact: Option<Vec<[f64; 2]>> = self.uniform.as_ref().map(|uniform| {
             let each = uniform.iter().zip(own);
@@ -218,9 +207,7 @@ impl Levels {
                 let each = self.nodes[node].iter().zip(&base);
                 ends[e] - each.map(|(w, base)| w * base[e]).sum::<f64>()
             };
-            table
-                .add(node)
-                .copy_from_slice(&[more(0) as f32, more(1) as f32]);
+            table.add(node).copy_from_slice(&[more(0) as f32, more(1) as f32]);
         }
         table
     }
@@ -241,13 +228,7 @@ impl Levels {
 
     /// Intervals that contain what is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ in a box, where shares are within `w` and upper ends
     /// within `highs`: everything is between what its tables have at the neighbourhoods and nodes about.
-    pub fn bound(
-        &self,
-        strands: &[Strand],
-        b: &Aabb,
-        w: &[Interval],
-        highs: &[Interval],
-    ) -> [Interval; 2] {
+    pub fn bound(&self, strands: &[Strand], b: &Aabb, w: &[Interval], highs: &[Interval]) -> [Interval; 2] {
         let all = [Interval::new(f64::NEG_INFINITY, f64::INFINITY); 2];
         // A box of several cells has everything in it.
         if self.joint.count_in(b).is_none_or(|c| c > MANY) {
@@ -264,12 +245,10 @@ impl Levels {
         });
         let nodes = self.about(w);
         let q: Vec<[Interval; 2]> = (0..w.len())
-            .map(
-                |i| match [highs[i].lo, highs[i].hi].map(|h| strands[i].quantiles(h)) {
-                    [Some(lo), Some(hi)] => [0, 1].map(|e| hull([lo[e], hi[e]].into_iter())),
-                    _ => [0, 1].map(|e| hull(near.iter().map(|s| s.own[i][e]))),
-                },
-            )
+            .map(|i| match [highs[i].lo, highs[i].hi].map(|h| strands[i].quantiles(h)) {
+                [Some(lo), Some(hi)] => [0, 1].map(|e| hull([lo[e], hi[e]].into_iter())),
+                _ => [0, 1].map(|e| hull(near.iter().map(|s| s.own[i][e]))),
+            })
             .collect();
         for station in near {
             let known: Vec<&[f32]> = nodes.iter().filter_map(|n| station.near.get(*n)).collect();
@@ -281,9 +260,7 @@ impl Levels {
             } else {
                 self.curved_bound(strands, &station.near, &known, w, &q)
             };
-            out = Some(out.map_or(here, |o: [Interval; 2]| {
-                [o[0].union(here[0]), o[1].union(here[1])]
-            }));
+            out = Some(out.map_or(here, |o: [Interval; 2]| [o[0].union(here[0]), o[1].union(here[1])]));
         }
         out.unwrap_or(all)
     }

@@ -55,18 +55,8 @@ impl Mixed {
     }
 
     /// The same for N lattices, or for any number if N is 0.
-    fn fill_of<const N: usize>(
-        &mut self,
-        blend: &Blend,
-        nodes: &[usize],
-        line: &Line,
-        row: &mut [f32],
-    ) {
-        let Mixed {
-            shares,
-            ends,
-            row: known,
-        } = self;
+    fn fill_of<const N: usize>(&mut self, blend: &Blend, nodes: &[usize], line: &Line, row: &mut [f32]) {
+        let Mixed { shares, ends, row: known } = self;
         let n = if N > 0 { N } else { blend.strands.len() };
         let strands = &blend.strands[..n];
         shares.renew(line, nodes, |points, out| blend.shares_at(points, out));
@@ -151,14 +141,7 @@ struct Numbers {
 
 impl Numbers {
     fn new(width: usize, varies: [bool; 3], nodes: usize) -> Numbers {
-        Numbers {
-            width,
-            varies,
-            of: vec![0.0; width * nodes],
-            known: None,
-            points: Vec::new(),
-            found: Vec::new(),
-        }
+        Numbers { width, varies, of: vec![0.0; width * nodes], known: None, points: Vec::new(), found: Vec::new() }
     }
 
     #[inline]
@@ -171,10 +154,7 @@ impl Numbers {
         let [x, y, z] = self.varies;
         // All nodes at once where another row asks for the same, or one is as good as all.
         let whole = !x || !(y || z);
-        let row = [
-            usize::from(y) * line.number[0],
-            usize::from(z) * line.number[1],
-        ];
+        let row = [usize::from(y) * line.number[0], usize::from(z) * line.number[1]];
         if whole && self.known == Some(row) {
             return;
         }
@@ -182,17 +162,13 @@ impl Numbers {
         self.points.clear();
         match (x, whole) {
             (false, _) => self.points.push(line.place(0)),
-            (_, true) => self
-                .points
-                .extend((0..line.xs.len()).map(|i| line.place(i))),
+            (_, true) => self.points.extend((0..line.xs.len()).map(|i| line.place(i))),
             _ => self.points.extend(nodes.iter().map(|i| line.place(*i))),
         }
         self.found.resize(self.points.len() * self.width, 0.0);
         find(&self.points, &mut self.found);
         match (x, whole) {
-            (false, _) => {
-                (self.of.chunks_exact_mut(self.width)).for_each(|n| n.copy_from_slice(&self.found))
-            }
+            (false, _) => (self.of.chunks_exact_mut(self.width)).for_each(|n| n.copy_from_slice(&self.found)),
             (_, true) => self.of.copy_from_slice(&self.found),
             _ => {
                 for (i, found) in nodes.iter().zip(self.found.chunks_exact(self.width)) {

@@ -35,12 +35,7 @@ struct Cube<'a, const C: usize> {
 impl<'a, const C: usize> Near<'a, C> {
     /// About no point yet.
     pub fn new(levels: &'a Levels, strands: &'a [Strand]) -> Near<'a, C> {
-        let none = || Cube {
-            name: NOBODY,
-            corners: [0; C],
-            ends: Vec::new(),
-            curves: Vec::new(),
-        };
+        let none = || Cube { name: NOBODY, corners: [0; C], ends: Vec::new(), curves: Vec::new() };
         Near {
             levels,
             strands,
@@ -114,9 +109,7 @@ impl<'a, const C: usize> Near<'a, C> {
     #[inline]
     pub fn curve(&mut self, node: usize, spot: Spot) -> ([f64; C], [f64; C]) {
         let (levels, strands) = (self.levels, self.strands);
-        let Cube {
-            corners, curves, ..
-        } = &mut self.kept[self.at];
+        let Cube { corners, curves, .. } = &mut self.kept[self.at];
         let of = curves[node]
             .get_or_insert_with(|| corners.map(|i| levels.numbers(i, strands, node)))
             .map(|knots| spot.ask(knots));
@@ -149,11 +142,7 @@ impl<'a, const C: usize> Near<'a, C> {
         let along_y = [0, 1].map(|i| along_x[2 * i] + y * rise_y[i]);
         let dx = [0, 1].map(|i| between(rise_x[2 * i], rise_x[2 * i + 1], y));
         let dz = along_y[1] - along_y[0];
-        let rise = [
-            between(dx[0], dx[1], z),
-            between(rise_y[0], rise_y[1], z),
-            dz,
-        ];
+        let rise = [between(dx[0], dx[1], z), between(rise_y[0], rise_y[1], z), dz];
         let per_mm = [0, 1, 2].map(|a| rise[a] * self.slope[a]);
         (along_y[0] + z * dz, per_mm)
     }

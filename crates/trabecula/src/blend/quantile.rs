@@ -22,31 +22,20 @@ impl Counted {
     pub fn of(values: &[f32]) -> Counted {
         let (lo, hi) = range(values);
         let mut below = [0; STEPS + 1];
-        let per = if hi > lo {
-            STEPS as f32 / (hi - lo)
-        } else {
-            0.0
-        };
+        let per = if hi > lo { STEPS as f32 / (hi - lo) } else { 0.0 };
         for v in values {
             below[1 + (((v - lo) * per) as usize).min(STEPS - 1)] += 1;
         }
         for k in 0..STEPS {
             below[k + 1] += below[k];
         }
-        Counted {
-            low: f64::from(lo),
-            step: f64::from(hi - lo) / STEPS as f64,
-            below,
-        }
+        Counted { low: f64::from(lo), step: f64::from(hi - lo) / STEPS as f64, below }
     }
 
     /// The value below which a share of all lies.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share.clamp(0.0, 1.0) * f64::from(self.below[STEPS]);
-        let k = self
-            .below
-            .partition_point(|n| f64::from(*n) < wanted)
-            .clamp(1, STEPS);
+        let k = self.below.partition_point(|n| f64::from(*n) < wanted).clamp(1, STEPS);
         let [a, b] = [k - 1, k].map(|k| f64::from(self.below[k]));
         self.low + self.step * ((k - 1) as f64 + ((wanted - a) / (b - a).max(1.0)).clamp(0.0, 1.0))
     }
@@ -77,12 +66,7 @@ fn range(values: &[f32]) -> (f32, f32) {
         }
     }
     let least = lo.iter().chain(rest).fold(f32::INFINITY, |a, b| a.min(*b));
-    (
-        least,
-        hi.iter()
-            .chain(rest)
-            .fold(f32::NEG_INFINITY, |a, b| a.max(*b)),
-    )
+    (least, hi.iter().chain(rest).fold(f32::NEG_INFINITY, |a, b| a.max(*b)))
 }
 
 /// Adds w times the values.
@@ -107,20 +91,12 @@ impl Spot {
     pub fn of(q: f64) -> Spot {
         if q < 0.0 {
             let knots = [0, KNOTS];
-            return Spot {
-                knots,
-                past: q,
-                per: 1.0,
-            };
+            return Spot { knots, past: q, per: 1.0 };
         }
         let x = (q * KNOTS as f64).min(KNOTS as f64);
         // The conversion to a short number is the fastest.
         let k = (x as i32 as usize).min(KNOTS - 1);
-        Spot {
-            knots: [k, k + 1],
-            past: x - k as f64,
-            per: KNOTS as f64,
-        }
+        Spot { knots: [k, k + 1], past: x - k as f64, per: KNOTS as f64 }
     }
 
     /// Value and slope of a quantile function there, from its knots.
@@ -144,9 +120,7 @@ mod tests {
     /// Numbers whose quantiles are known: v² of even v, and one number alone.
     #[test]
     fn quantiles_are_those_of_the_numbers() {
-        let values: Vec<f32> = (0..4099)
-            .map(|i| (i as f32 / 4098.0).powi(2) - 0.25)
-            .collect();
+        let values: Vec<f32> = (0..4099).map(|i| (i as f32 / 4098.0).powi(2) - 0.25).collect();
         let counted = Counted::of(&values);
         let mut knots = [0f32; KNOTS + 1];
         counted.knots(&mut knots);
@@ -155,21 +129,10 @@ mod tests {
             let q = f64::from(i) / 100.0;
             let want = q * q - 0.25;
             // A step of the range is as wide as what its own numbers are apart at most.
-            assert!(
-                (counted.quantile(q) - want).abs() < 1.5e-3,
-                "{q}: {}",
-                counted.quantile(q)
-            );
-            assert!(
-                (quantile(&knots, q).0 - want).abs() < 2.5e-3,
-                "{q}: {}",
-                quantile(&knots, q).0
-            );
+            assert!((counted.quantile(q) - want).abs() < 1.5e-3, "{q}: {}", counted.quantile(q));
+            assert!((quantile(&knots, q).0 - want).abs() < 2.5e-3, "{q}: {}", quantile(&knots, q).0);
         }
-        assert!(
-            (counted.quantile(0.0) + 0.25).abs() < 1e-6
-                && (counted.quantile(1.0) - 0.75).abs() < 1e-6
-        );
+        assert!((counted.quantile(0.0) + 0.25).abs() < 1e-6 && (counted.quantile(1.0) - 0.75).abs() < 1e-6);
         let (below, slope) = quantile(&knots, -0.1);
         assert!((below + 0.35).abs() < 1e-6 && (slope - 1.0).abs() < 1e-6);
         let same = Counted::of(&[2.5; 7]);

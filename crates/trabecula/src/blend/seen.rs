@@ -21,12 +21,7 @@ pub(super) fn zeros(n: usize) -> (Vec<f64>, Vec<Vec3>) {
 
 impl Seen {
     /// The i-th lattice where it counts; elsewhere nothing.
-    pub fn where_counted(
-        blend: &Blend,
-        i: usize,
-        points: &[Vec3],
-        counts: impl Fn(usize) -> bool,
-    ) -> Seen {
+    pub fn where_counted(blend: &Blend, i: usize, points: &[Vec3], counts: impl Fn(usize) -> bool) -> Seen {
         let n = points.len();
         if (0..n).all(&counts) {
             return Seen::at(blend, i, points);
@@ -52,13 +47,7 @@ impl Seen {
         } else {
             strand.high_gradients(points, &mut high, &mut high_slope);
         }
-        Seen {
-            core,
-            core_slope,
-            high,
-            high_slope,
-            quantiles,
-        }
+        Seen { core, core_slope, high, high_slope, quantiles }
     }
 
     /// The same among `n` points, being looked at `here`.

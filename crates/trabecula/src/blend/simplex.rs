@@ -44,8 +44,7 @@ impl Grid {
         for a in 0..binomial.len() {
             binomial[a][0] = 1;
             for k in 1..=n.min(a) {
-                binomial[a][k] =
-                    binomial[a - 1][k - 1] + if k < a { binomial[a - 1][k] } else { 0 };
+                binomial[a][k] = binomial[a - 1][k - 1] + if k < a { binomial[a - 1][k] } else { 0 };
             }
         }
         Grid { n, steps, binomial }
@@ -76,10 +75,7 @@ impl Grid {
             }
             each(self.rank(&y), &w);
             // The next falling sequence: the last that may rise does, what follows starts again.
-            let Some(i) = (0..d)
-                .rev()
-                .find(|&i| y[i] < if i == 0 { m } else { y[i - 1] })
-            else {
+            let Some(i) = (0..d).rev().find(|&i| y[i] < if i == 0 { m } else { y[i - 1] }) else {
                 return;
             };
             y[i] += 1;
@@ -115,8 +111,7 @@ impl Grid {
             // The furthest first; of equal ones the first axis, so that the order of the y is kept.
             let share = y - low as f64;
             let before = at.order.iter().position(|o| o.0 <= share);
-            at.order
-                .insert(before.unwrap_or(at.order.len()), (share, k));
+            at.order.insert(before.unwrap_or(at.order.len()), (share, k));
         }
         at.nodes.clear();
         at.shares.clear();
@@ -166,12 +161,7 @@ mod tests {
                 let sum: f64 = w.iter().sum();
                 w.iter_mut().for_each(|w| *w /= sum);
                 grid.place(&w, &mut at);
-                let found: f64 = at
-                    .nodes
-                    .iter()
-                    .zip(&at.shares)
-                    .map(|(i, s)| table[*i] * s)
-                    .sum();
+                let found: f64 = at.nodes.iter().zip(&at.shares).map(|(i, s)| table[*i] * s).sum();
                 assert!(at.shares.iter().all(|s| *s >= -1e-12));
                 assert!((found - f(&w)).abs() < 1e-12, "{n} {w:?}");
             }

@@ -35,13 +35,7 @@ impl Strand {
     /// `bounds` is where it is.
     pub fn new(of: Constituent, unit: f64, seen: &[f64], bounds: &Aabb) -> Strand {
         let turned = matches!(&of, Constituent::Lattice(l) if l.part == Part::Upper);
-        let mut made = Strand {
-            factor: if turned { -1.0 } else { 1.0 } / unit,
-            of,
-            least: 0.0,
-            floor: 0.0,
-            fine: 0.0,
-        };
+        let mut made = Strand { factor: if turned { -1.0 } else { 1.0 } / unit, of, least: 0.0, floor: 0.0, fine: 0.0 };
         let below = |range: Interval| range.lo - BELOW * (range.hi - range.lo);
         match &made.of {
             Constituent::Lattice(l) => {
@@ -53,10 +47,8 @@ impl Strand {
             }
             Constituent::Field { field, .. } => {
                 // A bound of the whole part is far below all values: a sheet's second side would be gone at once.
-                let (lo, hi) = (seen.iter())
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                        (l.min(*v), h.max(*v))
-                    });
+                let (lo, hi) =
+                    (seen.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
                 let proven = made.factor * field.bound(bounds).lo;
                 made.least = below(made.turned(Interval::new(lo.min(hi), hi)));
                 made.floor = made.least.min(proven.max(BOTTOM) - made.factor);
@@ -132,9 +124,7 @@ impl Strand {
             }
         }
         values.iter_mut().for_each(|v| *v *= self.factor);
-        gradients
-            .iter_mut()
-            .for_each(|g| *g = scale(*g, self.factor));
+        gradients.iter_mut().for_each(|g| *g = scale(*g, self.factor));
     }
 
     /// An interval that contains g in the box.
@@ -142,9 +132,7 @@ impl Strand {
         self.turned(match &self.of {
             Constituent::Lattice(l) => l.core_bound(b),
             Constituent::Field { field, .. } => field.bound(b),
-            Constituent::Wall { sides, .. } => {
-                (sides[0].bound(b) - sides[1].bound(b)).times(Interval::new(0.5, 0.5))
-            }
+            Constituent::Wall { sides, .. } => (sides[0].bound(b) - sides[1].bound(b)).times(Interval::new(0.5, 0.5)),
         })
     }
 
@@ -207,9 +195,7 @@ impl Strand {
             }
         }
         values.iter_mut().for_each(|v| *v *= self.factor);
-        gradients
-            .iter_mut()
-            .for_each(|g| *g = scale(*g, self.factor));
+        gradients.iter_mut().for_each(|g| *g = scale(*g, self.factor));
     }
 
     /// The lower end where the upper one is `high`.
@@ -264,11 +250,7 @@ impl Strand {
             count[1] += usize::from(f64::from(*v) <= high);
         }
         let share = count.map(|n| n as f64 / samples.len() as f64);
-        if self.is_sheet() {
-            share
-        } else {
-            [-BELOW, share[1]]
-        }
+        if self.is_sheet() { share } else { [-BELOW, share[1]] }
     }
 
     /// How the quantiles change with `high`.
@@ -313,13 +295,7 @@ impl Strand {
     }
 
     /// The same with gradients (per mm).
-    pub fn end_gradients(
-        &self,
-        points: &[Vec3],
-        high: &mut [f64],
-        slopes: &mut [Vec3],
-        quantiles: &mut [End],
-    ) -> bool {
+    pub fn end_gradients(&self, points: &[Vec3], high: &mut [f64], slopes: &mut [Vec3], quantiles: &mut [End]) -> bool {
         let Some(l) = self.lattice() else {
             self.high_gradients(points, high, slopes);
             return false;
@@ -381,10 +357,7 @@ impl Strand {
                 Kind::Filled(a, shape)
             }
         };
-        Rows {
-            of,
-            factor: self.factor,
-        }
+        Rows { of, factor: self.factor }
     }
 }
 

@@ -14,11 +14,7 @@ const NONE: u32 = u32::MAX;
 impl Table {
     /// A table of so many nodes, with `width` numbers for each that will be looked at.
     pub fn new(nodes: usize, width: usize) -> Table {
-        Table {
-            first: vec![NONE; nodes],
-            width,
-            numbers: Vec::new(),
-        }
+        Table { first: vec![NONE; nodes], width, numbers: Vec::new() }
     }
 
     /// Forgets all numbers.

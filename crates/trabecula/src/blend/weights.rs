@@ -18,10 +18,7 @@ pub struct Weights {
 impl Weights {
     /// Of two lattices: `weight` is the share of the second, cut off at 0 and 1.
     pub fn between(weight: Grade) -> Weights {
-        Weights {
-            of: vec![weight],
-            between: true,
-        }
+        Weights { of: vec![weight], between: true }
     }
 
     /// One number for each lattice, cut off at 0 and divided by their sum. Where all are 0 all count the same: what
@@ -62,11 +59,7 @@ impl Weights {
         }
         // The same each time; of two it is told how many they are.
         match n {
-            2 => out
-                .as_chunks_mut::<2>()
-                .0
-                .iter_mut()
-                .for_each(|w| normalise(w)),
+            2 => out.as_chunks_mut::<2>().0.iter_mut().for_each(|w| normalise(w)),
             _ => out.chunks_exact_mut(n).for_each(normalise),
         }
     }
@@ -77,16 +70,10 @@ impl Weights {
         let (mut raw, mut slope) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
         for (i, grade) in self.of.iter().enumerate() {
             grade.gradients(points, &mut raw, &mut slope);
-            let both = values
-                .chunks_exact_mut(n)
-                .zip(gradients.chunks_exact_mut(n));
+            let both = values.chunks_exact_mut(n).zip(gradients.chunks_exact_mut(n));
             for ((w, g), (r, s)) in both.zip(raw.iter().zip(&slope)) {
                 if self.between {
-                    let s = if (0.0..=1.0).contains(r) {
-                        *s
-                    } else {
-                        [0.0; 3]
-                    };
+                    let s = if (0.0..=1.0).contains(r) { *s } else { [0.0; 3] };
                     let r = r.clamp(0.0, 1.0);
                     w.copy_from_slice(&[1.0 - r, r]);
                     g.copy_from_slice(&[scale(s, -1.0), s]);
@@ -97,16 +84,11 @@ impl Weights {
             }
         }
         if n == 2 {
-            let (values, gradients) = (
-                values.as_chunks_mut::<2>().0,
-                gradients.as_chunks_mut::<2>().0,
-            );
+            let (values, gradients) = (values.as_chunks_mut::<2>().0, gradients.as_chunks_mut::<2>().0);
             let both = values.iter_mut().zip(gradients);
             return both.for_each(|(w, g)| normalise_gradients(w, g));
         }
-        let both = values
-            .chunks_exact_mut(n)
-            .zip(gradients.chunks_exact_mut(n));
+        let both = values.chunks_exact_mut(n).zip(gradients.chunks_exact_mut(n));
         both.for_each(|(w, g)| normalise_gradients(w, g));
     }
 
@@ -185,16 +167,8 @@ fn divide(r: &mut [Interval]) {
         // Sums less a term have a rounding error of the sums.
         let alone = others[1] <= 1e-15 * sums[1];
         let share = |v: f64, others: f64| if v > 0.0 { v / (v + others) } else { 0.0 };
-        let lo = if alone && r.lo > 0.0 {
-            1.0
-        } else {
-            share(r.lo, others[1]) - SLACK
-        };
-        let hi = if r.hi > 0.0 {
-            share(r.hi, others[0]) + SLACK
-        } else {
-            0.0
-        };
+        let lo = if alone && r.lo > 0.0 { 1.0 } else { share(r.lo, others[1]) - SLACK };
+        let hi = if r.hi > 0.0 { share(r.hi, others[0]) + SLACK } else { 0.0 };
         *r = Interval::new(lo.max(0.0), hi.min(1.0));
     }
 }
@@ -217,19 +191,12 @@ mod tests {
                 grade("exp(-(x - 2)^2)"),
                 grade("exp(-(y - 2)^2 - (z + 1)^2)"),
             ]),
-            Weights::shares(vec![
-                grade("x"),
-                grade("1 - x"),
-                grade("abs(y)"),
-                grade("0"),
-            ]),
+            Weights::shares(vec![grade("x"), grade("1 - x"), grade("abs(y)"), grade("0")]),
         ]
     }
 
     fn places() -> impl Iterator<Item = Vec3> {
-        (0..400).map(|i| {
-            [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0)
-        })
+        (0..400).map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0))
     }
 
     #[test]
@@ -271,10 +238,7 @@ mod tests {
             let n = weights.len();
             for (i, p) in places().enumerate() {
                 let size = 0.01 + 0.02 * (i % 40) as f64;
-                let b = Aabb {
-                    min: p,
-                    max: p.map(|x| x + size),
-                };
+                let b = Aabb { min: p, max: p.map(|x| x + size) };
                 let mut bound = vec![Interval::new(0.0, 0.0); n];
                 weights.bound(&b, &mut bound);
                 let mut w = vec![0.0; n];

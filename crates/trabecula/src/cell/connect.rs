@@ -52,9 +52,7 @@ pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
     let found = Sweep::prepared(f, part, |sweep| {
         let (births, events) = sweep.events();
         let last = sweep.order.last().map_or(0, |i| *i);
-        let full = sweep
-            .refine(last, &[], 3)
-            .unwrap_or(sweep.amounts[last as usize]);
+        let full = sweep.refine(last, &[], 3).unwrap_or(sweep.amounts[last as usize]);
         replay(births, events, full, sweep.grid.error, sweep.grid.range())
     });
     let mut intervals = found.unwrap_or_default();
@@ -102,18 +100,8 @@ impl Sweep<'_> {
         }
         amounts.iter_mut().for_each(|v| *v += 0.0); // −0.0 and 0.0 are one level
         let mut order: Vec<u32> = (0..amounts.len() as u32).collect();
-        order.sort_unstable_by(|a, b| {
-            amounts[*a as usize]
-                .total_cmp(&amounts[*b as usize])
-                .then(a.cmp(b))
-        });
-        Some(make(&Sweep {
-            f,
-            part,
-            grid: &grid,
-            amounts: &amounts,
-            order: &order,
-        }))
+        order.sort_unstable_by(|a, b| amounts[*a as usize].total_cmp(&amounts[*b as usize]).then(a.cmp(b)));
+        Some(make(&Sweep { f, part, grid: &grid, amounts: &amounts, order: &order }))
     }
 
     /// The amount at the critical point near a node from which at most `falling` directions lead to more solid;
@@ -124,14 +112,12 @@ impl Sweep<'_> {
             let d = sub(self.grid.position(*o), here).map(|v| v - v.round());
             [0, 1, 2].map(|a| here[a] + d[a] / 2.0)
         };
-        core::iter::once(here)
-            .chain(others.iter().map(middle))
-            .find_map(|start| {
-                let c = self.critical(node, start)?;
-                let level = amount(self.part, c.level);
-                let near = (level - self.amounts[node as usize]).abs() <= 3.0 * self.grid.error;
-                (c.falling <= falling && near).then_some(level)
-            })
+        core::iter::once(here).chain(others.iter().map(middle)).find_map(|start| {
+            let c = self.critical(node, start)?;
+            let level = amount(self.part, c.level);
+            let near = (level - self.amounts[node as usize]).abs() <= 3.0 * self.grid.error;
+            (c.falling <= falling && near).then_some(level)
+        })
     }
 
     /// The critical point near `start`, seen as one of the amount about `node`.
@@ -190,23 +176,13 @@ impl Sweep<'_> {
             for &(element, towards, wrap) in &nears {
                 let (pieces, shift) = match forest.join(node, element, wrap) {
                     Joined::Same => continue,
-                    Joined::Merged {
-                        pieces: [_, young], ..
-                    } if young == node => continue,
+                    Joined::Merged { pieces: [_, young], .. } if young == node => continue,
                     Joined::Merged { pieces, shift } => (pieces, shift),
                     Joined::Loop { piece, shift } => ([piece; 2], shift),
                 };
                 let level = self.refine(node, &[towards], 1);
-                let (level, exact) = (
-                    level.unwrap_or(self.amounts[node as usize]),
-                    level.is_some(),
-                );
-                events.push(Event {
-                    pieces,
-                    shift,
-                    level,
-                    exact,
-                });
+                let (level, exact) = (level.unwrap_or(self.amounts[node as usize]), level.is_some());
+                events.push(Event { pieces, shift, level, exact });
             }
         }
         (births, events)
@@ -238,9 +214,7 @@ impl Sweep<'_> {
                         (self.grid.edge(node, ((k + 1) | (l + 1)) - 1), [0; 3]),
                     ];
                     let mut crossed = sides.iter().filter(|(e, _)| forest.has(*e));
-                    if let (Some((a, wa)), Some((b, wb))) =
-                        (crossed.next().copied(), crossed.next().copied())
-                    {
+                    if let (Some((a, wa)), Some((b, wb))) = (crossed.next().copied(), crossed.next().copied()) {
                         forest.join(a, b, [0, 1, 2].map(|c| wb[c] - wa[c]));
                     }
                 }
@@ -248,12 +222,7 @@ impl Sweep<'_> {
         }
         for edge in crossed {
             if forest.leads(edge) {
-                births.push(Birth {
-                    node: edge,
-                    level: 0.0,
-                    exact: true,
-                    loops: forest.loops(edge),
-                });
+                births.push(Birth { node: edge, level: 0.0, exact: true, loops: forest.loops(edge) });
             }
         }
     }
@@ -268,10 +237,7 @@ impl Sweep<'_> {
             let here = self.grid.slopes[*i as usize];
             let step = self.grid.steps(*i);
             let near = |d: Int3| self.grid.slopes[step(d).0 as usize];
-            here <= steepest
-                && STEPS
-                    .iter()
-                    .all(|d| here <= near(*d) && here <= near(d.map(|c| -c)))
+            here <= steepest && STEPS.iter().all(|d| here <= near(*d) && here <= near(d.map(|c| -c)))
         };
         let points: Vec<Critical> = (0..n)
             .into_par_iter()
@@ -280,10 +246,7 @@ impl Sweep<'_> {
             .filter(|c| (c.falling == 1 && c.flat == 0) || (c.falling == 0 && c.flat > 0))
             .collect();
         let (saddles, lines): (Vec<_>, Vec<_>) = points.into_iter().partition(|c| c.flat == 0);
-        let least = self
-            .order
-            .first()
-            .map_or(0.0, |i| self.amounts[*i as usize]);
+        let least = self.order.first().map_or(0.0, |i| self.amounts[*i as usize]);
         let extreme = |c: &Critical| amount(self.part, c.level) - least <= self.grid.error;
         let h = 1.0 / self.grid.n as f64;
         let mut found = distinct(lines.into_iter().filter(extreme).collect(), 1.8 * h);
@@ -293,9 +256,7 @@ impl Sweep<'_> {
                 let level = amount(self.part, c.level);
                 let ends = [1.0, -1.0].map(|side| self.descend(&c, side * h, level - back));
                 // A side may end in a hollow less deep than that.
-                let hollow = ends.iter().fold(level - back, |m, (node, _)| {
-                    m.max(self.amounts[*node as usize])
-                });
+                let hollow = ends.iter().fold(level - back, |m, (node, _)| m.max(self.amounts[*node as usize]));
                 let limit = hollow + 1e-9 * back;
                 (limit < level).then_some((limit, ends, c))
             })
@@ -304,11 +265,7 @@ impl Sweep<'_> {
         let mut forest = Forest::new(self.order.len());
         let mut grown = 0;
         for (limit, [(a, v), (b, w)], saddle) in asked {
-            while let Some(&node) = self
-                .order
-                .get(grown)
-                .filter(|i| self.amounts[**i as usize] < limit)
-            {
+            while let Some(&node) = self.order.get(grown).filter(|i| self.amounts[**i as usize] < limit) {
                 grown += 1;
                 forest.insert(node);
                 let near = AROUND.map(self.grid.steps(node));
@@ -320,10 +277,7 @@ impl Sweep<'_> {
                 found.push(saddle);
             }
         }
-        found
-            .into_iter()
-            .map(|c| (c.at.map(|v| v - v.floor()), c.level))
-            .collect()
+        found.into_iter().map(|c| (c.at.map(|v| v - v.floor()), c.level)).collect()
     }
 
     /// Walks from a saddle, `first` turns along its falling direction and then straight down, to a node near the first
@@ -334,13 +288,8 @@ impl Sweep<'_> {
         let (mut v, mut g) = sample(self.f, at);
         let mut step = 0.4 * first.abs();
         loop {
-            let corners = self
-                .grid
-                .corners(at)
-                .map(|c| (self.amounts[c.0 as usize], c));
-            let lowest = corners
-                .into_iter()
-                .fold(corners[0], |a, b| if b.0 < a.0 { b } else { a });
+            let corners = self.grid.corners(at).map(|c| (self.amounts[c.0 as usize], c));
+            let lowest = corners.into_iter().fold(corners[0], |a, b| if b.0 < a.0 { b } else { a });
             if (sign * v < limit && lowest.0 < limit) || step < 0.01 * first.abs() {
                 return lowest.1;
             }
@@ -366,11 +315,7 @@ fn present(forest: &Forest, near: &[(u32, Int3); 14]) -> impl Iterator<Item = (u
 fn distinct(points: Vec<Critical>, apart: f64) -> Vec<Critical> {
     let mut kept: Vec<Critical> = Vec::new();
     for p in points {
-        let same = |k: &Critical| {
-            sub(p.at, k.at)
-                .iter()
-                .all(|d| (d - d.round()).abs() < apart)
-        };
+        let same = |k: &Critical| sub(p.at, k.at).iter().all(|d| (d - d.round()).abs() < apart);
         if !kept.iter().any(same) {
             kept.push(p);
         }
@@ -381,13 +326,7 @@ fn distinct(points: Vec<Critical>, apart: f64) -> Vec<Critical> {
 /// Plays the events at their refined levels; the intervals in which one piece winds round the torus every way.
 ///
 /// Pieces that join others again within the error of sampling, or exactly where they appear, are noise.
-fn replay(
-    births: Vec<Birth>,
-    mut events: Vec<Event>,
-    full: f64,
-    error: f64,
-    range: f64,
-) -> Vec<[f64; 2]> {
+fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, range: f64) -> Vec<[f64; 2]> {
     let index = |node: u32| births.iter().position(|b| b.node == node);
     let mut order: Vec<usize> = (0..births.len()).collect();
     order.sort_by(|a, b| births[*a].level.total_cmp(&births[*b].level));
@@ -401,9 +340,7 @@ fn replay(
     };
     for e in events.iter_mut().filter(|e| !e.exact) {
         // On a line of extreme values a piece meets its neighbours where it appears, whatever the samples say.
-        let born = e
-            .pieces
-            .map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
+        let born = e.pieces.map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
         let born = born[0].max(born[1]);
         if e.level - born <= error {
             (e.level, e.exact) = (born, true);
@@ -412,24 +349,14 @@ fn replay(
     events.sort_by(|a, b| a.level.total_cmp(&b.level));
     // Spans in which a second piece lives.
     let mut spans = Vec::new();
-    let mut whole = forest
-        .loops(eldest as u32)
-        .is_full()
-        .then_some(births[eldest].level);
+    let mut whole = forest.loops(eldest as u32).is_full().then_some(births[eldest].level);
     for e in &events {
         let (Some(a), Some(b)) = (index(e.pieces[0]), index(e.pieces[1])) else {
             continue;
         };
-        if let Joined::Merged {
-            pieces: [_, young], ..
-        } = forest.join(a as u32, b as u32, e.shift)
-        {
+        if let Joined::Merged { pieces: [_, young], .. } = forest.join(a as u32, b as u32, e.shift) {
             let born = &births[young as usize];
-            let noise = if born.exact && e.exact {
-                1e-6 * range
-            } else {
-                error
-            };
+            let noise = if born.exact && e.exact { 1e-6 * range } else { error };
             if e.level - born.level > noise {
                 spans.push([born.level, e.level]);
             }

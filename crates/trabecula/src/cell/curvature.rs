@@ -20,9 +20,7 @@ pub(super) fn radius(series: &Series, to_phase: &Mat3) -> Option<f64> {
         let nhn = dot(n, hn);
         // P H P = H − n (Hn)ᵀ − (Hn) nᵀ + (nᵀHn) n nᵀ.
         let shape = core::array::from_fn(|i| {
-            core::array::from_fn(|j| {
-                (h[i][j] - n[i] * hn[j] - hn[i] * n[j] + nhn * n[i] * n[j]) / steep
-            })
+            core::array::from_fn(|j| (h[i][j] - n[i] * hn[j] - hn[i] * n[j] + nhn * n[i] * n[j]) / steep)
         });
         let (values, _) = eigen(&shape);
         let most = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -43,12 +41,7 @@ mod tests {
     /// Twice the least radius, in cells, as the conventions give it (section 4).
     #[test]
     fn folding_limits_of_cubic_cells() {
-        for (name, limit) in [
-            ("gyroid", 0.37),
-            ("diamond", 0.31),
-            ("primitive", 0.32),
-            ("iwp", 0.21),
-        ] {
+        for (name, limit) in [("gyroid", 0.37), ("diamond", 0.31), ("primitive", 0.32), ("iwp", 0.21)] {
             let unit = crate::math::IDENTITY;
             let found = 2.0 * radius(&series(name), &unit).expect("a surface");
             println!("{name} {found:.5}");
@@ -64,27 +57,16 @@ mod tests {
     /// radius of curvature there |∇f|³ / (fₓₓ f_y² + …) = sin a / 2π in units of the cell.
     #[test]
     fn round_rods_have_their_radius_and_flat_walls_none() {
-        let wave = |hkl, amplitude, phase| super::super::Term {
-            hkl,
-            amplitude,
-            phase,
-        };
-        let rods = Series::new(vec![
-            wave([1, 0, 0], 1.0, 0.0),
-            wave([0, 1, 0], 1.0, 0.0),
-            wave([0, 0, 0], -1.9, 0.0),
-        ])
-        .expect("series");
+        let wave = |hkl, amplitude, phase| super::super::Term { hkl, amplitude, phase };
+        let rods = Series::new(vec![wave([1, 0, 0], 1.0, 0.0), wave([0, 1, 0], 1.0, 0.0), wave([0, 0, 0], -1.9, 0.0)])
+            .expect("series");
         let a = 0.9f64.acos();
         let found = radius(&rods, &crate::math::IDENTITY).expect("a surface");
         // Curvature on the axis: f_yy / |f_x| = cos 0 / sin a; on the diagonal cos b / (√2 sin b), cos b = 0.95.
         let b = 0.95f64.acos();
         let on_axis = a.sin() / core::f64::consts::TAU;
         let on_diagonal = 2f64.sqrt() * b.sin() / b.cos() / core::f64::consts::TAU;
-        assert!(
-            (found - on_axis.min(on_diagonal)).abs() < 1e-5,
-            "{found} {on_axis} {on_diagonal}"
-        );
+        assert!((found - on_axis.min(on_diagonal)).abs() < 1e-5, "{found} {on_axis} {on_diagonal}");
         let walls = Series::new(vec![wave([1, 0, 0], 1.0, 0.0)]).expect("series");
         assert!(radius(&walls, &crate::math::IDENTITY).is_some_and(|r| r > 1e6));
     }

@@ -72,19 +72,11 @@ mod tests {
     #[test]
     fn a_sheet_is_the_greater_of_its_sides() {
         let whole = Cut::new(Part::Sheet);
-        let side = |part| Cut {
-            side: Some(part),
-            ..whole
-        };
+        let side = |part| Cut { side: Some(part), ..whole };
         for f in [-2.0, -0.3, 0.0, 0.4, 3.0] {
             let sides = [Part::Lower, Part::Upper].map(|p| side(p).value(f, 0.7));
             assert_eq!(whole.value(f, 0.7), sides[0].max(sides[1]));
-            for cut in [
-                whole,
-                side(Part::Lower),
-                side(Part::Upper),
-                Cut::new(Part::Upper),
-            ] {
+            for cut in [whole, side(Part::Lower), side(Part::Upper), Cut::new(Part::Upper)] {
                 let at = |v: f64| Interval::new(v - 0.1, v + 0.1);
                 let b = cut.bound(at(f), at(0.7));
                 let (value, slope) = cut.gradient((f, [1.0, 0.0, 2.0]), (0.7, [0.0, 3.0, 0.0]));

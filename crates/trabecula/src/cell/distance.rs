@@ -46,9 +46,10 @@ impl Distance {
         let series = &series.scaled(1.0 / series.amplitude());
         let radius = curvature::radius(series, to_phase);
         let edges = transpose(&inverse(to_phase)).map(norm);
-        let finest = series.terms().iter().fold([1; 3], |top: [u32; 3], t| {
-            core::array::from_fn(|a| top[a].max(t.hkl[a].unsigned_abs()))
-        });
+        let finest = series
+            .terms()
+            .iter()
+            .fold([1; 3], |top: [u32; 3], t| core::array::from_fn(|a| top[a].max(t.hkl[a].unsigned_abs())));
         let shape = core::array::from_fn(|a| {
             let bends = radius.map_or(0.0, |r| FINE * edges[a] / r);
             let waves = WAVE * f64::from(finest[a]);
@@ -149,8 +150,7 @@ impl Distance {
 
     /// The intervals of solid fraction in which the periodic solid of this part is one piece in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
-        let found = self.connected[part as usize]
-            .get_or_init(|| connected(&|u, v, g| self.gradients(u, v, g), part));
+        let found = self.connected[part as usize].get_or_init(|| connected(&|u, v, g| self.gradients(u, v, g), part));
         let share = |t: f64| self.fraction(part, t).clamp(0.0, 1.0);
         found.iter().map(|i| i.map(share)).collect()
     }
@@ -172,11 +172,7 @@ pub(super) mod tests {
     }
 
     /// Points of f = 0 (phases) and their unit normals in space.
-    pub(in crate::cell) fn surface(
-        series: &Series,
-        to_phase: &Mat3,
-        count: usize,
-    ) -> Vec<(Vec3, Vec3)> {
+    pub(in crate::cell) fn surface(series: &Series, to_phase: &Mat3, count: usize) -> Vec<(Vec3, Vec3)> {
         let back = transpose(to_phase);
         (1..)
             .filter_map(|i| {
@@ -196,9 +192,7 @@ pub(super) mod tests {
     #[test]
     fn points_along_the_normal_are_as_far_as_they_went() {
         for name in ["gyroid", "diamond", "primitive", "iwp"] {
-            for (wavelength, degrees) in
-                [([1.0; 3], [0.0; 3]), ([3.0, 4.0, 6.0], [20.0, 35.0, 50.0])]
-            {
+            for (wavelength, degrees) in [([1.0; 3], [0.0; 3]), ([3.0, 4.0, 6.0], [20.0, 35.0, 50.0])] {
                 let (s, m) = (series(name), stretched(wavelength, degrees));
                 let d = Distance::new(&s, &m);
                 let reach = d.folding().expect("a surface") / 2.0;
@@ -223,11 +217,7 @@ pub(super) mod tests {
                 assert!(shares[..4].iter().all(|e| *e < 2e-3), "{name} {shares:?}");
                 assert!(shares.iter().all(|e| *e < 1e-2), "{name} {shares:?}");
                 // One where the distance is smooth; beside creases the spline swings.
-                assert!(
-                    (1.0..3.5).contains(&d.steepness()),
-                    "{name} {}",
-                    d.steepness()
-                );
+                assert!((1.0..3.5).contains(&d.steepness()), "{name} {}", d.steepness());
             }
         }
     }
@@ -263,21 +253,14 @@ pub(super) mod tests {
             let d = Distance::new(&series(name), &stretched([1.0, 1.2, 1.5], [0.0; 3]));
             let found = d.connected_fraction(Part::Sheet);
             assert_eq!(found.len(), 1, "{name} {found:?}");
-            assert!(
-                found[0][0] < 1e-3 && found[0][1] > 0.999,
-                "{name} {found:?}"
-            );
+            assert!(found[0][0] < 1e-3 && found[0][1] > 0.999, "{name} {found:?}");
         }
     }
 
     /// Waves too fine for the table are told by the error on the mid-surface.
     #[test]
     fn the_error_is_known() {
-        let wave = |hkl| super::super::Term {
-            hkl,
-            amplitude: 1.0,
-            phase: 0.1,
-        };
+        let wave = |hkl| super::super::Term { hkl, amplitude: 1.0, phase: 0.1 };
         let error = |n: i32| {
             let terms = vec![wave([n, 0, 0]), wave([0, n, 1]), wave([0, 1, n])];
             let s = Series::new(terms).expect("series");
@@ -285,10 +268,7 @@ pub(super) mod tests {
         };
         let found = [1, 4, 40].map(error);
         println!("{found:?}");
-        assert!(
-            found[0] < 1e-5 && found[1] < 1e-3 && found[2] > 1e-2,
-            "{found:?}"
-        );
+        assert!(found[0] < 1e-5 && found[1] < 1e-3 && found[2] > 1e-2, "{found:?}");
     }
 
     /// A cell without a mid-surface is far from it everywhere.

@@ -59,7 +59,8 @@ macro_rules! products {
     }};
 }
 
-const SCHOEN: &str = "Schoen, NASA TN D-5541 (1970); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407";
+const SCHOEN: &str =
+    "Schoen, NASA TN D-5541 (1970); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407";
 const SCHWARZ: &str = "Schwarz, Gesammelte Mathematische Abhandlungen (1890); nodal form after von Schnering and Nesper, Z. Phys. B 83 (1991) 407";
 
 static CATALOGUE: [Named; 10] = [
@@ -175,11 +176,7 @@ impl Named {
                     .collect();
             }
             let amplitude = k / waves.len() as f64;
-            terms.extend(waves.into_iter().map(|(hkl, phase)| Term {
-                hkl,
-                amplitude,
-                phase,
-            }));
+            terms.extend(waves.into_iter().map(|(hkl, phase)| Term { hkl, amplitude, phase }));
         }
         terms
     }
@@ -204,16 +201,11 @@ mod tests {
     /// The formulas of the conventions, typed out a second time.
     fn formula(name: &str, [x, y, z]: [f64; 3]) -> f64 {
         let (s, c) = (|v: f64| (TAU * v).sin(), |v: f64| (TAU * v).cos());
-        let (s2, c2) = (
-            |v: f64| (2.0 * TAU * v).sin(),
-            |v: f64| (2.0 * TAU * v).cos(),
-        );
+        let (s2, c2) = (|v: f64| (2.0 * TAU * v).sin(), |v: f64| (2.0 * TAU * v).cos());
         match name {
             "gyroid" => s(x) * c(y) + s(y) * c(z) + s(z) * c(x),
             "gyroid_mirrored" => c(x) * s(y) + c(y) * s(z) + c(z) * s(x),
-            "diamond" => {
-                s(x) * s(y) * s(z) + s(x) * c(y) * c(z) + c(x) * s(y) * c(z) + c(x) * c(y) * s(z)
-            }
+            "diamond" => s(x) * s(y) * s(z) + s(x) * c(y) * c(z) + c(x) * s(y) * c(z) + c(x) * c(y) * s(z),
             "primitive" => c(x) + c(y) + c(z),
             "iwp" => 2.0 * (c(x) * c(y) + c(y) * c(z) + c(z) * c(x)) - (c2(x) + c2(y) + c2(z)),
             "neovius" => 3.0 * (c(x) + c(y) + c(z)) + 4.0 * c(x) * c(y) * c(z),
@@ -238,18 +230,10 @@ mod tests {
         for n in catalogue() {
             let series = Series::new(n.terms()).expect(n.name);
             for i in 0..200 {
-                let u = [
-                    0.618 * f64::from(i),
-                    0.414 * f64::from(i) + 0.1,
-                    0.732 * f64::from(i) - 0.3,
-                ];
+                let u = [0.618 * f64::from(i), 0.414 * f64::from(i) + 0.1, 0.732 * f64::from(i) - 0.3];
                 let (mut v, mut g) = ([0.0], [[0.0; 3]]);
                 series.gradients(&[u], &mut v, &mut g);
-                assert!(
-                    (v[0] - formula(n.name, u)).abs() < 2e-12,
-                    "{} at {u:?}",
-                    n.name
-                );
+                assert!((v[0] - formula(n.name, u)).abs() < 2e-12, "{} at {u:?}", n.name);
             }
         }
     }

@@ -8,9 +8,7 @@
 use rayon::prelude::*;
 
 use super::series::Series;
-use crate::math::{
-    Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit,
-};
+use crate::math::{Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit};
 
 /// The nearest points of the surface to the nodes of a grid.
 pub(super) struct Search<'a> {
@@ -38,19 +36,9 @@ impl<'a> Search<'a> {
                 (d, apply(&to_space, turns))
             })
             .collect();
-        let edge = transpose(&to_space)
-            .map(norm)
-            .into_iter()
-            .fold(0.0, f64::max);
+        let edge = transpose(&to_space).map(norm).into_iter().fold(0.0, f64::max);
         let diagonal = around.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
-        Search {
-            series,
-            shape,
-            to_phase: *to_phase,
-            back: transpose(to_phase),
-            around,
-            sizes: [edge, diagonal],
-        }
+        Search { series, shape, to_phase: *to_phase, back: transpose(to_phase), around, sizes: [edge, diagonal] }
     }
 
     fn count(&self) -> usize {
@@ -83,10 +71,7 @@ impl<'a> Search<'a> {
     /// Signed distances at the nodes.
     pub(super) fn distances(&self) -> Vec<f64> {
         let (f, feet) = self.feet();
-        f.iter()
-            .zip(&feet)
-            .map(|(f, foot)| norm(*foot).min(self.sizes[0]).copysign(*f))
-            .collect()
+        f.iter().zip(&feet).map(|(f, foot)| norm(*foot).min(self.sizes[0]).copysign(*f)).collect()
     }
 
     /// Values of f at the nodes, and from each the way (mm) to the nearest point of the surface.
@@ -99,17 +84,12 @@ impl<'a> Search<'a> {
             .for_each(|((f, g), u)| self.series.gradients(u, f, g));
         drop(g);
         let mut feet = self.beside(&f);
-        let mut changed: Vec<usize> = (0..feet.len())
-            .filter(|i| feet[*i][0].is_finite())
-            .collect();
+        let mut changed: Vec<usize> = (0..feet.len()).filter(|i| feet[*i][0].is_finite()).collect();
         self.hand_on(&mut feet, changed);
         // Handed on, a foot belongs to a neighbour; sharpened feet may serve their neighbours better than their own.
         changed = (0..feet.len()).collect();
         for _ in 0..6 {
-            let sharp: Vec<Vec3> = changed
-                .par_iter()
-                .map(|&i| self.nearest(u[i], feet[i]))
-                .collect();
+            let sharp: Vec<Vec3> = changed.par_iter().map(|&i| self.nearest(u[i], feet[i])).collect();
             for (i, foot) in changed.iter().zip(sharp) {
                 feet[*i] = foot;
             }

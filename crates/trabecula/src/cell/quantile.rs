@@ -63,8 +63,7 @@ impl Quantile {
                     // Width of the uniform distribution with the variance Σ (g h)²/12 of the linear function.
                     let w = ((g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() * h).max(0.5 * step);
                     let (a, b) = (v - 0.5 * w, v + 0.5 * w);
-                    let index =
-                        |t: f64| (((t - start) / step).ceil().max(0.0) as usize).min(LEVELS);
+                    let index = |t: f64| (((t - start) / step).ceil().max(0.0) as usize).min(LEVELS);
                     let (s, c) = (weight / w, -weight * a / w);
                     slope[index(a)] += s;
                     constant[index(a)] += c;
@@ -74,12 +73,8 @@ impl Quantile {
             }
             (constant, slope)
         };
-        let slabs: Vec<_> = (0..n)
-            .step_by(SLAB)
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|k| slab(k..(k + SLAB).min(n)))
-            .collect();
+        let slabs: Vec<_> =
+            (0..n).step_by(SLAB).collect::<Vec<_>>().into_par_iter().map(|k| slab(k..(k + SLAB).min(n))).collect();
         let (mut constant, mut slope) = (vec![0.0; LEVELS + 1], vec![0.0; LEVELS + 1]);
         for (c, s) in slabs {
             constant.iter_mut().zip(c).for_each(|(sum, c)| *sum += c);
@@ -94,16 +89,8 @@ impl Quantile {
             })
             .collect();
         let at = |t: f64| interpolate(&lower, (t - start) / step);
-        let sheet = (0..LEVELS / 2)
-            .map(|i| step * i as f64)
-            .map(|t| at(t) - at(-t))
-            .collect();
-        Quantile {
-            start,
-            step,
-            lower,
-            sheet,
-        }
+        let sheet = (0..LEVELS / 2).map(|i| step * i as f64).map(|t| at(t) - at(-t)).collect();
+        Quantile { start, step, lower, sheet }
     }
 
     /// Solid fraction of the part at level t.
@@ -217,17 +204,9 @@ fn interpolate(table: &[f64], x: f64) -> f64 {
 fn invert(table: &[f64], v: f64) -> (f64, f64) {
     let i = table.partition_point(|&t| t < v).clamp(1, table.len() - 1);
     let (a, b) = (table[i - 1], table[i]);
-    let s = if b > a {
-        ((v - a) / (b - a)).clamp(0.0, 1.0)
-    } else {
-        0.5
-    };
+    let s = if b > a { ((v - a) / (b - a)).clamp(0.0, 1.0) } else { 0.5 };
     let (lo, hi) = (i.saturating_sub(8), (i + 7).min(table.len() - 1));
     let rise = table[hi] - table[lo];
-    let slope = if rise > 0.0 {
-        (hi - lo) as f64 / rise
-    } else {
-        0.0
-    };
+    let slope = if rise > 0.0 { (hi - lo) as f64 / rise } else { 0.0 };
     ((i - 1) as f64 + s, slope)
 }

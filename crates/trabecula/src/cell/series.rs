@@ -52,17 +52,11 @@ impl Series {
             }
             for (key, v) in [("amplitude", t.amplitude), ("phase", t.phase)] {
                 if !v.is_finite() {
-                    return Err(Fault::new(
-                        at(key),
-                        format!("{v} is not a number; give a finite one"),
-                    ));
+                    return Err(Fault::new(at(key), format!("{v} is not a number; give a finite one")));
                 }
             }
             if t.amplitude.abs() > 1e100 {
-                let message = format!(
-                    "{:e} is out of range; an amplitude is at most 1e100 either way",
-                    t.amplitude
-                );
+                let message = format!("{:e} is out of range; an amplitude is at most 1e100 either way", t.amplitude);
                 return Err(Fault::new(at("amplitude"), message));
             }
             largest = largest.max(t.amplitude.abs());
@@ -80,18 +74,10 @@ impl Series {
         }
         let terms: Vec<Term> = sums
             .into_iter()
-            .map(|(hkl, re, im)| Term {
-                hkl,
-                amplitude: re.hypot(im),
-                phase: im.atan2(re) / core::f64::consts::TAU,
-            })
+            .map(|(hkl, re, im)| Term { hkl, amplitude: re.hypot(im), phase: im.atan2(re) / core::f64::consts::TAU })
             .map(|t| {
                 if t.hkl == [0; 3] {
-                    Term {
-                        amplitude: t.amplitude * sin_cos_turns(t.phase).1,
-                        phase: 0.0,
-                        ..t
-                    }
+                    Term { amplitude: t.amplitude * sin_cos_turns(t.phase).1, phase: 0.0, ..t }
                 } else {
                     t
                 }
@@ -113,29 +99,15 @@ impl Series {
     ///
     /// # Errors
     /// Fewer than four nodes along an axis, numbers that are not finite, a function that is constant.
-    pub fn sampled(
-        values: &[f64],
-        shape: [usize; 3],
-        count: usize,
-    ) -> Result<(Series, f64), Fault> {
+    pub fn sampled(values: &[f64], shape: [usize; 3], count: usize) -> Result<(Series, f64), Fault> {
         use rustfft::{FftDirection, FftPlannerScalar, num_complex::Complex64};
         let all: usize = shape.iter().product();
         if shape.iter().any(|n| *n < 4) || values.len() != all {
-            return Err(Fault::new(
-                "path",
-                format!("a cell of {shape:?} numbers; give at least four along each axis"),
-            ));
+            return Err(Fault::new("path", format!("a cell of {shape:?} numbers; give at least four along each axis")));
         }
         if let Some(n) = values.iter().position(|v| !v.is_finite()) {
-            let at = [
-                n % shape[0],
-                n / shape[0] % shape[1],
-                n / shape[0] / shape[1],
-            ];
-            return Err(Fault::new(
-                "path",
-                format!("the number at {at:?} is {}; all must be finite", values[n]),
-            ));
+            let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
+            return Err(Fault::new("path", format!("the number at {at:?} is {}; all must be finite", values[n])));
         }
         let mut f: Vec<Complex64> = values.iter().map(|v| Complex64::new(*v, 0.0)).collect();
         let mut planner = FftPlannerScalar::new();
@@ -150,11 +122,7 @@ impl Series {
             }
         }
         let wave = |n: usize| -> [i32; 3] {
-            let at = [
-                n % shape[0],
-                n / shape[0] % shape[1],
-                n / shape[0] / shape[1],
-            ];
+            let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
             core::array::from_fn(|a| {
                 let (i, n) = (at[a] as i32, shape[a] as i32);
                 if 2 * i > n { i - n } else { i }
@@ -168,40 +136,24 @@ impl Series {
             .collect();
         let energy = f[1..].iter().map(|c| c.norm_sqr()).sum::<f64>() / (all as f64).powi(2);
         waves.retain(|(_, h, _)| {
-            (0..3).all(|a| {
-                h[a].unsigned_abs() as usize <= (shape[a] / 4).clamp(1, MAX_INDEX as usize)
-            })
+            (0..3).all(|a| h[a].unsigned_abs() as usize <= (shape[a] / 4).clamp(1, MAX_INDEX as usize))
         });
         // Of equal ones the shorter, then by their indices, so that the choice is always the same.
         let length = |h: &[i32; 3]| h.iter().map(|v| v * v).sum::<i32>();
         let rounded = |v: f64| (v * 1e12).round();
         waves.sort_by(|a, b| {
             let by_size = rounded(b.0).total_cmp(&rounded(a.0));
-            by_size
-                .then(length(&a.1).cmp(&length(&b.1)))
-                .then(a.1.cmp(&b.1))
+            by_size.then(length(&a.1).cmp(&length(&b.1))).then(a.1.cmp(&b.1))
         });
         waves.truncate(count.max(1));
-        let kept: f64 = waves
-            .iter()
-            .filter(|w| w.1 != [0; 3])
-            .map(|w| 2.0 * w.0 * w.0)
-            .sum();
+        let kept: f64 = waves.iter().filter(|w| w.1 != [0; 3]).map(|w| 2.0 * w.0 * w.0).sum();
         let terms = waves.iter().map(|(size, h, c)| Term {
             hkl: *h,
             amplitude: if *h == [0; 3] { c.re } else { 2.0 * size },
-            phase: if *h == [0; 3] {
-                0.0
-            } else {
-                c.im.atan2(c.re) / core::f64::consts::TAU
-            },
+            phase: if *h == [0; 3] { 0.0 } else { c.im.atan2(c.re) / core::f64::consts::TAU },
         });
-        let series = Series::new(terms.collect()).map_err(|_| {
-            Fault::new(
-                "path",
-                "the numbers of the cell do not vary, so it has no surface",
-            )
-        })?;
+        let series = Series::new(terms.collect())
+            .map_err(|_| Fault::new("path", "the numbers of the cell do not vary, so it has no surface"))?;
         Ok((series, ((energy - kept).max(0.0) / energy).sqrt()))
     }
 
@@ -225,10 +177,7 @@ impl Series {
     /// A bound of the largest second derivative of f in any direction of phase space: Σ |amplitude| |2πh|².
     pub fn curvature(&self) -> f64 {
         let squared = |h: [i32; 3]| h.iter().map(|&v| f64::from(v * v)).sum::<f64>();
-        self.terms
-            .iter()
-            .map(|t| t.amplitude.abs() * core::f64::consts::TAU.powi(2) * squared(t.hkl))
-            .sum()
+        self.terms.iter().map(|t| t.amplitude.abs() * core::f64::consts::TAU.powi(2) * squared(t.hkl)).sum()
     }
 
     /// The series whose value at a point is the mean of this one over the cube of edge `h` (turns) about the point.
@@ -237,10 +186,7 @@ impl Series {
             let x = core::f64::consts::PI * f64::from(k) * h;
             if x == 0.0 { 1.0 } else { x.sin() / x }
         };
-        let mean = |t: &Term| Term {
-            amplitude: t.amplitude * t.hkl.iter().map(|&k| sinc(k)).product::<f64>(),
-            ..*t
-        };
+        let mean = |t: &Term| Term { amplitude: t.amplitude * t.hkl.iter().map(|&k| sinc(k)).product::<f64>(), ..*t };
         Series::of(self.terms.iter().map(mean).collect())
     }
 
@@ -260,14 +206,8 @@ impl Series {
         };
         let factor = |a: usize| self.terms.iter().fold(0, |g, t| gcd(g, t.hkl[a])).max(1);
         let factors = [0, 1, 2].map(factor);
-        let divided = |t: &Term| Term {
-            hkl: [0, 1, 2].map(|a| t.hkl[a] / factors[a]),
-            ..*t
-        };
-        (
-            Series::of(self.terms.iter().map(divided).collect()),
-            factors,
-        )
+        let divided = |t: &Term| Term { hkl: [0, 1, 2].map(|a| t.hkl[a] / factors[a]), ..*t };
+        (Series::of(self.terms.iter().map(divided).collect()), factors)
     }
 
     /// The same series less a constant: its surface f = 0 is this one's f = `level`.
@@ -275,20 +215,13 @@ impl Series {
     /// # Errors
     /// A level that is not finite.
     pub fn about(&self, level: f64) -> Result<Series, Fault> {
-        let constant = Term {
-            hkl: [0; 3],
-            amplitude: -level,
-            phase: 0.0,
-        };
+        let constant = Term { hkl: [0; 3], amplitude: -level, phase: 0.0 };
         Series::new(self.terms.iter().copied().chain([constant]).collect())
     }
 
     /// The series times a factor.
     pub fn scaled(&self, by: f64) -> Series {
-        let times = |t: &Term| Term {
-            amplitude: t.amplitude * by,
-            ..*t
-        };
+        let times = |t: &Term| Term { amplitude: t.amplitude * by, ..*t };
         Series::of(self.terms.iter().map(times).collect())
     }
 
@@ -321,11 +254,7 @@ impl Series {
     /// Values at phases given coordinate by coordinate, in single precision: phases are reduced in double precision, and
     /// what rounding then leaves is about 1e-6 of the sum of the amplitudes.
     pub fn fill(&self, u: &[Vec<f64>; 3], out: &mut [f32]) {
-        let waves: Vec<([i32; 3], f32, f32)> = self
-            .waves
-            .iter()
-            .map(|w| (w.hkl, w.re as f32, w.im as f32))
-            .collect();
+        let waves: Vec<([i32; 3], f32, f32)> = self.waves.iter().map(|w| (w.hkl, w.re as f32, w.im as f32)).collect();
         fill(&waves, self.top, u, out);
     }
 
@@ -334,10 +263,7 @@ impl Series {
     pub fn row(&self, x: &[f64], [y, z]: [f64; 2], values: &mut [f64], gradients: &mut [Vec3]) {
         let powers = |v: f64| -> Vec<Complex> {
             let top = self.top as i32;
-            (-top..=top)
-                .map(|n| sin_cos_turns(f64::from(n) * v))
-                .map(|(s, c)| (c, s))
-                .collect()
+            (-top..=top).map(|n| sin_cos_turns(f64::from(n) * v)).map(|(s, c)| (c, s)).collect()
         };
         let (along_y, along_z) = (powers(y), powers(z));
         let at = |table: &[Complex], n: i32| table[(n + self.top as i32) as usize];
@@ -378,17 +304,12 @@ mod tests {
     use super::*;
 
     fn term(hkl: [i32; 3], amplitude: f64, phase: f64) -> Term {
-        Term {
-            hkl,
-            amplitude,
-            phase,
-        }
+        Term { hkl, amplitude, phase }
     }
 
     #[test]
     fn opposite_waves_merge_and_constants_are_refused() {
-        let s = Series::new(vec![term([1, 0, 0], 1.0, 0.1), term([-1, 0, 0], 1.0, -0.1)])
-            .expect("valid");
+        let s = Series::new(vec![term([1, 0, 0], 1.0, 0.1), term([-1, 0, 0], 1.0, -0.1)]).expect("valid");
         assert_eq!(s.terms().len(), 1);
         assert!((s.terms()[0].amplitude - 2.0).abs() < 1e-15);
         assert!(Series::new(vec![term([0, 0, 0], 1.0, 0.0)]).is_err());
@@ -414,11 +335,7 @@ mod tests {
         let (mut v, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
         s.gradients(&u, &mut v, &mut g);
         let (all, error) = Series::sampled(&v, shape, 50).expect("sampled");
-        assert!(
-            error < 1e-7 && all.terms().len() == 4,
-            "{error} {:?}",
-            all.terms()
-        );
+        assert!(error < 1e-7 && all.terms().len() == 4, "{error} {:?}", all.terms());
         let p = [[0.123, 0.456, 0.789]];
         let (mut a, mut b, mut h) = ([0.0], [0.0], [[0.0; 3]]);
         s.gradients(&p, &mut a, &mut h);
@@ -453,10 +370,7 @@ mod tests {
             // Slopes reach 2π · 64; products of 64 powers each lose a bit.
             assert!((0..3).all(|a| (g[i][a] - h[i][a]).abs() < 1e-11));
         }
-        let folded: Vec<Vec3> = u
-            .iter()
-            .map(|u| [0, 1, 2].map(|a| u[a] * f64::from(factors[a])))
-            .collect();
+        let folded: Vec<Vec3> = u.iter().map(|u| [0, 1, 2].map(|a| u[a] * f64::from(factors[a]))).collect();
         small.gradients(&folded, &mut v, &mut g);
         assert!((0..37).all(|i| (v[i] - w[i]).abs() < 1e-12));
     }
@@ -470,16 +384,11 @@ mod tests {
             term([0, 0, 0], 0.5, 0.0),
         ])
         .expect("valid");
-        let u: Vec<Vec3> = (0..37)
-            .map(|i| [0.37 * f64::from(i), 0.11 * f64::from(i) - 2.0, 1.7])
-            .collect();
+        let u: Vec<Vec3> = (0..37).map(|i| [0.37 * f64::from(i), 0.11 * f64::from(i) - 2.0, 1.7]).collect();
         let (mut v, mut g) = (vec![0.0; 37], vec![[0.0; 3]; 37]);
         s.gradients(&u, &mut v, &mut g);
         let mut single = vec![0f32; 37];
-        s.fill(
-            &[0, 1, 2].map(|a| u.iter().map(|u| u[a]).collect()),
-            &mut single,
-        );
+        s.fill(&[0, 1, 2].map(|a| u.iter().map(|u| u[a]).collect()), &mut single);
         for i in 0..37 {
             // 2π times the rounding of a phase times an index of three, and that of the sums.
             assert!((f64::from(single[i]) - v[i]).abs() < 3e-6);

@@ -52,11 +52,7 @@ impl Spline {
         let padded = (0..sx * sy * sz)
             .map(|i| c([wrap(i % sx, 0), wrap(i / sx % sy, 1), wrap(i / sx / sy, 2)]) as f32)
             .collect();
-        Spline {
-            shape,
-            padded,
-            stride: [sx, sx * sy],
-        }
+        Spline { shape, padded, stride: [sx, sx * sy] }
     }
 
     /// The entry of `padded` for coefficient (i, j, k) − 1.
@@ -72,10 +68,7 @@ impl Spline {
     /// An interval that contains every value: a spline lies in the hull of its coefficients.
     pub(super) fn range(&self) -> Interval {
         let fold = |(lo, hi): (f32, f32), v: &f32| (lo.min(*v), hi.max(*v));
-        let (lo, hi) = self
-            .padded
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), fold);
+        let (lo, hi) = self.padded.iter().fold((f32::INFINITY, f32::NEG_INFINITY), fold);
         Interval::new(f64::from(lo), f64::from(hi))
     }
 
@@ -89,9 +82,7 @@ impl Spline {
         let [nx, ny, nz] = self.shape;
         let longest = |sides: [[f64; 2]; 3]| {
             (0..8)
-                .map(|corner| {
-                    core::array::from_fn(|a| sides[a][corner >> a & 1] * self.shape[a] as f64)
-                })
+                .map(|corner| core::array::from_fn(|a| sides[a][corner >> a & 1] * self.shape[a] as f64))
                 .map(|g| norm(apply(&back, g)))
                 .fold(0.0, f64::max)
         };
@@ -239,24 +230,14 @@ fn along(row: &[f32], w: &[f64; 4]) -> f64 {
 #[inline]
 fn weights(t: f64) -> [f64; 4] {
     let r = 1.0 - t;
-    [
-        r * r * r / 6.0,
-        (t * t * (3.0 * t - 6.0) + 4.0) / 6.0,
-        (r * r * (3.0 * r - 6.0) + 4.0) / 6.0,
-        t * t * t / 6.0,
-    ]
+    [r * r * r / 6.0, (t * t * (3.0 * t - 6.0) + 4.0) / 6.0, (r * r * (3.0 * r - 6.0) + 4.0) / 6.0, t * t * t / 6.0]
 }
 
 /// Their derivatives.
 #[inline]
 fn slopes(t: f64) -> [f64; 4] {
     let r = 1.0 - t;
-    [
-        -0.5 * r * r,
-        t * (1.5 * t - 2.0),
-        -r * (1.5 * r - 2.0),
-        0.5 * t * t,
-    ]
+    [-0.5 * r * r, t * (1.5 * t - 2.0), -r * (1.5 * r - 2.0), 0.5 * t * t]
 }
 
 /// Values on a circle of nodes to the coefficients of the cubic spline through them: (c₋ + 4 c + c₊) / 6 = v.
@@ -265,11 +246,8 @@ fn prefilter(line: &mut [f64]) {
     let pole = 3f64.sqrt() - 2.0;
     // The sums over the whole circle; 0.268⁴⁸ is below rounding.
     let far = 48;
-    let start = |line: &[f64], at: &dyn Fn(usize) -> usize| {
-        (0..far)
-            .rev()
-            .fold(0.0, |sum, m| sum * pole + line[at(m) % n])
-    };
+    let start =
+        |line: &[f64], at: &dyn Fn(usize) -> usize| (0..far).rev().fold(0.0, |sum, m| sum * pole + line[at(m) % n]);
     line[0] = start(line, &|m| n * far - m);
     for k in 1..n {
         line[k] += pole * line[k - 1];
@@ -378,9 +356,7 @@ mod tests {
     }
 
     fn places(n: usize) -> Vec<Vec3> {
-        (0..n)
-            .map(|i| [0.7549, 0.5698, 0.4302].map(|s| 9.0 * (s * i as f64).fract() - 4.0))
-            .collect()
+        (0..n).map(|i| [0.7549, 0.5698, 0.4302].map(|s| 9.0 * (s * i as f64).fract() - 4.0)).collect()
     }
 
     #[test]
@@ -390,17 +366,11 @@ mod tests {
             let u = places(500);
             let mut v = vec![0.0; u.len()];
             s.values(&u, &mut v);
-            u.iter()
-                .zip(&v)
-                .map(|(u, v)| (wave(*u) - v).abs())
-                .fold(0.0, f64::max)
+            u.iter().zip(&v).map(|(u, v)| (wave(*u) - v).abs()).fold(0.0, f64::max)
         });
         println!("{errors:?}");
         // Halved nearly: (37/21)⁴ = 9.6 along the finest wave.
-        assert!(
-            errors[0] < 2e-2 && errors[0] / errors[1] > 9.0,
-            "{errors:?}"
-        );
+        assert!(errors[0] < 2e-2 && errors[0] / errors[1] > 9.0, "{errors:?}");
     }
 
     #[test]

@@ -62,12 +62,7 @@ impl Stencil {
             return Err(Fault::new("site", format!("{c} is not a finite number")));
         }
         let m = if dual { -1.0 } else { 1.0 } * edge * 2f64.sqrt() / 4.0;
-        let ends = [
-            [1.0, -1.0, -1.0],
-            [-1.0, 1.0, -1.0],
-            [-1.0, -1.0, 1.0],
-            [1.0, 1.0, 1.0],
-        ];
+        let ends = [[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]];
         let stencil = Stencil {
             series,
             corners: ends.map(|e| add(site, scale(e, m))),

@@ -47,13 +47,11 @@ pub(super) fn least(f: Function, measure: &(dyn Fn(Vec3) -> Option<f64> + Sync))
         while step > 1e-5 {
             let (_, g) = sample(f, at);
             let (a, b) = across(unit(g));
-            let next = [a, b, scale(a, -1.0), scale(b, -1.0)]
-                .into_iter()
-                .find_map(|d| {
-                    let p = onto_surface(f, add(at, scale(d, step)), step)?;
-                    let t = measure(p)?;
-                    (t < least).then_some((t, p))
-                });
+            let next = [a, b, scale(a, -1.0), scale(b, -1.0)].into_iter().find_map(|d| {
+                let p = onto_surface(f, add(at, scale(d, step)), step)?;
+                let t = measure(p)?;
+                (t < least).then_some((t, p))
+            });
             match next {
                 Some((t, p)) => (least, at) = (t, p),
                 None => step *= 0.5,
@@ -86,14 +84,7 @@ fn onto_surface(f: Function, mut u: Vec3, reach: f64) -> Option<Vec3> {
 }
 
 /// The wall at a point of the mid-surface: distance along one normal to |f| = iso plus that along the other.
-fn thickness_at(
-    f: Function,
-    u: Vec3,
-    iso: f64,
-    to_phase: &Mat3,
-    back: &Mat3,
-    speed: f64,
-) -> Option<f64> {
+fn thickness_at(f: Function, u: Vec3, iso: f64, to_phase: &Mat3, back: &Mat3, speed: f64) -> Option<f64> {
     let normal = unit(apply(back, sample(f, u).1));
     let d = apply(to_phase, normal);
     let one = first_beyond(f, u, d, speed, |v| v.abs() - iso)?;
@@ -103,13 +94,7 @@ fn thickness_at(
 
 /// The least s > 0 (mm) at which `outside`(f(u + s d)) is positive, up to two periods; to about 1e-12 of a period.
 /// Places are tried eight at a time, which a series takes in one go.
-fn first_beyond(
-    f: Function,
-    u: Vec3,
-    d: Vec3,
-    speed: f64,
-    outside: impl Fn(f64) -> f64,
-) -> Option<f64> {
+fn first_beyond(f: Function, u: Vec3, d: Vec3, speed: f64, outside: impl Fn(f64) -> f64) -> Option<f64> {
     const STEPS: usize = 192;
     const AT_ONCE: usize = 8;
     // Which of the places from + step, from + 2 step … is the first outside.
@@ -147,40 +132,26 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
 ///
 /// `necks` are those of [`necks`](super::necks): phases and levels. Where every neck is
 /// closed and the pieces are loose it is zero. `None` where the part is empty or full, and for sheets.
-pub fn neck(
-    f: Function,
-    part: Part,
-    iso: f64,
-    necks: &[(Vec3, f64)],
-    to_phase: &Mat3,
-) -> Option<f64> {
+pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: &Mat3) -> Option<f64> {
     let sign = match part {
         Part::Lower => 1.0,
         Part::Upper => -1.0,
         Part::Sheet => return None,
     };
-    let deep: Vec<Vec3> = necks
-        .iter()
-        .filter(|(_, level)| sign * (iso - level) > 0.0)
-        .map(|(at, _)| *at)
-        .collect();
+    let deep: Vec<Vec3> = necks.iter().filter(|(_, level)| sign * (iso - level) > 0.0).map(|(at, _)| *at).collect();
     if deep.is_empty() {
         // Every neck is closed: loose pieces, if any.
         return (!extremes(f, sign, iso).is_empty()).then_some(0.0);
     }
-    let radii: Vec<f64> = deep
-        .par_iter()
-        .filter_map(|u| distance(f, *u, iso, sign, to_phase))
-        .collect();
+    let radii: Vec<f64> = deep.par_iter().filter_map(|u| distance(f, *u, iso, sign, to_phase)).collect();
     radii.into_iter().reduce(f64::min).map(|r| 2.0 * r)
 }
 
 /// The places where sign · f is least, all of them that a grid shows, as far as they are solid at `iso`.
 fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     let n = 32;
-    let points: Vec<Vec3> = (0..n * n * n)
-        .map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64 / n as f64))
-        .collect();
+    let points: Vec<Vec3> =
+        (0..n * n * n).map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64 / n as f64)).collect();
     let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
     f(&points, &mut v, &mut g);
     let low = |i: usize| sign * v[i];
@@ -190,23 +161,15 @@ fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     };
     let hollow = |i: &usize| {
         (0..3).all(|a| {
-            [1, n - 1].into_iter().all(|s| {
-                low(*i)
-                    <= low(near(
-                        *i,
-                        core::array::from_fn(|b| if a == b { s } else { 0 }),
-                    ))
-            })
+            [1, n - 1]
+                .into_iter()
+                .all(|s| low(*i) <= low(near(*i, core::array::from_fn(|b| if a == b { s } else { 0 }))))
         })
     };
     let mut found: Vec<Vec3> = Vec::new();
     for i in (0..points.len()).filter(hollow) {
         let at = critical(f, points[i], 2.0 / n as f64).map_or(points[i], |c| c.at);
-        let seen = |p: &Vec3| {
-            sub(*p, at)
-                .iter()
-                .all(|d| (d - d.round()).abs() < 0.5 / n as f64)
-        };
+        let seen = |p: &Vec3| sub(*p, at).iter().all(|d| (d - d.round()).abs() < 0.5 / n as f64);
         if sign * (iso - sample(f, at).0) > 0.0 && !found.iter().any(seen) {
             found.push(at);
         }
@@ -275,10 +238,7 @@ mod tests {
     }
 
     fn about(found: Option<f64>, want: f64, tolerance: f64) {
-        assert!(
-            found.is_some_and(|v| (v - want).abs() <= tolerance * want),
-            "{found:?} is not {want}"
-        );
+        assert!(found.is_some_and(|v| (v - want).abs() <= tolerance * want), "{found:?} is not {want}");
     }
 
     #[test]
@@ -289,10 +249,7 @@ mod tests {
         }
         // Stretched and turned: only the length along the phase's gradient counts.
         let r = crate::math::rotation([20.0, 35.0, 50.0]);
-        let map = crate::math::product(
-            &[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]],
-            &transpose(&r),
-        );
+        let map = crate::math::product(&[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]], &transpose(&r));
         about(wall(&slabs, 0.3, &map), 4.0 * 0.3f64.asin() / PI, 1e-8);
     }
 
@@ -300,11 +257,7 @@ mod tests {
     fn thin_walls_are_their_first_order() {
         // The gradient of the primitive on f = 0 is greatest where sin² sums most: cos = 0 on all axes, |∇f| = 2π√3.
         let t = 1e-3;
-        about(
-            wall(&primitive, t, &cubic(4.0)),
-            4.0 * 2.0 * t / (TAU * 3f64.sqrt()),
-            1e-5,
-        );
+        about(wall(&primitive, t, &cubic(4.0)), 4.0 * 2.0 * t / (TAU * 3f64.sqrt()), 1e-5);
     }
 
     #[test]
@@ -323,14 +276,9 @@ mod tests {
         let n = 400;
         for i in 0..=n {
             for j in 0..=n {
-                let (th, ph) = (
-                    PI / 2.0 * f64::from(i) / f64::from(n),
-                    PI / 2.0 * f64::from(j) / f64::from(n),
-                );
+                let (th, ph) = (PI / 2.0 * f64::from(i) / f64::from(n), PI / 2.0 * f64::from(j) / f64::from(n));
                 let d = [th.sin() * ph.cos(), th.sin() * ph.sin(), th.cos()];
-                let f = |r: f64| {
-                    -(TAU * r * d[0]).cos() - (TAU * r * d[1]).cos() + (TAU * r * d[2]).cos() - t
-                };
+                let f = |r: f64| -(TAU * r * d[0]).cos() - (TAU * r * d[1]).cos() + (TAU * r * d[2]).cos() - t;
                 if f(least.min(0.5)) <= 0.0 {
                     continue;
                 }
@@ -351,25 +299,13 @@ mod tests {
         assert_eq!(necks.len(), 3);
         for t in [-0.9, -0.5, 0.0] {
             let want = 2.0 * neck_radius(t);
-            about(
-                neck(&primitive, Part::Lower, t, &necks, &cubic(1.0)),
-                want,
-                1e-4,
-            );
+            about(neck(&primitive, Part::Lower, t, &necks, &cubic(1.0)), want, 1e-4);
             // Lengths scale with the wavelength.
-            about(
-                neck(&primitive, Part::Lower, t, &necks, &cubic(7.0)),
-                7.0 * want,
-                1e-4,
-            );
+            about(neck(&primitive, Part::Lower, t, &necks, &cubic(7.0)), 7.0 * want, 1e-4);
         }
         // The upper part is the lower one moved by half a period.
         let upper = super::super::necks(&primitive, Part::Upper);
-        about(
-            neck(&primitive, Part::Upper, 0.5, &upper, &cubic(1.0)),
-            2.0 * neck_radius(-0.5),
-            1e-4,
-        );
+        about(neck(&primitive, Part::Upper, 0.5, &upper, &cubic(1.0)), 2.0 * neck_radius(-0.5), 1e-4);
     }
 
     #[test]
@@ -379,10 +315,7 @@ mod tests {
         let long = neck(&primitive, Part::Lower, -0.9, &necks, &map);
         // Necks along z keep their sections; the nearest point lies across, at cos a = 1 − (1 + t)…: solved on one axis.
         let section = 2.0 * ((0.9f64).acos() / TAU).min(f64::INFINITY);
-        assert!(
-            long.is_some_and(|v| v <= section * 1.001 && v > 0.5 * section),
-            "{long:?} {section}"
-        );
+        assert!(long.is_some_and(|v| v <= section * 1.001 && v > 0.5 * section), "{long:?} {section}");
     }
 
     #[test]
@@ -392,17 +325,8 @@ mod tests {
             let found = neck(&primitive, Part::Lower, t, &necks, &cubic(2.0));
             assert_eq!(found, Some(0.0), "{t}");
         }
-        assert_eq!(
-            neck(&primitive, Part::Lower, -3.5, &necks, &cubic(2.0)),
-            None
-        );
-        assert_eq!(
-            neck(&primitive, Part::Lower, 3.5, &necks, &cubic(2.0)),
-            None
-        );
-        assert_eq!(
-            neck(&primitive, Part::Sheet, 0.5, &necks, &cubic(2.0)),
-            None
-        );
+        assert_eq!(neck(&primitive, Part::Lower, -3.5, &necks, &cubic(2.0)), None);
+        assert_eq!(neck(&primitive, Part::Lower, 3.5, &necks, &cubic(2.0)), None);
+        assert_eq!(neck(&primitive, Part::Sheet, 0.5, &necks, &cubic(2.0)), None);
     }
 }

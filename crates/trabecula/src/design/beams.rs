@@ -29,22 +29,13 @@ use wire::{check_beams, check_left, greatest, mean_length, merging, radii, table
 const ON: f64 = 1e-9;
 
 /// The beams of a design, filling the region.
-pub(super) fn beams(
-    spec: &BeamsSpec,
-    place: &Place,
-    warnings: &mut Vec<Warning>,
-) -> Result<Beams, DesignError> {
+pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>) -> Result<Beams, DesignError> {
     if let Some(pattern) = &spec.pattern {
         return pattern::laid(spec, pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
-    let Frame {
-        mut wire,
-        mut own,
-        wavelength,
-        reach,
-    } = frame(spec, &radii, place, warnings)?;
+    let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &radii, place, warnings)?;
     let mut cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
     let source = if spec.cell.is_some() { "map" } else { "struts" };
     check_left(&wire, source, place)?;
@@ -153,12 +144,7 @@ struct Frame {
     reach: f64,
 }
 
-fn frame(
-    spec: &BeamsSpec,
-    radii: &Radii,
-    place: &Place,
-    warnings: &mut Vec<Warning>,
-) -> Result<Frame, DesignError> {
+fn frame(spec: &BeamsSpec, radii: &Radii, place: &Place, warnings: &mut Vec<Warning>) -> Result<Frame, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let bounds = place.region.bounds();
     let thick = thickest(radii, &bounds, place);
@@ -169,32 +155,16 @@ fn frame(
     };
     let (Some(name), Some(map)) = (&spec.cell, &spec.map) else {
         let (wire, own) = tables(spec, place)?;
-        let longest = wire
-            .struts
-            .iter()
-            .map(|s| wire.length(*s))
-            .fold(0.0, f64::max);
-        let largest = own
-            .iter()
-            .copied()
-            .filter(|r| r.is_finite())
-            .fold(0.0, f64::max);
-        return Ok(Frame {
-            wavelength: mean_length(&wire),
-            reach: reach(longest).max(largest),
-            wire,
-            own,
-        });
+        let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
+        let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
+        return Ok(Frame { wavelength: mean_length(&wire), reach: reach(longest).max(largest), wire, own });
     };
     let unit = graph::named(name).ok_or_else(|| {
         let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
         DesignError::unknown(&below("cell"), "cell of beams", name, &names)
     })?;
     let net = unit.net().map_err(|f| DesignError::fault(&place.path, f))?;
-    let at = Place {
-        path: below("map"),
-        ..*place
-    };
+    let at = Place { path: below("map"), ..*place };
     let made = map::map(map, &at)?;
     map::warn(&made, map, &place.path, warnings);
     for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
@@ -208,19 +178,10 @@ fn frame(
             return Err(DesignError::new(below(key), message).found(number(most)));
         }
     }
-    let longest = net
-        .lengths([made.longest(); 3])
-        .into_iter()
-        .fold(0.0, f64::max);
+    let longest = net.lengths([made.longest(); 3]).into_iter().fold(0.0, f64::max);
     let reach = reach(longest);
-    let wire = graph::fill(&net, &made, &bounds, reach)
-        .map_err(|f| DesignError::fault(&below("map"), f))?;
-    Ok(Frame {
-        wire,
-        own: Vec::new(),
-        wavelength: made.wavelength(),
-        reach,
-    })
+    let wire = graph::fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
+    Ok(Frame { wire, own: Vec::new(), wavelength: made.wavelength(), reach })
 }
 
 pub(super) fn fillet(spec: FilletSpec) -> Fillet {

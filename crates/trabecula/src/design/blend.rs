@@ -26,11 +26,7 @@ impl BlendSpec {
     fn weights(&self) -> Vec<(String, &GradeSpec)> {
         match &self.lattices {
             BlendKind::Between(b) => vec![("blend.weight".into(), &b.weight)],
-            BlendKind::Of(of) => of
-                .of
-                .iter()
-                .map(|(n, g)| (format!("blend.of.{n}"), g))
-                .collect(),
+            BlendKind::Of(of) => of.of.iter().map(|(n, g)| (format!("blend.of.{n}"), g)).collect(),
         }
     }
 }
@@ -70,26 +66,14 @@ pub struct Functions {
 }
 
 /// The radial basis functions in a weight, itself or under a step.
-fn functions(
-    spec: &GradeSpec,
-    path: &str,
-    place: &Place,
-    out: &mut Vec<Functions>,
-) -> Result<(), DesignError> {
+fn functions(spec: &GradeSpec, path: &str, place: &Place, out: &mut Vec<Functions>) -> Result<(), DesignError> {
     match spec {
-        GradeSpec::Kind(GradeKind::Sigmoid(s)) => {
-            functions(&s.of, &format!("{path}.sigmoid.of"), place, out)
-        }
+        GradeSpec::Kind(GradeKind::Sigmoid(s)) => functions(&s.of, &format!("{path}.sigmoid.of"), place, out),
         GradeSpec::Kind(GradeKind::Rbf(r)) => {
             let path = format!("{path}.rbf");
             let made = control::rbf(r, &path, place)?;
             let (points, delta, condition) = (made.len(), made.delta(), made.condition());
-            out.push(Functions {
-                path,
-                points,
-                delta,
-                condition,
-            });
+            out.push(Functions { path, points, delta, condition });
             Ok(())
         }
         _ => Ok(()),
@@ -106,27 +90,18 @@ pub(super) fn blend(
     let names = spec.names();
     if let Some(idle) = members.iter().find(|m| !names.contains(&m.name.as_str())) {
         let message = format!("the blend does not use this; it is of {}", names.join(", "));
-        return Err(DesignError::new(
-            format!("{}.{}", idle.table, idle.name),
-            message,
-        ));
+        return Err(DesignError::new(format!("{}.{}", idle.table, idle.name), message));
     }
     let mut of = Vec::new();
     for name in &names {
         let message = || DesignError::new("blend", format!("there is no lattice \"{name}\""));
-        let member = members
-            .iter()
-            .find(|m| m.name == *name)
-            .ok_or_else(message)?;
+        let member = members.iter().find(|m| m.name == *name).ok_or_else(message)?;
         of.push(member.of.clone());
     }
     let (mut grades, mut rbf) = (Vec::new(), Vec::new());
     for (path, spec) in spec.weights() {
         functions(spec, &path, place, &mut rbf)?;
-        let here = Place {
-            path: path.clone(),
-            ..*place
-        };
+        let here = Place { path: path.clone(), ..*place };
         grades.push(grade(spec, &path, &here, Allowed::Finite, false)?);
     }
     let weights = match (&spec.lattices, grades.pop()) {
@@ -150,43 +125,26 @@ pub(super) fn blend(
             figure(width),
             number(longest)
         );
-        warnings.push(Warning {
-            path: spec.weights()[0].0.clone(),
-            message,
-        });
+        warnings.push(Warning { path: spec.weights()[0].0.clone(), message });
     }
-    Ok(Blended {
-        blend: Arc::new(blend),
-        names: names.into_iter().map(String::from).collect(),
-        functions: rbf,
-        width,
-    })
+    Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
 
 /// Refuses weights that are no number, or none of which counts, anywhere that is looked at.
 fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(), DesignError> {
     let paths = spec.weights();
     let (points, _) = sample::inside(place.region, 60_000);
-    let points: Vec<Vec3> = points
-        .into_iter()
-        .chain(place.points.iter().copied())
-        .collect();
+    let points: Vec<Vec3> = points.into_iter().chain(place.points.iter().copied()).collect();
     let mut most = vec![f64::NEG_INFINITY; points.len()];
     let mut values = vec![0.0; points.len()];
     let at = |i: usize| points[i].map(|v| format!("{v:.4}")).join(", ");
     for (grade, (path, _)) in weights.grades().iter().zip(&paths) {
         grade.values(&points, &mut values);
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-            let message = format!(
-                "the weight is {} at ({}) mm; it must be a finite number",
-                number(values[i]),
-                at(i)
-            );
+            let message = format!("the weight is {} at ({}) mm; it must be a finite number", number(values[i]), at(i));
             return Err(DesignError::new(path, message).found(number(values[i])));
         }
-        most.iter_mut()
-            .zip(&values)
-            .for_each(|(m, v)| *m = m.max(*v));
+        most.iter_mut().zip(&values).for_each(|(m, v)| *m = m.max(*v));
     }
     if let (BlendKind::Of(_), Some(i)) = (&spec.lattices, most.iter().position(|m| *m <= 0.0)) {
         let message = format!(
@@ -199,29 +157,15 @@ fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(
 }
 
 /// Warns of lattices that count nowhere.
-fn unused(
-    blend: &Blend,
-    names: &[&str],
-    members: &[Member],
-    place: &Place,
-    warnings: &mut Vec<Warning>,
-) {
+fn unused(blend: &Blend, names: &[&str], members: &[Member], place: &Place, warnings: &mut Vec<Warning>) {
     let n = names.len();
     let mut w = vec![0.0; n * place.points.len()];
     blend.weights().values(place.points, &mut w);
     for (i, name) in names.iter().enumerate() {
         if w.chunks_exact(n).all(|w| w[i] == 0.0) {
-            let message =
-                "this lattice has no weight at any place that was looked at in the region"
-                    .to_string();
-            let table = members
-                .iter()
-                .find(|m| m.name == *name)
-                .map_or("lattice", |m| m.table);
-            warnings.push(Warning {
-                path: format!("{table}.{name}"),
-                message,
-            });
+            let message = "this lattice has no weight at any place that was looked at in the region".to_string();
+            let table = members.iter().find(|m| m.name == *name).map_or("lattice", |m| m.table);
+            warnings.push(Warning { path: format!("{table}.{name}"), message });
         }
     }
 }
@@ -240,9 +184,7 @@ fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
     let mut own = vec![0.0; n];
     for i in (0..points.len()).step_by(stride) {
         // The nearest of some places that belong to another.
-        let near = (1..200)
-            .map(|k| (i + k * 7) % points.len())
-            .filter(|j| owner[*j] != owner[i]);
+        let near = (1..200).map(|k| (i + k * 7) % points.len()).filter(|j| owner[*j] != owner[i]);
         let way = |j: &usize| norm(sub(points[*j], points[i]));
         let Some(j) = near.min_by(|a, b| way(a).total_cmp(&way(b))) else {
             continue;
@@ -251,11 +193,7 @@ fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
         for _ in 0..50 {
             let middle = scale(add(a, b), 0.5);
             weights.values(&[middle], &mut own);
-            if first(&own) == owner[i] {
-                a = middle
-            } else {
-                b = middle
-            }
+            if first(&own) == owner[i] { a = middle } else { b = middle }
         }
         let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
         weights.gradients(&[a], &mut v, &mut g);
@@ -263,12 +201,7 @@ fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
         weights.gradients(&[b], &mut u, &mut h);
         let steep = g.iter().chain(&h).map(|g| norm(*g)).fold(0.0, f64::max);
         // A jump has no slope on either side of it.
-        let jump = v
-            .iter()
-            .zip(&u)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
-            > 0.1;
+        let jump = v.iter().zip(&u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) > 0.1;
         let width = if jump { 0.0 } else { 1.0 / steep };
         least = Some(least.map_or(width, |l| l.min(width)));
     }

@@ -7,8 +7,7 @@ use super::data::*;
 use super::error::DesignError;
 use super::place::{LOOKS, Place};
 use super::{
-    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, skin, tets,
-    tiling, warn,
+    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, skin, tets, tiling, warn,
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
@@ -82,30 +81,17 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let (mut points, _) = sample::inside(&space, LOOKS);
     if points.is_empty() {
         let [x, y, z] = bounds.size().map(number);
-        let message = format!(
-            "the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm"
-        );
+        let message = format!("the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm");
         return Err(DesignError::new("region", message));
     }
     points.extend(sample::nodes(&space));
     let largest = bounds.size().into_iter().fold(0.0, f64::max);
-    if !(0.1..=2000.0).contains(&largest)
-        && !notes.warnings.iter().any(|w| w.message.contains("unit"))
-    {
-        let message = format!(
-            "the region is {} mm across; is its unit right?",
-            number(largest)
-        );
-        notes.warnings.push(Warning {
-            path: "region".into(),
-            message,
-        });
+    if !(0.1..=2000.0).contains(&largest) && !notes.warnings.iter().any(|w| w.message.contains("unit")) {
+        let message = format!("the region is {} mm across; is its unit right?", number(largest));
+        notes.warnings.push(Warning { path: "region".into(), message });
     }
     let (filled, thinnest) = skin::filled(d, &space, &points, loader, &mut notes)?;
-    let region::Notes {
-        mut warnings,
-        repairs,
-    } = notes;
+    let region::Notes { mut warnings, repairs } = notes;
     let (mut lattices, mut tilings) = (Vec::new(), Vec::new());
     if let Some(domain) = domain {
         let place = Place {
@@ -115,11 +101,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             filled: &filled,
             loader,
         };
-        let tiling::Made {
-            tiling,
-            explicit,
-            joins,
-        } = tiling::lattice(&domain, &place, &mut warnings)?;
+        let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, &place, &mut warnings)?;
         tilings.push(Tiled {
             name: domain.name.to_string(),
             tiling: tiling.clone(),
@@ -146,13 +128,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let others = d.lattice.iter();
     for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapSpec::Tets(_))) {
         let path = format!("lattice.{name}");
-        let place = Place {
-            path: path.clone(),
-            region: &space,
-            points: &points,
-            filled: &filled,
-            loader,
-        };
+        let place = Place { path: path.clone(), region: &space, points: &points, filled: &filled, loader };
         if spec.level.of == Of::Part && d.blend.is_some() {
             let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
             return Err(DesignError::new(format!("{path}.level.of"), message));
@@ -165,13 +141,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     }
     let mut graphs = Vec::new();
     for (name, spec) in &d.beams {
-        let place = Place {
-            path: format!("beams.{name}"),
-            region: &space,
-            points: &points,
-            filled: &filled,
-            loader,
-        };
+        let place = Place { path: format!("beams.{name}"), region: &space, points: &points, filled: &filled, loader };
         let made = beams::beams(spec, &place, &mut warnings)?;
         graphs.push((name.clone(), made));
     }
@@ -182,19 +152,8 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut blended = None;
     let field: Arc<dyn Field> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
         (Some(spec), ..) => {
-            let place = Place {
-                path: "blend".into(),
-                region: &space,
-                points: &points,
-                filled: &filled,
-                loader,
-            };
-            let made = blend::blend(
-                spec,
-                &members(&lattices, &tilings, &graphs),
-                &place,
-                &mut warnings,
-            )?;
+            let place = Place { path: "blend".into(), region: &space, points: &points, filled: &filled, loader };
+            let made = blend::blend(spec, &members(&lattices, &tilings, &graphs), &place, &mut warnings)?;
             let field = made.blend.clone();
             blended = Some(made);
             field
@@ -214,24 +173,11 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut solid = Solid::new(space.clone(), Some(field), wavelength);
     solid.transition = blended.as_ref().and_then(|b| b.width);
     let solid = filled.into_iter().fold(solid, Solid::with);
-    Ok(Built {
-        solid,
-        lattices,
-        tilings,
-        beams: graphs,
-        blend: blended,
-        skin: thinnest,
-        warnings,
-        repairs,
-    })
+    Ok(Built { solid, lattices, tilings, beams: graphs, blend: blended, skin: thinnest, warnings, repairs })
 }
 
 /// What may be named in a blend.
-fn members(
-    lattices: &[(String, Arc<Lattice>)],
-    tilings: &[Tiled],
-    graphs: &[(String, Beams)],
-) -> Vec<blend::Member> {
+fn members(lattices: &[(String, Arc<Lattice>)], tilings: &[Tiled], graphs: &[(String, Beams)]) -> Vec<blend::Member> {
     let lattices = lattices.iter().map(|(name, l)| blend::Member {
         table: "lattice",
         name: name.clone(),
@@ -241,24 +187,14 @@ fn members(
         table: "lattice",
         name: t.name.clone(),
         of: match <[_; 2]>::try_from(t.tiling.parts()) {
-            Ok(sides) => Constituent::Wall {
-                sides,
-                half: t.tiling.uniform(),
-                wavelength: t.tiling.wavelength(),
-            },
-            Err(_) => Constituent::Field {
-                field: t.tiling.clone(),
-                wavelength: t.tiling.wavelength(),
-            },
+            Ok(sides) => Constituent::Wall { sides, half: t.tiling.uniform(), wavelength: t.tiling.wavelength() },
+            Err(_) => Constituent::Field { field: t.tiling.clone(), wavelength: t.tiling.wavelength() },
         },
     });
     let graphs = graphs.iter().map(|(name, b)| blend::Member {
         table: "beams",
         name: name.clone(),
-        of: Constituent::Field {
-            field: b.field(),
-            wavelength: b.wavelength(),
-        },
+        of: Constituent::Field { field: b.field(), wavelength: b.wavelength() },
     });
     lattices.chain(tilings).chain(graphs).collect()
 }
@@ -272,15 +208,9 @@ fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
         cell = cell.truncated(share);
     }
     let cell = Arc::new(cell);
-    let here = Place {
-        path: below("map"),
-        ..*place
-    };
+    let here = Place { path: below("map"), ..*place };
     let map = map::map(&spec.map, &here)?;
-    let here = Place {
-        path: below("level"),
-        ..*place
-    };
+    let here = Place { path: below("level"), ..*place };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
 }

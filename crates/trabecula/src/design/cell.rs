@@ -64,11 +64,7 @@ fn plain_term(t: &TermSpec) -> Term {
         Component::Re => 0.0,
         Component::Im => 0.25,
     };
-    Term {
-        hkl: t.hkl,
-        amplitude: t.amplitude,
-        phase: t.phase - behind,
-    }
+    Term { hkl: t.hkl, amplitude: t.amplitude, phase: t.phase - behind }
 }
 
 /// The sum of a term over a space group. A phase mixes its two parts, each of them normalised.

@@ -50,18 +50,8 @@ pub(super) fn checked(
 }
 
 /// A smooth step of another number.
-pub(super) fn sigmoid(
-    spec: &SigmoidSpec,
-    path: &str,
-    place: &Place,
-) -> Result<Sigmoid, DesignError> {
-    let of = grade(
-        &spec.of,
-        &format!("{path}.of"),
-        place,
-        Allowed::Finite,
-        false,
-    )?;
+pub(super) fn sigmoid(spec: &SigmoidSpec, path: &str, place: &Place) -> Result<Sigmoid, DesignError> {
+    let of = grade(&spec.of, &format!("{path}.of"), place, Allowed::Finite, false)?;
     let at = finite(&format!("{path}.at"), spec.at)?;
     Ok(Sigmoid::new(of, at, width(spec.width, path)?))
 }
@@ -70,9 +60,7 @@ pub(super) fn sigmoid(
 fn width(v: f64, path: &str) -> Result<f64, DesignError> {
     let path = format!("{path}.width");
     if v == 0.0 || v.is_subnormal() {
-        return Err(
-            DesignError::new(path, "the width is 0; a step needs room to rise in").found(number(v)),
-        );
+        return Err(DesignError::new(path, "the width is 0; a step needs room to rise in").found(number(v)));
     }
     finite(&path, v)
 }
@@ -100,11 +88,7 @@ pub(super) fn control(
     match spec {
         ControlSpec::Path(file) => samples::control(file, &format!("{path}.path"), place),
         ControlSpec::Points(points) => {
-            for (i, v) in points
-                .iter()
-                .enumerate()
-                .flat_map(|(i, p)| p.iter().map(move |v| (i, v)))
-            {
+            for (i, v) in points.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |v| (i, v))) {
                 finite(&format!("{path}.points[{i}]"), *v)?;
             }
             Ok((points.clone(), None))
@@ -119,10 +103,7 @@ fn direction(axis: Option<[f64; 3]>, path: &str) -> Result<Option<Vec3>, DesignE
         finite(&path, v)?;
     }
     if norm(axis) == 0.0 {
-        return Err(DesignError::new(
-            path,
-            "the direction is zero; give one such as [0, 0, 1]",
-        ));
+        return Err(DesignError::new(path, "the direction is zero; give one such as [0, 0, 1]"));
     }
     Ok(Some(axis))
 }
@@ -130,25 +111,17 @@ fn direction(axis: Option<[f64; 3]>, path: &str) -> Result<Option<Vec3>, DesignE
 /// A fault of control points stands where they do.
 pub(super) fn wrong(spec: &ControlSpec, path: &str, f: Fault) -> DesignError {
     let f = match spec {
-        ControlSpec::Path(_) if f.at == "points" => Fault {
-            at: "path".into(),
-            ..f
-        },
+        ControlSpec::Path(_) if f.at == "points" => Fault { at: "path".into(), ..f },
         _ => f,
     };
     DesignError::fault(path, f)
 }
 
 /// Distance to a line.
-pub(super) fn distance(
-    spec: &DistanceSpec,
-    path: &str,
-    place: &Place,
-) -> Result<Polyline, DesignError> {
+pub(super) fn distance(spec: &DistanceSpec, path: &str, place: &Place) -> Result<Polyline, DesignError> {
     let (points, _) = control(&spec.points, path, place)?;
     let axis = direction(spec.axis, path)?;
-    Polyline::new(points, spec.closed, axis, spec.sharpness)
-        .map_err(|f| wrong(&spec.points, path, f))
+    Polyline::new(points, spec.closed, axis, spec.sharpness).map_err(|f| wrong(&spec.points, path, f))
 }
 
 /// Radial basis functions.
@@ -157,11 +130,7 @@ pub(super) fn rbf(spec: &RbfSpec, path: &str, place: &Place) -> Result<Rbf, Desi
     let ones = || vec![1.0; points.len()];
     let values = spec.values.clone().or(beside).unwrap_or_else(ones);
     if values.len() != points.len() {
-        let message = format!(
-            "{} values for {} points; give one for each",
-            values.len(),
-            points.len()
-        );
+        let message = format!("{} values for {} points; give one for each", values.len(), points.len());
         return Err(DesignError::new(format!("{path}.values"), message));
     }
     for (i, v) in values.iter().enumerate() {

@@ -22,11 +22,7 @@ pub struct DesignError {
 impl DesignError {
     /// An error at `path`.
     pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
-        DesignError {
-            path: path.into(),
-            message: message.into(),
-            ..Default::default()
-        }
+        DesignError { path: path.into(), message: message.into(), ..Default::default() }
     }
 
     /// The same, with what was found.
@@ -58,22 +54,11 @@ impl DesignError {
     }
 
     /// The same, the nearest right word known.
-    pub(super) fn unknown_but(
-        path: &str,
-        what: &str,
-        word: &str,
-        allowed: &[&str],
-        nearest: Option<&str>,
-    ) -> Self {
+    pub(super) fn unknown_but(path: &str, what: &str, word: &str, allowed: &[&str], nearest: Option<&str>) -> Self {
         let hint = nearest.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
         let stop = if hint.is_empty() { "." } else { "" };
-        let mut e = DesignError::new(
-            path,
-            format!(
-                "unknown {what} \"{word}\"{hint}{stop} Allowed: {}",
-                allowed.join(", ")
-            ),
-        );
+        let mut e =
+            DesignError::new(path, format!("unknown {what} \"{word}\"{hint}{stop} Allowed: {}", allowed.join(", ")));
         e.nearest = nearest.map(str::to_string);
         e.found(word)
     }
@@ -102,9 +87,7 @@ mod tests {
 
     #[test]
     fn the_message_says_file_line_path_and_cure() {
-        let mut e =
-            DesignError::unknown("lattice.a.cell", "cell", "gyriod", &["gyroid", "diamond"])
-                .in_file("d.toml");
+        let mut e = DesignError::unknown("lattice.a.cell", "cell", "gyriod", &["gyroid", "diamond"]).in_file("d.toml");
         e.line = Some(7);
         assert_eq!(
             e.to_string(),

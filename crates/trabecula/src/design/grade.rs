@@ -36,16 +36,12 @@ impl Allowed {
                 Err(DesignError::new(path, message).found(number(v)))
             }
             Allowed::Length(name, most) if !(v > 0.0 && v <= most) => {
-                let message = format!(
-                    "{name} is {v} mm{place}; it must be greater than 0 and at most the wavelength, {most} mm"
-                );
+                let message =
+                    format!("{name} is {v} mm{place}; it must be greater than 0 and at most the wavelength, {most} mm");
                 Err(DesignError::new(path, message).found(v.to_string()))
             }
             Allowed::Positive(name) if !(v > 0.0 && v.is_finite()) => {
-                let message = format!(
-                    "{name} is {} mm{place}; it must be a finite number greater than 0",
-                    number(v)
-                );
+                let message = format!("{name} is {} mm{place}; it must be a finite number greater than 0", number(v));
                 Err(DesignError::new(path, message).found(number(v)))
             }
             Allowed::Share(_) | Allowed::Length(..) | Allowed::Positive(_) => Ok(v),
@@ -80,10 +76,7 @@ pub(super) fn grade(
     };
     let stops = |path: &str, stops: &[[f64; 2]]| {
         if stops.is_empty() {
-            return Err(DesignError::new(
-                path,
-                "no stops given; give at least one [position, value]",
-            ));
+            return Err(DesignError::new(path, "no stops given; give at least one [position, value]"));
         }
         let mut out = Vec::with_capacity(stops.len());
         let mut last = f64::NEG_INFINITY;
@@ -91,18 +84,12 @@ pub(super) fn grade(
             let path = format!("{path}[{i}]");
             finite(&path, at)?;
             if at <= last {
-                let message = format!(
-                    "positions must rise from stop to stop, found {} after {}",
-                    number(at),
-                    number(last)
-                );
+                let message =
+                    format!("positions must rise from stop to stop, found {} after {}", number(at), number(last));
                 return Err(DesignError::new(path, message).found(number(at)));
             }
             last = at;
-            out.push([
-                at,
-                turn(allowed.check(&path, value, &format!(" at position {}", number(at)))?),
-            ]);
+            out.push([at, turn(allowed.check(&path, value, &format!(" at position {}", number(at)))?)]);
         }
         Ok(out)
     };
@@ -113,20 +100,13 @@ pub(super) fn grade(
                 finite(&below, v)?;
             }
             if l.along == [0.0; 3] {
-                return Err(DesignError::new(
-                    below,
-                    "the direction is zero; give one such as [0, 0, 1]",
-                ));
+                return Err(DesignError::new(below, "the direction is zero; give one such as [0, 0, 1]"));
             }
-            Ok(Grade::Linear {
-                along: l.along,
-                stops: stops(&format!("{path}.linear.stops"), &l.stops)?,
-            })
+            Ok(Grade::Linear { along: l.along, stops: stops(&format!("{path}.linear.stops"), &l.stops)? })
         }
-        GradeKind::Depth(d) => Ok(Grade::Depth {
-            region: place.region.clone(),
-            stops: stops(&format!("{path}.depth.stops"), &d.stops)?,
-        }),
+        GradeKind::Depth(d) => {
+            Ok(Grade::Depth { region: place.region.clone(), stops: stops(&format!("{path}.depth.stops"), &d.stops)? })
+        }
         GradeKind::Radial(r) => {
             let below = |key: &str| format!("{path}.radial.{key}");
             for v in r.center {
@@ -145,11 +125,7 @@ pub(super) fn grade(
                 }
                 None => None,
             };
-            Ok(Grade::Radial {
-                center: r.center,
-                axis,
-                stops: stops(&below("stops"), &r.stops)?,
-            })
+            Ok(Grade::Radial { center: r.center, axis, stops: stops(&below("stops"), &r.stops)? })
         }
         GradeKind::Grid(g) => {
             let at = format!("{path}.grid");
@@ -188,15 +164,12 @@ pub(super) fn grade(
         }
         GradeKind::Formula(text) => {
             let place = format!("{path}.formula");
-            let own =
-                Formula::parse(text).map_err(|f| DesignError::fault(&place, f).found(text))?;
+            let own = Formula::parse(text).map_err(|f| DesignError::fault(&place, f).found(text))?;
             if !complement {
                 return Ok(Grade::Formula(own));
             }
             let turned = format!("1 - ({text})");
-            Formula::parse(&turned)
-                .map(Grade::Formula)
-                .map_err(|f| DesignError::fault(&place, f).found(text))
+            Formula::parse(&turned).map(Grade::Formula).map_err(|f| DesignError::fault(&place, f).found(text))
         }
     }
 }

@@ -28,10 +28,7 @@ pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joi
         common(a?, b?, tiling.part, fraction)
     };
     let shares = foretold.joins.iter().map(|j| share(j.zones).unwrap_or(0.0));
-    Some(Joins {
-        shares: shares.collect(),
-        foretold,
-    })
+    Some(Joins { shares: shares.collect(), foretold })
 }
 
 /// The share of a face that is solid in both of two cells at the same fraction, by points evenly on it.
@@ -56,35 +53,18 @@ fn common(a: &Stencil, b: &Stencil, part: Part, fraction: f64) -> Option<f64> {
         };
         s.values(&points).into_iter().map(inside).collect()
     };
-    let both = solid(a)
-        .into_iter()
-        .zip(solid(b))
-        .filter(|s| s.0 && s.1)
-        .count();
+    let both = solid(a).into_iter().zip(solid(b)).filter(|s| s.0 && s.1).count();
     Some(both as f64 / points.len() as f64)
 }
 
 impl Joins {
     /// Warns of zones that do not join, or of a lattice in pieces although they do.
-    pub(super) fn warn(
-        &self,
-        names: &BTreeMap<String, String>,
-        path: &str,
-        warnings: &mut Vec<Warning>,
-    ) {
+    pub(super) fn warn(&self, names: &BTreeMap<String, String>, path: &str, warnings: &mut Vec<Warning>) {
         let mut say = |message: String| {
-            warnings.push(Warning {
-                path: path.to_string(),
-                message,
-            });
+            warnings.push(Warning { path: path.to_string(), message });
         };
         let name = |zone: u32| names.get(&zone.to_string()).map_or("", String::as_str);
-        let apart = self
-            .foretold
-            .joins
-            .iter()
-            .zip(&self.shares)
-            .filter(|(j, _)| !j.joined);
+        let apart = self.foretold.joins.iter().zip(&self.shares).filter(|(j, _)| !j.joined);
         let mut any = false;
         for (join, share) in apart {
             any = true;
@@ -100,10 +80,7 @@ impl Joins {
             ));
         }
         if !any && self.foretold.pieces > 1 {
-            say(format!(
-                "the lattice is in {} pieces, told by its ports",
-                self.foretold.pieces
-            ));
+            say(format!("the lattice is in {} pieces, told by its ports", self.foretold.pieces));
         }
     }
 
@@ -115,11 +92,6 @@ impl Joins {
     /// For the report.
     pub(super) fn json(&self) -> Json {
         let one = |(j, share): (&extract::Join, &f64)| json!({ "zones": j.zones, "faces": j.faces, "open": j.open, "ports": share, "joined": j.joined });
-        self.foretold
-            .joins
-            .iter()
-            .zip(&self.shares)
-            .map(one)
-            .collect()
+        self.foretold.joins.iter().zip(&self.shares).map(one).collect()
     }
 }

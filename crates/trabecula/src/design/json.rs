@@ -12,20 +12,11 @@ use super::node::{Node, Value};
 /// Reads a tree from JSON.
 pub(super) fn read(text: &str) -> Result<Node, DesignError> {
     let line = Cell::new(1);
-    let counted = Counted {
-        bytes: text.as_bytes(),
-        line: &line,
-    };
+    let counted = Counted { bytes: text.as_bytes(), line: &line };
     let refused = RefCell::new(None);
     let mut reader = serde_json::Deserializer::from_reader(counted);
-    let root = At {
-        path: String::new(),
-        line: &line,
-        refused: &refused,
-    };
-    let read = root
-        .deserialize(&mut reader)
-        .and_then(|node| reader.end().map(|()| node));
+    let root = At { path: String::new(), line: &line, refused: &refused };
+    let read = root.deserialize(&mut reader).and_then(|node| reader.end().map(|()| node));
     read.map_err(|e| {
         refused.take().unwrap_or_else(|| DesignError {
             line: Some(e.line()),
@@ -102,10 +93,7 @@ impl<'de> Visitor<'de> for At<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<Value, A::Error> {
         let mut items = Vec::new();
-        let item = |i| At {
-            path: format!("{}[{i}]", self.path),
-            ..self
-        };
+        let item = |i| At { path: format!("{}[{i}]", self.path), ..self };
         while let Some(node) = from.next_element_seed(item(items.len()))? {
             items.push(node);
         }
@@ -116,18 +104,11 @@ impl<'de> Visitor<'de> for At<'_> {
         let mut entries: Vec<(String, Option<usize>, Node)> = Vec::new();
         while let Some(key) = from.next_key::<String>()? {
             let line = Some(self.line.get());
-            let path = if self.path.is_empty() {
-                key.clone()
-            } else {
-                format!("{}.{key}", self.path)
-            };
+            let path = if self.path.is_empty() { key.clone() } else { format!("{}.{key}", self.path) };
             if let Some((_, first, _)) = entries.iter().find(|e| e.0 == key) {
                 let first = first.map_or(String::new(), |l| format!(" (first on line {l})"));
                 let message = format!("the key \"{key}\" is given twice{first}; keep one");
-                *self.refused.borrow_mut() = Some(DesignError {
-                    line,
-                    ..DesignError::new(path, message).found(key)
-                });
+                *self.refused.borrow_mut() = Some(DesignError { line, ..DesignError::new(path, message).found(key) });
                 return Err(A::Error::custom("a key is given twice"));
             }
             let value = from.next_value_seed(At { path, ..self })?;
@@ -143,14 +124,12 @@ mod tests {
 
     #[test]
     fn keys_have_lines_and_stand_once() {
-        let node = read("{\n  \"a\": 1,\n  \"b\": [1,\n    {\"c\": null}],\n \"d\": 1e3\n}")
-            .expect("readable");
+        let node = read("{\n  \"a\": 1,\n  \"b\": [1,\n    {\"c\": null}],\n \"d\": 1e3\n}").expect("readable");
         let lines = node.lines();
         for (path, line) in [("a", 2), ("b", 3), ("b[1].c", 4), ("d", 5)] {
             assert_eq!(lines.line(path), Some(line), "{path}");
         }
-        let e = read("{\"a\": {\n\"b\": 1,\n\"c\": [{\"x\": 1, \"x\": 2}],\n\"b\": 2}}")
-            .expect_err("twice");
+        let e = read("{\"a\": {\n\"b\": 1,\n\"c\": [{\"x\": 1, \"x\": 2}],\n\"b\": 2}}").expect_err("twice");
         assert_eq!((e.path.as_str(), e.line), ("a.c[0].x", Some(3)));
         let e = read("{\"a\": {\n\"b\": 1,\n\"b\": 2}}").expect_err("twice");
         assert_eq!((e.path.as_str(), e.line), ("a.b", Some(3)));

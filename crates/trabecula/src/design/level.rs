@@ -74,9 +74,7 @@ pub(super) fn level(
     if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
-                let message = format!(
-                    "\"{option}\" goes with fraction or porosity, found {key}; leave it out"
-                );
+                let message = format!("\"{option}\" goes with fraction or porosity, found {key}; leave it out");
                 return Err(DesignError::new(path(option), message));
             }
         }
@@ -104,9 +102,8 @@ pub(super) fn level(
         (Of::Cell, Fit::Table) => Ok(Level::Fraction(amount)),
         (Of::Part, Fit::Table) => {
             let Some(target) = amount.constant() else {
-                let message = format!(
-                    "of = \"part\" solves for one level and takes a constant {key}; found one that varies"
-                );
+                let message =
+                    format!("of = \"part\" solves for one level and takes a constant {key}; found one that varies");
                 return Err(DesignError::new(path("of"), message));
             };
             let solved = solve(target, part.into(), cell, map, place);
@@ -120,17 +117,15 @@ pub(super) fn level(
                 return Err(DesignError::new(path("fit"), message));
             }
             let Some(fraction) = amount.constant() else {
-                let message =
-                    format!("fit = \"spartan\" takes a constant {key}; found one that varies");
+                let message = format!("fit = \"spartan\" takes a constant {key}; found one that varies");
                 return Err(DesignError::new(path("fit"), message));
             };
             match name.and_then(|n| spartan(n, 1.0 - fraction)) {
                 Some(iso) => Ok(Level::Iso(Grade::Constant(iso))),
                 None => {
                     let found = name.unwrap_or("a series");
-                    let message = format!(
-                        "fit = \"spartan\" is known for {fits}; found {found}, so use fit = \"table\""
-                    );
+                    let message =
+                        format!("fit = \"spartan\" is known for {fits}; found {found}, so use fit = \"table\"");
                     Err(DesignError::new(path("fit"), message))
                 }
             }
@@ -149,19 +144,13 @@ fn check_sheet(part: PartSpec, key: &str, path: &str) -> Result<(), DesignError>
         PartSpec::Lower => "lower",
         PartSpec::Upper => "upper",
     };
-    let message = format!(
-        "{key} goes with part = \"sheet\", found part = \"{found}\": a network has no wall; give its fraction"
-    );
+    let message =
+        format!("{key} goes with part = \"sheet\", found part = \"{found}\": a network has no wall; give its fraction");
     Err(DesignError::new(path, message))
 }
 
 /// The cell of a lattice whose mid-surface is f = mid: the same series less a constant.
-pub(super) fn about_mid(
-    cell: Cell,
-    spec: &LevelSpec,
-    part: PartSpec,
-    path: &str,
-) -> Result<Cell, DesignError> {
+pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str) -> Result<Cell, DesignError> {
     let path = format!("{path}.mid");
     let mid = finite(&path, spec.mid)?;
     if mid == 0.0 {
@@ -190,40 +179,21 @@ pub(super) fn check_varied(
 ) -> Result<(), DesignError> {
     let Place { region, points, .. } = *place;
     let bounds = region.bounds();
-    let corner = |i: usize| {
-        core::array::from_fn(|a| {
-            if i >> a & 1 == 0 {
-                bounds.min[a]
-            } else {
-                bounds.max[a]
-            }
-        })
-    };
+    let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
     let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
     let mut distance = [0.0; 8];
     region.values(&corners, &mut distance);
-    let in_corners = corners
-        .iter()
-        .zip(distance)
-        .filter(|(_, d)| *d <= 1e-9)
-        .map(|(c, _)| *c);
+    let in_corners = corners.iter().zip(distance).filter(|(_, d)| *d <= 1e-9).map(|(c, _)| *c);
     let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
     let mut values = vec![0.0; points.len()];
     amount.values(&points, &mut values);
     let own = |v: f64| if complement { 1.0 - v } else { v };
     let order = |a: &usize, b: &usize| own(values[*a]).total_cmp(&own(values[*b]));
     // Not a number comes first or last in this order.
-    let ends = [
-        (0..values.len()).min_by(order),
-        (0..values.len()).max_by(order),
-    ];
+    let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
     for i in ends.into_iter().flatten() {
         let [x, y, z] = points[i];
-        allowed.check(
-            path,
-            own(values[i]),
-            &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"),
-        )?;
+        allowed.check(path, own(values[i]), &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
     }
     Ok(())
 }
@@ -231,21 +201,10 @@ pub(super) fn check_varied(
 /// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's
 /// values at a million points inside, those that are filled anyway coming first. Error about 1e-4 in the fraction.
 /// Refuses, in a sentence, less than what is filled.
-fn solve(
-    target: f64,
-    part: Part,
-    cell: &Arc<Cell>,
-    map: &Map,
-    place: &Place,
-) -> Result<f64, String> {
+fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) -> Result<f64, String> {
     let (points, _) = sample::inside(place.region, 1_000_000);
     // At level zero the field is |f|, f or −f; the part at level t is where that is at most t, t or −t.
-    let at_zero = Lattice::new(
-        cell.clone(),
-        map.clone(),
-        part,
-        Level::Iso(Grade::Constant(0.0)),
-    );
+    let at_zero = Lattice::new(cell.clone(), map.clone(), part, Level::Iso(Grade::Constant(0.0)));
     let mut values = vec![0.0; points.len()];
     at_zero.values(&points, &mut values);
     let mut filled = vec![0.0; points.len()];
@@ -278,10 +237,7 @@ mod tests {
         for i in 1..20 {
             let p = f64::from(i) / 20.0;
             for (cell, odd) in [("diamond", 2e-3), ("gyroid", 1e-3)] {
-                let (a, b) = (
-                    spartan(cell, p).unwrap_or(9.0),
-                    spartan(cell, 1.0 - p).unwrap_or(9.0),
-                );
+                let (a, b) = (spartan(cell, p).unwrap_or(9.0), spartan(cell, 1.0 - p).unwrap_or(9.0));
                 assert!((a + b).abs() < odd, "{cell} {p}: {a} {b}");
             }
         }

@@ -50,17 +50,13 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
             };
             let radii = radii(c.center, c.axis, place);
             let map = Round::cylinder(c.center, c.axis, wavelength, c.around, radii);
-            return map
-                .map(Map::Round)
-                .map_err(|f| DesignError::fault(&path, f));
+            return map.map(Map::Round).map_err(|f| DesignError::fault(&path, f));
         }
         MapSpec::Sweep(s) => return sweep(s, &path, place),
         MapSpec::Sphere(s) => {
             let radii = radii(s.center, s.axis, place);
             let map = Round::sphere(s.center, s.axis, s.wavelength, s.around, radii);
-            return map
-                .map(Map::Round)
-                .map_err(|f| DesignError::fault(&path, f));
+            return map.map(Map::Round).map_err(|f| DesignError::fault(&path, f));
         }
     };
     let below = |key: &str| format!("{path}.{key}");
@@ -70,10 +66,7 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
                 OneOrThree::One(_) => below("wavelength"),
                 OneOrThree::Three(_) => format!("{}[{i}]", below("wavelength")),
             };
-            let message = format!(
-                "wavelength is {}; it must be a finite number of mm greater than 0",
-                number(v)
-            );
+            let message = format!("wavelength is {}; it must be a finite number of mm greater than 0", number(v));
             return Err(DesignError::new(at, message).found(number(v)));
         }
     }
@@ -90,10 +83,7 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
                 let at = below(&format!("skew.{name}"));
                 finite(&at, angle)?;
                 if angle.abs() >= 89.0 {
-                    let message = format!(
-                        "a shear of {} degrees; it must be between -89 and 89",
-                        number(angle)
-                    );
+                    let message = format!("a shear of {} degrees; it must be between -89 and 89", number(angle));
                     return Err(DesignError::new(at, message).found(number(angle)));
                 }
                 if angle != 0.0 {
@@ -105,19 +95,12 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
         }
         _ => Affine::spartan(wavelength.three(), rotate, offset),
     };
-    affine
-        .map(Map::Affine)
-        .map_err(|f| DesignError::fault(&path, f))
+    affine.map(Map::Affine).map_err(|f| DesignError::fault(&path, f))
 }
 
 fn sweep(spec: &SweepSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
     let (points, _) = control::control(&spec.points, path, place)?;
-    let line = Path {
-        points,
-        closed: spec.closed,
-        wavelength: spec.wavelength.three(),
-        normal: spec.normal,
-    };
+    let line = Path { points, closed: spec.closed, wavelength: spec.wavelength.three(), normal: spec.normal };
     Sweep::new(&line, &**place.region, place.points)
         .map(|s| Map::Sweep(Arc::new(s)))
         .map_err(|f| control::wrong(&spec.points, path, f))
@@ -152,18 +135,12 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
     let vector = |of: &VectorSpec, key: &str| match of {
         VectorSpec::Components(of) => each(of, &below(key), &any),
         VectorSpec::Field(of) => {
-            samples::several(&of.field, &below(&format!("{key}.field")), place, |n| {
-                (n == 3).then_some([0, 1, 2])
-            })
+            samples::several(&of.field, &below(&format!("{key}.field")), place, |n| (n == 3).then_some([0, 1, 2]))
         }
     };
     let angles = |of: [Option<&GradeSpec>; 3]| {
         let names = ["rotate_x", "rotate_y", "rotate_z"];
-        let mut out = [
-            Grade::Constant(0.0),
-            Grade::Constant(0.0),
-            Grade::Constant(0.0),
-        ];
+        let mut out = [Grade::Constant(0.0), Grade::Constant(0.0), Grade::Constant(0.0)];
         for ((o, g), name) in out.iter_mut().zip(of).zip(names) {
             if let Some(g) = g {
                 *o = any(g, below(name))?;
@@ -176,30 +153,21 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
     } else if let Some(of) = &spec.direction {
         Orientation::Direction(vector(of, "direction")?)
     } else if let Some(of) = &spec.frame {
-        Orientation::Frame {
-            x: vector(&of.x, "frame.x")?,
-            z: vector(&of.z, "frame.z")?,
-        }
+        Orientation::Frame { x: vector(&of.x, "frame.x")?, z: vector(&of.z, "frame.z")? }
     } else if let Some(of) = &spec.stress {
         Orientation::Stress(match of {
             TensorSpec::Components(of) => each(of, &below("stress"), &any)?,
             TensorSpec::Field(of) => {
-                samples::several(&of.field, &below("stress.field"), place, |n| {
-                    match (n, of.order) {
-                        (9, _) => Some([0, 4, 8, 5, 2, 1]),
-                        (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
-                        (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
-                        _ => None,
-                    }
+                samples::several(&of.field, &below("stress.field"), place, |n| match (n, of.order) {
+                    (9, _) => Some([0, 4, 8, 5, 2, 1]),
+                    (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
+                    (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
+                    _ => None,
                 })?
             }
         })
     } else {
-        Orientation::Angles(angles([
-            spec.rotate_x.as_ref(),
-            spec.rotate_y.as_ref(),
-            spec.rotate_z.as_ref(),
-        ])?)
+        Orientation::Angles(angles([spec.rotate_x.as_ref(), spec.rotate_y.as_ref(), spec.rotate_z.as_ref()])?)
     };
     for v in spec.offset {
         finite(&below("offset"), v)?;
@@ -213,11 +181,8 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
         offset: spec.offset,
     };
     let region: &dyn Field = &**place.region;
-    let settings = Settings {
-        step: spec.step,
-        region: (spec.domain == Domain::Region).then_some(region),
-        folds: spec.folds,
-    };
+    let settings =
+        Settings { step: spec.step, region: (spec.domain == Domain::Region).then_some(region), folds: spec.folds };
     Phase::solve(&place.region.bounds(), &wanted, &settings)
         .map(|p| Map::Phase(Arc::new(p)))
         .map_err(|f| DesignError::fault(path, f))
@@ -229,16 +194,9 @@ fn each<const N: usize>(
     path: &str,
     one: &impl Fn(&GradeSpec, String) -> Result<Grade, DesignError>,
 ) -> Result<[Grade; N], DesignError> {
-    let made = of
-        .iter()
-        .enumerate()
-        .map(|(i, g)| one(g, format!("{path}[{i}]")));
-    let mut made = made
-        .collect::<Result<Vec<Grade>, DesignError>>()?
-        .into_iter();
-    Ok(core::array::from_fn(|_| {
-        made.next().unwrap_or(Grade::Constant(0.0))
-    }))
+    let made = of.iter().enumerate().map(|(i, g)| one(g, format!("{path}[{i}]")));
+    let mut made = made.collect::<Result<Vec<Grade>, DesignError>>()?.into_iter();
+    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
 }
 
 /// Warns of a map that is far from what was asked for.
@@ -246,10 +204,7 @@ pub(super) fn warn(map: &Map, spec: &MapSpec, lattice: &str, warnings: &mut Vec<
     let Map::Phase(phase) = map else { return };
     let d = phase.distortion();
     let mut say = |message: String| {
-        warnings.push(Warning {
-            path: format!("{lattice}.map.{}", kind(spec)),
-            message,
-        });
+        warnings.push(Warning { path: format!("{lattice}.map.{}", kind(spec)), message });
     };
     let at = |[x, y, z]: [f64; 3]| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     if d.turn > TURN {
@@ -269,9 +224,6 @@ pub(super) fn warn(map: &Map, spec: &MapSpec, lattice: &str, warnings: &mut Vec<
         ));
     }
     if d.density[0] <= 0.0 {
-        say(format!(
-            "the map folds: cells turn inside out at {}",
-            at(d.least_at)
-        ));
+        say(format!("the map folds: cells turn inside out at {}", at(d.least_at)));
     }
 }

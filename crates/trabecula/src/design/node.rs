@@ -41,22 +41,14 @@ impl Node {
     /// Reads TOML.
     pub fn from_toml(text: &str) -> Result<Node, DesignError> {
         let starts: Vec<usize> = std::iter::once(0)
-            .chain(
-                text.bytes()
-                    .enumerate()
-                    .filter(|&(_, b)| b == b'\n')
-                    .map(|(i, _)| i + 1),
-            )
+            .chain(text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1))
             .collect();
         let line = |at: usize| starts.partition_point(|&s| s <= at);
         match toml::de::DeTable::parse(text) {
             Ok(table) => Ok(toml_table(table.get_ref(), &line, 1)),
             Err(e) => Err(DesignError {
                 line: e.span().map(|s| line(s.start)),
-                ..DesignError::new(
-                    "",
-                    format!("not readable as TOML: {}", e.message().replace('\n', "; ")),
-                )
+                ..DesignError::new("", format!("not readable as TOML: {}", e.message().replace('\n', "; ")))
             }),
         }
     }
@@ -84,11 +76,7 @@ impl Node {
             }
             Value::Table(entries) => {
                 for (key, line, item) in entries {
-                    let path = if path.is_empty() {
-                        key.clone()
-                    } else {
-                        format!("{path}.{key}")
-                    };
+                    let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                     lines.put(&path, *line);
                     item.collect(&path, lines);
                 }
@@ -126,17 +114,11 @@ fn toml_table(table: &toml::de::DeTable<'_>, line: &dyn Fn(usize) -> usize, at: 
         .iter()
         .map(|(k, v)| {
             let l = line(k.span().start);
-            (
-                k.span().start,
-                (k.get_ref().to_string(), Some(l), toml_value(v, line)),
-            )
+            (k.span().start, (k.get_ref().to_string(), Some(l), toml_value(v, line)))
         })
         .collect();
     entries.sort_by_key(|e| e.0); // in the order of the file, so that the first mistake is reported first
-    Node {
-        value: Value::Table(entries.into_iter().map(|e| e.1).collect()),
-        line: Some(at),
-    }
+    Node { value: Value::Table(entries.into_iter().map(|e| e.1).collect()), line: Some(at) }
 }
 
 fn toml_value(v: &toml::Spanned<toml::de::DeValue<'_>>, line: &dyn Fn(usize) -> usize) -> Node {
@@ -144,22 +126,16 @@ fn toml_value(v: &toml::Spanned<toml::de::DeValue<'_>>, line: &dyn Fn(usize) -> 
     let at = line(v.span().start);
     let value = match v.get_ref() {
         DeValue::String(s) => Value::Text(s.to_string()),
-        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix())
-            .map_or(Value::Other(i.to_string()), |i| Value::Number(i as f64)),
-        DeValue::Float(f) => f
-            .as_str()
-            .replace('_', "")
-            .parse()
-            .map_or(Value::Other(f.to_string()), Value::Number),
+        DeValue::Integer(i) => {
+            i64::from_str_radix(i.as_str(), i.radix()).map_or(Value::Other(i.to_string()), |i| Value::Number(i as f64))
+        }
+        DeValue::Float(f) => f.as_str().replace('_', "").parse().map_or(Value::Other(f.to_string()), Value::Number),
         DeValue::Boolean(b) => Value::Bool(*b),
         DeValue::Datetime(d) => Value::Other(format!("the date {d}")),
         DeValue::Array(items) => Value::List(items.iter().map(|i| toml_value(i, line)).collect()),
         DeValue::Table(t) => return toml_table(t, line, at),
     };
-    Node {
-        value,
-        line: Some(at),
-    }
+    Node { value, line: Some(at) }
 }
 
 /// A node and the path that leads to it.
@@ -172,19 +148,11 @@ pub(super) struct At<'a> {
 
 impl<'a> At<'a> {
     pub fn root(node: &'a Node) -> Self {
-        At {
-            node,
-            path: String::new(),
-            line: None,
-        }
+        At { node, path: String::new(), line: None }
     }
 
     fn below(&self, key: &str) -> String {
-        if self.path.is_empty() {
-            key.to_string()
-        } else {
-            format!("{}.{key}", self.path)
-        }
+        if self.path.is_empty() { key.to_string() } else { format!("{}.{key}", self.path) }
     }
 
     /// An error here.
@@ -204,10 +172,7 @@ impl<'a> At<'a> {
 
     fn unknown(&self, what: &str, word: &str, allowed: &[&str]) -> DesignError {
         let line = self.line.or(self.node.line);
-        DesignError {
-            line,
-            ..DesignError::unknown(&self.path, what, word, allowed)
-        }
+        DesignError { line, ..DesignError::unknown(&self.path, what, word, allowed) }
     }
 
     /// The entries of a table with any keys.
@@ -215,19 +180,7 @@ impl<'a> At<'a> {
         let Value::Table(entries) = &self.node.value else {
             return Err(self.expected(what));
         };
-        Ok(entries
-            .iter()
-            .map(|(k, line, node)| {
-                (
-                    k.as_str(),
-                    At {
-                        node,
-                        path: self.below(k),
-                        line: *line,
-                    },
-                )
-            })
-            .collect())
+        Ok(entries.iter().map(|(k, line, node)| (k.as_str(), At { node, path: self.below(k), line: *line })).collect())
     }
 
     /// The entries of a table whose keys are all among `allowed`.
@@ -239,18 +192,12 @@ impl<'a> At<'a> {
                 return Err(at.unknown("key", key, allowed));
             }
         }
-        Ok(Fields {
-            at: self.clone(),
-            entries,
-        })
+        Ok(Fields { at: self.clone(), entries })
     }
 
     /// The one kind named by a table with one key.
     pub fn kind(&self, what: &str, allowed: &[&str]) -> Result<(&'a str, At<'a>), DesignError> {
-        let entries = self.entries(&format!(
-            "a {what} as a table named by its kind: {}",
-            allowed.join(", ")
-        ))?;
+        let entries = self.entries(&format!("a {what} as a table named by its kind: {}", allowed.join(", ")))?;
         for (key, at) in &entries {
             if !allowed.contains(key) {
                 return Err(at.unknown(what, key, allowed));
@@ -259,14 +206,10 @@ impl<'a> At<'a> {
         let mut entries = entries.into_iter();
         match (entries.next(), entries.next()) {
             (Some(one), None) => Ok(one),
-            (None, _) => Err(self.error(format!(
-                "a {what} is missing here; give one of {}",
-                allowed.join(", ")
-            ))),
-            (Some(a), Some(b)) => Err(b.1.error(format!(
-                "two kinds of {what} at once, {} and {}; give exactly one",
-                a.0, b.0
-            ))),
+            (None, _) => Err(self.error(format!("a {what} is missing here; give one of {}", allowed.join(", ")))),
+            (Some(a), Some(b)) => {
+                Err(b.1.error(format!("two kinds of {what} at once, {} and {}; give exactly one", a.0, b.0)))
+            }
         }
     }
 
@@ -311,7 +254,9 @@ impl<'a> At<'a> {
             Value::Table(t) if t.first().is_some_and(|e| GRADES.contains(&e.0.as_str())) => {
                 let of_map = [".map.affine.", ".map.spartan."];
                 Err(self.error(match of_map.iter().any(|m| self.path.contains(m)) {
-                    true => "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary",
+                    true => {
+                        "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary"
+                    }
                     false => "this number cannot vary in space; give one number",
                 }))
             }
@@ -330,11 +275,7 @@ impl<'a> At<'a> {
         let Value::List(items) = &self.node.value else {
             return Err(self.expected(what));
         };
-        let item = |(i, node): (usize, &'a Node)| At {
-            node,
-            path: format!("{}[{i}]", self.path),
-            line: node.line,
-        };
+        let item = |(i, node): (usize, &'a Node)| At { node, path: format!("{}[{i}]", self.path), line: node.line };
         Ok(items.iter().enumerate().map(item).collect())
     }
 
@@ -365,10 +306,8 @@ impl<'a> At<'a> {
 }
 
 /// The kinds of grade in this version.
-pub(super) const GRADES: [&str; 11] = [
-    "linear", "depth", "radial", "formula", "grid", "points", "field", "sigmoid", "region",
-    "distance", "rbf",
-];
+pub(super) const GRADES: [&str; 11] =
+    ["linear", "depth", "radial", "formula", "grid", "points", "field", "sigmoid", "region", "distance", "rbf"];
 
 /// A table whose keys are known to be allowed.
 pub(super) struct Fields<'a> {
@@ -382,10 +321,8 @@ impl<'a> Fields<'a> {
     }
 
     pub fn need(&self, key: &str, meaning: &str) -> Result<&At<'a>, DesignError> {
-        self.get(key).ok_or_else(|| DesignError {
-            found: None,
-            ..self.at.error(format!("\"{key}\" is missing: {meaning}"))
-        })
+        self.get(key)
+            .ok_or_else(|| DesignError { found: None, ..self.at.error(format!("\"{key}\" is missing: {meaning}")) })
     }
 
     pub fn read<T>(
@@ -407,13 +344,7 @@ fn describe(node: &Node) -> String {
         Value::Text(s) => format!("\"{}…\"", s.chars().take(57).collect::<String>()),
         Value::List(items) => format!("a list of {}", items.len()),
         Value::Table(t) if t.is_empty() => "an empty table".into(),
-        Value::Table(t) => format!(
-            "a table with {}",
-            t.iter()
-                .map(|e| e.0.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
+        Value::Table(t) => format!("a table with {}", t.iter().map(|e| e.0.as_str()).collect::<Vec<_>>().join(", ")),
         Value::Other(s) => s.clone(),
     }
 }

@@ -27,8 +27,7 @@ pub(super) fn laid(
         None => Ok(None),
         Some(GradeSpec::Constant(v)) => Allowed::Positive(key).check(&below(key), *v, "").map(Some),
         Some(_) => {
-            let message =
-                "in a pattern it is one number, at the first place; it scales with the repeats";
+            let message = "in a pattern it is one number, at the first place; it scales with the repeats";
             Err(DesignError::new(below(key), message))
         }
     };
@@ -42,10 +41,7 @@ pub(super) fn laid(
             let message = "it has no radius of its own, and no radius of beams is given; give one";
             return Err(DesignError::new(format!("{at}.nodes[{i}]"), message));
         };
-        hubs.push(Hub {
-            center: *center,
-            radius,
-        });
+        hubs.push(Hub { center: *center, radius });
     }
     let profile = match (spec.profile, radius) {
         (Some(ProfileSpec::Cylinder), _) => Profile::Cylinder,
@@ -54,36 +50,23 @@ pub(super) fn laid(
         (None, Some(r)) => Profile::Mid(r),
         (Some(ProfileSpec::Cone), _) | (None, None) => Profile::Cone,
     };
-    let strut = |s: &[i32; 5]| Strut {
-        ends: [s[0] as u32, s[1] as u32],
-        by: [s[2], s[3], s[4]],
-        profile,
-    };
+    let strut = |s: &[i32; 5]| Strut { ends: [s[0] as u32, s[1] as u32], by: [s[2], s[3], s[4]], profile };
     let mut steps = [(Similarity::STILL, 1); 3];
     for (i, (step, repeat)) in steps.iter_mut().zip(&of.repeat).enumerate() {
         let at = |key: &str| format!("{at}.repeat[{i}].{key}");
-        for (key, three) in [
-            ("rotate", repeat.rotate),
-            ("about", repeat.about),
-            ("by", repeat.by),
-        ] {
+        for (key, three) in [("rotate", repeat.rotate), ("about", repeat.about), ("by", repeat.by)] {
             for v in three {
                 finite(&at(key), v)?;
             }
         }
         if !(repeat.count >= 1.0 && repeat.count.fract() == 0.0 && repeat.count <= COUNT) {
-            let message = format!(
-                "count is {}; it must be a whole number from 1 to {}",
-                number(repeat.count),
-                number(COUNT)
-            );
+            let message =
+                format!("count is {}; it must be a whole number from 1 to {}", number(repeat.count), number(COUNT));
             return Err(DesignError::new(at("count"), message).found(number(repeat.count)));
         }
         if !(repeat.scale >= 0.1 && repeat.scale <= 10.0) {
-            let message = format!(
-                "scale is {}; from one repeat to the next it must be from 0.1 to 10",
-                number(repeat.scale)
-            );
+            let message =
+                format!("scale is {}; from one repeat to the next it must be from 0.1 to 10", number(repeat.scale));
             return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
         }
         let all = repeat.scale.powf(repeat.count - 1.0);
@@ -94,16 +77,9 @@ pub(super) fn laid(
             );
             return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
         }
-        *step = (
-            Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by),
-            repeat.count as u32,
-        );
+        *step = (Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by), repeat.count as u32);
     }
-    let pattern = Pattern {
-        nodes: hubs,
-        struts: of.struts.iter().map(strut).collect(),
-        steps,
-    };
+    let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;
     let laid = Laid::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
     let region = place.region.bounds();
@@ -136,17 +112,11 @@ pub(super) fn laid(
 }
 
 /// The figures of a pattern.
-pub(super) fn report(
-    laid: &Laid,
-    built: &Built,
-    sampled: &dyn core::ops::Deref<Target = f64>,
-) -> Json {
+pub(super) fn report(laid: &Laid, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
     let pattern = laid.pattern();
     let (hubs, beams) = pattern.counts();
     let radii = pattern.nodes.iter().map(|h| h.radius);
-    let range = radii.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
-        [a.min(v), b.max(v)]
-    });
+    let range = radii.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)]);
     let scales = laid.scales();
     let found = laid.collisions().ok().flatten();
     let clear = found.is_none_or(|c| c.count == 0);

@@ -26,10 +26,6 @@ pub(super) fn finite(path: &str, v: f64) -> Result<f64, DesignError> {
     if v.is_finite() {
         Ok(v)
     } else {
-        Err(DesignError::new(
-            path,
-            format!("expected a finite number, found {}", number(v)),
-        )
-        .found(number(v)))
+        Err(DesignError::new(path, format!("expected a finite number, found {}", number(v))).found(number(v)))
     }
 }

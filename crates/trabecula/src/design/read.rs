@@ -23,65 +23,40 @@ type Read<T> = Result<T, DesignError>;
 
 const THREE: &str = "three numbers [x, y, z]";
 const AMOUNTS: &str = "exactly one of iso, fraction, porosity, thickness";
-const REGIONS: [&str; 10] = [
-    "box",
-    "cylinder",
-    "sphere",
-    "tetrahedron",
-    "halfspace",
-    "mesh",
-    "union",
-    "intersection",
-    "difference",
-    "offset",
-];
+const REGIONS: [&str; 10] =
+    ["box", "cylinder", "sphere", "tetrahedron", "halfspace", "mesh", "union", "intersection", "difference", "offset"];
 
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
-    let f = At::root(node).fields(
-        "a design",
-        &[
-            "schema", "units", "region", "lattice", "beams", "blend", "skin", "keep",
-        ],
-    )?;
+    let f = At::root(node)
+        .fields("a design", &["schema", "units", "region", "lattice", "beams", "blend", "skin", "keep"])?;
     let schema = f.need("schema", "write schema = 1 at the top")?;
     let number = schema.number()?;
     if number != 1.0 {
-        return Err(schema.error(format!(
-            "this version reads schema 1, found {}",
-            fault::number(number)
-        )));
+        return Err(schema.error(format!("this version reads schema 1, found {}", fault::number(number))));
     }
     if let Some(units) = f.get("units") {
         let word = units.text("\"mm\"")?;
         if word != "mm" {
-            let message = format!(
-                "lengths in a design are mm, found \"{word}\"; a mesh file may have its own unit"
-            );
+            let message = format!("lengths in a design are mm, found \"{word}\"; a mesh file may have its own unit");
             return Err(units.error(message));
         }
     }
-    let spec = region(f.need(
-        "region",
-        "say where the part may be, such as [region.box] with size = [20, 20, 20]",
-    )?)?;
+    let spec = region(f.need("region", "say where the part may be, such as [region.box] with size = [20, 20, 20]")?)?;
     let missing = "say what fills the region, such as [lattice.core] with cell = \"gyroid\", or [beams.core] with cell = \"octet\"";
     let beams = f.read("beams", BeamsSpecs::new(), beams::all)?;
     let lattice_at = match f.get("lattice") {
         None if !beams.is_empty() => None,
         _ => Some(f.need("lattice", missing)?),
     };
-    let entries = lattice_at.map_or(Ok(Vec::new()), |at| {
-        at.entries("lattices by name, such as [lattice.core]")
-    })?;
+    let entries = lattice_at.map_or(Ok(Vec::new()), |at| at.entries("lattices by name, such as [lattice.core]"))?;
     if entries.is_empty() && beams.is_empty() {
         return Err(DesignError::new("lattice", missing));
     }
     let mut names: Vec<&str> = entries.iter().map(|e| e.0).collect();
     for name in beams.keys() {
         if names.contains(&name.as_str()) {
-            let message =
-                format!("\"{name}\" names a lattice already; give the beams another name");
+            let message = format!("\"{name}\" names a lattice already; give the beams another name");
             return Err(f.need("beams", "")?.error(message));
         }
         names.push(name);
@@ -117,29 +92,19 @@ pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
     let missing = "say where the part may be, such as [region.box] with size = [20, 20, 20]";
     match entry(&At::root(node), "region")? {
         Some(at) => region(&at),
-        None => Err(DesignError::new(
-            "region",
-            format!("\"region\" is missing: {missing}"),
-        )),
+        None => Err(DesignError::new("region", format!("\"region\" is missing: {missing}"))),
     }
 }
 
 /// The region in a design, or in a tree that says nothing else.
 pub(super) fn region_in(node: &Node) -> Read<RegionIn> {
     let at = At::root(node);
-    if at
-        .entries("a design or a region")?
-        .iter()
-        .any(|(key, _)| ["lattice", "beams"].contains(key))
-    {
+    if at.entries("a design or a region")?.iter().any(|(key, _)| ["lattice", "beams"].contains(key)) {
         return Ok(RegionIn::Design(Box::new(design(node)?)));
     }
     let f = at.fields("a region file", &["schema", "units", "region"])?;
-    region(f.need(
-        "region",
-        "say where the part may be, such as [region.box] with size = [20, 20, 20]",
-    )?)
-    .map(RegionIn::Alone)
+    region(f.need("region", "say where the part may be, such as [region.box] with size = [20, 20, 20]")?)
+        .map(RegionIn::Alone)
 }
 
 /// What a file that is read for its region holds.
@@ -172,7 +137,8 @@ pub(super) fn tets_in(node: &Node, lattice: Option<&str>) -> Read<(String, TetsS
             return Ok((tets.path.clone(), map::tets(&tets)?));
         }
     }
-    let message = "no lattice of the design has a tetrahedral mesh; give one, such as [lattice.core.map.tets] with size = 5";
+    let message =
+        "no lattice of the design has a tetrahedral mesh; give one, such as [lattice.core.map.tets] with size = 5";
     Err(DesignError::new("lattice", message))
 }
 
@@ -275,11 +241,7 @@ fn skin(at: &At) -> Read<SkinSpec> {
 
 fn opening(at: &At) -> Read<OpenSpec> {
     if at.is_text() {
-        return Ok(OpenSpec::Side(at.word_or(
-            "side",
-            &SideSpec::ALL,
-            &SIDES,
-        )?));
+        return Ok(OpenSpec::Side(at.word_or("side", &SideSpec::ALL, &SIDES)?));
     }
     Ok(OpenSpec::Plane(halfspace(at)?))
 }
@@ -289,9 +251,7 @@ fn keeps(at: &At) -> Read<Keeps> {
     for (name, at) in at.entries("regions by name, such as [keep.boss.cylinder]")? {
         // A kind where a name should be.
         if REGIONS.contains(&name) && region(&at).is_err() {
-            let message = format!(
-                "a name comes first, such as [keep.boss.{name}]: {name} is a kind of region"
-            );
+            let message = format!("a name comes first, such as [keep.boss.{name}]: {name} is a kind of region");
             return Err(at.error(message));
         }
         keeps.insert(name.to_string(), region(&at)?);
@@ -312,9 +272,7 @@ fn cuboid(at: &At) -> Read<BoxSpec> {
     let corners = ["min", "max"].iter().find_map(|k| f.get(k));
     let size = ["size", "center"].iter().find_map(|k| f.get(k));
     match (size, corners) {
-        (Some(_), Some(c)) => {
-            Err(c.error("a box has either size and center, or min and max; found both"))
-        }
+        (Some(_), Some(c)) => Err(c.error("a box has either size and center, or min and max; found both")),
         (None, Some(_)) => Ok(BoxSpec::Corners(BoxCorners {
             min: three(f.need("min", "the lower corner, mm")?)?,
             max: three(f.need("max", "the upper corner, mm")?)?,
@@ -330,10 +288,7 @@ fn mesh(at: &At) -> Read<RegionSpec> {
     let f = at.fields("a mesh", &["path", "unit", "scale", "repair"])?;
     let repairs = [("auto", RepairSpec::Auto), ("refuse", RepairSpec::Refuse)];
     Ok(RegionSpec::Mesh(MeshSpec {
-        path: f
-            .need("path", "the mesh file, relative to the design file")?
-            .text("a path")?
-            .to_string(),
+        path: f.need("path", "the mesh file, relative to the design file")?.text("a path")?.to_string(),
         unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
         scale: f.read("scale", 1.0, At::number)?,
         repair: f.read("repair", RepairSpec::Auto, |at| at.word("repair", &repairs))?,
@@ -377,16 +332,10 @@ fn lattice(at: &At) -> Read<LatticeSpec> {
         }
     }
     let f = at.fields("a lattice", &["cell", "part", "map", "level"])?;
-    let parts = [
-        ("sheet", PartSpec::Sheet),
-        ("lower", PartSpec::Lower),
-        ("upper", PartSpec::Upper),
-    ];
+    let parts = [("sheet", PartSpec::Sheet), ("lower", PartSpec::Lower), ("upper", PartSpec::Upper)];
     Ok(LatticeSpec {
         cell: cell(f.need("cell", "such as cell = \"gyroid\"")?)?,
-        part: f
-            .need("part", "sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)")?
-            .word_or("part", &parts, &PARTS)?,
+        part: f.need("part", "sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)")?.word_or("part", &parts, &PARTS)?,
         map: map(f.need("map", "such as map.affine with wavelength = 4")?)?,
         level: level(f.need("level", AMOUNTS)?)?,
     })
@@ -404,9 +353,8 @@ fn cell(at: &At) -> Read<CellSpec> {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
         let word = at.text("a name")?;
         if crate::graph::named(word).is_some() && crate::cell::named(word).is_none() {
-            let message = format!(
-                "{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\""
-            );
+            let message =
+                format!("{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\"");
             return Err(at.error(message));
         }
         return Ok(CellSpec::Name(at.word("cell", &names)?.to_string()));
@@ -424,20 +372,10 @@ fn cell(at: &At) -> Read<CellSpec> {
         return Ok(CellSpec::Kind(CellKind::Tet(tet(&at)?)));
     }
     let f = at.fields("a series", &["terms", "group"])?;
-    let terms = f.need(
-        "terms",
-        "a list of { hkl = [h, k, l], amplitude = 1, phase = 0 }",
-    )?;
-    let terms = terms
-        .list("a list of terms")?
-        .iter()
-        .map(term)
-        .collect::<Read<Vec<_>>>()?;
+    let terms = f.need("terms", "a list of { hkl = [h, k, l], amplitude = 1, phase = 0 }")?;
+    let terms = terms.list("a list of terms")?.iter().map(term).collect::<Read<Vec<_>>>()?;
     let group = f.get("group").map(group).transpose()?;
-    Ok(CellSpec::Kind(CellKind::Series(SeriesSpec {
-        group,
-        terms,
-    })))
+    Ok(CellSpec::Kind(CellKind::Series(SeriesSpec { group, terms })))
 }
 
 /// The name of a ready tetrahedral cell. Of a periodic cell that can be none it says why.
@@ -447,10 +385,7 @@ fn tet_name(at: &At) -> Read<&'static str> {
         let periodic = at.text("").ok().and_then(named);
         let group = periodic.and_then(|n| Group::named(n.number()).ok());
         match group.map(|g| g.tetrahedral_sites()) {
-            Some(Err(why)) => DesignError {
-                message: format!("{}. {}", why.message, e.message),
-                ..e
-            },
+            Some(Err(why)) => DesignError { message: format!("{}. {}", why.message, e.message), ..e },
             _ => e,
         }
     })
@@ -463,49 +398,30 @@ fn tet(at: &At) -> Read<TetCellSpec> {
     let f = at.fields("a tetrahedral cell", &keys)?;
     if let Some(zones) = f.get("zones") {
         if let Some(other) = ["name"].iter().chain(&own).find_map(|k| f.get(k)) {
-            return Err(
-                other.error("with zones every cell is a ready one, by its name; leave this out")
-            );
+            return Err(other.error("with zones every cell is a ready one, by its name; leave this out"));
         }
         let mut of = BTreeMap::new();
-        for (zone, at) in
-            zones.entries("a ready cell for each zone, such as { 1 = \"diamond\" }")?
-        {
+        for (zone, at) in zones.entries("a ready cell for each zone, such as { 1 = \"diamond\" }")? {
             of.insert(zone.to_string(), tet_name(&at)?.to_string());
         }
-        return Ok(TetCellSpec {
-            zones: of,
-            ..TetCellSpec::default()
-        });
+        return Ok(TetCellSpec { zones: of, ..TetCellSpec::default() });
     }
     if let Some(name) = f.get("name") {
         if let Some(other) = own.iter().find_map(|k| f.get(k)) {
-            let message =
-                "a ready cell has its own group, terms, site and edge; give a name or these";
+            let message = "a ready cell has its own group, terms, site and edge; give a name or these";
             return Err(other.error(message));
         }
-        return Ok(TetCellSpec {
-            name: Some(tet_name(name)?.to_string()),
-            ..TetCellSpec::default()
-        });
+        return Ok(TetCellSpec { name: Some(tet_name(name)?.to_string()), ..TetCellSpec::default() });
     }
-    let terms = f.need(
-        "terms",
-        "a list of { hkl = [h, k, l] }, or a ready cell's name",
-    )?;
+    let terms = f.need("terms", "a list of { hkl = [h, k, l] }, or a ready cell's name")?;
     let terms = terms.list("a list of terms")?;
     Ok(TetCellSpec {
         name: None,
-        group: Some(group(
-            f.need("group", "a space group such as 221 or \"227:2\"")?,
-        )?),
+        group: Some(group(f.need("group", "a space group such as 221 or \"227:2\"")?)?),
         terms: terms.iter().map(term).collect::<Read<Vec<_>>>()?,
         site: f.read("site", None, |at| three(at).map(Some))?,
         dual: f.read("dual", false, At::truth)?,
-        edge: Some(
-            f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?
-                .number()?,
-        ),
+        edge: Some(f.need("edge", "the tetrahedron's edge in edges of the cubic cell")?.number()?),
         zones: BTreeMap::new(),
     })
 }
@@ -513,15 +429,11 @@ fn tet(at: &At) -> Read<TetCellSpec> {
 /// A space group's symbol, which may be its number.
 fn group(at: &At) -> Read<String> {
     if !at.is_number() {
-        return Ok(at
-            .text("a space group such as 227, \"227:2\" or \"Fd-3m\"")?
-            .to_string());
+        return Ok(at.text("a space group such as 227, \"227:2\" or \"Fd-3m\"")?.to_string());
     }
     match at.number()? {
         n if n.fract() == 0.0 && n.abs() < 1e6 => Ok(format!("{n}")),
-        n => Err(at.error(format!(
-            "expected a space group, found {n}; they are numbered from 1 to 230"
-        ))),
+        n => Err(at.error(format!("expected a space group, found {n}; they are numbered from 1 to 230"))),
     }
 }
 
@@ -537,29 +449,14 @@ fn term(at: &At) -> Read<TermSpec> {
         hkl: numbers.map(|v| v as i32),
         amplitude: f.read("amplitude", 1.0, At::number)?,
         phase: f.read("phase", 0.0, At::number)?,
-        component: f.read("component", Component::Re, |at| {
-            at.word("component", &components)
-        })?,
+        component: f.read("component", Component::Re, |at| at.word("component", &components))?,
     })
 }
 
 fn level(at: &At) -> Read<LevelSpec> {
-    let f = at.fields(
-        "a level",
-        &[
-            "iso",
-            "fraction",
-            "porosity",
-            "thickness",
-            "of",
-            "fit",
-            "mid",
-        ],
-    )?;
-    let given: Vec<_> = ["iso", "fraction", "porosity", "thickness"]
-        .into_iter()
-        .filter_map(|k| Some((k, f.get(k)?)))
-        .collect();
+    let f = at.fields("a level", &["iso", "fraction", "porosity", "thickness", "of", "fit", "mid"])?;
+    let given: Vec<_> =
+        ["iso", "fraction", "porosity", "thickness"].into_iter().filter_map(|k| Some((k, f.get(k)?))).collect();
     let amount = match given.as_slice() {
         [] => {
             return Err(f.at.error(format!("no amount given; give {AMOUNTS}")));
@@ -579,17 +476,8 @@ fn level(at: &At) -> Read<LevelSpec> {
             return Err(several[1].1.error(message));
         }
     };
-    let of = f.read("of", Of::Cell, |at| {
-        at.word("word", &[("cell", Of::Cell), ("part", Of::Part)])
-    })?;
-    let fit = f.read("fit", Fit::Table, |at| {
-        at.word("fit", &[("table", Fit::Table), ("spartan", Fit::Spartan)])
-    })?;
+    let of = f.read("of", Of::Cell, |at| at.word("word", &[("cell", Of::Cell), ("part", Of::Part)]))?;
+    let fit = f.read("fit", Fit::Table, |at| at.word("fit", &[("table", Fit::Table), ("spartan", Fit::Spartan)]))?;
     let mid = f.read("mid", 0.0, At::number)?;
-    Ok(LevelSpec {
-        amount,
-        of,
-        fit,
-        mid,
-    })
+    Ok(LevelSpec { amount, of, fit, mid })
 }

@@ -10,8 +10,8 @@ use crate::fault::{Fault, number};
 use crate::io;
 use crate::math::{add, scale, sub};
 use crate::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair,
-    Repaired, Shape, Sphere, Tetrahedron, Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Repaired, Shape, Sphere,
+    Tetrahedron, Union,
 };
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
@@ -69,10 +69,8 @@ pub(super) fn region(
             let of = several(of, &path, loader, notes)?;
             let groups = if whole { groups(&of) } else { 1 };
             if groups > 1 {
-                let message = format!(
-                    "these {} regions are {groups} bodies that do not touch: the part is in pieces",
-                    of.len()
-                );
+                let message =
+                    format!("these {} regions are {groups} bodies that do not touch: the part is in pieces", of.len());
                 let path = path.clone();
                 notes.warnings.push(Warning { path, message });
             }
@@ -89,10 +87,7 @@ pub(super) fn region(
         RegionSpec::Offset(o) => {
             let path = format!("{path}.offset");
             finite(&format!("{path}.by"), o.by)?;
-            shared(
-                &path,
-                Offset::new(region(&o.of, &format!("{path}.of"), loader, notes)?, o.by),
-            )
+            shared(&path, Offset::new(region(&o.of, &format!("{path}.of"), loader, notes)?, o.by))
         }
     }
 }
@@ -104,8 +99,7 @@ pub(super) fn halfspace(h: &HalfSpaceSpec, path: &str) -> Result<HalfSpace, Desi
 }
 
 fn shared<S: Shape + 'static>(path: &str, made: Result<S, Fault>) -> Result<Region, DesignError> {
-    made.map(|s| Arc::new(s) as Region)
-        .map_err(|f| DesignError::fault(path, f))
+    made.map(|s| Arc::new(s) as Region).map_err(|f| DesignError::fault(path, f))
 }
 
 /// How many bodies regions surely are when united, at least.
@@ -150,31 +144,19 @@ fn may_meet(a: &Region, b: &Region) -> bool {
     true
 }
 
-fn several(
-    of: &[RegionSpec],
-    path: &str,
-    loader: &dyn Loader,
-    notes: &mut Notes,
-) -> Result<Vec<Region>, DesignError> {
-    of.iter()
-        .enumerate()
-        .map(|(i, r)| region(r, &format!("{path}[{i}]"), loader, notes))
-        .collect()
+fn several(of: &[RegionSpec], path: &str, loader: &dyn Loader, notes: &mut Notes) -> Result<Vec<Region>, DesignError> {
+    of.iter().enumerate().map(|(i, r)| region(r, &format!("{path}[{i}]"), loader, notes)).collect()
 }
 
 fn three(path: &str, key: &str, v: [f64; 3]) -> Result<(), DesignError> {
-    v.iter()
-        .try_for_each(|v| finite(&format!("{path}.{key}"), *v).map(|_| ()))
+    v.iter().try_for_each(|v| finite(&format!("{path}.{key}"), *v).map(|_| ()))
 }
 
 fn positive(path: &str, key: &str, v: f64) -> Result<(), DesignError> {
     if v.is_finite() && v > 0.0 {
         return Ok(());
     }
-    let message = format!(
-        "{key} is {}; it must be a finite number of mm greater than 0",
-        number(v)
-    );
+    let message = format!("{key} is {}; it must be a finite number of mm greater than 0", number(v));
     Err(DesignError::new(format!("{path}.{key}"), message).found(number(v)))
 }
 
@@ -196,9 +178,7 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
                         number(c.max[a]),
                         number(c.min[a])
                     );
-                    return Err(
-                        DesignError::new(format!("{path}.max"), message).found(number(c.max[a]))
-                    );
+                    return Err(DesignError::new(format!("{path}.max"), message).found(number(c.max[a])));
                 }
             }
             (c.min, c.max)
@@ -207,24 +187,11 @@ fn cuboid(spec: &BoxSpec, path: &str) -> Result<Region, DesignError> {
     shared(path, Cuboid::new(min, max))
 }
 
-fn mesh(
-    spec: &MeshSpec,
-    path: &str,
-    loader: &dyn Loader,
-    notes: &mut Notes,
-) -> Result<Region, DesignError> {
+fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader, notes: &mut Notes) -> Result<Region, DesignError> {
     let at = format!("{path}.path");
-    let extension = spec
-        .path
-        .rsplit_once('.')
-        .map_or("", |(_, e)| e)
-        .to_lowercase();
+    let extension = spec.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
     if !FORMATS.contains(&extension.as_str()) {
-        let message = format!(
-            "the name must end in one of {}; found \"{}\"",
-            FORMATS.join(", "),
-            spec.path
-        );
+        let message = format!("the name must end in one of {}; found \"{}\"", FORMATS.join(", "), spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     if !(spec.scale.is_finite() && spec.scale > 0.0) {
@@ -232,9 +199,7 @@ fn mesh(
         let message = format!("scale is {scale}; it must be a finite number greater than 0");
         return Err(DesignError::new(format!("{path}.scale"), message).found(scale));
     }
-    let bytes = loader
-        .load(&spec.path)
-        .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
+    let bytes = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let of_file = |f: Fault| DesignError::new(&at, format!("{}: {f}", spec.path)).found(&spec.path);
     let mut loaded = io::read_mesh(&bytes, &extension).map_err(of_file)?;
     if let (true, Some(unit)) = (loaded.in_mm, spec.unit)
@@ -243,12 +208,7 @@ fn mesh(
         let message = "this file names its own unit and was read in mm; leave unit out";
         return Err(DesignError::new(format!("{path}.unit"), message));
     }
-    let factor = spec.scale
-        * if loaded.in_mm {
-            1.0
-        } else {
-            spec.unit.unwrap_or(Unit::Mm).in_mm()
-        };
+    let factor = spec.scale * if loaded.in_mm { 1.0 } else { spec.unit.unwrap_or(Unit::Mm).in_mm() };
     if factor != 1.0 {
         for v in &mut loaded.mesh.vertices {
             *v = scale(*v, factor);
@@ -261,10 +221,7 @@ fn mesh(
     let made = MeshRegion::new(loaded.mesh, repair).map_err(of_file)?;
     let largest = made.bounds().size().into_iter().fold(0.0, f64::max);
     let mut warn = |message: String| {
-        notes.warnings.push(Warning {
-            path: path.into(),
-            message,
-        });
+        notes.warnings.push(Warning { path: path.into(), message });
     };
     if spec.unit.is_none() && !loaded.in_mm && spec.scale == 1.0 && largest < SMALL {
         warn(format!(
@@ -286,17 +243,14 @@ mod tests {
     #[test]
     fn bodies_of_a_union() {
         let ball = |x: f64, radius| Arc::new(Sphere::new([x, 0.0, 0.0], radius).unwrap()) as Region;
-        let post = |x: f64| {
-            Arc::new(Cylinder::new([x, x, -5.0], [0.0, 0.0, 1.0], 1.0, 10.0).unwrap()) as Region
-        };
+        let post = |x: f64| Arc::new(Cylinder::new([x, x, -5.0], [0.0, 0.0, 1.0], 1.0, 10.0).unwrap()) as Region;
         assert_eq!(groups(&[ball(0.0, 1.0), ball(3.0, 1.0), ball(1.5, 1.0)]), 1);
         assert_eq!(groups(&[ball(0.0, 1.0), ball(3.0, 1.0), ball(9.0, 1.0)]), 3);
         // Their bounds overlap, they do not: the diagonal is √2 · 1.5 mm, the radii 2 mm together; or 1.3 mm.
         assert_eq!(groups(&[post(0.0), post(1.5)]), 2);
         assert_eq!(groups(&[post(0.0), post(1.3)]), 1);
         // Faces in common touch.
-        let cube =
-            |x: f64| Arc::new(Cuboid::new([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]).unwrap()) as Region;
+        let cube = |x: f64| Arc::new(Cuboid::new([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]).unwrap()) as Region;
         assert_eq!(groups(&[cube(0.0), cube(1.0)]), 1);
         assert_eq!(groups(&[cube(0.0), cube(1.001)]), 2);
     }

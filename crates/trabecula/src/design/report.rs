@@ -23,20 +23,12 @@ pub(super) struct Varied {
 
 impl Varied {
     pub fn of(values: &[f64]) -> Varied {
-        let (min, max) = values
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                (a.min(*v), b.max(*v))
-            });
+        let (min, max) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         Varied { min, max }
     }
 
     pub fn map(self, f: impl Fn(f64) -> f64) -> Varied {
-        if self.min == self.max {
-            Varied::of(&[f(self.min)])
-        } else {
-            Varied::of(&[f(self.min), f(self.max)])
-        }
+        if self.min == self.max { Varied::of(&[f(self.min)]) } else { Varied::of(&[f(self.min), f(self.max)]) }
     }
 
     /// The level t of the core at the points; half the thickness, where that is the level.
@@ -63,31 +55,20 @@ impl Varied {
                 }
             },
             // The fraction rises (sheet, lower) or falls (upper) with the level, so its ends are at the level's ends.
-            Level::Iso(_) | Level::Thickness(_) => {
-                Varied::of_iso(lattice, points).map(|t| lattice.fraction(t))
-            }
+            Level::Iso(_) | Level::Thickness(_) => Varied::of_iso(lattice, points).map(|t| lattice.fraction(t)),
         }
     }
 
     fn json(self) -> Json {
-        if self.min == self.max {
-            json!(self.min)
-        } else {
-            json!([self.min, self.max])
-        }
+        if self.min == self.max { json!(self.min) } else { json!([self.min, self.max]) }
     }
 }
 
 impl core::fmt::Display for Varied {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         // Adding zero takes the sign off a negative one.
-        let [min, max] =
-            [self.min, self.max].map(|v| format!("{:.4}", (v * 1e4).round() / 1e4 + 0.0));
-        if min == max {
-            write!(f, "{min}")
-        } else {
-            write!(f, "{min} to {max}")
-        }
+        let [min, max] = [self.min, self.max].map(|v| format!("{:.4}", (v * 1e4).round() / 1e4 + 0.0));
+        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
     }
 }
 
@@ -184,9 +165,10 @@ fn phases(phases: Phases) -> &'static str {
 
 /// The blend without its transitions.
 fn blend(b: &Blended) -> Json {
-    let functions = b.functions.iter().map(|f| {
-        json!({ "path": f.path, "points": f.points, "delta": f.delta, "condition": f.condition })
-    });
+    let functions = b
+        .functions
+        .iter()
+        .map(|f| json!({ "path": f.path, "points": f.points, "delta": f.delta, "condition": f.condition }));
     json!({
         "lattices": b.names,
         "by": if b.blend.phases().is_some() { "fraction" } else { "value" },
@@ -202,10 +184,7 @@ fn tiled(it: &Tiled) -> Json {
     let stencil = &tiling.cells[0].stencil;
     let part = tiling.part;
     let levels = tiling.levels();
-    let iso = Varied {
-        min: levels.lo,
-        max: levels.hi,
-    };
+    let iso = Varied { min: levels.lo, max: levels.hi };
     let share = iso.map(|t| stencil.fraction(part, t));
     let shares = tiling.shares();
     let sums = |zone: Option<u32>| {
@@ -316,11 +295,7 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Json {
         .flat_map(|m| (0..steps).map(move |i| (i, m)))
         .filter_map(|(i, m)| lattice.cell.thickness(lattice.part, level(i), m))
         .collect();
-    if found.is_empty() {
-        Json::Null
-    } else {
-        Varied::of(&found).json()
-    }
+    if found.is_empty() { Json::Null } else { Varied::of(&found).json() }
 }
 
 /// How far a solved map is from what was asked for.

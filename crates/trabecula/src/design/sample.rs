@@ -28,20 +28,10 @@ pub(super) fn nodes(region: &Region) -> Vec<Vec3> {
     const N: usize = 12;
     let (b, size) = (region.bounds(), region.bounds().size());
     let at = |i: usize, a: usize| {
-        if i == N {
-            b.max[a]
-        } else {
-            b.min[a] + size[a] * i as f64 / N as f64
-        }
+        if i == N { b.max[a] } else { b.min[a] + size[a] * i as f64 / N as f64 }
     };
     let count = (N + 1).pow(3);
-    let grid = (0..count).map(|i| {
-        [
-            at(i % (N + 1), 0),
-            at(i / (N + 1) % (N + 1), 1),
-            at(i / (N + 1).pow(2), 2),
-        ]
-    });
+    let grid = (0..count).map(|i| [at(i % (N + 1), 0), at(i / (N + 1) % (N + 1), 1), at(i / (N + 1).pow(2), 2)]);
     let reach = 1e-9 * size.into_iter().fold(0.0, f64::max);
     grid.filter(|p| region.value(*p) <= reach).collect()
 }
@@ -57,13 +47,7 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
         points.clear();
         points.extend((i..i + n).map(|i| place(bounds, i)));
         region.values(&points, &mut values[..n]);
-        kept.extend(
-            points
-                .iter()
-                .zip(&values)
-                .filter(|(_, v)| **v < 0.0)
-                .map(|(p, _)| *p),
-        );
+        kept.extend(points.iter().zip(&values).filter(|(_, v)| **v < 0.0).map(|(p, _)| *p));
         i += n;
     }
     kept
@@ -92,15 +76,11 @@ mod tests {
 
     #[test]
     fn the_sequence_fills_a_box_evenly() {
-        let b = Aabb {
-            min: [-1.0, 0.0, 2.0],
-            max: [1.0, 3.0, 6.0],
-        };
+        let b = Aabb { min: [-1.0, 0.0, 2.0], max: [1.0, 3.0, 6.0] };
         let mut counts = [0usize; 64];
         for i in 0..64_000 {
             let p = place(&b, i);
-            let k: [usize; 3] =
-                core::array::from_fn(|a| ((p[a] - b.min[a]) / b.size()[a] * 4.0) as usize);
+            let k: [usize; 3] = core::array::from_fn(|a| ((p[a] - b.min[a]) / b.size()[a] * 4.0) as usize);
             counts[k[0] + 4 * k[1] + 16 * k[2]] += 1;
         }
         for c in counts {

@@ -21,40 +21,26 @@ pub(super) use field::{field, several};
 pub(super) use grid::grid;
 
 pub(super) fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {
-    place
-        .loader
-        .load(path)
-        .map_err(|m| DesignError::new(at, m).found(path))
+    place.loader.load(path).map_err(|m| DesignError::new(at, m).found(path))
 }
 
 /// Nodes along an axis of the grid on which a mesh of one cell is looked at.
 const CELL: usize = 64;
 
 /// A cell from numbers or a mesh.
-pub(super) fn cell(
-    spec: &FileCellSpec,
-    path: &str,
-    loader: &dyn Loader,
-) -> Result<Cell, DesignError> {
+pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Result<Cell, DesignError> {
     let at = format!("{path}.path");
-    let wrong =
-        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     if !(spec.terms >= 1.0 && spec.terms <= 2000.0 && spec.terms.fract() == 0.0) {
-        let message = format!(
-            "terms is {}; it must be a whole number from 1 to 2000",
-            number(spec.terms)
-        );
+        let message = format!("terms is {}; it must be a whole number from 1 to 2000", number(spec.terms));
         return Err(DesignError::new(format!("{path}.terms"), message));
     }
-    let file = loader
-        .load(&spec.path)
-        .map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
+    let file = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let kind = extension(&spec.path);
     let (shape, values) = if kind == "npy" {
         let (shape, values) = io::read_npy(&file).map_err(wrong)?;
         let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
-            let message =
-                format!("the array has shape {shape:?}; a cell has three dimensions [x, y, z]");
+            let message = format!("the array has shape {shape:?}; a cell has three dimensions [x, y, z]");
             wrong(Fault::new("", message))
         })?;
         (shape, values)
@@ -64,9 +50,7 @@ pub(super) fn cell(
         let (b, size) = (solid.bounds(), solid.bounds().size());
         let points: Vec<Vec3> = (0..CELL.pow(3))
             .map(|n| [n % CELL, n / CELL % CELL, n / CELL / CELL])
-            .map(|i| {
-                core::array::from_fn(|a| b.min[a] + size[a] * (i[a] as f64 + 0.5) / CELL as f64)
-            })
+            .map(|i| core::array::from_fn(|a| b.min[a] + size[a] * (i[a] as f64 + 0.5) / CELL as f64))
             .collect();
         let mut values = vec![0.0; points.len()];
         solid.values(&points, &mut values);
@@ -100,10 +84,7 @@ pub(super) fn grade(
         finite(&at, *v)?;
         finite(&at, *w)?;
         if stops.last().is_some_and(|s| s[0] >= *v) {
-            return Err(DesignError::new(
-                at,
-                format!("numbers must rise from stop to stop, found {}", number(*v)),
-            ));
+            return Err(DesignError::new(at, format!("numbers must rise from stop to stop, found {}", number(*v))));
         }
         stops.push([*v, *w]);
     }
@@ -115,10 +96,7 @@ pub(super) fn grade(
         }
         stops.iter_mut().for_each(|s| s[1] = 1.0 - s[1]);
     }
-    let grade = Grade::Samples {
-        of: Arc::new(samples),
-        remap: stops,
-    };
+    let grade = Grade::Samples { of: Arc::new(samples), remap: stops };
     super::level::check_varied(&grade, path, allowed, complement, place)?;
     Ok(grade)
 }
@@ -137,11 +115,7 @@ fn pick<'a>(arrays: &'a [io::Array], name: Option<&str>) -> Result<&'a io::Array
                 )
             })
             .collect();
-        if names.is_empty() {
-            "it has none".to_string()
-        } else {
-            format!("it has {}", names.join(", "))
-        }
+        if names.is_empty() { "it has none".to_string() } else { format!("it has {}", names.join(", ")) }
     };
     match name {
         Some(name) => arrays
@@ -150,52 +124,30 @@ fn pick<'a>(arrays: &'a [io::Array], name: Option<&str>) -> Result<&'a io::Array
             .ok_or_else(|| format!("the file has no array \"{name}\"; {}", listed())),
         None => match arrays {
             [one] => Ok(one),
-            _ => Err(format!(
-                "the file does not have exactly one array, so name one; {}",
-                listed()
-            )),
+            _ => Err(format!("the file does not have exactly one array, so name one; {}", listed())),
         },
     }
 }
 
 fn percent(share: f64) -> String {
-    if share >= 0.01 {
-        format!("{:.0} %", 100.0 * share)
-    } else {
-        format!("{:.2} %", 100.0 * share)
-    }
+    if share >= 0.01 { format!("{:.0} %", 100.0 * share) } else { format!("{:.2} %", 100.0 * share) }
 }
 
 pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let file = bytes(&spec.path, &at, place)?;
-    let wrong =
-        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
-    let (places, values): (Vec<Vec3>, Vec<f64>) =
-        rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
+    let (places, values): (Vec<Vec3>, Vec<f64>) = rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
     if spec.neighbours < 1.0 || spec.neighbours.fract() != 0.0 || spec.neighbours > 64.0 {
-        let message = format!(
-            "neighbours is {}; it must be a whole number from 1 to 64",
-            number(spec.neighbours)
-        );
+        let message = format!("neighbours is {}; it must be a whole number from 1 to 64", number(spec.neighbours));
         return Err(DesignError::new(format!("{path}.neighbours"), message));
     }
-    Samples::scattered(
-        &places,
-        &values,
-        spec.neighbours as usize,
-        &place.region.bounds(),
-    )
-    .map_err(wrong)
+    Samples::scattered(&places, &values, spec.neighbours as usize, &place.region.bounds()).map_err(wrong)
 }
 
 /// Control points, and the values beside them if there are four columns.
-pub(super) fn control(
-    file: &str,
-    at: &str,
-    place: &Place,
-) -> Result<(Vec<Vec3>, Option<Vec<f64>>), DesignError> {
+pub(super) fn control(file: &str, at: &str, place: &Place) -> Result<(Vec<Vec3>, Option<Vec<f64>>), DesignError> {
     let text = bytes(file, at, place)?;
     let rows = table(&String::from_utf8_lossy(&text), &[3, 4])
         .map_err(|f| DesignError::new(at, format!("{file}: {}", f.message)).found(file))?;
@@ -217,14 +169,8 @@ fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
         if line.is_empty() {
             continue;
         }
-        let words: Vec<&str> = line
-            .split([',', ';', '\t', ' '])
-            .filter(|w| !w.is_empty())
-            .collect();
-        let row: Vec<Option<f64>> = words
-            .iter()
-            .map(|w| w.trim_matches('"').parse().ok())
-            .collect();
+        let words: Vec<&str> = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty()).collect();
+        let row: Vec<Option<f64>> = words.iter().map(|w| w.trim_matches('"').parse().ok()).collect();
         if rows.is_empty() && row.iter().all(Option::is_none) {
             continue;
         }
@@ -234,10 +180,7 @@ fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
             return Err(fault(n, format!("expected {what}, found \"{line}\"")));
         };
         if row.iter().any(|v| !v.is_finite()) {
-            return Err(fault(
-                n,
-                format!("numbers must be finite, found \"{line}\""),
-            ));
+            return Err(fault(n, format!("numbers must be finite, found \"{line}\"")));
         }
         rows.push(row);
     }

@@ -28,13 +28,7 @@ pub(super) fn filled(
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
-        let place = Place {
-            path: "skin".into(),
-            region: space,
-            points,
-            filled: &[],
-            loader,
-        };
+        let place = Place { path: "skin".into(), region: space, points, filled: &[], loader };
         let (body, least) = grown(spec, &place)?;
         filled.push(body);
         thinnest = Some(least);
@@ -75,11 +69,7 @@ fn is_open(filled: &[Body], space: &Region, points: &[Vec3]) -> bool {
 
 /// The skin and its least thickness.
 fn grown(spec: &SkinSpec, place: &Place) -> Result<(Body, f64), DesignError> {
-    let Place {
-        region: space,
-        points,
-        ..
-    } = *place;
+    let Place { region: space, points, .. } = *place;
     let path = "skin.thickness";
     let allowed = Allowed::Positive("thickness");
     let thickness = grade(&spec.thickness, path, place, allowed, false)?;
@@ -118,12 +108,7 @@ fn grown(spec: &SkinSpec, place: &Place) -> Result<(Body, f64), DesignError> {
 }
 
 /// Refuses a zone that has nothing of the region or all of it.
-fn check_zone(
-    zone: &Region,
-    space: &Region,
-    points: &[Vec3],
-    path: &str,
-) -> Result<(), DesignError> {
+fn check_zone(zone: &Region, space: &Region, points: &[Vec3], path: &str) -> Result<(), DesignError> {
     let mut distance = vec![0.0; points.len()];
     zone.values(points, &mut distance);
     if distance.iter().all(|d| *d <= 0.0) {

@@ -118,50 +118,23 @@ fn skins_and_keep_zones_survive() {
         let again = Design::from_json(&d.to_json().to_string()).expect("readable");
         assert_eq!(again.to_json(), d.to_json(), "{text}");
     }
-    assert_eq!(
-        Design::from_toml(GOOD).expect("good").to_json().get("keep"),
-        None
-    );
+    assert_eq!(Design::from_toml(GOOD).expect("good").to_json().get("keep"), None);
     for (more, path, word) in [
         ("[skin]\nthicknes = 1\n", "skin.thicknes", "thickness"),
-        (
-            "[skin]\nthickness = 1\nopen = [\"botom\"]\n",
-            "skin.open[0]",
-            "-z",
-        ),
-        (
-            "[keep.boss.cylindre]\nradius = 2\n",
-            "keep.boss.cylindre",
-            "cylinder",
-        ),
+        ("[skin]\nthickness = 1\nopen = [\"botom\"]\n", "skin.open[0]", "-z"),
+        ("[keep.boss.cylindre]\nradius = 2\n", "keep.boss.cylindre", "cylinder"),
         ("[keeps.boss.sphere]\nradius = 2\n", "keeps", "keep"),
     ] {
         let e = refused(&format!("{GOOD}{more}"));
-        assert_eq!(
-            (e.path.as_str(), e.nearest.as_deref()),
-            (path, Some(word)),
-            "{e}"
-        );
+        assert_eq!((e.path.as_str(), e.nearest.as_deref()), (path, Some(word)), "{e}");
         assert!(e.line > Some(13), "{e}");
     }
     for (more, path, part) in [
         ("[skin]\nopen = []\n", "skin", "\"thickness\" is missing"),
-        (
-            "[keep.sphere]\nradius = 2\n",
-            "keep.sphere",
-            "a name comes first",
-        ),
+        ("[keep.sphere]\nradius = 2\n", "keep.sphere", "a name comes first"),
         ("[keep.boss]\n", "keep.boss", "a region is missing"),
-        (
-            "[skin]\nthickness = 1\nopen = \"-z\"\n",
-            "skin.open",
-            "a list of sides",
-        ),
-        (
-            "[keep.a.sphere]\nradius = 2\n[keep.a.sphere]\nradius = 3\n",
-            "",
-            "not readable as TOML",
-        ),
+        ("[skin]\nthickness = 1\nopen = \"-z\"\n", "skin.open", "a list of sides"),
+        ("[keep.a.sphere]\nradius = 2\n[keep.a.sphere]\nradius = 3\n", "", "not readable as TOML"),
     ] {
         let e = refused(&format!("{GOOD}{more}"));
         assert!(e.path == path && e.message.contains(part), "{e}");
@@ -176,55 +149,15 @@ fn slips_are_told_with_path_line_and_nearest_word() {
         ("cell =", "cel =", "lattice.core.cel", 6, "cell"),
         ("\"gyroid\"", "\"gyriod\"", "lattice.core.cell", 6, "gyroid"),
         ("\"lower\"", "\"lowr\"", "lattice.core.part", 7, "lower"),
-        (
-            "wavelength =",
-            "wavelenght =",
-            "lattice.core.map.affine.wavelenght",
-            9,
-            "wavelength",
-        ),
-        (
-            "map.affine",
-            "map.afine",
-            "lattice.core.map.afine",
-            8,
-            "affine",
-        ),
-        (
-            "porosity =",
-            "porosty =",
-            "lattice.core.level.porosty",
-            13,
-            "porosity",
-        ),
-        (
-            "linear =",
-            "liner =",
-            "lattice.core.level.porosity.liner",
-            13,
-            "linear",
-        ),
-        (
-            "stops =",
-            "stop =",
-            "lattice.core.level.porosity.linear.stop",
-            13,
-            "stops",
-        ),
-        (
-            "xz = 20",
-            "xzz = 20",
-            "lattice.core.map.affine.skew.xzz",
-            11,
-            "xz",
-        ),
+        ("wavelength =", "wavelenght =", "lattice.core.map.affine.wavelenght", 9, "wavelength"),
+        ("map.affine", "map.afine", "lattice.core.map.afine", 8, "affine"),
+        ("porosity =", "porosty =", "lattice.core.level.porosty", 13, "porosity"),
+        ("linear =", "liner =", "lattice.core.level.porosity.liner", 13, "linear"),
+        ("stops =", "stop =", "lattice.core.level.porosity.linear.stop", 13, "stops"),
+        ("xz = 20", "xzz = 20", "lattice.core.map.affine.skew.xzz", 11, "xz"),
     ] {
         let e = with(line, instead);
-        assert_eq!(
-            (e.path.as_str(), e.line, e.nearest.as_deref()),
-            (path, Some(number), Some(nearest)),
-            "{e}"
-        );
+        assert_eq!((e.path.as_str(), e.line, e.nearest.as_deref()), (path, Some(number), Some(nearest)), "{e}");
     }
 }
 
@@ -232,26 +165,16 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 fn several_lattices_need_a_blend() {
     let two = GOOD.to_string() + "[lattice.rim]\ncell = \"gyroid\"\n";
     let e = refused(&two);
-    assert!(
-        e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14),
-        "{e}"
-    );
+    assert!(e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14), "{e}");
 }
 
 #[test]
 fn exactly_one_amount() {
     let e = refused(&(GOOD.to_string() + "fraction = 0.3\n"));
     assert!(e.message.contains("fraction and porosity at once"), "{e}");
-    assert_eq!(
-        (e.path.as_str(), e.line),
-        ("lattice.core.level.porosity", Some(13))
-    );
+    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.porosity", Some(13)));
     let e = refused(GOOD.split("porosity").next().unwrap_or_default());
-    assert!(
-        e.message
-            .contains("exactly one of iso, fraction, porosity, thickness"),
-        "{e}"
-    );
+    assert!(e.message.contains("exactly one of iso, fraction, porosity, thickness"), "{e}");
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));
 }
 
@@ -262,17 +185,9 @@ fn values_of_the_wrong_type_say_what_was_found() {
         ("[8, 8.5, 9]", "8", "found 8"),
         ("[8, 8.5, 9]", "[8, 9]", "found 2 values"),
         ("[4, 4, 5]", "\"four\"", "found \"four\""),
-        (
-            "[4, 4, 5]",
-            "{ linear = { along = [1,0,0], stops = [] } }",
-            "map.phase takes a wavelength",
-        ),
+        ("[4, 4, 5]", "{ linear = { along = [1,0,0], stops = [] } }", "map.phase takes a wavelength"),
         ("[0, 30, 0]", "[0, true, 0]", "found true"),
-        (
-            "units = \"mm\"",
-            "units = \"inch\"",
-            "lengths in a design are mm",
-        ),
+        ("units = \"mm\"", "units = \"inch\"", "lengths in a design are mm"),
         ("[[0, 0.5], [9, 0.8]]", "[[0, 0.5, 1]]", "found 3 values"),
     ] {
         let e = with(line, instead);
@@ -299,31 +214,16 @@ fn the_schema_and_the_reader_agree() {
     let defs = schema["$defs"].as_object().expect("definitions");
     let keys = |name: &str| -> Vec<String> {
         let object = &defs[name];
-        let mut keys: Vec<String> = object["properties"]
-            .as_object()
-            .into_iter()
-            .flatten()
-            .map(|(k, _)| k.clone())
-            .collect();
+        let mut keys: Vec<String> =
+            object["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()).collect();
         for option in object["oneOf"].as_array().into_iter().flatten() {
-            keys.extend(
-                option["properties"]
-                    .as_object()
-                    .into_iter()
-                    .flatten()
-                    .map(|(k, _)| k.clone()),
-            );
+            keys.extend(option["properties"].as_object().into_iter().flatten().map(|(k, _)| k.clone()));
         }
         keys.sort();
         keys
     };
     let listed = |e: DesignError| -> Vec<String> {
-        let list = e
-            .message
-            .split("Allowed: ")
-            .nth(1)
-            .unwrap_or_else(|| panic!("{e}"))
-            .to_string();
+        let list = e.message.split("Allowed: ").nth(1).unwrap_or_else(|| panic!("{e}")).to_string();
         let mut words: Vec<String> = list.split(", ").map(str::to_string).collect();
         words.sort();
         words
@@ -343,28 +243,15 @@ fn the_schema_and_the_reader_agree() {
     both.extend(keys("BoxCorners"));
     both.sort();
     assert_eq!(listed(region("box")), both);
-    assert_eq!(
-        listed(refused("schema = 1\n[region]\nzzzzzzzz = 1\n")),
-        keys("RegionSpec")
-    );
+    assert_eq!(listed(refused("schema = 1\n[region]\nzzzzzzzz = 1\n")), keys("RegionSpec"));
     assert_eq!(listed(with("cell =", "zzzzzzzz =")), keys("LatticeSpec"));
-    assert_eq!(
-        listed(with("units = \"mm\"", "skin = { zzzzzzzz = 1 }")),
-        keys("SkinSpec")
-    );
-    assert_eq!(
-        listed(with("wavelength =", "zzzzzzzz =")),
-        keys("AffineSpec")
-    );
+    assert_eq!(listed(with("units = \"mm\"", "skin = { zzzzzzzz = 1 }")), keys("SkinSpec"));
+    assert_eq!(listed(with("wavelength =", "zzzzzzzz =")), keys("AffineSpec"));
     assert_eq!(listed(with("xz =", "zzzzzzzz =")), keys("SkewSpec"));
     assert_eq!(listed(with("porosity =", "zzzzzzzz =")), keys("LevelSpec"));
     assert_eq!(listed(with("map.affine", "map.zzzzzzzz")), keys("MapSpec"));
     assert_eq!(listed(with("linear =", "zzzzzzzz =")), keys("GradeKind"));
-    for (kind, name) in [
-        ("phase", "PhaseSpec"),
-        ("cylinder", "CylinderMapSpec"),
-        ("sphere", "SphereMapSpec"),
-    ] {
+    for (kind, name) in [("phase", "PhaseSpec"), ("cylinder", "CylinderMapSpec"), ("sphere", "SphereMapSpec")] {
         // The first key that an affine map alone has is unknown.
         let words = listed(with("map.affine", &format!("map.{kind}")));
         assert_eq!(words, keys(name), "{kind}");
@@ -381,8 +268,5 @@ fn the_committed_schema_is_current() {
         std::fs::write(path, &text).expect("schema/ exists");
     }
     let old = std::fs::read_to_string(path).unwrap_or_default();
-    assert!(
-        old == text,
-        "schema/design.json is stale; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema"
-    );
+    assert!(old == text, "schema/design.json is stale; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema");
 }

@@ -47,11 +47,7 @@ pub struct TetReport {
 
 impl Tets {
     /// The tetrahedral mesh of a lattice (by name, or the first that has one) in a design; its other keys are left alone.
-    pub fn in_design(
-        node: &Node,
-        lattice: Option<&str>,
-        loader: &dyn Loader,
-    ) -> Result<Tets, DesignError> {
+    pub fn in_design(node: &Node, lattice: Option<&str>, loader: &dyn Loader) -> Result<Tets, DesignError> {
         let lines = node.lines();
         let make = || {
             let (path, spec) = read::tets_in(node, lattice)?;
@@ -63,8 +59,7 @@ impl Tets {
             };
             let bounds = space.bounds();
             if !bounds.is_empty() && !bounds.is_finite() {
-                let message =
-                    "the region has no end; intersect it with a box or another bounded region";
+                let message = "the region has no end; intersect it with a box or another bounded region";
                 return Err(DesignError::new("region", message));
             }
             let (mut points, _) = sample::inside(&space, LOOKS);
@@ -72,13 +67,7 @@ impl Tets {
                 return Err(DesignError::new("region", "the region is empty"));
             }
             points.extend(sample::nodes(&space));
-            let place = Place {
-                path,
-                region: &space,
-                points: &points,
-                filled: &[],
-                loader,
-            };
+            let place = Place { path, region: &space, points: &points, filled: &[], loader };
             let mut made = tets(&spec, &region_spec, &place)?;
             made.warnings.splice(0..0, notes.warnings);
             Ok(made)
@@ -104,11 +93,7 @@ impl Tets {
 }
 
 /// The tetrahedral mesh that `spec` asks for; `place.path` is that of its table.
-pub(super) fn tets(
-    spec: &TetsSpec,
-    space: &RegionSpec,
-    place: &Place,
-) -> Result<Tets, DesignError> {
+pub(super) fn tets(spec: &TetsSpec, space: &RegionSpec, place: &Place) -> Result<Tets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&place.path, f);
     // Points that lie on the surface tell nothing of what is lost.
     let inside: Vec<Vec3> = {
@@ -121,25 +106,14 @@ pub(super) fn tets(
     let (mut mesh, fit, checked, mesher) = match spec {
         TetsSpec::Made(made) => {
             let below = |key: &str| format!("{}.{key}", place.path);
-            let size = grade(
-                &made.size,
-                &below("size"),
-                place,
-                Allowed::Positive("size"),
-                false,
-            )?;
+            let size = grade(&made.size, &below("size"), place, Allowed::Positive("size"), false)?;
             if made.mesher == MesherSpec::Background {
-                let (mesh, fit) =
-                    background(&**place.region, &bounds, &size, &inside).map_err(wrong)?;
-                (
-                    mesh,
-                    Some(fit),
-                    Checked::default(),
-                    "background".to_string(),
-                )
+                let (mesh, fit) = background(&**place.region, &bounds, &size, &inside).map_err(wrong)?;
+                (mesh, Some(fit), Checked::default(), "background".to_string())
             } else {
                 let Some(size) = size.constant() else {
-                    let message = "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
+                    let message =
+                        "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
                     return Err(DesignError::new(below("size"), message));
                 };
                 let surface = surface(space, place, size)?;
@@ -158,9 +132,7 @@ pub(super) fn tets(
     }
     let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
     let todo = match spec {
-        TetsSpec::Made(_) => {
-            "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one"
-        }
+        TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
         TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
     };
     let mut told = told(mesh, &checked, mesher, Some(fit), &place.path, todo)?;
@@ -180,17 +152,13 @@ fn zones(
         return Ok(Vec::new());
     }
     let middle = |t: &[u32; 4]| {
-        let sum = t
-            .iter()
-            .fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize]));
+        let sum = t.iter().fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize]));
         scale(sum, 0.25)
     };
     let middles: Vec<Vec3> = mesh.tets.iter().map(middle).collect();
     let mut of: Vec<Option<u32>> = vec![None; middles.len()];
     let numbered = made.zones.iter();
-    let mut numbered: Vec<(u32, &RegionSpec)> = numbered
-        .filter_map(|(n, r)| Some((n.parse().ok()?, r)))
-        .collect();
+    let mut numbered: Vec<(u32, &RegionSpec)> = numbered.filter_map(|(n, r)| Some((n.parse().ok()?, r))).collect();
     numbered.sort_by_key(|z| z.0);
     for (zone, spec) in numbered {
         let path = format!("{path}.zones.{zone}");
@@ -198,16 +166,13 @@ fn zones(
         let mut values = vec![0.0; middles.len()];
         region.values(&middles, &mut values);
         let mut count = 0;
-        for (of, _) in of
-            .iter_mut()
-            .zip(&values)
-            .filter(|(of, v)| of.is_none() && **v < 0.0)
-        {
+        for (of, _) in of.iter_mut().zip(&values).filter(|(of, v)| of.is_none() && **v < 0.0) {
             *of = Some(zone);
             count += 1;
         }
         if count == 0 {
-            let message = "no tetrahedron's middle is in this region, or all are in zones before it; move it or leave it out";
+            let message =
+                "no tetrahedron's middle is in this region, or all are in zones before it; move it or leave it out";
             return Err(DesignError::new(path, message));
         }
     }
@@ -226,17 +191,9 @@ fn told(
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
-    let report = TetReport {
-        mesher,
-        quality,
-        fit,
-    };
+    let report = TetReport { mesher, quality, fit };
     let warnings = warnings(&report, checked, path, todo);
-    Ok(Tets {
-        mesh,
-        report,
-        warnings,
-    })
+    Ok(Tets { mesh, report, warnings })
 }
 
 /// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the
@@ -270,10 +227,7 @@ pub(super) fn of_soup(
     mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
     let mut told = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
     told.warnings.extend(notes.warnings);
-    let message = format!(
-        "no region, so the boundary of the tetrahedra is taken for one: {}",
-        why.message
-    );
+    let message = format!("no region, so the boundary of the tetrahedra is taken for one: {}", why.message);
     let path = "region.mesh".into();
     told.warnings.push(Warning { path, message });
     Ok(told)
@@ -283,30 +237,18 @@ pub(super) fn of_soup(
 fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut say = |message: String| {
-        out.push(Warning {
-            path: path.to_string(),
-            message,
-        });
+        out.push(Warning { path: path.to_string(), message });
     };
     let at = |[x, y, z]: Vec3| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     let q = &report.quality;
     if checked.turned {
-        say(
-            "every tetrahedron was numbered the other way round (negative volume), and was turned"
-                .into(),
-        );
+        say("every tetrahedron was numbered the other way round (negative volume), and was turned".into());
     }
     if q.pieces > 1 {
-        say(format!(
-            "the tetrahedra are {} pieces that share no faces: the lattice will fall apart there",
-            q.pieces
-        ));
+        say(format!("the tetrahedra are {} pieces that share no faces: the lattice will fall apart there", q.pieces));
     }
     if checked.pinched > 0 {
-        say(format!(
-            "the boundary meets itself in {}",
-            counted(checked.pinched, "edge")
-        ));
+        say(format!("the boundary meets itself in {}", counted(checked.pinched, "edge")));
     }
     if q.slivers > 0 {
         say(format!(
@@ -362,9 +304,7 @@ mod tests {
                 )
             };
             match path {
-                "hex.vtk" => {
-                    Ok(format!("{HEAD}CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n").into())
-                }
+                "hex.vtk" => Ok(format!("{HEAD}CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n").into()),
                 "tets.vtk" => Ok(tets("0 1 3 7").into()),
                 "turned.vtk" => Ok(tets("1 0 3 7").into()),
                 _ => Err(format!("{path} does not exist")),
@@ -386,20 +326,11 @@ mod tests {
         assert!((it.report.quality.volume - 1.0).abs() < 1e-12 && it.warnings.is_empty());
         assert!(it.report.fit.unwrap().lost == 0.0);
         let it = made("path = \"tets.vtk\"").unwrap();
-        assert_eq!(
-            (it.mesh.tets.len(), it.mesh.zones.as_slice()),
-            (6, &[1, 1, 1, 2, 2, 2][..])
-        );
+        assert_eq!((it.mesh.tets.len(), it.mesh.zones.as_slice()), (6, &[1, 1, 1, 2, 2, 2][..]));
         let it = made("path = \"hex.vtk\"\nsplit = true").unwrap();
         assert!((it.mesh.volume() - 1.0).abs() < 1e-12 && it.mesh.tets.len() == 12);
         let it = made("path = \"tets.vtk\"\nunit = \"cm\"").unwrap();
-        assert!(
-            it.warnings
-                .iter()
-                .any(|w| w.message.contains("off the region")),
-            "{:?}",
-            it.warnings
-        );
+        assert!(it.warnings.iter().any(|w| w.message.contains("off the region")), "{:?}", it.warnings);
         let graded = "size = { linear = { along = [1, 0, 0], stops = [[0, 0.1], [1, 0.3]] } }";
         assert!(made(graded).unwrap().report.quality.tets > 500);
     }
@@ -414,57 +345,18 @@ mod tests {
         };
         wrong("", "", Some(6), "\"size\" is missing");
         wrong("size = -1", ".size", Some(7), "size is -1 mm");
-        wrong(
-            "size = 1\npath = \"tets.vtk\"",
-            ".path",
-            Some(8),
-            "found both",
-        );
-        wrong(
-            "size = 1\nsplit = true",
-            ".split",
-            Some(8),
-            "there is no path",
-        );
-        wrong(
-            "size = 1\nmesher = \"ftetwlid\"",
-            ".mesher",
-            Some(8),
-            "did you mean \"ftetwild\"?",
-        );
-        wrong(
-            "size = 1\nmesher = \"ftetwild\"",
-            ".mesher",
-            Some(8),
-            "not available here",
-        );
+        wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "found both");
+        wrong("size = 1\nsplit = true", ".split", Some(8), "there is no path");
+        wrong("size = 1\nmesher = \"ftetwlid\"", ".mesher", Some(8), "did you mean \"ftetwild\"?");
+        wrong("size = 1\nmesher = \"ftetwild\"", ".mesher", Some(8), "not available here");
         wrong("size = 1\nmesh = 3", ".mesh", Some(8), "did you mean");
         wrong("size = 1e-4", ".size", Some(7), "use a greater one");
-        wrong(
-            "path = \"none.vtk\"",
-            ".path",
-            Some(7),
-            "none.vtk does not exist",
-        );
+        wrong("path = \"none.vtk\"", ".path", Some(7), "none.vtk does not exist");
         wrong("path = \"cube.inp\"", ".path", Some(7), "only vtu and vtk");
-        wrong(
-            "path = \"hex.vtk\"",
-            ".split",
-            Some(6),
-            "1 hexahedron beside 0 tetrahedra; give split = true",
-        );
-        wrong(
-            "path = \"turned.vtk\"",
-            ".path",
-            Some(7),
-            "1 of 6 tetrahedra are inverted",
-        );
+        wrong("path = \"hex.vtk\"", ".split", Some(6), "1 hexahedron beside 0 tetrahedra; give split = true");
+        wrong("path = \"turned.vtk\"", ".path", Some(7), "1 of 6 tetrahedra are inverted");
         let none = "[region.sphere]\nradius = 1\n[lattice.core.map.affine]\nwavelength = 1";
         let e = Tets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();
-        assert!(
-            e.message
-                .contains("no lattice of the design has a tetrahedral mesh"),
-            "{e}"
-        );
+        assert!(e.message.contains("no lattice of the design has a tetrahedral mesh"), "{e}");
     }
 }

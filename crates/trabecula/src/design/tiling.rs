@@ -56,11 +56,7 @@ fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsSpec)> {
 
 /// The tetrahedra of a design whose region is none, for the reason `why`, if they can be made without one, and the region
 /// that they fill.
-pub(super) fn of_soup(
-    d: &Design,
-    loader: &dyn Loader,
-    why: DesignError,
-) -> Result<(tets::Tets, Region), DesignError> {
+pub(super) fn of_soup(d: &Design, loader: &dyn Loader, why: DesignError) -> Result<(tets::Tets, Region), DesignError> {
     let Some((name, _, spec)) = over_tets(d) else {
         return Err(why);
     };
@@ -74,9 +70,7 @@ pub(super) fn of_soup(
 fn enclosed(boundary: Mesh, path: &str) -> Result<Region, DesignError> {
     let region = MeshRegion::new(boundary, Repair::Auto);
     let wrong = |f: Fault| format!("the boundary of the mesh: {}", f.message);
-    Ok(Arc::new(
-        region.map_err(|f| DesignError::new(path, wrong(f)))?,
-    ))
+    Ok(Arc::new(region.map_err(|f| DesignError::new(path, wrong(f)))?))
 }
 
 /// The mesh of a design that has one; `soup` is what was made of triangles that are no region.
@@ -121,10 +115,7 @@ pub(super) fn domain<'a>(
     };
     let overlap = finite(&format!("{path}.overlap"), joined.overlap)?;
     if !(0.0..=OVERLAP).contains(&overlap) {
-        let message = format!(
-            "overlap is {}; it must be from 0 to {OVERLAP}",
-            number(overlap)
-        );
+        let message = format!("overlap is {}; it must be from 0 to {OVERLAP}", number(overlap));
         return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
     }
     let (made, filled) = match soup {
@@ -132,13 +123,7 @@ pub(super) fn domain<'a>(
         None => {
             let (mut points, _) = sample::inside(space, LOOKS);
             points.extend(sample::nodes(space));
-            let place = Place {
-                path: path.clone(),
-                region: space,
-                points: &points,
-                filled: &[],
-                loader,
-            };
+            let place = Place { path: path.clone(), region: space, points: &points, filled: &[], loader };
             (tets::tets(spec_of_mesh, &d.region, &place)?, None)
         }
     };
@@ -148,23 +133,14 @@ pub(super) fn domain<'a>(
         Some(region) => region,
         None => enclosed(map.boundary(), &path)?,
     };
-    Ok(Some(Domain {
-        name,
-        spec,
-        cell,
-        joined,
-        map: Arc::new(map),
-        report: made.report,
-        region,
-    }))
+    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), report: made.report, region }))
 }
 
 /// The cell that a table describes.
 pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignError> {
     let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
     if let Some(name) = &spec.name {
-        let cell =
-            ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
+        let cell = ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
         return cell.stencil().map_err(|f| wrong("", f));
     }
     let group = Group::named(spec.group.as_deref().unwrap_or_default());
@@ -219,11 +195,7 @@ pub(super) struct Made {
 pub(super) type Zoned = BTreeMap<u32, Arc<Stencil>>;
 
 /// The lattice.
-pub(super) fn lattice(
-    domain: &Domain,
-    place: &Place,
-    warnings: &mut Vec<Warning>,
-) -> Result<Made, DesignError> {
+pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     if !domain.cell.zones.is_empty() {
         return zoned(domain, place, warnings);
@@ -234,8 +206,7 @@ pub(super) fn lattice(
     let path = below("level");
     for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
         if set {
-            let message =
-                "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
+            let message = "the fraction of a tetrahedral cell is the part's own, and exact; leave this out";
             return Err(DesignError::new(format!("{path}.{option}"), message));
         }
     }
@@ -246,8 +217,7 @@ pub(super) fn lattice(
     let key = amount_key(domain.spec);
     let path = format!("{path}.{key}");
     if key == "thickness" && part != Part::Sheet {
-        let message =
-            "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
+        let message = "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
         return Err(DesignError::new(path, message));
     }
     let (value, allowed, amount) = match &spec.amount {
@@ -269,11 +239,7 @@ pub(super) fn lattice(
     let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    Ok(Made {
-        tiling: Arc::new(tiling),
-        explicit: explicit(domain, place),
-        joins: None,
-    })
+    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, place), joins: None })
 }
 
 /// Whether the surface is made without a grid.
@@ -299,10 +265,7 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
         }
     };
     if domain.spec.level.mid != 0.0 {
-        return Err(DesignError::new(
-            below("level.mid"),
-            "cells of zones are taken about f = 0",
-        ));
+        return Err(DesignError::new(below("level.mid"), "cells of zones are taken about f = 0"));
     }
     let found: BTreeSet<u32> = (0..map.len()).map(|t| map.zone(t)).collect();
     let zones = &domain.cell.zones;
@@ -310,15 +273,9 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
         let message = format!("the mesh has a zone {zone}, which has no cell; give it one");
         return Err(DesignError::new(at, message));
     }
-    if let Some(zone) = zones
-        .keys()
-        .find(|z| !found.iter().any(|f| f.to_string() == **z))
-    {
+    if let Some(zone) = zones.keys().find(|z| !found.iter().any(|f| f.to_string() == **z)) {
         let listed: Vec<String> = found.iter().map(u32::to_string).collect();
-        let message = format!(
-            "no tetrahedron of the mesh is of zone {zone}; its zones are {}",
-            listed.join(", ")
-        );
+        let message = format!("no tetrahedron of the mesh is of zone {zone}; its zones are {}", listed.join(", "));
         return Err(DesignError::new(format!("{at}.{zone}"), message));
     }
     let complement = key == "porosity";
@@ -326,26 +283,17 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
     let asked = grade(value, &path, place, allowed, complement)?;
     let values = at_nodes(&asked, allowed, complement, &path, map)?;
     let names: BTreeSet<&String> = zones.values().collect();
-    let (lo, hi) = values
-        .iter()
-        .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (lo, hi) = values.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let (mut cells, mut zoned) = (Vec::new(), Zoned::new());
     for name in names {
-        let spec = TetCellSpec {
-            name: Some(name.clone()),
-            ..TetCellSpec::default()
-        };
+        let spec = TetCellSpec { name: Some(name.clone()), ..TetCellSpec::default() };
         let stencil = Arc::new(stencil(&spec, &at)?);
         let range = stencil.range();
         let of = found.iter().filter(|z| zones[&z.to_string()] == **name);
         zoned.extend(of.map(|z| (*z, stencil.clone())));
         apart(&stencil, part, [lo, hi], &path, warnings);
         let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
-        cells.push(Share {
-            stencil,
-            scale: 0.5 * (range.hi - range.lo),
-            weights: Some(Arc::new(weights)),
-        });
+        cells.push(Share { stencil, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level);
@@ -355,11 +303,7 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
     if let Some(joins) = &joins {
         joins.warn(zones, &at, warnings);
     }
-    Ok(Made {
-        tiling: Arc::new(tiling),
-        explicit,
-        joins,
-    })
+    Ok(Made { tiling: Arc::new(tiling), explicit, joins })
 }
 
 /// The cell about another mid-surface.
@@ -403,16 +347,11 @@ fn at_nodes(
 fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
     let levels = tiling.levels();
     if !(levels.lo.is_finite() && levels.hi.is_finite()) {
-        return Err(DesignError::new(
-            path,
-            "the level is not a number somewhere in the mesh",
-        ));
+        return Err(DesignError::new(path, "the level is not a number somewhere in the mesh"));
     }
     if tiling.part == Part::Sheet && levels.lo <= 0.0 {
-        let message = format!(
-            "the half-level of a sheet, |f| ≤ t, goes down to {:.4}; it must be above 0 everywhere",
-            levels.lo
-        );
+        let message =
+            format!("the half-level of a sheet, |f| ≤ t, goes down to {:.4}; it must be above 0 everywhere", levels.lo);
         return Err(DesignError::new(path, message));
     }
     let stencil = &tiling.cells[0].stencil;
@@ -427,10 +366,7 @@ fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
     let range = stencil.range();
     let message = format!(
         "the lattice leaves the part {what}; the level t is {}, the cell's values run from {:.4} to {:.4} in the tetrahedron",
-        Varied {
-            min: levels.lo,
-            max: levels.hi
-        },
+        Varied { min: levels.lo, max: levels.hi },
         range.lo,
         range.hi
     );
@@ -453,44 +389,26 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
                  between {:.4} and {:.4} mm",
             s.mean, s.low, s.high, s.min, s.max
         );
-        warnings.push(Warning {
-            path: path.to_string(),
-            message,
-        });
+        warnings.push(Warning { path: path.to_string(), message });
     }
 }
 
 /// Warns of fractions at which a cell falls apart.
-fn apart(
-    stencil: &Stencil,
-    part: Part,
-    [min, max]: [f64; 2],
-    path: &str,
-    warnings: &mut Vec<Warning>,
-) {
+fn apart(stencil: &Stencil, part: Part, [min, max]: [f64; 2], path: &str, warnings: &mut Vec<Warning>) {
     let fraction = Varied { min, max };
     let whole = stencil.connected_fraction(part);
     if !gaps([min, max], &whole).is_empty() {
         let count = stencil.count(part, stencil.iso(part, 0.5 * (min + max)));
-        let texts: Vec<String> = whole
-            .iter()
-            .map(|&[min, max]| Varied { min, max }.to_string())
-            .collect();
+        let texts: Vec<String> = whole.iter().map(|&[min, max]| Varied { min, max }.to_string()).collect();
         let limit = match texts.len() {
             0 => "at no fraction is it one piece that reaches all faces".to_string(),
-            _ => format!(
-                "it is one piece that reaches all faces at fractions {}",
-                texts.join(" and ")
-            ),
+            _ => format!("it is one piece that reaches all faces at fractions {}", texts.join(" and ")),
         };
         let message = format!(
             "at solid fraction {fraction} the tetrahedral cell is in {} with {} on each face, so the lattice may fall apart; {limit}",
             crate::fault::counted(count.pieces, "piece"),
             crate::fault::counted(count.ports, "port"),
         );
-        warnings.push(Warning {
-            path: path.to_string(),
-            message,
-        });
+        warnings.push(Warning { path: path.to_string(), message });
     }
 }

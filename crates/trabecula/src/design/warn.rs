@@ -27,19 +27,12 @@ pub(super) fn amount_key(spec: &LatticeSpec) -> &'static str {
 }
 
 /// Refuses a lattice that leaves the region empty or solid everywhere.
-pub(super) fn check(
-    lattice: &Lattice,
-    place: &Place,
-    spec: &LatticeSpec,
-) -> Result<(), DesignError> {
+pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(), DesignError> {
     let mut values = vec![0.0; place.points.len()];
     lattice.values(place.points, &mut values);
     let path = format!("{}.level.{}", place.path, amount_key(spec));
     if values.iter().any(|v| v.is_nan()) {
-        return Err(DesignError::new(
-            path,
-            "the level is not a number somewhere in the region",
-        ));
+        return Err(DesignError::new(path, "the level is not a number somewhere in the region"));
     }
     let solid = values.iter().filter(|v| **v <= 0.0).count();
     if solid > 0 && solid < values.len() {
@@ -53,26 +46,17 @@ pub(super) fn check(
     if solid > 0 && solid < values.len() {
         return Ok(());
     }
-    let what = if solid == 0 {
-        "empty: nothing is solid"
-    } else {
-        "solid everywhere: nothing is open"
-    };
+    let what = if solid == 0 { "empty: nothing is solid" } else { "solid everywhere: nothing is open" };
     let iso = Varied::of_iso(lattice, place.points);
     let why = if lattice.distance().is_some() {
         lattice.cores(&points, &mut values);
-        let (near, far) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), d| {
-            (a.min(d.abs()), b.max(d.abs()))
-        });
+        let (near, far) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), d| (a.min(d.abs()), b.max(d.abs())));
         format!(
             "half the thickness is {iso} mm, the mid-surface is between {near:.4} and {far:.4} mm away in the region"
         )
     } else {
         let range = lattice.cell.range();
-        format!(
-            "the level t is {iso}, the cell's values run from {:.4} to {:.4}",
-            range.lo, range.hi
-        )
+        format!("the level t is {iso}, the cell's values run from {:.4} to {:.4}", range.lo, range.hi)
     };
     let (size, wavelength) = (place.region.bounds().size(), lattice.map.wavelength());
     let largest = size.into_iter().fold(0.0, f64::max);
@@ -108,20 +92,11 @@ pub(super) fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 /// A length in a sentence.
 fn figure(v: f64) -> String {
-    if (1e-2..1e6).contains(&v) {
-        format!("{v:.4}")
-    } else {
-        format!("{v:.2e}")
-    }
+    if (1e-2..1e6).contains(&v) { format!("{v:.4}") } else { format!("{v:.2e}") }
 }
 
 /// Warns of what may not be meant.
-pub(super) fn warn(
-    lattice: &Lattice,
-    place: &Place,
-    spec: &LatticeSpec,
-    warnings: &mut Vec<Warning>,
-) {
+pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
     let path = &place.path;
     let fraction = Varied::of_fraction(lattice, place.points);
     let whole = lattice.connected_fraction();
@@ -138,26 +113,17 @@ pub(super) fn warn(
         let place = if broken == [[fraction.min, fraction.max]] {
             format!("at solid fraction {fraction}")
         } else {
-            format!(
-                "the solid fraction is {fraction} over the region, and at {}",
-                ranges(&broken)
-            )
+            format!("the solid fraction is {fraction} over the region, and at {}", ranges(&broken))
         };
         let message = format!("{place} the periodic solid is not one piece in space; {limit}");
-        warnings.push(Warning {
-            path: format!("{}.level.{}", path, amount_key(spec)),
-            message,
-        });
+        warnings.push(Warning { path: format!("{}.level.{}", path, amount_key(spec)), message });
     }
     if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
         let message = format!(
             "the waves that are kept leave out {:.1} % (root mean square) of the cell in the file; keep more terms",
             100.0 * share
         );
-        warnings.push(Warning {
-            path: format!("{}.cell.file.terms", place.path),
-            message,
-        });
+        warnings.push(Warning { path: format!("{}.cell.file.terms", place.path), message });
     }
     let top = lattice.cell.plain().top();
     if top > FINEST {
@@ -165,10 +131,7 @@ pub(super) fn warn(
             "indices reach {top}: beyond {FINEST} waves are finer than the grids on which the fraction, the walls and \
              the connectivity of a cell are found, and these figures are rough"
         );
-        warnings.push(Warning {
-            path: format!("{}.cell.series.terms", place.path),
-            message,
-        });
+        warnings.push(Warning { path: format!("{}.cell.series.terms", place.path), message });
     }
     if let Some(error) = lattice.distance().map(Distance::error) {
         let half = Varied::of_iso(lattice, place.points);
@@ -179,10 +142,7 @@ pub(super) fn warn(
                 figure(2.0 * half.min),
                 figure(2.0 * error)
             );
-            warnings.push(Warning {
-                path: format!("{}.level.{}", place.path, amount_key(spec)),
-                message,
-            });
+            warnings.push(Warning { path: format!("{}.level.{}", place.path, amount_key(spec)), message });
         }
     }
     if let Some(limit) = lattice.folding() {
@@ -194,19 +154,11 @@ pub(super) fn warn(
                  mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
                 figure(limit)
             );
-            warnings.push(Warning {
-                path: format!("{}.level.{}", place.path, amount_key(spec)),
-                message,
-            });
+            warnings.push(Warning { path: format!("{}.level.{}", place.path, amount_key(spec)), message });
         }
     }
     let wavelength = lattice.map.wavelength();
-    let least = place
-        .region
-        .bounds()
-        .size()
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
+    let least = place.region.bounds().size().into_iter().fold(f64::INFINITY, f64::min);
     if wavelength > least {
         let message = format!(
             "the wavelength, {} mm, is more than the region's least extent, {} mm: the part is less than one cell thick and \
@@ -215,10 +167,7 @@ pub(super) fn warn(
             number(least)
         );
         let kind = map::kind(&spec.map);
-        warnings.push(Warning {
-            path: format!("{}.map.{kind}.wavelength", place.path),
-            message,
-        });
+        warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", place.path), message });
     }
 }
 

@@ -29,13 +29,7 @@ pub(super) struct Sum {
 }
 
 impl Sum {
-    pub const NONE: Sum = Sum {
-        triangles: 0,
-        vertices: 0,
-        volume: 0.0,
-        area: [0.0; 2],
-        bounds: Aabb::EMPTY,
-    };
+    pub const NONE: Sum = Sum { triangles: 0, vertices: 0, volume: 0.0, area: [0.0; 2], bounds: Aabb::EMPTY };
 
     pub fn add(&mut self, o: &Sum) {
         self.triangles += o.triangles;
@@ -78,11 +72,7 @@ impl Bodies {
     /// Finds the bodies of a tile's surface and calls `take` for its triangles, body by body, so that what is left out
     /// later lies together: with the corners' numbers, and whether it lies on the region's surface. Volumes are taken
     /// about `middle`.
-    pub fn each_triangle(
-        view: &View,
-        middle: Vec3,
-        mut take: impl FnMut([u32; 3], bool),
-    ) -> Bodies {
+    pub fn each_triangle(view: &View, middle: Vec3, mut take: impl FnMut([u32; 3], bool)) -> Bodies {
         let places = view.places();
         let mut root = vec![NONE; places.len()];
         for (t, _) in view.triangles() {
@@ -100,8 +90,7 @@ impl Bodies {
         // Added up apart: what is not in memory need not go through it.
         if let [sum] = &mut sums[..] {
             let mut whole = *sum;
-            view.triangles()
-                .for_each(|(t, cut)| add(&mut whole, t, cut));
+            view.triangles().for_each(|(t, cut)| add(&mut whole, t, cut));
             *sum = whole;
         } else {
             let apart = sorted(view, &body, sums.len());
@@ -115,13 +104,7 @@ impl Bodies {
         }
         let border = border(view, &body, &mut sums);
         let (lines, beside) = lines(view, &body);
-        Bodies {
-            tile: view.tile(),
-            border,
-            beside,
-            lines,
-            sums,
-        }
+        Bodies { tile: view.tile(), border, beside, lines, sums }
     }
 }
 
@@ -215,11 +198,7 @@ fn lines(view: &View, body: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
             open = NONE;
         }
         if first != NONE || open != NONE {
-            lines.push(Line {
-                row,
-                first,
-                last: open,
-            });
+            lines.push(Line { row, first, last: open });
         }
     }
     (lines, beside)
@@ -254,9 +233,7 @@ impl View<'_> {
             let [i, j, k] = self.nodes.at(key.node());
             let Some(row) = row_of(j, k) else { continue };
             let enters = if key.is_along(0) && mine >> i & 1 == 1 {
-                key.faces()
-                    .next()
-                    .map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
+                key.faces().next().map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
             } else if key.spans() == 0 {
                 // A node of a cap: on lines that pass through the plane, it is where they do.
                 let caps = self.flat().iter().filter(|f| f.axis == 0);

@@ -50,10 +50,7 @@ pub(super) fn close(knots: &mut Knots, flat: usize, own: &[Range<usize>; 3]) {
                 ring.reverse();
             }
             let [p, q, r, s] = ring;
-            knots
-                .extra
-                .triangles
-                .extend([([p, q, r], true), ([p, r, s], true)]);
+            knots.extra.triangles.extend([([p, q, r], true), ([p, r, s], true)]);
         }
     }
 }
@@ -68,13 +65,11 @@ fn holds(knots: &Knots, [i, j, k]: [usize; 3]) -> bool {
 /// Whether a cell has a knotted neighbour in its layer, which may divide a common edge.
 fn beside_knot(knots: &Knots, cell: [usize; 3], sides: [usize; 2]) -> bool {
     sides.into_iter().any(|side| {
-        [cell[side].wrapping_sub(1), cell[side] + 1]
-            .into_iter()
-            .any(|n| {
-                let mut beside = cell;
-                beside[side] = n;
-                n < knots.signs.shape[side] - 1 && knots.signs.is_knotted(beside)
-            })
+        [cell[side].wrapping_sub(1), cell[side] + 1].into_iter().any(|n| {
+            let mut beside = cell;
+            beside[side] = n;
+            n < knots.signs.shape[side] - 1 && knots.signs.is_knotted(beside)
+        })
     })
 }
 
@@ -153,11 +148,7 @@ fn plain(knots: &mut Knots, cell: [usize; 3], axis: usize, upper: bool) {
         }
         let (along, side) = if c % 2 == 0 { (u, v) } else { (v, u) };
         let mut beside = cell;
-        beside[side] = if c == 1 || c == 2 {
-            beside[side] + 1
-        } else {
-            beside[side].wrapping_sub(1)
-        };
+        beside[side] = if c == 1 || c == 2 { beside[side] + 1 } else { beside[side].wrapping_sub(1) };
         let knotted = beside[side] < signs.shape[side] - 1 && signs.is_knotted(beside);
         let low = [0, 1, 2].map(|a| here[a].min(next[a]));
         let mut points = knots.edge_points(knots.nodes.index(low), along);

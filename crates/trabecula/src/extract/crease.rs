@@ -250,10 +250,7 @@ impl Edges {
                 continue;
             };
             let untouched = || seen.alone(cell) && seen.untouched(cell);
-            if count < 3
-                || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1
-                || !untouched()
-            {
+            if count < 3 || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
                 continue;
             }
             let sides = (0..3).flat_map(|a| [(a, false), (a, true)]);
@@ -351,13 +348,7 @@ impl<'a> Others<'a> {
                 _ => varies |= 1 << f,
             }
         }
-        Others {
-            local,
-            cell: [i, j, k],
-            own: 1 << face,
-            negative,
-            varies,
-        }
+        Others { local, cell: [i, j, k], own: 1 << face, negative, varies }
     }
 
     fn holds(&self, mask: u64) -> bool {
@@ -383,9 +374,7 @@ impl<'a> Others<'a> {
 
     fn each_case(&self, is: impl Fn(bool, bool) -> bool) -> bool {
         let cases = [self.negative, self.negative | self.varies];
-        cases
-            .iter()
-            .all(|n| is(self.holds(*n), self.holds(n | self.own)))
+        cases.iter().all(|n| is(self.holds(*n), self.holds(n | self.own)))
     }
 
     /// Whether there is no surface at all.
@@ -403,11 +392,7 @@ fn decides(local: &Local, signs: &Signs, face: usize, cell: [usize; 3]) -> bool 
 fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
     let along = sub(q, p);
     let square = dot(along, along);
-    let t = if square > 0.0 {
-        (dot(sub(to, p), along) / square).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let t = if square > 0.0 { (dot(sub(to, p), along) / square).clamp(0.0, 1.0) } else { 0.0 };
     add(p, scale(along, t))
 }
 
@@ -433,11 +418,7 @@ fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
 }
 
 /// The cells that have edges, among some.
-pub(super) fn cells(
-    edges: &Edges,
-    nodes: &Nodes,
-    own: &[std::ops::Range<usize>; 3],
-) -> Vec<([usize; 3], usize)> {
+pub(super) fn cells(edges: &Edges, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
     let ny = nodes.shape[1];
     let mut found = Vec::new();
     for (row, w) in edges.cells.iter().enumerate() {

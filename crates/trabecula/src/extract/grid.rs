@@ -59,17 +59,11 @@ pub(super) struct Flat {
 impl Grid {
     pub(super) fn new(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
         if !(edge > 0.0 && edge.is_finite()) {
-            return Err(Fault::new(
-                "edge",
-                format!("{edge} mm; the grid spacing is a positive, finite length"),
-            ));
+            return Err(Fault::new("edge", format!("{edge} mm; the grid spacing is a positive, finite length")));
         }
         let bounds = solid.region.bounds();
         if bounds.is_empty() {
-            return Err(Fault::new(
-                "region",
-                "the region is empty; there is nothing to fill",
-            ));
+            return Err(Fault::new("region", "the region is empty; there is nothing to fill"));
         }
         if !bounds.is_finite() {
             return Err(Fault::new(
@@ -89,13 +83,9 @@ impl Grid {
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
         tree.each_required(&mut |f| required.push(f));
-        let mut planes: Vec<_> = required
-            .iter()
-            .filter_map(|&f| Some((f, faces[f].plane?)))
-            .collect();
+        let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, faces[f].plane?))).collect();
         // What is kept apart by a hair is too near for cells that are fitted to edges.
-        let fits =
-            faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.flush);
+        let fits = faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.flush);
         // Caps on planes of the grid know of knots alone, not of such cells.
         if fits {
             planes.clear();
@@ -122,11 +112,7 @@ impl Grid {
                 );
                 return Err(Fault::new("edge", message));
             }
-            let mut stops: Vec<f64> = planes
-                .iter()
-                .filter(|p| p.1.axis == a)
-                .map(|p| p.1.at)
-                .collect();
+            let mut stops: Vec<f64> = planes.iter().filter(|p| p.1.axis == a).map(|p| p.1.at).collect();
             stops.retain(|s| (lo..=hi).contains(s));
             stops.sort_by(f64::total_cmp);
             // Planes closer than a hundredth of a step would make needles; the others are faces like any other.
@@ -153,8 +139,7 @@ impl Grid {
             nodes.extend((0..below as usize).map(|i| stops[0] - edge * (below - i as f64)));
             for w in stops.windows(2) {
                 let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
-                nodes
-                    .extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
+                nodes.extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
             }
             let last = stops[stops.len() - 1];
             nodes.push(last);
@@ -163,10 +148,7 @@ impl Grid {
             }
             nodes.push(nodes[nodes.len() - 1] + edge);
         }
-        let finest = axes
-            .iter()
-            .flat_map(|n| n.windows(2).map(|w| w[1] - w[0]))
-            .fold(f64::INFINITY, f64::min);
+        let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
         let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
         // Eight units in the last place of the farthest f32 coordinate between any two points of an edge: rounding
         // keeps their order, hence every guarantee.
@@ -198,9 +180,7 @@ impl Grid {
             creases: Vec::new(),
             fitted: None,
         };
-        grid.creases = (grid.faces.iter())
-            .map(|f| crease::by_tile(&grid, &f.creases))
-            .collect();
+        grid.creases = (grid.faces.iter()).map(|f| crease::by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
         grid.fitted = creased.next().filter(|_| fits);
@@ -268,17 +248,13 @@ impl Grid {
 
     /// First and one-past-last node of a tile with its halo.
     pub(super) fn nodes(&self, tile: [usize; 3]) -> [std::ops::Range<usize>; 3] {
-        [0, 1, 2].map(|a| {
-            (tile[a] * TILE).saturating_sub(1)..((tile[a] + 1) * TILE + 2).min(self.axes[a].len())
-        })
+        [0, 1, 2].map(|a| (tile[a] * TILE).saturating_sub(1)..((tile[a] + 1) * TILE + 2).min(self.axes[a].len()))
     }
 
     /// The nodes of a tile with its halo.
     pub(super) fn block(&self, tile: [usize; 3]) -> Block<'_> {
         let n = self.nodes(tile);
-        Block {
-            axes: [0, 1, 2].map(|a| &self.axes[a][n[a].clone()]),
-        }
+        Block { axes: [0, 1, 2].map(|a| &self.axes[a][n[a].clone()]) }
     }
 
     /// The same with one node more on each side, where there is one.
@@ -303,14 +279,7 @@ impl Grid {
                 (Some(p), Some(at)) => {
                     let range = &nodes[p.axis];
                     if at > range.start && at + 1 < range.end {
-                        flat.push((
-                            f,
-                            Flat {
-                                axis: p.axis,
-                                at: at - range.start,
-                                below: p.below,
-                            },
-                        ));
+                        flat.push((f, Flat { axis: p.axis, at: at - range.start, below: p.below }));
                         None
                     } else if (at <= range.start) == p.below {
                         Some(Sign::Positive)
@@ -335,19 +304,12 @@ impl Grid {
         if matches!(&tree, Tree::All(of) | Tree::Any(of) if of.is_empty()) {
             return None;
         }
-        live.extend(
-            (0..self.faces.len())
-                .filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)),
-        );
+        live.extend((0..self.faces.len()).filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)));
         let place = |f: usize| {
             let at = live.iter().position(|&g| g == f);
             at.or_else(|| Some(live.len() + flat.iter().position(|(g, _)| *g == f)?))
         };
         let tree = tree.given(&|f| place(f).map_or(Sign::Negative, Sign::Varies));
-        Some(Local {
-            tree,
-            live,
-            flat: flat.into_iter().map(|(_, p)| p).collect(),
-        })
+        Some(Local { tree, live, flat: flat.into_iter().map(|(_, p)| p).collect() })
     }
 }

@@ -98,9 +98,7 @@ impl Pieces {
         // Rounded downwards: what is not all of it is never 100 %.
         let share = number((1e4 * self.share()).floor() / 100.0);
         // Plus zero: −0 is 0.
-        let [x, y, z] = island
-            .place()
-            .map(|v| number((1e3 * v).round() / 1e3 + 0.0));
+        let [x, y, z] = island.place().map(|v| number((1e3 * v).round() / 1e3 + 0.0));
         let (volume, largest) = (short(self.volume), short(island.volume));
         let place = format!("about ({x}, {y}, {z}) mm");
         match (self.others, self.border) {
@@ -145,12 +143,7 @@ pub(super) struct Found {
 impl Census {
     /// Bodies that are joined already: those that are parts of one, and those of one piece of solid, by their lower roots.
     pub fn joined(sums: Vec<Sum>, body: Vec<u32>, solid: Vec<u32>) -> Census {
-        Census {
-            sums,
-            body,
-            solid,
-            ..Census::default()
-        }
+        Census { sums, body, solid, ..Census::default() }
     }
 
     /// Adds the bodies of the next tile.
@@ -167,11 +160,7 @@ impl Census {
         // A vertex is shared within a layer of tiles or with the layer below, so names need not be kept for longer.
         if tile.tile[2] != self.layer {
             let last = std::mem::take(&mut self.here);
-            self.below = if tile.tile[2] == self.layer + 1 {
-                last
-            } else {
-                ByName::default()
-            };
+            self.below = if tile.tile[2] == self.layer + 1 { last } else { ByName::default() };
             self.layer = tile.tile[2];
         }
         for (name, body) in tile.border {
@@ -200,11 +189,7 @@ impl Census {
                 joined = (line.first, *open);
                 unite(&mut self.solid, base + line.first, *open);
             }
-            *open = if line.last == NONE {
-                NONE
-            } else {
-                base + line.last
-            };
+            *open = if line.last == NONE { NONE } else { base + line.last };
         }
         Ok(())
     }
@@ -260,10 +245,7 @@ impl Census {
             told.volume += net[i];
             if told.island.is_none_or(|o| net[i] > o.volume) {
                 let Aabb { min, max } = whole[i].bounds;
-                told.island = Some(Island {
-                    volume: net[i],
-                    bounds: [min, max],
-                });
+                told.island = Some(Island { volume: net[i], bounds: [min, max] });
             }
         }
         if islands == Islands::Error && told.others > 0 {
@@ -283,18 +265,12 @@ impl Census {
         // Closed and made of triangles: three edges for two of them.
         told.euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
         let part = |i: usize| (self.sums[i].triangles, stays(self.body[i] as usize));
-        Ok(Found {
-            parts: (0..count).map(part).collect(),
-            sum,
-            pieces: told,
-        })
+        Ok(Found { parts: (0..count).map(part).collect(), sum, pieces: told })
     }
 }
 
 /// Why a solid in several pieces is refused.
 fn refusal(p: &Pieces) -> String {
     let words = p.words();
-    format!(
-        "the solid is not in one piece: {words}; drop them, make walls thicker, or change what cuts them off"
-    )
+    format!("the solid is not in one piece: {words}; drop them, make walls thicker, or change what cuts them off")
 }

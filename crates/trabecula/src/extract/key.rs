@@ -14,10 +14,7 @@ impl Key {
 
     pub fn new(node: usize, steps: &[usize], faces: &[usize]) -> Key {
         let steps = steps.iter().rev().fold(0, |w, s| w << 3 | *s as u64);
-        let faces = faces
-            .iter()
-            .rev()
-            .fold(0, |w, f| w << Key::FACE | (*f as u64 + 1));
+        let faces = faces.iter().rev().fold(0, |w, f| w << Key::FACE | (*f as u64 + 1));
         Key(node as u64 | (steps | faces << 9) << Key::NODE)
     }
 
@@ -86,9 +83,7 @@ impl Key {
 
     /// The name among all tiles.
     pub fn global(self, node: u128, face: impl Fn(usize) -> usize) -> u128 {
-        let faces = self
-            .faces()
-            .fold(0u128, |w, f| w << 16 | (face(f) as u128 + 1));
+        let faces = self.faces().fold(0u128, |w, f| w << 16 | (face(f) as u128 + 1));
         // In a side at most two faces meet: the third one's room is free.
         let points = u128::from(self.0 >> Key::POINTS) << 32;
         node << 57 | u128::from(self.steps()) << 48 | faces | points

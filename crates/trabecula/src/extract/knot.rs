@@ -67,14 +67,8 @@ pub(super) struct Knots<'a> {
 
 /// The six ways from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron they make
 /// is right-handed.
-const PATHS: [([usize; 2], bool); 6] = [
-    ([1, 3], true),
-    ([2, 6], true),
-    ([4, 5], true),
-    ([1, 5], false),
-    ([2, 3], false),
-    ([4, 6], false),
-];
+const PATHS: [([usize; 2], bool); 6] =
+    [([1, 3], true), ([2, 6], true), ([4, 5], true), ([1, 5], false), ([2, 3], false), ([4, 6], false)];
 
 /// The middle of some points.
 pub(super) fn middle(points: &[Vec3]) -> Vec3 {
@@ -126,9 +120,7 @@ impl Knots<'_> {
     /// Adds a convex polygon by its vertices.
     pub fn fan(&mut self, names: &[u32], cut: bool) {
         for i in 2..names.len() {
-            self.extra
-                .triangles
-                .push(([names[0], names[i - 1], names[i]], cut));
+            self.extra.triangles.push(([names[0], names[i - 1], names[i]], cut));
         }
     }
 
@@ -148,8 +140,7 @@ impl Knots<'_> {
             let ((a, b), (c, d)) = (ends(e), ends(next));
             ring.push(Key::new(node + self.offset(a), &[a ^ b], &[face]));
             // The side that both edges lie in, and the cell across it.
-            let Some(axis) = (0..3).find(|x| [b, c, d].iter().all(|m| (m ^ a) >> x & 1 == 0))
-            else {
+            let Some(axis) = (0..3).find(|x| [b, c, d].iter().all(|m| (m ^ a) >> x & 1 == 0)) else {
                 continue;
             };
             let upper = a >> axis & 1 == 1;
@@ -164,8 +155,7 @@ impl Knots<'_> {
             if !self.signs.is_knotted(across) {
                 continue;
             }
-            let key =
-                |k: &Self, c: usize, d: usize| Key::new(node + k.offset(c & d), &[c ^ d], &[face]);
+            let key = |k: &Self, c: usize, d: usize| Key::new(node + k.offset(c & d), &[c ^ d], &[face]);
             let from = key(self, a, b);
             ring.extend(self.trace(cell, axis, upper, face, from).0);
         }
@@ -173,17 +163,8 @@ impl Knots<'_> {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         if names.len() == n {
             // Nothing was added: the plain patch will do.
-            let name = |e: u8| {
-                case.ring
-                    .iter()
-                    .position(|r| *r == e)
-                    .map_or(0, |at| names[at])
-            };
-            self.extra.triangles.extend(
-                case.triangles[..case.count]
-                    .iter()
-                    .map(|t| (t.map(name), cut)),
-            );
+            let name = |e: u8| case.ring.iter().position(|r| *r == e).map_or(0, |at| names[at]);
+            self.extra.triangles.extend(case.triangles[..case.count].iter().map(|t| (t.map(name), cut)));
             return;
         }
         let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
@@ -280,8 +261,7 @@ impl Knots<'_> {
         }
         self.moved = moved;
         if !self.moved.is_empty() {
-            self.places
-                .truncate(self.places.len() - self.extra.keys.len());
+            self.places.truncate(self.places.len() - self.extra.keys.len());
             self.extra.clear();
             for c in cells.iter().filter(|c| mine(c)) {
                 self.cell(*c);
@@ -315,34 +295,23 @@ impl Knots<'_> {
 
     /// The side of a cell along an axis, divided by the faces that cross it: the pieces of its two triangles with the
     /// faces that are negative there, counter-clockwise seen from outside the cell.
-    pub(super) fn side_pieces(
-        &self,
-        cell: [usize; 3],
-        axis: usize,
-        upper: bool,
-    ) -> Vec<(u64, Vec<Key>)> {
+    pub(super) fn side_pieces(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<Key>)> {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
         let mut all = Vec::new();
         for (step, right) in [(u, true), (v, false)] {
             let simplex = self.simplex(node, &[step, u | v]);
             let (negative, mixed) = self.faces_of(&simplex);
-            let mut ring: Vec<Spot> = (0..3)
-                .map(|c| Spot {
-                    corners: 1 << c,
-                    faces: 0,
-                })
-                .collect();
+            let mut ring: Vec<Spot> = (0..3).map(|c| Spot { corners: 1 << c, faces: 0 }).collect();
             if right != upper {
                 ring.reverse();
             }
             let pieces = self.split_by(&simplex, negative, mixed, ring);
-            all.extend(pieces.into_iter().map(|(negative, ring)| {
-                (
-                    negative,
-                    ring.iter().map(|s| self.key(&simplex, *s)).collect(),
-                )
-            }));
+            all.extend(
+                pieces
+                    .into_iter()
+                    .map(|(negative, ring)| (negative, ring.iter().map(|s| self.key(&simplex, *s)).collect())),
+            );
         }
         all
     }
@@ -358,14 +327,7 @@ impl Knots<'_> {
 
     /// The points after one on the line in which a face crosses the side of a cell, up to the next grid edge; and the one
     /// there.
-    pub fn trace(
-        &self,
-        cell: [usize; 3],
-        axis: usize,
-        upper: bool,
-        face: usize,
-        from: Key,
-    ) -> (Vec<Key>, Option<Key>) {
+    pub fn trace(&self, cell: [usize; 3], axis: usize, upper: bool, face: usize, from: Key) -> (Vec<Key>, Option<Key>) {
         let mut steps: Vec<(Key, Key)> = Vec::new();
         let on = |k: &Key| k.faces().any(|f| f == face);
         let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);

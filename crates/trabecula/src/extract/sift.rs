@@ -19,8 +19,7 @@ impl Store for std::fs::File {
 
 impl Store for io::Cursor<Vec<u8>> {
     fn end_at(&mut self, length: u64) -> io::Result<()> {
-        self.get_mut()
-            .truncate(usize::try_from(length).unwrap_or(usize::MAX));
+        self.get_mut().truncate(usize::try_from(length).unwrap_or(usize::MAX));
         Ok(())
     }
 }
@@ -85,15 +84,7 @@ mod tests {
 
     #[test]
     fn what_stays_moves_up() {
-        let parts = [
-            (2, true),
-            (1, true),
-            (3, false),
-            (0, true),
-            (2, true),
-            (1, false),
-            (1, true),
-        ];
+        let parts = [(2, true), (1, true), (3, false), (0, true), (2, true), (1, false), (1, true)];
         assert_eq!(runs(&parts), [0..3, 6..8, 9..10]);
         assert_eq!(runs(&[(3, false)]), []);
         let bytes: Vec<u8> = (0..4 + 3 * 10).collect();

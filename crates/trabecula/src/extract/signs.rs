@@ -53,21 +53,13 @@ impl Signs {
         let inner = below(nx - 1);
         for k in 0..nz - 1 {
             for j in 0..ny - 1 {
-                let solid = local
-                    .tree
-                    .solid(&|f| match f.checked_sub(local.live.len()) {
-                        Some(flat) => Signs::beside(local, flat, j, k),
-                        None if f < known => self.some_and_all(f, j, k).0,
-                        None => u64::MAX,
-                    })
-                    & inner;
+                let solid = local.tree.solid(&|f| match f.checked_sub(local.live.len()) {
+                    Some(flat) => Signs::beside(local, flat, j, k),
+                    None if f < known => self.some_and_all(f, j, k).0,
+                    None => u64::MAX,
+                }) & inner;
                 let both = solid | solid << 1;
-                for row in [
-                    k * ny + j,
-                    k * ny + j + 1,
-                    (k + 1) * ny + j,
-                    (k + 1) * ny + j + 1,
-                ] {
+                for row in [k * ny + j, k * ny + j + 1, (k + 1) * ny + j, (k + 1) * ny + j + 1] {
                     nodes[row] |= both;
                 }
             }
@@ -154,10 +146,7 @@ impl Signs {
         let n = &self.negative[face];
         let row = k * self.shape[1] + j;
         let pair = |r: usize| (n[r] >> i & 3) as usize;
-        pair(row)
-            | pair(row + 1) << 2
-            | pair(row + self.shape[1]) << 4
-            | pair(row + self.shape[1] + 1) << 6
+        pair(row) | pair(row + 1) << 2 | pair(row + self.shape[1]) << 4 | pair(row + self.shape[1] + 1) << 6
     }
 
     /// Whether a face is negative at a node.
@@ -181,10 +170,7 @@ impl Signs {
     /// The knotted cells of the block.
     pub fn knotted_cells(&self) -> impl Iterator<Item = [usize; 3]> {
         let ny = self.shape[1];
-        self.knotted
-            .iter()
-            .enumerate()
-            .flat_map(move |(row, w)| bits(*w).map(move |i| [i, row % ny, row / ny]))
+        self.knotted.iter().enumerate().flat_map(move |(row, w)| bits(*w).map(move |i| [i, row % ny, row / ny]))
     }
 
     /// For a word of cells in each row: the grid edges along `axis` that belong to any of them, for row (j, k).
@@ -192,11 +178,7 @@ impl Signs {
     pub fn edges_of(&self, cells: &[u64], axis: usize, j: usize, k: usize) -> u64 {
         let ny = self.shape[1];
         let at = |dj: usize, dk: usize| {
-            if j < dj || k < dk {
-                0
-            } else {
-                cells[(k - dk) * ny + j - dj]
-            }
+            if j < dj || k < dk { 0 } else { cells[(k - dk) * ny + j - dj] }
         };
         match axis {
             0 => at(0, 0) | at(1, 0) | at(0, 1) | at(1, 1),

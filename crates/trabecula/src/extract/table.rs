@@ -12,20 +12,8 @@
 use std::sync::LazyLock;
 
 /// The twelve edges of a cell as (lower corner, axis); corner bits are x = 1, y = 2, z = 4.
-pub(super) const EDGES: [(usize, usize); 12] = [
-    (0, 0),
-    (0, 1),
-    (0, 2),
-    (1, 1),
-    (1, 2),
-    (2, 0),
-    (2, 2),
-    (3, 2),
-    (4, 0),
-    (4, 1),
-    (5, 1),
-    (6, 0),
-];
+pub(super) const EDGES: [(usize, usize); 12] =
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 0), (2, 2), (3, 2), (4, 0), (4, 1), (5, 1), (6, 0)];
 
 /// Most triangles in a cell.
 pub(super) const MOST: usize = 5;
@@ -57,12 +45,7 @@ pub(super) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| {
         };
         let plain = loops.len() == 1 && !faces().any(diagonal);
         let ring = loops.iter().take(1).flatten().map(|&e| e as u8).collect();
-        Case {
-            triangles,
-            count,
-            plain,
-            ring,
-        }
+        Case { triangles, count, plain, ring }
     })
 });
 
@@ -79,11 +62,7 @@ fn faces() -> impl Iterator<Item = [usize; 4]> {
         [false, true].map(|far| {
             let base = usize::from(far) << axis;
             let ring = [base, base | u, base | u | v, base | v];
-            if far {
-                ring
-            } else {
-                [ring[3], ring[2], ring[1], ring[0]]
-            }
+            if far { ring } else { [ring[3], ring[2], ring[1], ring[0]] }
         })
     })
 }
@@ -100,8 +79,7 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
                 while solid(ring[(first + 3) % 4]) {
                     first = (first + 3) % 4;
                 }
-                next[edge(ring[(first + 3) % 4], ring[first])] =
-                    Some(edge(ring[i], ring[(i + 1) % 4]));
+                next[edge(ring[(first + 3) % 4], ring[first])] = Some(edge(ring[i], ring[(i + 1) % 4]));
             }
         }
     }
@@ -129,9 +107,7 @@ fn fan(ring: &[usize]) -> Vec<[u8; 3]> {
             has(a) && has(b)
         })
     };
-    let apex = (0..n)
-        .find(|&s| (2..n - 1).all(|k| !on_one_face(ring[s], ring[(s + k) % n])))
-        .unwrap_or(0);
+    let apex = (0..n).find(|&s| (2..n - 1).all(|k| !on_one_face(ring[s], ring[(s + k) % n]))).unwrap_or(0);
     let at = |k: usize| ring[(apex + k) % n] as u8;
     (1..n - 1).map(|k| [at(0), at(k), at(k + 1)]).collect()
 }
@@ -154,8 +130,7 @@ mod tests {
 
     fn pierces(p: Vec3, q: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
         let s = [side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)];
-        side(a, b, c, p) * side(a, b, c, q) < -1e-24
-            && (s.iter().all(|&v| v > 1e-12) || s.iter().all(|&v| v < -1e-12))
+        side(a, b, c, p) * side(a, b, c, q) < -1e-24 && (s.iter().all(|&v| v > 1e-12) || s.iter().all(|&v| v < -1e-12))
     }
 
     #[test]
@@ -169,14 +144,8 @@ mod tests {
             }
             assert!(count.values().all(|&n| n == 1));
             // Inner edges appear both ways, edges on faces once: as many of these as there are edge points.
-            let single = count
-                .keys()
-                .filter(|(a, b)| !count.contains_key(&(*b, *a)))
-                .count();
-            let crossed = EDGES
-                .iter()
-                .filter(|&&(c, a)| (case >> c & 1) != (case >> (c | 1 << a) & 1))
-                .count();
+            let single = count.keys().filter(|(a, b)| !count.contains_key(&(*b, *a))).count();
+            let crossed = EDGES.iter().filter(|&&(c, a)| (case >> c & 1) != (case >> (c | 1 << a) & 1)).count();
             assert_eq!(single, crossed, "case {case}");
         }
         // One solid corner at the origin: the normal points away from it.
@@ -188,9 +157,7 @@ mod tests {
     fn no_pattern_crosses_itself_wherever_its_points_stand() {
         let mut seed = 1u64;
         let mut random = || {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1u64 << 53) as f64
         };
         for case in 1..255usize {
@@ -212,10 +179,7 @@ mod tests {
                         for k in 0..3 {
                             let (a, b) = (s[k], s[(k + 1) % 3]);
                             if !t.contains(&a) && !t.contains(&b) {
-                                assert!(
-                                    !pierces(p(a), p(b), t.map(p)),
-                                    "case {case}: {s:?} through {t:?}"
-                                );
+                                assert!(!pierces(p(a), p(b), t.map(p)), "case {case}: {s:?} through {t:?}");
                             }
                         }
                     }

@@ -25,9 +25,7 @@ use rayon::prelude::*;
 
 use super::bodies::Sum;
 use super::islands::{Islands, Pieces};
-use super::{
-    Estimate, Progress, Sifting, Stopped, Store, Summary, Surface, finish, not_empty, only, sift,
-};
+use super::{Estimate, Progress, Sifting, Stopped, Store, Summary, Surface, finish, not_empty, only, sift};
 use crate::cell::tet::{Grid, Nodes, Ready};
 use crate::fault::{Fault, number};
 use crate::io::stl;
@@ -164,11 +162,7 @@ impl<'a> Work<'a> {
         if let (Level::Same(level), false) = (&self.tiling.level, self.tiling.varies()) {
             let levels = Levels::Same(*level);
             return Of::Same(self.same[mask as usize].get_or_init(|| {
-                let core = Core {
-                    values,
-                    slopes,
-                    levels,
-                };
+                let core = Core { values, slopes, levels };
                 cut(&core, &mut Scratch::default())
             }));
         }
@@ -188,11 +182,7 @@ impl<'a> Work<'a> {
         let levels = Levels::Each(&levels);
         let mixed = self.tiling.cells.iter().any(|c| c.weights.is_some());
         if !mixed {
-            let core = Core {
-                values,
-                slopes,
-                levels,
-            };
+            let core = Core { values, slopes, levels };
             return Of::Own(Box::new(cut(&core, scratch)));
         }
         let mut sum = vec![0.0; values.len()];
@@ -212,11 +202,7 @@ impl<'a> Work<'a> {
                 s[1] += w[b] * g[1] + values[b] * step;
             }
         }
-        let core = Core {
-            values: &sum,
-            slopes: &turns,
-            levels,
-        };
+        let core = Core { values: &sum, slopes: &turns, levels };
         Of::Own(Box::new(cut(&core, scratch)))
     }
 
@@ -284,9 +270,7 @@ impl<'a> Work<'a> {
             let starts: Vec<usize> = (first..end).step_by(CHUNK).collect();
             starts
                 .par_iter()
-                .map_init(Scratch::default, |scratch, &i| {
-                    self.chunk(i..end.min(i + CHUNK), scratch, stl)
-                })
+                .map_init(Scratch::default, |scratch, &i| self.chunk(i..end.min(i + CHUNK), scratch, stl))
                 .collect()
         };
         let mut made = make(0);
@@ -326,8 +310,7 @@ pub(super) fn surface(
     progress: &dyn Progress,
 ) -> Result<(Surface, Pieces), Stopped> {
     let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
-    let (mut out, mut links, mut shared) =
-        (Surface::default(), Links::default(), Shared::default());
+    let (mut out, mut links, mut shared) = (Surface::default(), Links::default(), Shared::default());
     work.each(progress, false, |start, chunk| {
         let (mut sums, mut places) = (&chunk.sums[..], &chunk.places[..]);
         for (t, piece) in (start..).zip(&chunk.pieces) {
@@ -343,9 +326,7 @@ pub(super) fn surface(
             }
             let (of, rest) = sums.split_at(piece.bounds.len());
             sums = rest;
-            links
-                .add(&tiling.map, t, work.mask(t), piece, of)
-                .map_err(Stopped::Refused)?;
+            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
         }
         Ok(())
     })?;
@@ -383,9 +364,7 @@ pub(super) fn stream_stl<W: Store>(
         for (t, piece) in (start..).zip(&chunk.pieces) {
             let (of, rest) = sums.split_at(piece.bounds.len());
             sums = rest;
-            links
-                .add(&tiling.map, t, work.mask(t), piece, of)
-                .map_err(Stopped::Refused)?;
+            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
         }
         out.write_all(&chunk.records).map_err(Stopped::Io)
     })?;
@@ -396,11 +375,7 @@ pub(super) fn stream_stl<W: Store>(
 }
 
 /// A ready cell in a single regular tetrahedron.
-pub(super) fn stencil(
-    ready: &Ready,
-    steps: usize,
-    progress: &dyn Progress,
-) -> Result<Surface, Stopped> {
+pub(super) fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<Surface, Stopped> {
     let stencil = ready.stencil().map_err(Stopped::Refused)?;
     let h = 0.5f64.sqrt() / 2.0;
     let mesh = TetMesh {
@@ -419,11 +394,7 @@ pub(super) fn estimate(tiling: &Tiling, edge: f64) -> Result<Estimate, Fault> {
     const SAMPLES: usize = 64;
     let work = Work::new(tiling, edge)?;
     let total = tiling.map.len();
-    let step = if tiling.varies() {
-        total.div_ceil(SAMPLES)
-    } else {
-        1
-    };
+    let step = if tiling.varies() { total.div_ceil(SAMPLES) } else { 1 };
     let mut scratch = Scratch::default();
     let (mut count, mut looked) = (0.0, 0.0);
     for t in (step / 2..total).step_by(step) {

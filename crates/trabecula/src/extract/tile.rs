@@ -194,13 +194,7 @@ impl<'a> Nodes<'a> {
                 *step = ends[1] - ends[0];
             }
         }
-        Nodes {
-            axes: block.axes,
-            shape,
-            stride: [1, shape[0], shape[0] * shape[1]],
-            places,
-            steps,
-        }
+        Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], places, steps }
     }
 
     pub fn count(&self) -> usize {
@@ -240,11 +234,7 @@ pub(super) struct View<'a> {
 }
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
-pub(super) fn extract<'a>(
-    grid: &'a Grid,
-    tile: [usize; 3],
-    s: &'a mut Scratch,
-) -> Option<View<'a>> {
+pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) -> Option<View<'a>> {
     let block = grid.block(tile);
     let range = grid.nodes(tile);
     let local = grid.local(&range, &block.bounds())?;
@@ -264,10 +254,7 @@ pub(super) fn extract<'a>(
     list_vertices(s, &nodes);
     let mut first = 0;
     for (i, &face) in local.live.iter().enumerate() {
-        let count = s.vertices[first..]
-            .iter()
-            .take_while(|v| usize::from(v.face) == i)
-            .count();
+        let count = s.vertices[first..].iter().take_while(|v| usize::from(v.face) == i).count();
         solve(s, &nodes, &*grid.faces[face].field, i, first..first + count);
         first += count;
     }
@@ -293,16 +280,8 @@ pub(super) fn extract<'a>(
     list_triangles(s, grid, &local, &own);
     balance(s, grid, &local, &nodes, &own);
     finish(s, grid, &local, &nodes, &own);
-    let own_triangles =
-        s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
-    own_triangles.then_some(View {
-        s,
-        nodes,
-        grid,
-        local,
-        from,
-        own,
-    })
+    let own_triangles = s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
+    own_triangles.then_some(View { s, nodes, grid, local, from, own })
 }
 
 /// Fills the samples and signs of the live faces. The lattice's are dear, so they are asked for only where the region
@@ -363,14 +342,7 @@ fn take(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
 
 /// Finds what becomes of the edges that faces have of their own.
 fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
-    let Scratch {
-        edges,
-        samples,
-        signs,
-        numbers,
-        places,
-        ..
-    } = s;
+    let Scratch { edges, samples, signs, numbers, places, .. } = s;
     for (face, &id) in local.live.iter().enumerate() {
         if edges.has(face) {
             let seen = Seen {
@@ -481,9 +453,7 @@ impl View<'_> {
                 if *slot == u32::MAX {
                     *slot = patch.vertices.len() as u32;
                     patch.vertices.push(self.s.places[v as usize]);
-                    patch
-                        .shared
-                        .push(shared[v as usize].then(|| self.name(v as usize)));
+                    patch.shared.push(shared[v as usize].then(|| self.name(v as usize)));
                 }
                 *slot
             }));
@@ -531,8 +501,7 @@ impl View<'_> {
         for numbers in self.numbers() {
             for axis in 0..3 {
                 for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
-                    let whole = (axis != 1 && borders(1).contains(&j))
-                        || (axis != 2 && borders(2).contains(&k));
+                    let whole = (axis != 1 && borders(1).contains(&j)) || (axis != 2 && borders(2).contains(&k));
                     let mask = match axis {
                         _ if whole => u64::MAX,
                         0 => continue,

@@ -84,9 +84,7 @@ impl Formula {
     /// **Errors** name the column, what was found there and what may stand there; an unknown word gets the nearest
     /// known one.
     pub fn parse(text: &str) -> Result<Formula, Fault> {
-        Ok(Formula {
-            program: parse(text)?,
-        })
+        Ok(Formula { program: parse(text)? })
     }
 
     /// Fills `out[i]` with the value at `points[i]` (mm).
@@ -110,13 +108,7 @@ impl Formula {
     }
 
     /// The same, where it varies along these axes alone.
-    fn slopes<const N: usize>(
-        &self,
-        axes: [usize; N],
-        points: &[Vec3],
-        values: &mut [f64],
-        gradients: &mut [Vec3],
-    ) {
+    fn slopes<const N: usize>(&self, axes: [usize; N], points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let mut stack = Vec::new();
         let out = values.chunks_mut(LANES).zip(gradients.chunks_mut(LANES));
         for (points, (values, gradients)) in points.chunks(LANES).zip(out) {
@@ -143,11 +135,7 @@ impl Formula {
 
     /// Along which axes it may change: those that it names.
     pub fn varies(&self) -> [bool; 3] {
-        [0, 1, 2].map(|a| {
-            self.program
-                .iter()
-                .any(|i| matches!(i, Instruction::Variable(n) if *n == a))
-        })
+        [0, 1, 2].map(|a| self.program.iter().any(|i| matches!(i, Instruction::Variable(n) if *n == a)))
     }
 
     /// Contains every value in the box, by interval arithmetic; everything where the formula may be undefined.
@@ -157,11 +145,7 @@ impl Formula {
     }
 
     /// Runs the program on some points at once, instruction by instruction.
-    fn run_lanes<T: Quantity>(
-        &self,
-        variable: impl Fn(usize, usize) -> T,
-        stack: &mut Vec<[T; LANES]>,
-    ) -> [T; LANES] {
+    fn run_lanes<T: Quantity>(&self, variable: impl Fn(usize, usize) -> T, stack: &mut Vec<[T; LANES]>) -> [T; LANES] {
         stack.clear();
         for instruction in &self.program {
             match *instruction {
@@ -231,9 +215,7 @@ mod tests {
         let text = "max(0, min(1, x/8 + 1)) * sqrt(abs(y)) - z^2 / sin(x + y) + smoothstep(-1, 1, z) - atan2(x, y)";
         let f = Formula::parse(text).unwrap_or_else(|e| panic!("{e}"));
         let points: Vec<Vec3> = (0..3 * LANES + 5)
-            .map(|i| {
-                [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0)
-            })
+            .map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0))
             .collect();
         let (mut v, mut w) = (vec![0.0; points.len()], vec![0.0; points.len()]);
         let mut g = vec![[0.0; 3]; points.len()];
@@ -273,11 +255,7 @@ mod tests {
             ("smoothstep(0, 1, z)", 0.5),
             ("step(1, x) + sign(-x) + floor(z) + ceil(z)", 1.0),
         ] {
-            assert!(
-                (at(text, p) - want).abs() < 1e-15,
-                "{text} = {} not {want}",
-                at(text, p)
-            );
+            assert!((at(text, p) - want).abs() < 1e-15, "{text} = {} not {want}", at(text, p));
         }
     }
 
@@ -286,17 +264,12 @@ mod tests {
         let f = Formula::parse("x^2*sin(y) + exp(z)/x").unwrap_or(Formula { program: vec![] });
         let [x, y, z] = [1.3, 0.7, 0.2f64];
         let (_, g) = f.gradient([x, y, z]);
-        let want = [
-            2.0 * x * y.sin() - z.exp() / (x * x),
-            x * x * y.cos(),
-            z.exp() / x,
-        ];
+        let want = [2.0 * x * y.sin() - z.exp() / (x * x), x * x * y.cos(), z.exp() / x];
         for a in 0..3 {
             assert!((g[a] - want[a]).abs() < 1e-14);
         }
         // A constant exponent gives no logarithm of a negative number, a standing argument no 0 · ∞.
-        let (v, g) = Formula::parse("x^3 + sqrt(0*y)")
-            .map_or((0.0, [0.0; 3]), |f| f.gradient([-2.0, 1.0, 0.0]));
+        let (v, g) = Formula::parse("x^3 + sqrt(0*y)").map_or((0.0, [0.0; 3]), |f| f.gradient([-2.0, 1.0, 0.0]));
         assert_eq!((v, g[0]), (-8.0, 12.0));
     }
 
@@ -304,17 +277,12 @@ mod tests {
     fn bounds_hold_over_random_boxes() {
         let mut s = 3u64;
         let mut next = || {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 11) as f64 / (1u64 << 53) as f64
         };
-        for text in [
-            "sin(x*y)/(2+cos(z))",
-            "x^2 - y^3 + abs(z)^1.5",
-            "mod(x, 0.7)*smoothstep(-1, 1, y)",
-            "log(2+hypot(x,y))^2",
-        ] {
+        for text in
+            ["sin(x*y)/(2+cos(z))", "x^2 - y^3 + abs(z)^1.5", "mod(x, 0.7)*smoothstep(-1, 1, y)", "log(2+hypot(x,y))^2"]
+        {
             let f = Formula::parse(text).unwrap_or_else(|e| panic!("{e}"));
             for _ in 0..500 {
                 let min = [0; 3].map(|_| next() * 4.0 - 2.0);
@@ -323,10 +291,7 @@ mod tests {
                 for _ in 0..8 {
                     let p = [0, 1, 2].map(|a| min[a] + (max[a] - min[a]) * next());
                     let v = f.gradient(p).0;
-                    assert!(
-                        bound.lo <= v && v <= bound.hi,
-                        "{text} at {p:?}: {v} not in {bound:?}"
-                    );
+                    assert!(bound.lo <= v && v <= bound.hi, "{text} at {p:?}: {v} not in {bound:?}");
                 }
             }
         }
@@ -337,53 +302,30 @@ mod tests {
         for (text, words) in [
             ("", "column 1: the formula ends; expected a number"),
             ("1 +", "column 4: the formula ends"),
-            (
-                "sinn(x)",
-                "column 1: found 'sinn'; did you mean sin? Known words: x, y, z, pi",
-            ),
+            ("sinn(x)", "column 1: found 'sinn'; did you mean sin? Known words: x, y, z, pi"),
             ("0.3 + COS(x)", "column 7: found 'COS'; did you mean cos?"),
             ("2 x", "column 3: found 'x'; expected an operator"),
             ("x(2)", "column 2: found '('; x is not a function"),
-            (
-                "(x",
-                "column 3: the formula ends; expected an operator or )",
-            ),
+            ("(x", "column 3: the formula ends; expected an operator or )"),
             ("x)", "column 2: found ')'; this bracket was never opened"),
             ("x**2", "column 2: found '*'; write a power as ^, not **"),
-            (
-                "atan2(x)",
-                "column 8: found ')'; atan2 takes 2 arguments, not 1",
-            ),
-            (
-                "sin(x, y)",
-                "column 6: found ','; sin takes no more than 1 argument",
-            ),
-            (
-                "sin x",
-                "column 5: found 'x'; sin takes its argument in brackets",
-            ),
+            ("atan2(x)", "column 8: found ')'; atan2 takes 2 arguments, not 1"),
+            ("sin(x, y)", "column 6: found ','; sin takes no more than 1 argument"),
+            ("sin x", "column 5: found 'x'; sin takes its argument in brackets"),
             ("1e999", "column 1: found '1'; expected a finite number"),
             ("x ; y", "column 3: found ';'"),
             ("ü + 1", "column 1: found 'ü'; known words: x, y, z, pi"),
             (".", "column 1: found '.'; expected a finite number"),
             ("__import__('os')", "column 1: found '__import__'"),
         ] {
-            let message = Formula::parse(text)
-                .err()
-                .map_or(String::new(), |f| f.message);
+            let message = Formula::parse(text).err().map_or(String::new(), |f| f.message);
             assert!(message.contains(words), "{text}: {message}");
         }
     }
 
     #[test]
     fn hostile_nesting_is_refused_not_followed() {
-        for text in [
-            "(".repeat(4000),
-            "-".repeat(4000),
-            "x^".repeat(2000),
-            "sin(".repeat(1000),
-            "x".repeat(5000),
-        ] {
+        for text in ["(".repeat(4000), "-".repeat(4000), "x^".repeat(2000), "sin(".repeat(1000), "x".repeat(5000)] {
             assert!(Formula::parse(&text).is_err());
         }
         assert!(Formula::parse(&format!("{}x{}", "(".repeat(60), ")".repeat(60))).is_ok());

@@ -30,23 +30,14 @@ impl Polyline {
     ///
     /// # Errors
     /// Fewer than two points (three if closed), two in a row that coincide seen along the axis, a sharpness below 10.
-    pub fn new(
-        points: Vec<Vec3>,
-        closed: bool,
-        axis: Option<Vec3>,
-        sharpness: Option<f64>,
-    ) -> Result<Polyline, Fault> {
+    pub fn new(points: Vec<Vec3>, closed: bool, axis: Option<Vec3>, sharpness: Option<f64>) -> Result<Polyline, Fault> {
         let least = if closed { 3 } else { 2 };
         if points.len() < least {
-            let message = format!(
-                "{}; a line needs at least {least}",
-                counted(points.len(), "point")
-            );
+            let message = format!("{}; a line needs at least {least}", counted(points.len(), "point"));
             return Err(Fault::new("points", message));
         }
         if let Some(k) = sharpness.filter(|k| !(*k >= LEAST_SHARPNESS && k.is_finite())) {
-            let message =
-                format!("sharpness is {k}; it must be a finite number, at least {LEAST_SHARPNESS}");
+            let message = format!("sharpness is {k}; it must be a finite number, at least {LEAST_SHARPNESS}");
             return Err(Fault::new("sharpness", message));
         }
         let axis = axis.map(unit);
@@ -61,11 +52,7 @@ impl Polyline {
             let message = format!(
                 "points {i} and {} coincide{}; leave one out",
                 (i + 1) % (points.len() - usize::from(closed)),
-                if axis.is_some() {
-                    " seen along the axis"
-                } else {
-                    ""
-                }
+                if axis.is_some() { " seen along the axis" } else { "" }
             );
             return Err(Fault::new("points", message));
         }
@@ -76,13 +63,7 @@ impl Polyline {
             let u = unit(cross(n, e));
             [u, cross(n, u)]
         });
-        Ok(Polyline {
-            points,
-            axis,
-            sharpness,
-            plane,
-            longest,
-        })
+        Ok(Polyline { points, axis, sharpness, plane, longest })
     }
 
     /// The most by which the smooth form is off, mm; 0 for the exact one.
@@ -186,10 +167,7 @@ impl Field for Polyline {
             None if self.plane.is_some() => r,
             None => Interval::new(r.lo.max(0.0), r.hi),
             // More than one in all, and between segments whichever seems nearer.
-            Some(_) => Interval::new(
-                (r.lo.max(0.0) - self.error()).max(0.0),
-                r.hi * (1.0 + 1e-4) + self.error(),
-            ),
+            Some(_) => Interval::new((r.lo.max(0.0) - self.error()).max(0.0), r.hi * (1.0 + 1e-4) + self.error()),
         }
     }
 }
@@ -200,18 +178,11 @@ mod tests {
     use super::*;
 
     fn places() -> impl Iterator<Item = Vec3> {
-        (0..3000).map(|i| {
-            [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 10.0 - 5.0)
-        })
+        (0..3000).map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 10.0 - 5.0))
     }
 
     fn chain() -> Vec<Vec3> {
-        vec![
-            [-2.0, -1.0, 0.0],
-            [1.0, -1.5, 0.3],
-            [2.0, 1.0, 0.0],
-            [-1.0, 2.0, -0.5],
-        ]
+        vec![[-2.0, -1.0, 0.0], [1.0, -1.5, 0.3], [2.0, 1.0, 0.0], [-1.0, 2.0, -0.5]]
     }
 
     #[test]
@@ -226,10 +197,7 @@ mod tests {
                 let p = [f64::from(i) / 1000.0 - 1.5, 0.0, 0.0];
                 worst = worst.max((exact.at(p) - smooth.at(p)).abs());
             }
-            assert!(
-                worst <= smooth.error() * 1.006 && worst > 0.9 * most && worst <= most * 1.01,
-                "{k} {worst}"
-            );
+            assert!(worst <= smooth.error() * 1.006 && worst > 0.9 * most && worst <= most * 1.01, "{k} {worst}");
         }
     }
 
@@ -243,10 +211,7 @@ mod tests {
         for line in &made {
             for (i, p) in places().enumerate() {
                 let size = 0.002 * (i % 500) as f64;
-                let b = line.bound(&Aabb {
-                    min: p,
-                    max: p.map(|x| x + size),
-                });
+                let b = line.bound(&Aabb { min: p, max: p.map(|x| x + size) });
                 let q = [0.3, 0.9, 0.6].map(|t| t * size);
                 let v = line.at(add(p, q));
                 assert!(b.lo <= v && v <= b.hi, "{v} {b:?}");
@@ -269,31 +234,18 @@ mod tests {
 
     #[test]
     fn a_closed_line_has_an_inside() {
-        let square = vec![
-            [-1.0, -1.0, 5.0],
-            [1.0, -1.0, -3.0],
-            [1.0, 1.0, 0.0],
-            [-1.0, 1.0, 2.0],
-        ];
+        let square = vec![[-1.0, -1.0, 5.0], [1.0, -1.0, -3.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 2.0]];
         let line = Polyline::new(square, true, Some([0.0, 0.0, 2.0]), None).unwrap();
-        for (p, d) in [
-            ([0.0, 0.0, 9.0], -1.0),
-            ([0.5, 0.0, 0.0], -0.5),
-            ([3.0, 0.0, 1.0], 2.0),
-        ] {
+        for (p, d) in [([0.0, 0.0, 9.0], -1.0), ([0.5, 0.0, 0.0], -0.5), ([3.0, 0.0, 1.0], 2.0)] {
             assert!((line.at(p) - d).abs() < 1e-12);
         }
     }
 
     #[test]
     fn lines_that_are_none_are_refused() {
-        let at =
-            |points: Vec<Vec3>, axis, k| Polyline::new(points, false, axis, k).err().map(|f| f.at);
+        let at = |points: Vec<Vec3>, axis, k| Polyline::new(points, false, axis, k).err().map(|f| f.at);
         assert_eq!(at(vec![[0.0; 3]], None, None).as_deref(), Some("points"));
-        assert_eq!(
-            at(vec![[0.0; 3], [0.0, 0.0, 1.0]], Some([0.0, 0.0, 1.0]), None).as_deref(),
-            Some("points")
-        );
+        assert_eq!(at(vec![[0.0; 3], [0.0, 0.0, 1.0]], Some([0.0, 0.0, 1.0]), None).as_deref(), Some("points"));
         assert_eq!(at(chain(), None, Some(2.0)).as_deref(), Some("sharpness"));
     }
 }

@@ -29,18 +29,11 @@ impl Rbf {
     /// # Errors
     /// No point or more than 2000, points that coincide, a δ that is not positive or so large that the equations are
     /// singular to working precision.
-    pub fn new(
-        points: Vec<Vec3>,
-        values: &[f64],
-        delta: Option<f64>,
-        axis: Option<Vec3>,
-    ) -> Result<Rbf, Fault> {
+    pub fn new(points: Vec<Vec3>, values: &[f64], delta: Option<f64>, axis: Option<Vec3>) -> Result<Rbf, Fault> {
         let n = points.len();
         if n == 0 || n > MOST || values.len() != n {
-            let message = format!(
-                "{n} points and {} values; give from 1 to {MOST} points with a value each",
-                values.len()
-            );
+            let message =
+                format!("{n} points and {} values; give from 1 to {MOST} points with a value each", values.len());
             return Err(Fault::new("points", message));
         }
         let axis = axis.map(unit);
@@ -68,41 +61,26 @@ impl Rbf {
                 "points {} and {} coincide{}: no function passes through both; leave one out",
                 i.min(nearest[i].1),
                 i.max(nearest[i].1),
-                if axis.is_some() {
-                    " seen along the axis"
-                } else {
-                    ""
-                }
+                if axis.is_some() { " seen along the axis" } else { "" }
             );
             return Err(Fault::new("points", message));
         }
         let own = WIDTH * nearest.iter().map(|d| d.0).sum::<f64>() / n as f64;
         let delta = match delta {
             Some(d) if !(d > 0.0 && d.is_finite()) => {
-                let message = format!(
-                    "delta is {} mm; it must be a finite length greater than 0",
-                    number(d)
-                );
+                let message = format!("delta is {} mm; it must be a finite length greater than 0", number(d));
                 return Err(Fault::new("delta", message));
             }
             Some(d) => d,
             None if n == 1 => {
-                return Err(Fault::new(
-                    "delta",
-                    "one point has no neighbour; give delta, mm",
-                ));
+                return Err(Fault::new("delta", "one point has no neighbour; give delta, mm"));
             }
             None => own,
         };
         let kernel = |a: Vec3, b: Vec3| (-dot(sub(a, b), sub(a, b)) / (delta * delta)).exp();
-        let matrix: Vec<Vec<f64>> = points
-            .iter()
-            .map(|a| points.iter().map(|b| kernel(*a, *b)).collect())
-            .collect();
+        let matrix: Vec<Vec<f64>> = points.iter().map(|a| points.iter().map(|b| kernel(*a, *b)).collect()).collect();
         let factor = cholesky(&matrix);
-        let condition = factor
-            .as_ref()
-            .map_or(f64::INFINITY, |l| condition(&matrix, l));
+        let condition = factor.as_ref().map_or(f64::INFINITY, |l| condition(&matrix, l));
         let (Some(factor), true) = (factor, condition < WORST) else {
             let message = format!(
                 "delta is {} mm: functions that wide are so alike at these points that their equations are singular to working \
@@ -113,13 +91,7 @@ impl Rbf {
             return Err(Fault::new("delta", message));
         };
         let beta = solve(&factor, values);
-        Ok(Rbf {
-            points,
-            beta,
-            delta,
-            axis,
-            condition,
-        })
+        Ok(Rbf { points, beta, delta, axis, condition })
     }
 
     /// δ, mm.
@@ -155,11 +127,7 @@ fn cholesky(m: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let (above, rest) = l.split_at_mut(i);
         let row = &mut rest[0];
         for j in 0..i {
-            let s: f64 = row[..j]
-                .iter()
-                .zip(&above[j][..j])
-                .map(|(a, b)| a * b)
-                .sum();
+            let s: f64 = row[..j].iter().zip(&above[j][..j]).map(|(a, b)| a * b).sum();
             row[j] = (m[i][j] - s) / above[j][j];
         }
         let s = m[i][i] - row[..i].iter().map(|v| v * v).sum::<f64>();
@@ -202,11 +170,7 @@ fn condition(m: &[Vec<f64>], l: &[Vec<f64>]) -> f64 {
         }
         value
     };
-    let times = |x: &[f64]| {
-        m.iter()
-            .map(|r| r.iter().zip(x).map(|(a, b)| a * b).sum())
-            .collect()
-    };
+    let times = |x: &[f64]| m.iter().map(|r| r.iter().zip(x).map(|(a, b)| a * b).sum()).collect();
     powers(&times) * powers(&|x| solve(l, x))
 }
 
@@ -239,10 +203,7 @@ impl Field for Rbf {
 
     fn bound(&self, b: &Aabb) -> Interval {
         if !b.is_finite() {
-            let ends = self
-                .beta
-                .iter()
-                .fold([0.0; 2], |s, v| [s[0] + v.min(0.0), s[1] + v.max(0.0)]);
+            let ends = self.beta.iter().fold([0.0; 2], |s, v| [s[0] + v.min(0.0), s[1] + v.max(0.0)]);
             return Interval::new(ends[0], ends[1]);
         }
         let by = 1.0 / (self.delta * self.delta);
@@ -265,10 +226,7 @@ impl Field for Rbf {
             size += beta.abs() * most;
         }
         let slack = 1e-13 * size;
-        Interval::new(
-            lo.max(value - slope * reach) - slack,
-            hi.min(value + slope * reach) + slack,
-        )
+        Interval::new(lo.max(value - slope * reach) - slack, hi.min(value + slope * reach) + slack)
     }
 }
 
@@ -279,9 +237,7 @@ mod tests {
 
     fn ring(n: usize) -> Vec<Vec3> {
         let turn = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
-        (0..n)
-            .map(|i| [turn(i).cos(), turn(i).sin(), 0.0])
-            .collect()
+        (0..n).map(|i| [turn(i).cos(), turn(i).sin(), 0.0]).collect()
     }
 
     #[test]
@@ -301,11 +257,7 @@ mod tests {
     fn the_middle_of_a_ring_is_as_known() {
         for (n, delta, middle) in [(16, 0.3, 0.0002), (16, 0.6, 0.358), (16, 1.0, 1.192)] {
             let rbf = Rbf::new(ring(n), &vec![1.0; n], Some(delta), None).unwrap();
-            assert!(
-                (rbf.value([0.0; 3]) - middle).abs() < 2e-3,
-                "{delta}: {}",
-                rbf.value([0.0; 3])
-            );
+            assert!((rbf.value([0.0; 3]) - middle).abs() < 2e-3, "{delta}: {}", rbf.value([0.0; 3]));
         }
         // Seen along an axis a point's height does not matter.
         let rbf = Rbf::new(ring(16), &[1.0; 16], Some(0.6), Some([0.0, 0.0, 3.0])).unwrap();
@@ -316,13 +268,9 @@ mod tests {
     fn gradients_and_bounds_hold() {
         let rbf = Rbf::new(ring(12), &[1.0; 12], None, None).unwrap();
         for i in 0..3000 {
-            let p =
-                [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 4.0 - 2.0);
+            let p = [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 4.0 - 2.0);
             let size = 0.001 * f64::from(i % 700);
-            let b = rbf.bound(&Aabb {
-                min: p,
-                max: p.map(|x| x + size),
-            });
+            let b = rbf.bound(&Aabb { min: p, max: p.map(|x| x + size) });
             let q = add(p, [0.2 * size, 0.9 * size, 0.5 * size]);
             assert!(b.lo <= rbf.value(q) && rbf.value(q) <= b.hi);
             let (mut v, mut g) = ([0.0], [[0.0; 3]]);

@@ -26,34 +26,18 @@ impl Samples {
     ///
     /// # Errors
     /// Steps that are not positive, a shape that does not fit the numbers, numbers that are not finite.
-    pub fn new(
-        origin: Vec3,
-        step: Vec3,
-        shape: [usize; 3],
-        values: Vec<f64>,
-    ) -> Result<Samples, Fault> {
+    pub fn new(origin: Vec3, step: Vec3, shape: [usize; 3], values: Vec<f64>) -> Result<Samples, Fault> {
         if origin.iter().any(|v| !v.is_finite()) {
-            return Err(Fault::new(
-                "origin",
-                format!("found {origin:?}; give three finite numbers, mm"),
-            ));
+            return Err(Fault::new("origin", format!("found {origin:?}; give three finite numbers, mm")));
         }
         if step.iter().any(|h| !(*h > 0.0 && h.is_finite())) {
-            return Err(Fault::new(
-                "step",
-                format!("found {step:?}; a step is a positive, finite length, mm"),
-            ));
+            return Err(Fault::new("step", format!("found {step:?}; a step is a positive, finite length, mm")));
         }
         let [nx, ny, nz] = shape;
-        if values.is_empty()
-            || shape.iter().try_fold(1usize, |n, m| n.checked_mul(*m)) != Some(values.len())
-        {
+        if values.is_empty() || shape.iter().try_fold(1usize, |n, m| n.checked_mul(*m)) != Some(values.len()) {
             return Err(Fault::new(
                 "path",
-                format!(
-                    "{} do not fill a grid of {nx} × {ny} × {nz}",
-                    counted(values.len(), "number")
-                ),
+                format!("{} do not fill a grid of {nx} × {ny} × {nz}", counted(values.len(), "number")),
             ));
         }
         if let Some(n) = values.iter().position(|v| !v.is_finite()) {
@@ -77,15 +61,7 @@ impl Samples {
             // A node between blocks belongs to all of them.
             let of = |a: usize| {
                 let b = at[a] / BLOCK;
-                (
-                    if at[a] % BLOCK == 0 {
-                        b.saturating_sub(1)
-                    } else {
-                        b
-                    }
-                    .min(blocks[a] - 1),
-                    b.min(blocks[a] - 1),
-                )
+                (if at[a] % BLOCK == 0 { b.saturating_sub(1) } else { b }.min(blocks[a] - 1), b.min(blocks[a] - 1))
             };
             for k in of(2).0..=of(2).1 {
                 for j in of(1).0..=of(1).1 {
@@ -96,24 +72,13 @@ impl Samples {
                 }
             }
         }
-        Ok(Samples {
-            origin,
-            step,
-            shape,
-            values,
-            ranges,
-            blocks,
-        })
+        Ok(Samples { origin, step, shape, values, ranges, blocks })
     }
 
     /// The box that the nodes span.
     pub fn bounds(&self) -> Aabb {
-        let far =
-            core::array::from_fn(|a| self.origin[a] + self.step[a] * (self.shape[a] - 1) as f64);
-        Aabb {
-            min: self.origin,
-            max: far,
-        }
+        let far = core::array::from_fn(|a| self.origin[a] + self.step[a] * (self.shape[a] - 1) as f64);
+        Aabb { min: self.origin, max: far }
     }
 
     /// Steps between nodes, mm.
@@ -136,11 +101,7 @@ impl Samples {
         let [(i, x, inx), (j, y, iny), (k, z, inz)] = [0, 1, 2].map(|a| self.place(p[a], a));
         let [nx, ny, nz] = self.shape;
         let v = |di: usize, dj: usize, dk: usize| {
-            let (i, j, k) = (
-                (i + di).min(nx - 1),
-                (j + dj).min(ny - 1),
-                (k + dk).min(nz - 1),
-            );
+            let (i, j, k) = ((i + di).min(nx - 1), (j + dj).min(ny - 1), (k + dk).min(nz - 1));
             self.values[(k * ny + j) * nx + i]
         };
         let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
@@ -150,21 +111,9 @@ impl Samples {
         let (front, back) = (mix(on[0], on[1], y), mix(on[2], on[3], y));
         let dx = rows.map(|(a, b)| b - a);
         let slope = [
-            if inx {
-                mix(mix(dx[0], dx[1], y), mix(dx[2], dx[3], y), z) / self.step[0]
-            } else {
-                0.0
-            },
-            if iny {
-                mix(on[1] - on[0], on[3] - on[2], z) / self.step[1]
-            } else {
-                0.0
-            },
-            if inz {
-                (back - front) / self.step[2]
-            } else {
-                0.0
-            },
+            if inx { mix(mix(dx[0], dx[1], y), mix(dx[2], dx[3], y), z) / self.step[0] } else { 0.0 },
+            if iny { mix(on[1] - on[0], on[3] - on[2], z) / self.step[1] } else { 0.0 },
+            if inz { (back - front) / self.step[2] } else { 0.0 },
         ];
         (mix(front, back, z), slope)
     }
@@ -175,10 +124,7 @@ impl Samples {
         for a in 0..3 {
             let at = |x: f64| self.place(x, a).0 / BLOCK;
             // Infinite ends are clamped as all others.
-            range[a] = (
-                at(b.min[a]).min(self.blocks[a] - 1),
-                at(b.max[a]).min(self.blocks[a] - 1),
-            );
+            range[a] = (at(b.min[a]).min(self.blocks[a] - 1), at(b.max[a]).min(self.blocks[a] - 1));
         }
         let mut all = [f64::INFINITY, f64::NEG_INFINITY];
         for k in range[2].0..=range[2].1 {
@@ -198,12 +144,7 @@ impl Samples {
     ///
     /// # Errors
     /// No points; numbers or places that are not finite.
-    pub fn scattered(
-        points: &[Vec3],
-        values: &[f64],
-        neighbours: usize,
-        bounds: &Aabb,
-    ) -> Result<Samples, Fault> {
+    pub fn scattered(points: &[Vec3], values: &[f64], neighbours: usize, bounds: &Aabb) -> Result<Samples, Fault> {
         if points.is_empty() {
             return Err(Fault::new("path", "there are no points"));
         }
@@ -211,15 +152,11 @@ impl Samples {
         let apart = (spread.iter().product::<f64>() / points.len() as f64).cbrt();
         let (step, shape) = grid(bounds, 0.5 * apart);
         // Buckets of about two points.
-        let edge = (2.0 * apart * apart * apart)
-            .cbrt()
-            .max(1e-9 * norm(spread));
+        let edge = (2.0 * apart * apart * apart).cbrt().max(1e-9 * norm(spread));
         let all = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
         let counts = all.size().map(|s| ((s / edge) as usize + 1).min(512));
         let cell = |p: Vec3| -> [usize; 3] {
-            core::array::from_fn(|a| {
-                ((p[a] - all.min[a]) / edge).clamp(0.0, (counts[a] - 1) as f64) as usize
-            })
+            core::array::from_fn(|a| ((p[a] - all.min[a]) / edge).clamp(0.0, (counts[a] - 1) as f64) as usize)
         };
         let mut buckets = vec![Vec::new(); counts.iter().product()];
         for (n, p) in points.iter().enumerate() {
@@ -228,11 +165,7 @@ impl Samples {
         }
         let wanted = neighbours.clamp(1, points.len());
         let at = |n: usize| {
-            let index = [
-                n % shape[0],
-                n / shape[0] % shape[1],
-                n / shape[0] / shape[1],
-            ];
+            let index = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
             let p: Vec3 = core::array::from_fn(|a| bounds.min[a] + step[a] * index[a] as f64);
             let c = cell(p);
             let mut near: Vec<(f64, usize)> = Vec::new();
@@ -245,10 +178,7 @@ impl Samples {
                             let off = [i, j, k].iter().zip(&c).map(|(a, b)| a.abs_diff(*b)).max();
                             if off == Some(ring) {
                                 let of = &buckets[(k * counts[1] + j) * counts[0] + i];
-                                near.extend(
-                                    of.iter()
-                                        .map(|&n| (dot(sub(points[n], p), sub(points[n], p)), n)),
-                                );
+                                near.extend(of.iter().map(|&n| (dot(sub(points[n], p), sub(points[n], p)), n)));
                             }
                         }
                     }
@@ -272,10 +202,7 @@ impl Samples {
             sum / weights
         };
         use rayon::prelude::*;
-        let values = (0..shape.iter().product())
-            .into_par_iter()
-            .map(at)
-            .collect();
+        let values = (0..shape.iter().product()).into_par_iter().map(at).collect();
         Samples::new(bounds.min, step, shape, values)
     }
 
@@ -297,15 +224,10 @@ impl Samples {
         }
         let corners = |t: &[u32; 4]| t.map(|i| points[i as usize]);
         // Two steps on an edge of a typical tetrahedron, a sixth of whose cube it is about.
-        let volume = |p: &[Vec3; 4]| {
-            determinant(&[sub(p[1], p[0]), sub(p[2], p[0]), sub(p[3], p[0])]).abs() / 6.0
-        };
+        let volume = |p: &[Vec3; 4]| determinant(&[sub(p[1], p[0]), sub(p[2], p[0]), sub(p[3], p[0])]).abs() / 6.0;
         let mut sizes: Vec<f64> = tets.iter().map(|t| volume(&corners(t))).collect();
         sizes.sort_by(f64::total_cmp);
-        let (step, shape) = grid(
-            bounds,
-            0.5 * (6.0 * sizes[sizes.len() / 2]).cbrt().max(1e-12),
-        );
+        let (step, shape) = grid(bounds, 0.5 * (6.0 * sizes[sizes.len() / 2]).cbrt().max(1e-12));
         let count: usize = shape.iter().product();
         let mut out = vec![vec![f64::NAN; count]; values.len()];
         for t in tets {
@@ -316,24 +238,18 @@ impl Samples {
             }
             let b = p.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
             let span = |a: usize| {
-                let lo = ((b.min[a] - bounds.min[a]) / step[a] - 1e-9)
-                    .ceil()
-                    .max(0.0);
-                let hi = ((b.max[a] - bounds.min[a]) / step[a] + 1e-9)
-                    .floor()
-                    .min((shape[a] - 1) as f64);
+                let lo = ((b.min[a] - bounds.min[a]) / step[a] - 1e-9).ceil().max(0.0);
+                let hi = ((b.max[a] - bounds.min[a]) / step[a] + 1e-9).floor().min((shape[a] - 1) as f64);
                 (lo as usize, if hi < lo { 0 } else { hi as usize + 1 })
             };
             let [x, y, z] = [0, 1, 2].map(span);
             for k in z.0..z.1 {
                 for j in y.0..y.1 {
                     for i in x.0..x.1 {
-                        let q: Vec3 =
-                            core::array::from_fn(|a| bounds.min[a] + step[a] * [i, j, k][a] as f64);
+                        let q: Vec3 = core::array::from_fn(|a| bounds.min[a] + step[a] * [i, j, k][a] as f64);
                         let v = p.map(|p| sub(p, q));
                         let part = |a: usize, b: usize, c: usize| dot(v[a], cross(v[b], v[c]));
-                        let w = [part(1, 2, 3), -part(0, 2, 3), part(0, 1, 3), -part(0, 1, 2)]
-                            .map(|w| w / six);
+                        let w = [part(1, 2, 3), -part(0, 2, 3), part(0, 1, 3), -part(0, 1, 2)].map(|w| w / six);
                         if w.iter().all(|w| *w >= -1e-9) {
                             let n = (k * shape[1] + j) * shape[0] + i;
                             for (o, v) in out.iter_mut().zip(values) {
@@ -346,15 +262,10 @@ impl Samples {
         }
         let found: Vec<bool> = out[0].iter().map(|v| !v.is_nan()).collect();
         if !found.contains(&true) {
-            return Err(Fault::new(
-                "path",
-                "the mesh does not meet the region; are its coordinates in mm?",
-            ));
+            return Err(Fault::new("path", "the mesh does not meet the region; are its coordinates in mm?"));
         }
         let node = |p: &Vec3| -> [usize; 3] {
-            core::array::from_fn(|a| {
-                ((p[a] - bounds.min[a]) / step[a]).clamp(0.0, (shape[a] - 1) as f64) as usize
-            })
+            core::array::from_fn(|a| ((p[a] - bounds.min[a]) / step[a]).clamp(0.0, (shape[a] - 1) as f64) as usize)
         };
         let missed = |p: &&Vec3| {
             let at = node(p);
@@ -365,9 +276,7 @@ impl Samples {
         };
         let share = of.iter().filter(missed).count() as f64 / of.len().max(1) as f64;
         spread(&mut out, &found, shape);
-        let made = out
-            .into_iter()
-            .map(|v| Samples::new(bounds.min, step, shape, v));
+        let made = out.into_iter().map(|v| Samples::new(bounds.min, step, shape, v));
         Ok((made.collect::<Result<Vec<Samples>, Fault>>()?, share))
     }
 }
@@ -378,10 +287,7 @@ fn grid(bounds: &Aabb, h: f64) -> (Vec3, [usize; 3]) {
     let least = (size.iter().product::<f64>() / NODES).cbrt();
     let h = h.max(least);
     let shape = size.map(|s| ((s / h).ceil() as usize).clamp(2, 4096) + 1);
-    (
-        core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64),
-        shape,
-    )
+    (core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape)
 }
 
 /// Gives nodes that have no value that of the nearest which has one, counted in steps.
@@ -390,11 +296,7 @@ fn spread(values: &mut [Vec<f64>], found: &[bool], shape: [usize; 3]) {
     let mut queue: VecDeque<usize> = (0..found.len()).filter(|&n| found[n]).collect();
     let strides = [1, shape[0], shape[0] * shape[1]];
     while let Some(n) = queue.pop_front() {
-        let at = [
-            n % shape[0],
-            n / shape[0] % shape[1],
-            n / shape[0] / shape[1],
-        ];
+        let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
         for a in 0..3 {
             let below = (at[a] > 0).then(|| n - strides[a]);
             let above = (at[a] + 1 < shape[a]).then(|| n + strides[a]);
@@ -421,22 +323,14 @@ mod tests {
         0.3 + 2.0 * x - y + 0.5 * z
     }
 
-    const UNIT: Aabb = Aabb {
-        min: [0.0; 3],
-        max: [1.0; 3],
-    };
+    const UNIT: Aabb = Aabb { min: [0.0; 3], max: [1.0; 3] };
 
     #[test]
     fn straight_fields_are_met_between_nodes_and_held_beyond() {
         let shape = [6, 9, 11];
         let step = [0.2, 0.125, 0.1];
-        let values = (0..6 * 9 * 11).map(|n| {
-            linear([
-                0.2 * (n % 6) as f64,
-                0.125 * (n / 6 % 9) as f64,
-                0.1 * (n / 54) as f64,
-            ])
-        });
+        let values =
+            (0..6 * 9 * 11).map(|n| linear([0.2 * (n % 6) as f64, 0.125 * (n / 6 % 9) as f64, 0.1 * (n / 54) as f64]));
         let s = Samples::new([0.0; 3], step, shape, values.collect()).unwrap();
         for p in places(500) {
             let p = p.map(|v| 1.6 * v - 0.3);
@@ -444,17 +338,10 @@ mod tests {
             let (v, g) = s.at(p);
             assert!((v - linear(held)).abs() < 1e-13);
             for a in 0..3 {
-                let want = if held[a] == p[a] {
-                    [2.0, -1.0, 0.5][a]
-                } else {
-                    0.0
-                };
+                let want = if held[a] == p[a] { [2.0, -1.0, 0.5][a] } else { 0.0 };
                 assert!((g[a] - want).abs() < 1e-12);
             }
-            let b = Aabb {
-                min: p,
-                max: p.map(|v| v + 0.17),
-            };
+            let b = Aabb { min: p, max: p.map(|v| v + 0.17) };
             let bound = s.bound(&b);
             for q in places(20) {
                 let v = s.at(core::array::from_fn(|a| p[a] + 0.17 * q[a])).0;
@@ -464,9 +351,7 @@ mod tests {
         let all = s.bound(&Aabb::ALL);
         assert!((all.lo - (-0.7)).abs() < 1e-12 && (all.hi - 2.8).abs() < 1e-12);
         assert!(Samples::new([0.0; 3], step, [6, 9, 10], vec![0.0; 594]).is_err());
-        let f = Samples::new([0.0; 3], step, [2, 2, 1], vec![0.0, 1.0, f64::NAN, 2.0])
-            .err()
-            .unwrap();
+        let f = Samples::new([0.0; 3], step, [2, 2, 1], vec![0.0, 1.0, f64::NAN, 2.0]).err().unwrap();
         assert!(f.message.contains("(0, 1, 0)"), "{f}");
     }
 
@@ -474,27 +359,13 @@ mod tests {
     fn a_mesh_gives_its_field_and_the_share_it_misses() {
         // A box of hexahedra's tetrahedra on [0, 0.8] × [0, 1]².
         let n = 5usize;
-        let node = |i: usize| {
-            [
-                0.2 * (i % n) as f64,
-                0.25 * (i / n % n) as f64,
-                0.25 * (i / n / n) as f64,
-            ]
-        };
+        let node = |i: usize| [0.2 * (i % n) as f64, 0.25 * (i / n % n) as f64, 0.25 * (i / n / n) as f64];
         let points: Vec<Vec3> = (0..n * n * n).map(node).collect();
         let mut tets = Vec::new();
         for c in 0..64 {
             let base = c % 4 + c / 4 % 4 * n + c / 16 * n * n;
-            let v = [0, 1, 1 + n, n, n * n, n * n + 1, n * n + n + 1, n * n + n]
-                .map(|d| (base + d) as u32);
-            for t in [
-                [0, 1, 2, 6],
-                [0, 2, 3, 6],
-                [0, 3, 7, 6],
-                [0, 7, 4, 6],
-                [0, 4, 5, 6],
-                [0, 5, 1, 6],
-            ] {
+            let v = [0, 1, 1 + n, n, n * n, n * n + 1, n * n + n + 1, n * n + n].map(|d| (base + d) as u32);
+            for t in [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]] {
                 tets.push(t.map(|i: usize| v[i]));
             }
         }
@@ -507,10 +378,7 @@ mod tests {
             assert!((made[0].at(p).0 - linear(p)).abs() < 1e-12);
         }
         assert!((made[0].at([1.0, 0.5, 0.5]).0 - linear([0.8, 0.5, 0.5])).abs() < 0.4);
-        let far = Aabb {
-            min: [5.0; 3],
-            max: [6.0; 3],
-        };
+        let far = Aabb { min: [5.0; 3], max: [6.0; 3] };
         assert!(Samples::meshed(&points, &tets, &values, &far, &inside).is_err());
     }
 
@@ -519,23 +387,13 @@ mod tests {
         let points: Vec<Vec3> = places(300).collect();
         let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
         let s = Samples::scattered(&points, &values, 8, &UNIT).unwrap();
-        let worst = places(900)
-            .skip(300)
-            .fold(0.0f64, |m, p| m.max((s.at(p).0 - linear(p)).abs()));
+        let worst = places(900).skip(300).fold(0.0f64, |m, p| m.max((s.at(p).0 - linear(p)).abs()));
         // A field of slope 2.3 over points 0.15 apart; corners have theirs on one side.
         assert!(worst < 0.45, "{worst}");
-        let mean = places(900)
-            .skip(300)
-            .map(|p| s.at(p).0 - linear(p))
-            .sum::<f64>()
-            / 600.0;
+        let mean = places(900).skip(300).map(|p| s.at(p).0 - linear(p)).sum::<f64>() / 600.0;
         assert!(mean.abs() < 0.02, "{mean}");
         let all = s.bound(&Aabb::ALL);
-        let given = values
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                (a.min(*v), b.max(*v))
-            });
+        let given = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         assert!(all.lo >= given.0 - 1e-12 && all.hi <= given.1 + 1e-12);
         let one = Samples::scattered(&[[3.0, 0.0, 0.0]], &[7.0], 8, &UNIT).unwrap();
         assert_eq!(one.at([0.3; 3]).0, 7.0);

@@ -59,16 +59,9 @@ impl Field for Sigmoid {
         let ends = [self.step(r.lo).0, self.step(r.hi).0];
         // Rounding is not quite monotone; at the ends it is exact.
         let widen = |v: f64, by: f64| {
-            if v == 0.0 || v == 1.0 {
-                v
-            } else {
-                (v + by).clamp(0.0, 1.0)
-            }
+            if v == 0.0 || v == 1.0 { v } else { (v + by).clamp(0.0, 1.0) }
         };
-        Interval::new(
-            widen(ends[0].min(ends[1]), -1e-13),
-            widen(ends[0].max(ends[1]), 1e-13),
-        )
+        Interval::new(widen(ends[0].min(ends[1]), -1e-13), widen(ends[0].max(ends[1]), 1e-13))
     }
 }
 
@@ -79,10 +72,7 @@ mod tests {
     #[test]
     fn the_step_is_half_in_the_middle_and_ends() {
         let s = Sigmoid::new(Grade::Constant(0.0), 2.0, 4.0);
-        assert_eq!(
-            [0.0, 2.0, 4.0, 9.0].map(|v| s.step(v).0),
-            [0.0, 0.5, 1.0, 1.0]
-        );
+        assert_eq!([0.0, 2.0, 4.0, 9.0].map(|v| s.step(v).0), [0.0, 0.5, 1.0, 1.0]);
         for i in 1..40 {
             let v = 0.1 * f64::from(i);
             let (lo, hi) = (s.step(v - 1e-6).0, s.step(v + 1e-6).0);

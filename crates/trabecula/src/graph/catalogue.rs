@@ -53,19 +53,8 @@ const BODY: [Vec3; 2] = [O, [0.5, 0.5, 0.5]];
 const EDGE: [Vec3; 2] = [O, [1.0, 0.0, 0.0]];
 const UP: [Vec3; 2] = [O, [0.0, 0.0, 1.0]];
 
-const fn cubic(
-    name: &'static str,
-    title: &'static str,
-    group: &'static str,
-    beams: &'static [[Vec3; 2]],
-) -> Unit {
-    Unit {
-        name,
-        title,
-        group,
-        beams,
-        aspect: EVEN,
-    }
+const fn cubic(name: &'static str, title: &'static str, group: &'static str, beams: &'static [[Vec3; 2]]) -> Unit {
+    Unit { name, title, group, beams, aspect: EVEN }
 }
 
 /// 1 / (2 + √2): the cut of a truncated cube.
@@ -79,42 +68,12 @@ const WP: f64 = 0.209_986_841_649_145_5;
 static CATALOGUE: [Unit; 23] = [
     cubic("sc", "simple cubic", "Pm-3m", &[EDGE]),
     cubic("bcc", "body-centred cubic", "Im-3m", &[BODY]),
-    cubic(
-        "bccz",
-        "body-centred cubic with beams along z through every node",
-        "I4/mmm",
-        &[BODY, UP],
-    ),
-    cubic(
-        "sc_bcc",
-        "simple and body-centred cubic together",
-        "Pm-3m",
-        &[EDGE, BODY],
-    ),
-    cubic(
-        "fcc",
-        "face-centred cubic: the diagonals of all faces",
-        "Pm-3m",
-        &[FACE],
-    ),
-    cubic(
-        "fccz",
-        "face-centred cubic with the edges along z",
-        "P4/mmm",
-        &[FACE, SIDE, UP],
-    ),
-    cubic(
-        "fbcc",
-        "face- and body-centred cubic together",
-        "Pm-3m",
-        &[FACE, BODY],
-    ),
-    cubic(
-        "fbccz",
-        "face- and body-centred cubic with the edges along z",
-        "P4/mmm",
-        &[FACE, SIDE, BODY, UP],
-    ),
+    cubic("bccz", "body-centred cubic with beams along z through every node", "I4/mmm", &[BODY, UP]),
+    cubic("sc_bcc", "simple and body-centred cubic together", "Pm-3m", &[EDGE, BODY]),
+    cubic("fcc", "face-centred cubic: the diagonals of all faces", "Pm-3m", &[FACE]),
+    cubic("fccz", "face-centred cubic with the edges along z", "P4/mmm", &[FACE, SIDE, UP]),
+    cubic("fbcc", "face- and body-centred cubic together", "Pm-3m", &[FACE, BODY]),
+    cubic("fbccz", "face- and body-centred cubic with the edges along z", "P4/mmm", &[FACE, SIDE, BODY, UP]),
     cubic("octet", "octet truss", "Fm-3m", &[FACE]),
     cubic(
         "octahedra",
@@ -123,18 +82,8 @@ static CATALOGUE: [Unit; 23] = [
         &[[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]],
     ),
     cubic("diamond", "diamond", "Fd-3m:1", &[[O, [0.25, 0.25, 0.25]]]),
-    cubic(
-        "kelvin",
-        "truncated octahedra",
-        "Im-3m",
-        &[[[0.5, 0.25, 0.0], [0.5, 0.0, 0.25]]],
-    ),
-    cubic(
-        "rhombic_dodecahedron",
-        "rhombic dodecahedra: the graph of fluorite",
-        "Fm-3m",
-        &[[O, [0.25, 0.25, 0.25]]],
-    ),
+    cubic("kelvin", "truncated octahedra", "Im-3m", &[[[0.5, 0.25, 0.0], [0.5, 0.0, 0.25]]]),
+    cubic("rhombic_dodecahedron", "rhombic dodecahedra: the graph of fluorite", "Fm-3m", &[[O, [0.25, 0.25, 0.25]]]),
     cubic(
         "weaire_phelan",
         "Weaire–Phelan, plane faces, equal volumes: the graph of clathrate I",
@@ -150,19 +99,13 @@ static CATALOGUE: [Unit; 23] = [
         "truncated_cube",
         "truncated cubes and octahedra",
         "Pm-3m",
-        &[
-            [[CUT, 0.0, 0.0], [1.0 - CUT, 0.0, 0.0]],
-            [[CUT, 0.0, 0.0], [0.0, CUT, 0.0]],
-        ],
+        &[[[CUT, 0.0, 0.0], [1.0 - CUT, 0.0, 0.0]], [[CUT, 0.0, 0.0], [0.0, CUT, 0.0]]],
     ),
     cubic(
         "rhombicuboctahedron",
         "rhombicuboctahedra, cuboctahedra and cubes",
         "Pm-3m",
-        &[
-            [[0.0, CUT, CUT], [0.0, 1.0 - CUT, CUT]],
-            [[0.0, CUT, CUT], [CUT, 0.0, CUT]],
-        ],
+        &[[[0.0, CUT, CUT], [0.0, 1.0 - CUT, CUT]], [[0.0, CUT, CUT], [CUT, 0.0, CUT]]],
     ),
     cubic(
         "truncated_cuboctahedron",
@@ -174,12 +117,7 @@ static CATALOGUE: [Unit; 23] = [
             [[0.0, GREAT[0], GREAT[1]], [GREAT[0], 0.0, GREAT[1]]],
         ],
     ),
-    cubic(
-        "pyrochlore",
-        "tetrahedra joined at corners: kagome in space",
-        "Fd-3m:2",
-        &[[O, [0.25, 0.25, 0.0]]],
-    ),
+    cubic("pyrochlore", "tetrahedra joined at corners: kagome in space", "Fd-3m:2", &[[O, [0.25, 0.25, 0.0]]]),
     cubic(
         "gyroid_graph",
         "the graph of the gyroid: three beams at each node (srs, K4 crystal)",
@@ -196,10 +134,7 @@ static CATALOGUE: [Unit; 23] = [
         "re_entrant",
         "re-entrant: widens when stretched along z",
         "I4/mmm",
-        &[
-            [[0.0, 0.0, -0.35], [0.0, 0.0, 0.35]],
-            [[0.0, 0.0, 0.35], [0.5, 0.5, 0.15]],
-        ],
+        &[[[0.0, 0.0, -0.35], [0.0, 0.0, 0.35]], [[0.0, 0.0, 0.35], [0.5, 0.5, 0.15]]],
     ),
     Unit {
         aspect: HEXAGONAL,
@@ -214,15 +149,7 @@ static CATALOGUE: [Unit; 23] = [
             ],
         )
     },
-    Unit {
-        aspect: HEXAGONAL,
-        ..cubic(
-            "triangular_prism",
-            "triangular prisms in layers",
-            "Cmmm",
-            &[EDGE, FACE, UP],
-        )
-    },
+    Unit { aspect: HEXAGONAL, ..cubic("triangular_prism", "triangular prisms in layers", "Cmmm", &[EDGE, FACE, UP]) },
 ];
 
 /// All unit cells by name.
@@ -244,10 +171,7 @@ impl Unit {
     /// # Errors
     /// None for the cells of the catalogue: a group that does not exist.
     pub fn net(&self) -> Result<Net, Fault> {
-        Ok(Net::spread(
-            &Group::named(self.group)?.operations,
-            self.beams,
-        ))
+        Ok(Net::spread(&Group::named(self.group)?.operations, self.beams))
     }
 }
 
@@ -269,21 +193,12 @@ impl Net {
                     (node, cell.map(|v| v as i32))
                 });
                 let shift: [i32; 3] = core::array::from_fn(|i| b.1[i] - a.1[i]);
-                let there = Link {
-                    ends: [a.0, b.0],
-                    shift,
-                };
-                let back = Link {
-                    ends: [b.0, a.0],
-                    shift: shift.map(|s| -s),
-                };
+                let there = Link { ends: [a.0, b.0], shift };
+                let back = Link { ends: [b.0, a.0], shift: shift.map(|s| -s) };
                 links.insert(there.max(back));
             }
         }
-        Net {
-            nodes,
-            beams: links.into_iter().collect(),
-        }
+        Net { nodes, beams: links.into_iter().collect() }
     }
 
     /// The vector along a beam, in cell edges.
@@ -364,11 +279,7 @@ mod tests {
                 "{} {total}",
                 unit.name
             );
-            assert!(
-                known.4.is_nan() || (total - known.4).abs() < 1e-6,
-                "{}: {total}",
-                unit.name
-            );
+            assert!(known.4.is_nan() || (total - known.4).abs() < 1e-6, "{}: {total}", unit.name);
         }
     }
 }

@@ -15,15 +15,7 @@ impl Graph {
 
     /// The box about all hubs.
     pub fn bounds(&self) -> Aabb {
-        let ball = |b: Aabb, h: &super::Hub| {
-            b.union(
-                Aabb {
-                    min: h.center,
-                    max: h.center,
-                }
-                .grown(h.radius),
-            )
-        };
+        let ball = |b: Aabb, h: &super::Hub| b.union(Aabb { min: h.center, max: h.center }.grown(h.radius));
         self.hubs.iter().fold(Aabb::EMPTY, ball)
     }
 
@@ -81,29 +73,16 @@ mod tests {
 
     fn line(places: &[[f64; 2]], beams: &[[u32; 2]], profile: Profile) -> Graph {
         Graph {
-            hubs: (places.iter())
-                .map(|[x, radius]| Hub {
-                    center: [*x, 0.0, 0.0],
-                    radius: *radius,
-                })
-                .collect(),
+            hubs: (places.iter()).map(|[x, radius]| Hub { center: [*x, 0.0, 0.0], radius: *radius }).collect(),
             beams: beams.iter().map(|e| Beam { ends: *e, profile }).collect(),
         }
     }
 
     #[test]
     fn a_beam_in_a_longer_one_is_swallowed() {
-        let graph = line(
-            &[[0.0, 0.5], [2.0, 0.5], [5.0, 0.5]],
-            &[[0, 1], [0, 2]],
-            Profile::Cone,
-        );
+        let graph = line(&[[0.0, 0.5], [2.0, 0.5], [5.0, 0.5]], &[[0, 1], [0, 2]], Profile::Cone);
         assert_eq!(graph.swallowed(), Some((1, [1.0, 0.0, 0.0])));
-        let apart = line(
-            &[[0.0, 0.5], [2.0, 0.5], [-5.0, 0.5]],
-            &[[0, 1], [0, 2]],
-            Profile::Cone,
-        );
+        let apart = line(&[[0.0, 0.5], [2.0, 0.5], [-5.0, 0.5]], &[[0, 1], [0, 2]], Profile::Cone);
         assert_eq!(apart.swallowed(), None);
     }
 }

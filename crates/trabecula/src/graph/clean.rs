@@ -27,9 +27,7 @@ impl Wire {
     pub fn clean(&mut self, within: f64, radii: &mut Vec<f64>) -> Cleaned {
         let mut done = Cleaned::default();
         let root = self.merged(within);
-        done.merged = (root.iter().enumerate())
-            .filter(|(n, r)| *n != **r as usize)
-            .count();
+        done.merged = (root.iter().enumerate()).filter(|(n, r)| *n != **r as usize).count();
         let mut seen = HashSet::with_capacity(self.struts.len());
         self.struts.retain_mut(|strut| {
             *strut = strut.map(|n| root[n as usize]);
@@ -55,9 +53,7 @@ impl Wire {
         let mut valence: Vec<usize> = (0..self.nodes.len()).map(|n| stars.at(n).len()).collect();
         let mut gone = vec![false; self.struts.len()];
         let free = |n: usize, valence: &[usize]| valence[n] == 1 && !held(self.nodes[n]);
-        let mut open: Vec<usize> = (0..self.nodes.len())
-            .filter(|n| free(*n, &valence))
-            .collect();
+        let mut open: Vec<usize> = (0..self.nodes.len()).filter(|n| free(*n, &valence)).collect();
         while let Some(n) = open.pop() {
             let Some(s) = stars.at(n).iter().find(|s| !gone[**s as usize]) else {
                 continue;
@@ -80,9 +76,7 @@ impl Wire {
     pub fn dangling(&self, held: &impl Fn(Vec3) -> bool) -> usize {
         let stars = Stars::of(self);
         let nodes = self.nodes.iter().enumerate();
-        nodes
-            .filter(|(n, p)| stars.at(*n).len() == 1 && !held(**p))
-            .count()
+        nodes.filter(|(n, p)| stars.at(*n).len() == 1 && !held(**p)).count()
     }
 
     /// For each node the one of least number that it is merged into.
@@ -96,11 +90,7 @@ impl Wire {
         for (n, p) in self.nodes.iter().enumerate() {
             let (low, high) = (cube(p.map(|v| v - within)), cube(p.map(|v| v + within)));
             let axis = |a: usize| {
-                if low[a] == high[a] {
-                    vec![low[a]]
-                } else {
-                    vec![low[a], high[a]]
-                }
+                if low[a] == high[a] { vec![low[a]] } else { vec![low[a], high[a]] }
             };
             for x in axis(0) {
                 for y in axis(1) {
@@ -127,28 +117,12 @@ mod tests {
     #[test]
     fn what_is_twice_goes_and_is_told() {
         let mut wire = Wire {
-            nodes: vec![
-                [0.0; 3],
-                [1.0, 0.0, 0.0],
-                [1.0, 1e-7, 0.0],
-                [0.0, 1.0, 0.0],
-                [5.0; 3],
-                [-1e-9, 0.0, 0.0],
-            ],
+            nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-7, 0.0], [0.0, 1.0, 0.0], [5.0; 3], [-1e-9, 0.0, 0.0]],
             struts: vec![[0, 1], [2, 5], [1, 2], [1, 3], [3, 0]],
         };
         let mut radii = vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
         let done = wire.clean(1e-6, &mut radii);
-        assert_eq!(
-            done,
-            Cleaned {
-                merged: 2,
-                short: 1,
-                duplicates: 1,
-                isolated: 1,
-                dangling: 0
-            }
-        );
+        assert_eq!(done, Cleaned { merged: 2, short: 1, duplicates: 1, isolated: 1, dangling: 0 });
         assert_eq!(wire.struts, [[0, 1], [1, 2], [2, 0]]);
         assert_eq!(radii, [0.1, 0.2, 0.4]);
     }
@@ -165,10 +139,7 @@ mod tests {
         assert_eq!(loose.drop_dangling(&|_| false, &mut Vec::new()), 3);
         assert_eq!((loose.nodes.len(), loose.struts.len()), (3, 3));
         let mut held = line(5);
-        assert_eq!(
-            held.drop_dangling(&|p| p[0] == 0.0 || p[0] == 5.0, &mut Vec::new()),
-            0
-        );
+        assert_eq!(held.drop_dangling(&|p| p[0] == 0.0 || p[0] == 5.0, &mut Vec::new()), 0);
         assert_eq!(line(5).drop_dangling(&|_| false, &mut Vec::new()), 5);
     }
 }

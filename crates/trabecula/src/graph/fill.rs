@@ -20,11 +20,7 @@ pub fn expected(net: &Net, map: &Map, bounds: &Aabb) -> f64 {
     let at = |i: usize, a: usize| bounds.min[a] + size[a] * (i as f64 + 0.5) / LOOKS as f64;
     let mean = (0..LOOKS.pow(3))
         .map(|n| {
-            let p = [
-                at(n % LOOKS, 0),
-                at(n / LOOKS % LOOKS, 1),
-                at(n / LOOKS / LOOKS, 2),
-            ];
+            let p = [at(n % LOOKS, 0), at(n / LOOKS % LOOKS, 1), at(n / LOOKS / LOOKS, 2)];
             determinant(&map.jacobian(p)).abs()
         })
         .sum::<f64>()
@@ -53,34 +49,21 @@ pub fn fill(net: &Net, map: &Map, bounds: &Aabb, reach: f64) -> Result<Wire, Fau
     let mut wire = Wire::default();
     let mut numbers: HashMap<([i32; 3], usize), u32> = HashMap::new();
     let mut register = |cell: [i32; 3], node: usize, place: Vec3, nodes: &mut Vec<Vec3>| {
-        *numbers
-            .entry((map.canonical(cell), node))
-            .or_insert_with(|| {
-                nodes.push(place);
-                (nodes.len() - 1) as u32
-            })
+        *numbers.entry((map.canonical(cell), node)).or_insert_with(|| {
+            nodes.push(place);
+            (nodes.len() - 1) as u32
+        })
     };
     let phase = |cell: [i32; 3], node: usize| add(net.nodes[node], cell.map(f64::from));
     for (cell, near) in cells {
-        let places: Vec<Option<Vec3>> = (0..net.nodes.len())
-            .map(|n| map.position(phase(cell, n), near))
-            .collect();
+        let places: Vec<Option<Vec3>> = (0..net.nodes.len()).map(|n| map.position(phase(cell, n), near)).collect();
         for link in &net.beams {
             let [a, b] = link.ends;
             let there: [i32; 3] = core::array::from_fn(|i| cell[i] + link.shift[i]);
             let Some(from) = places[a] else { continue };
-            let to = if link.shift == [0; 3] {
-                places[b]
-            } else {
-                map.position(phase(there, b), from)
-            };
+            let to = if link.shift == [0; 3] { places[b] } else { map.position(phase(there, b), from) };
             let Some(to) = to else { continue };
-            if Aabb::EMPTY
-                .with(from)
-                .with(to)
-                .intersection(bounds)
-                .is_empty()
-            {
+            if Aabb::EMPTY.with(from).with(to).intersection(bounds).is_empty() {
                 continue;
             }
             let from = register(cell, a, from, &mut wire.nodes);
@@ -104,10 +87,7 @@ mod tests {
 
     #[test]
     fn inner_nodes_have_the_valence_of_the_cell_and_lengths_are_those_of_the_cell() {
-        let bounds = Aabb {
-            min: [-5.0; 3],
-            max: [5.0; 3],
-        };
+        let bounds = Aabb { min: [-5.0; 3], max: [5.0; 3] };
         for unit in catalogue() {
             let net = unit.net().expect("net");
             let mut wire = fill(&net, &affine(4.0), &bounds, 0.0).expect("frame");
@@ -121,10 +101,7 @@ mod tests {
             // A node deeper than the longest strut has all its struts.
             let deep = bounds.grown(-lengths[lengths.len() - 1]);
             let mut valence = vec![0; wire.nodes.len()];
-            wire.struts
-                .iter()
-                .flatten()
-                .for_each(|n| valence[*n as usize] += 1);
+            wire.struts.iter().flatten().for_each(|n| valence[*n as usize] += 1);
             let known = net.valences();
             for (p, v) in wire.nodes.iter().zip(&valence) {
                 if deep.distance(*p) == 0.0 {
@@ -141,10 +118,7 @@ mod tests {
         let net = named("sc").and_then(|u| u.net().ok()).expect("net");
         let round = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0; 2], 12.0, [0.0, 4.0, 6.0]);
         let map = Map::Round(round.expect("map"));
-        let bounds = Aabb {
-            min: [-6.0, -6.0, -0.5],
-            max: [6.0, 6.0, 1.5],
-        };
+        let bounds = Aabb { min: [-6.0, -6.0, -0.5], max: [6.0, 6.0, 1.5] };
         let mut wire = fill(&net, &map, &bounds, 0.0).expect("frame");
         let done = wire.clean(1e-6, &mut Vec::new());
         // On the axis twelve nodes are one, and the struts between them have no length.
@@ -158,10 +132,7 @@ mod tests {
     #[test]
     fn a_huge_frame_is_refused_before_it_is_made() {
         let net = named("octet").and_then(|u| u.net().ok()).expect("net");
-        let bounds = Aabb {
-            min: [0.0; 3],
-            max: [1000.0; 3],
-        };
+        let bounds = Aabb { min: [0.0; 3], max: [1000.0; 3] };
         let fault = fill(&net, &affine(0.1), &bounds, 0.0).expect_err("refused");
         assert!(fault.message.contains("beams"), "{fault}");
     }

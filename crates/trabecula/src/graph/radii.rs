@@ -28,11 +28,7 @@ pub fn sized(wire: &Wire, own: &[f64], radii: &Radii) -> Result<Graph, Fault> {
             scale(add(a, b), 0.5)
         })
         .collect();
-    let thick = radii
-        .radius
-        .as_ref()
-        .map(|g| values(g, &middles, "radius"))
-        .transpose()?;
+    let thick = radii.radius.as_ref().map(|g| values(g, &middles, "radius")).transpose()?;
     let mut sizes = match &radii.hub {
         Some(g) => values(g, &wire.nodes, "hub")?,
         None => {
@@ -57,10 +53,7 @@ pub fn sized(wire: &Wire, own: &[f64], radii: &Radii) -> Result<Graph, Fault> {
             ),
         ));
     }
-    let hub = |(center, radius): (&Vec3, f64)| Hub {
-        center: *center,
-        radius,
-    };
+    let hub = |(center, radius): (&Vec3, f64)| Hub { center: *center, radius };
     let beam = |(i, ends): (usize, &[u32; 2])| Beam {
         ends: *ends,
         profile: match (radii.profile, &thick) {

@@ -18,10 +18,7 @@ pub struct Nodes {
 }
 
 /// The words of each line that is no comment and no heading, with its number.
-fn rows<'a>(
-    text: &'a str,
-    heading: &'a dyn Fn(&[&str]) -> bool,
-) -> impl Iterator<Item = (usize, Vec<&'a str>)> {
+fn rows<'a>(text: &'a str, heading: &'a dyn Fn(&[&str]) -> bool) -> impl Iterator<Item = (usize, Vec<&'a str>)> {
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut first = true;
     lines.filter_map(move |(n, line)| {
@@ -31,9 +28,7 @@ fn rows<'a>(
         }
         // Between commas nothing may stand; between spaces something does.
         let words: Vec<&str> = if line.contains([',', ';', '\t']) {
-            line.split([',', ';', '\t'])
-                .map(|w| w.trim().trim_matches('"'))
-                .collect()
+            line.split([',', ';', '\t']).map(|w| w.trim().trim_matches('"')).collect()
         } else {
             line.split_whitespace().collect()
         };
@@ -58,16 +53,11 @@ pub fn nodes(text: &str) -> Result<Nodes, Fault> {
             [Some(x), Some(y), Some(z), None] if words[4].is_empty() => ([x, y, z], f64::NAN),
             _ => {
                 let row = words.join(", ");
-                return Err(fault(format!(
-                    "expected id, x, y, z and perhaps a radius, found \"{row}\""
-                )));
+                return Err(fault(format!("expected id, x, y, z and perhaps a radius, found \"{row}\"")));
             }
         };
         if place.iter().any(|v| !v.is_finite()) {
-            return Err(fault(format!(
-                "node {} is at {place:?}; numbers must be finite",
-                words[0]
-            )));
+            return Err(fault(format!("node {} is at {place:?}; numbers must be finite", words[0])));
         }
         let given = words.len() == 5 && !words[4].is_empty();
         if given && !(radius > 0.0 && radius.is_finite()) {
@@ -104,9 +94,7 @@ pub fn struts(text: &str, nodes: &Nodes) -> Result<Wire, Fault> {
         let fault = |message: String| Fault::new("", format!("line {line}: {message}"));
         let [a, b] = words[..] else {
             let row = words.join(", ");
-            return Err(fault(format!(
-                "expected the ids of two nodes, found \"{row}\""
-            )));
+            return Err(fault(format!("expected the ids of two nodes, found \"{row}\"")));
         };
         let number = |id: &str| {
             let known = nodes.names.get(id).copied();
@@ -117,10 +105,7 @@ pub fn struts(text: &str, nodes: &Nodes) -> Result<Wire, Fault> {
     if struts.is_empty() {
         return Err(Fault::new("", "the file has no rows of two ids"));
     }
-    Ok(Wire {
-        nodes: nodes.places.clone(),
-        struts,
-    })
+    Ok(Wire { nodes: nodes.places.clone(), struts })
 }
 
 #[cfg(test)]
@@ -129,8 +114,7 @@ mod tests {
 
     #[test]
     fn tables_are_read_with_or_without_headings_and_radii() {
-        let text =
-            "\u{feff}id, x, y, z, r\na, 0, 0, 0, 0.5\nb, 1, 0, 0,\n# a comment\n7; 0; 1e1; 0; 2\n";
+        let text = "\u{feff}id, x, y, z, r\na, 0, 0, 0, 0.5\nb, 1, 0, 0,\n# a comment\n7; 0; 1e1; 0; 2\n";
         let n = nodes(text).expect("nodes");
         assert_eq!(n.places, [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 10.0, 0.0]]);
         assert!(n.radii[0] == 0.5 && n.radii[1].is_nan() && n.radii[2] == 2.0);

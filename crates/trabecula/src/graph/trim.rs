@@ -49,18 +49,9 @@ impl Trim {
     /// Trims a frame to a region, given by its signed distance (steeper nowhere than 1). Struts within `reach` (mm) of
     /// the region, a ball's radius, count as having a part in it. Ends within `slack` (mm) outside count as inside.
     /// `radii` of the nodes, if not empty, is kept in step.
-    pub fn apply(
-        self,
-        wire: &mut Wire,
-        region: &dyn Field,
-        reach: f64,
-        slack: f64,
-        radii: &mut Vec<f64>,
-    ) -> Trimmed {
+    pub fn apply(self, wire: &mut Wire, region: &dyn Field, reach: f64, slack: f64, radii: &mut Vec<f64>) -> Trimmed {
         let mut depth = vec![0.0; wire.nodes.len()];
-        let pieces = depth
-            .par_chunks_mut(BATCH)
-            .zip(wire.nodes.par_chunks(BATCH));
+        let pieces = depth.par_chunks_mut(BATCH).zip(wire.nodes.par_chunks(BATCH));
         pieces.for_each(|(d, p)| region.values(p, d));
         let inside = |n: u32| depth[n as usize] <= slack;
         let at = |s: &[u32; 2]| s.map(|n| wire.nodes[n as usize]);
@@ -70,12 +61,10 @@ impl Trim {
                 Trim::Cut if ends.contains(&true) => Fate::Stays,
                 Trim::Cut if least(region, at(s), reach) <= reach => Fate::Stays,
                 Trim::Cut => Fate::Outside,
-                Trim::Drop | Trim::Snap if ends == [true; 2] => {
-                    match leaves(region, at(s), slack) {
-                        None => Fate::Stays,
-                        Some(_) => Fate::Dropped,
-                    }
-                }
+                Trim::Drop | Trim::Snap if ends == [true; 2] => match leaves(region, at(s), slack) {
+                    None => Fate::Stays,
+                    Some(_) => Fate::Dropped,
+                },
                 Trim::Drop => Fate::Dropped,
                 Trim::Snap if ends == [false; 2] => Fate::Outside,
                 Trim::Snap => {
@@ -160,10 +149,7 @@ mod tests {
 
     fn comb() -> Wire {
         let nodes = (-6..=6).map(|i| [f64::from(i), 0.5, 0.0]).collect();
-        Wire {
-            nodes,
-            struts: (0..12).map(|i| [i, i + 1]).collect(),
-        }
+        Wire { nodes, struts: (0..12).map(|i| [i, i + 1]).collect() }
     }
 
     #[test]
@@ -177,14 +163,8 @@ mod tests {
         assert_eq!((dropped.struts.len(), done.dropped), (6, 6));
         let mut snapped = comb();
         let done = Trim::Snap.apply(&mut snapped, &ball, 0.3, 0.0, &mut Vec::new());
-        assert_eq!(
-            (snapped.struts.len(), done.snapped, done.outside),
-            (8, 2, 4)
-        );
-        let on = snapped
-            .nodes
-            .iter()
-            .filter(|p| (norm(**p) - 3.6).abs() < 1e-9);
+        assert_eq!((snapped.struts.len(), done.snapped, done.outside), (8, 2, 4));
+        let on = snapped.nodes.iter().filter(|p| (norm(**p) - 3.6).abs() < 1e-9);
         assert_eq!(on.count(), 2);
         assert_eq!(snapped.nodes.len(), 9);
     }

@@ -110,10 +110,7 @@ impl Wire {
     pub fn facts(&self, inside: &(impl Fn(Vec3) -> bool + Sync)) -> Facts {
         let within: Vec<bool> = self.nodes.par_iter().map(|p| inside(*p)).collect();
         let has = |s: &&[u32; 2]| s.iter().any(|n| within[*n as usize]);
-        let part = Wire {
-            nodes: self.nodes.clone(),
-            struts: self.struts.iter().filter(has).copied().collect(),
-        };
+        let part = Wire { nodes: self.nodes.clone(), struts: self.struts.iter().filter(has).copied().collect() };
         let stars = Stars::of(&part);
         let mut facts = Facts {
             struts: part.struts.len(),

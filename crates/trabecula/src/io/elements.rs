@@ -30,60 +30,18 @@ struct Solid {
 fn solid(kind: u8) -> Option<Solid> {
     let (name, corners, faces): (_, _, &[&[usize]]) = match kind {
         10 | 24 => ("tetrahedron", 4, &[]),
-        11 => (
-            "voxel",
-            8,
-            &[
-                &[0, 2, 3, 1],
-                &[4, 5, 7, 6],
-                &[0, 1, 5, 4],
-                &[2, 6, 7, 3],
-                &[0, 4, 6, 2],
-                &[1, 3, 7, 5],
-            ],
-        ),
+        11 => ("voxel", 8, &[&[0, 2, 3, 1], &[4, 5, 7, 6], &[0, 1, 5, 4], &[2, 6, 7, 3], &[0, 4, 6, 2], &[1, 3, 7, 5]]),
         12 | 25 | 29 => (
             "hexahedron",
             8,
-            &[
-                &[0, 3, 2, 1],
-                &[4, 5, 6, 7],
-                &[0, 1, 5, 4],
-                &[3, 7, 6, 2],
-                &[0, 4, 7, 3],
-                &[1, 2, 6, 5],
-            ],
+            &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 4, 7, 3], &[1, 2, 6, 5]],
         ),
         // VTK's wedge begins with the triangle whose normal points out of it.
-        13 | 26 => (
-            "wedge",
-            6,
-            &[
-                &[0, 1, 2],
-                &[3, 5, 4],
-                &[0, 3, 4, 1],
-                &[1, 4, 5, 2],
-                &[0, 2, 5, 3],
-            ],
-        ),
-        14 | 27 => (
-            "pyramid",
-            5,
-            &[
-                &[0, 3, 2, 1],
-                &[0, 1, 4],
-                &[1, 2, 4],
-                &[2, 3, 4],
-                &[3, 0, 4],
-            ],
-        ),
+        13 | 26 => ("wedge", 6, &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[0, 2, 5, 3]]),
+        14 | 27 => ("pyramid", 5, &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]]),
         _ => return None,
     };
-    Some(Solid {
-        name,
-        corners,
-        faces,
-    })
+    Some(Solid { name, corners, faces })
 }
 
 impl Elements {
@@ -101,13 +59,7 @@ impl Elements {
             // What is no index becomes one that is not there.
             connectivity: connectivity
                 .iter()
-                .map(|v| {
-                    if *v >= 0.0 && *v < f64::from(u32::MAX) {
-                        *v as u32
-                    } else {
-                        u32::MAX
-                    }
-                })
+                .map(|v| if *v >= 0.0 && *v < f64::from(u32::MAX) { *v as u32 } else { u32::MAX })
                 .collect(),
             ends: ends.iter().map(|v| *v as usize).collect(),
             kinds: kinds.iter().map(|v| *v as u8).collect(),
@@ -119,19 +71,11 @@ impl Elements {
     /// Refuses points that are not finite and cells of points that are not there.
     pub fn check(&self) -> Result<(), Fault> {
         let fault = |message: String| Err(Fault::new("", message));
-        if let Some(p) = self
-            .points
-            .iter()
-            .find(|p| p.iter().any(|c| !c.is_finite()))
-        {
+        if let Some(p) = self.points.iter().find(|p| p.iter().any(|c| !c.is_finite())) {
             return fault(format!("a point is at {p:?}; coordinates must be finite"));
         }
         if self.ends.len() != self.kinds.len() {
-            return fault(format!(
-                "{} ends for {} kinds of cells",
-                self.ends.len(),
-                self.kinds.len()
-            ));
+            return fault(format!("{} ends for {} kinds of cells", self.ends.len(), self.kinds.len()));
         }
         let mut from = 0;
         for (cell, (end, kind)) in self.ends.iter().zip(&self.kinds).enumerate() {
@@ -166,14 +110,7 @@ impl Elements {
             let cuts: &[[usize; 4]] = match s.name {
                 "tetrahedron" => &[[0, 1, 2, 3]],
                 "voxel" => &CUBE,
-                "hexahedron" => &[
-                    [0, 1, 2, 6],
-                    [0, 2, 3, 6],
-                    [0, 3, 7, 6],
-                    [0, 7, 4, 6],
-                    [0, 4, 5, 6],
-                    [0, 5, 1, 6],
-                ],
+                "hexahedron" => &[[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
                 "wedge" => &[[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
                 _ => &[[0, 1, 2, 4], [0, 2, 3, 4]],
             };
@@ -192,10 +129,7 @@ impl Elements {
     /// **Errors**: no volumes; without `split`, volumes that are no tetrahedra, with their numbers.
     pub fn tet_mesh(&self, split: bool) -> Result<(TetMesh, Vec<u32>), Fault> {
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
-        let mut mesh = TetMesh {
-            nodes: self.points.clone(),
-            ..TetMesh::default()
-        };
+        let mut mesh = TetMesh { nodes: self.points.clone(), ..TetMesh::default() };
         let mut of = Vec::new();
         for (cell, s, corners) in self.solids() {
             if let (4, &[a, b, c, d]) = (s.corners, corners) {
@@ -218,15 +152,12 @@ impl Elements {
                 let around = |i: usize| corners[face[(least + i) % face.len()]];
                 for i in 1..face.len() - 1 {
                     // Seen from outside the face turns left, seen from the middle right.
-                    mesh.tets
-                        .push([around(0), around(i + 1), around(i), middle]);
+                    mesh.tets.push([around(0), around(i + 1), around(i), middle]);
                     of.push(cell as u32);
                 }
             }
             // Programs do not agree on which way round a wedge is.
-            let whole: f64 = (first..mesh.tets.len())
-                .map(|i| volume(mesh.corners(i)))
-                .sum();
+            let whole: f64 = (first..mesh.tets.len()).map(|i| volume(mesh.corners(i))).sum();
             if whole < 0.0 {
                 mesh.tets[first..].iter_mut().for_each(|t| t.swap(0, 1));
             }
@@ -281,13 +212,7 @@ mod tests {
         Elements {
             points,
             // The wedge's first triangle, 7 10 13, is seen counter-clockwise from outside.
-            connectivity: [
-                &hex(0)[..],
-                &hex(1),
-                &[7, 10, 13, 6, 9, 12],
-                &[2, 5, 11, 8, 14],
-            ]
-            .concat(),
+            connectivity: [&hex(0)[..], &hex(1), &[7, 10, 13, 6, 9, 12], &[2, 5, 11, 8, 14]].concat(),
             ends: vec![8, 16, 22, 27],
             kinds: vec![12, 12, 13, 14],
         }
@@ -298,10 +223,7 @@ mod tests {
         let mixed = mixed();
         mixed.check().unwrap();
         let message = mixed.tet_mesh(false).unwrap_err().message;
-        assert!(
-            message.contains("2 hexahedra, 1 pyramid, 1 wedge"),
-            "{message}"
-        );
+        assert!(message.contains("2 hexahedra, 1 pyramid, 1 wedge"), "{message}");
         let (mesh, of) = mixed.tet_mesh(true).unwrap();
         assert_eq!(mesh.tets.len(), 12 + 12 + 8 + 6);
         assert_eq!(of.len(), mesh.tets.len());
@@ -315,22 +237,10 @@ mod tests {
     fn surfaces_and_missing_points_are_refused() {
         let mut surface = mixed();
         surface.kinds = vec![9; 4];
-        assert!(
-            surface
-                .tet_mesh(false)
-                .unwrap_err()
-                .message
-                .contains("no volume")
-        );
+        assert!(surface.tet_mesh(false).unwrap_err().message.contains("no volume"));
         let mut wrong = mixed();
         wrong.connectivity[3] = 99;
-        assert!(
-            wrong
-                .check()
-                .unwrap_err()
-                .message
-                .contains("cell 0 names a point")
-        );
+        assert!(wrong.check().unwrap_err().message.contains("cell 0 names a point"));
         let mut short = mixed();
         short.ends[3] = 99;
         assert!(short.check().is_err());

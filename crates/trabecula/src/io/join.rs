@@ -45,10 +45,7 @@ impl Joiner {
         let index = *self.known.entry(p.map(f64::to_bits)).or_insert(next as u32);
         if index as usize == next {
             if next >= u32::MAX as usize {
-                return Err(Fault::new(
-                    "",
-                    format!("more than {} vertices: split the mesh", u32::MAX),
-                ));
+                return Err(Fault::new("", format!("more than {} vertices: split the mesh", u32::MAX)));
             }
             self.mesh.vertices.push(p);
         }
@@ -91,8 +88,7 @@ mod tests {
         let mut j = Joiner::default();
         let (a, b, c) = ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
         j.triangle([a, b, c]).unwrap();
-        j.triangle([[-0.0, 0.0, -0.0], c, [1.0 + f64::EPSILON, 0.0, 0.0]])
-            .unwrap();
+        j.triangle([[-0.0, 0.0, -0.0], c, [1.0 + f64::EPSILON, 0.0, 0.0]]).unwrap();
         let mesh = j.finish();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices.len(), 4);

@@ -14,9 +14,7 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
     let fault = |message: String| Fault::new("", message);
     let cut = || Fault::new("", "the file ends early: truncated");
     if !bytes.starts_with(b"\x93NUMPY") {
-        return Err(fault(
-            "not an NPY file: it does not begin with \\x93NUMPY".into(),
-        ));
+        return Err(fault("not an NPY file: it does not begin with \\x93NUMPY".into()));
     }
     let version = *bytes.get(6).ok_or_else(cut)?;
     let (length, start): (usize, usize) = if version == 1 {
@@ -30,27 +28,13 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
     let header = String::from_utf8_lossy(bytes.get(start..end).ok_or_else(cut)?);
     let after = |key: &str| {
         let at = header.find(&format!("'{key}'"))? + key.len() + 2;
-        header[at..]
-            .trim_start()
-            .strip_prefix(':')
-            .map(str::trim_start)
+        header[at..].trim_start().strip_prefix(':').map(str::trim_start)
     };
-    let malformed = || {
-        fault(format!(
-            "the header of the NPY file is malformed: {}",
-            header.trim()
-        ))
-    };
-    let quoted = after("descr")
-        .and_then(|t| t.strip_prefix('\''))
-        .ok_or_else(malformed)?;
+    let malformed = || fault(format!("the header of the NPY file is malformed: {}", header.trim()));
+    let quoted = after("descr").and_then(|t| t.strip_prefix('\'')).ok_or_else(malformed)?;
     let kind = &quoted[..quoted.find('\'').ok_or_else(malformed)?];
-    let fortran = after("fortran_order")
-        .ok_or_else(malformed)?
-        .starts_with("True");
-    let inside = after("shape")
-        .and_then(|t| t.strip_prefix('('))
-        .ok_or_else(malformed)?;
+    let fortran = after("fortran_order").ok_or_else(malformed)?.starts_with("True");
+    let inside = after("shape").and_then(|t| t.strip_prefix('(')).ok_or_else(malformed)?;
     let inside = &inside[..inside.find(')').ok_or_else(malformed)?];
     let shape = inside
         .split(',')
@@ -58,10 +42,7 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         .filter(|t| !t.is_empty())
         .map(|t| t.parse().map_err(|_| malformed()))
         .collect::<Result<Vec<usize>, Fault>>()?;
-    let count = shape
-        .iter()
-        .try_fold(1usize, |n, s| n.checked_mul(*s))
-        .ok_or_else(malformed)?;
+    let count = shape.iter().try_fold(1usize, |n, s| n.checked_mul(*s)).ok_or_else(malformed)?;
     let big = kind.starts_with('>');
     let width = match &kind[kind.len().min(1)..] {
         "f8" | "i8" | "u8" => 8,
@@ -69,21 +50,14 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
         "i2" | "u2" | "f2" => 2,
         "i1" | "u1" | "b1" => 1,
         _ => {
-            return Err(fault(format!(
-                "an array of type {kind} holds no plain numbers; save it as float64"
-            )));
+            return Err(fault(format!("an array of type {kind} holds no plain numbers; save it as float64")));
         }
     };
     if kind.ends_with("f2") {
-        return Err(fault(
-            "half precision is not read; save the array as float32 or float64".into(),
-        ));
+        return Err(fault("half precision is not read; save the array as float32 or float64".into()));
     }
     let need = count.checked_mul(width).ok_or_else(cut)?;
-    let data = bytes
-        .get(end..)
-        .filter(|d| d.len() >= need)
-        .ok_or_else(cut)?;
+    let data = bytes.get(end..).filter(|d| d.len() >= need).ok_or_else(cut)?;
     let read = |b: &[u8]| {
         let mut w = [0u8; 8];
         for (i, v) in b.iter().enumerate() {
@@ -126,13 +100,9 @@ pub fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f64>), Fault> {
 pub fn write_npy<W: Write>(shape: [usize; 3], data: &[u8], out: &mut W) -> io::Result<()> {
     let [x, y, z] = shape;
     if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(data.len()) {
-        return Err(invalid(format!(
-            "an array of {x} × {y} × {z} does not have {} bytes",
-            data.len()
-        )));
+        return Err(invalid(format!("an array of {x} × {y} × {z} does not have {} bytes", data.len())));
     }
-    let mut header =
-        format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");
+    let mut header = format!("{{'descr': '|u1', 'fortran_order': True, 'shape': ({x}, {y}, {z}), }}");
     // Magic, version and length take ten bytes; the data begin at a multiple of 64.
     while (10 + header.len() + 1) % 64 != 0 {
         header.push(' ');
@@ -153,10 +123,7 @@ mod tests {
         let mut bytes = Vec::new();
         write_npy([2, 3, 1], &[1, 2, 3, 4, 5, 6], &mut bytes).unwrap();
         let (shape, values) = read_npy(&bytes).unwrap();
-        assert_eq!(
-            (shape, values),
-            (vec![2, 3, 1], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-        );
+        assert_eq!((shape, values), (vec![2, 3, 1], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
         for n in 0..bytes.len() {
             assert!(read_npy(&bytes[..n]).is_err());
         }
@@ -175,9 +142,7 @@ mod tests {
         assert_eq!(bytes.len(), 128 + 6);
         assert_eq!(bytes[8..10], 118u16.to_le_bytes());
         let header = String::from_utf8_lossy(&bytes[10..128]).to_string();
-        assert!(
-            header.starts_with("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3, 1), }")
-        );
+        assert!(header.starts_with("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3, 1), }"));
         assert!(header.ends_with(" \n"));
         assert!(write_npy([2, 3, 2], &[0; 6], &mut bytes).is_err());
         assert!(write_npy([usize::MAX, 3, 2], &[0; 6], &mut bytes).is_err());

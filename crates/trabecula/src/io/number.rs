@@ -70,10 +70,7 @@ pub fn push_f32(out: &mut Vec<u8>, v: f32) {
     }
     // Any decimal nearer than half the gap to the next number below is read as v.
     let reach = (a - f64::from(f32::from_bits(v.abs().to_bits() - 1))) * 0.4999;
-    let mut decimals = [1e6, 1e5, 1e4, 1e3, 1e2, 1e1, 1e0, 1e-1, 1e-2]
-        .iter()
-        .take_while(|p| a < **p)
-        .count();
+    let mut decimals = [1e6, 1e5, 1e4, 1e3, 1e2, 1e1, 1e0, 1e-1, 1e-2].iter().take_while(|p| a < **p).count();
     let mut n = 0;
     for _ in 0..3 {
         let power = POWERS[decimals] as f64;
@@ -137,17 +134,11 @@ mod tests {
         let mut seed = 1u64;
         let mut check = |v: f32| {
             let t = text(v);
-            assert_eq!(
-                t.parse::<f32>().unwrap().to_bits(),
-                (v + 0.0).to_bits(),
-                "{t}"
-            );
+            assert_eq!(t.parse::<f32>().unwrap().to_bits(), (v + 0.0).to_bits(), "{t}");
             assert!(t.len() <= 16, "{t}");
         };
         for _ in 0..400_000 {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             let any = f32::from_bits((seed >> 32) as u32);
             if any.is_finite() {
                 check(any);
@@ -157,9 +148,7 @@ mod tests {
         for e in -30..30 {
             let p = 2f32.powi(e);
             let ten = 10f32.powi(e);
-            [p, p.next_up(), p.next_down(), ten, ten.next_down()]
-                .into_iter()
-                .for_each(&mut check);
+            [p, p.next_up(), p.next_down(), ten, ten.next_down()].into_iter().for_each(&mut check);
         }
     }
 }

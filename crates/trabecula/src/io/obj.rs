@@ -14,15 +14,9 @@ use crate::mesh::Mesh;
 /// Writes OBJ; coordinates are the shortest decimal text that reads back to the same double.
 pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
     if mesh.vertices.len() >= u32::MAX as usize {
-        return Err(invalid(format!(
-            "OBJ holds at most {} vertices here",
-            u32::MAX - 1
-        )));
+        return Err(invalid(format!("OBJ holds at most {} vertices here", u32::MAX - 1)));
     }
-    for (key, text) in [
-        ("", meta.application.as_str()),
-        ("title ", meta.title.as_str()),
-    ] {
+    for (key, text) in [("", meta.application.as_str()), ("title ", meta.title.as_str())] {
         if !text.is_empty() {
             writeln!(out, "# {key}{}", text.replace(['\n', '\r', '\\'], " "))?;
         }
@@ -36,9 +30,7 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
         }
         text
     };
-    in_order(mesh.vertices.len(), 1 << 14, points, |text| {
-        out.write_all(&text)
-    })?;
+    in_order(mesh.vertices.len(), 1 << 14, points, |text| out.write_all(&text))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 28);
         for t in &mesh.triangles[r] {
@@ -51,9 +43,7 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
         }
         text
     };
-    in_order(mesh.triangles.len(), 1 << 14, faces, |text| {
-        out.write_all(&text)
-    })
+    in_order(mesh.triangles.len(), 1 << 14, faces, |text| out.write_all(&text))
 }
 
 /// Reads vertices and faces; everything else is passed over.
@@ -64,20 +54,14 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         let mut w = words(text);
         match w.next() {
             Some(b"v") => vertices.push(position(line, w)?),
-            Some(k)
-                if !k.starts_with(b"#")
-                    && !k.iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_') =>
-            {
+            Some(k) if !k.starts_with(b"#") && !k.iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_') => {
                 unknown.get_or_insert((line, k));
             }
             _ => {}
         }
     }
     if let Some((line, k)) = unknown {
-        return Err(at_line(
-            line,
-            format!("{} is not a keyword of OBJ: damaged or not OBJ", shown(k)),
-        ));
+        return Err(at_line(line, format!("{} is not a keyword of OBJ: damaged or not OBJ", shown(k))));
     }
     let mut joiner = Joiner::default();
     let (mut so_far, mut polygon) = (0i64, Vec::new());
@@ -93,25 +77,18 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
                         Some(n) if n < 0 => so_far + n,
                         Some(n) => n - 1,
                         None => {
-                            return Err(at_line(
-                                line,
-                                format!("{} is not a vertex index", shown(corner)),
-                            ));
+                            return Err(at_line(line, format!("{} is not a vertex index", shown(corner))));
                         }
                     };
                     if index < 0 || index >= vertices.len() as i64 {
                         let count = vertices.len();
-                        let message =
-                            format!("vertex {} does not exist: there are {count}", shown(corner));
+                        let message = format!("vertex {} does not exist: there are {count}", shown(corner));
                         return Err(at_line(line, message));
                     }
                     polygon.push(index as u32);
                 }
                 if polygon.len() < 3 {
-                    return Err(at_line(
-                        line,
-                        format!("a face of {} vertices: three are the least", polygon.len()),
-                    ));
+                    return Err(at_line(line, format!("a face of {} vertices: three are the least", polygon.len())));
                 }
                 joiner.fan(&vertices, &polygon)?;
             }
@@ -119,13 +96,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         }
     }
     if joiner.len() == 0 {
-        return Err(Fault::new(
-            "",
-            format!(
-                "{} vertices and no face: truncated or not OBJ",
-                vertices.len()
-            ),
-        ));
+        return Err(Fault::new("", format!("{} vertices and no face: truncated or not OBJ", vertices.len())));
     }
     Ok(joiner.finish())
 }
@@ -140,10 +111,7 @@ mod tests {
         let mut mesh = tetrahedron();
         mesh.vertices[3] = [1.0 / 3.0, -1e-300, 1e22];
         let mut bytes = Vec::new();
-        let meta = Metadata {
-            title: "two\nlines".into(),
-            ..Metadata::default()
-        };
+        let meta = Metadata { title: "two\nlines".into(), ..Metadata::default() };
         write(&mesh, &meta, &mut bytes).unwrap();
         let back = read(&bytes).unwrap();
         assert_eq!(back.volume(), mesh.volume());
@@ -161,19 +129,10 @@ mod tests {
 
     #[test]
     fn faces_must_use_vertices_that_exist() {
-        for (face, line) in [
-            ("f 1 2 4", 4),
-            ("f 0 1 2", 4),
-            ("f -4 1 2", 4),
-            ("f 1 2", 4),
-            ("f 1 2 x", 4),
-        ] {
+        for (face, line) in [("f 1 2 4", 4), ("f 0 1 2", 4), ("f -4 1 2", 4), ("f 1 2", 4), ("f 1 2 x", 4)] {
             let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{face}\n");
             let fault = read(text.as_bytes()).unwrap_err();
-            assert!(
-                fault.message.starts_with(&format!("line {line}: ")),
-                "{fault}"
-            );
+            assert!(fault.message.starts_with(&format!("line {line}: ")), "{fault}");
         }
     }
 }

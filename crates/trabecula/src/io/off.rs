@@ -17,66 +17,33 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     };
     let first = words(text).next().unwrap_or_default();
     if let Some(kind) = first.to_ascii_uppercase().strip_suffix(b"OFF") {
-        if !matches!(
-            kind,
-            b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN"
-        ) {
-            return Err(at_line(
-                line,
-                format!(
-                    "{} has four or more coordinates: give OFF in three",
-                    shown(first)
-                ),
-            ));
+        if !matches!(kind, b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN") {
+            return Err(at_line(line, format!("{} has four or more coordinates: give OFF in three", shown(first))));
         }
-        if words(text)
-            .nth(1)
-            .is_some_and(|w| w.eq_ignore_ascii_case(b"binary"))
-        {
+        if words(text).nth(1).is_some_and(|w| w.eq_ignore_ascii_case(b"binary")) {
             return Err(at_line(line, "binary OFF is not read: save it as text"));
         }
         if words(text).nth(1).is_some() {
-            let skip = text
-                .windows(first.len())
-                .position(|w| w == first)
-                .unwrap_or(0)
-                + first.len();
+            let skip = text.windows(first.len()).position(|w| w == first).unwrap_or(0) + first.len();
             text = &text[skip..];
         } else {
-            (line, text) = lines
-                .next()
-                .ok_or_else(|| at_line(line, "the counts are missing: truncated"))?;
+            (line, text) = lines.next().ok_or_else(|| at_line(line, "the counts are missing: truncated"))?;
         }
     }
     let counts: Vec<Option<usize>> = words(text).take(2).map(parse).collect();
     let [Some(vertex_count), Some(face_count)] = counts[..] else {
-        return Err(at_line(
-            line,
-            format!(
-                "{} is not the counts of vertices, faces and edges",
-                shown(text)
-            ),
-        ));
+        return Err(at_line(line, format!("{} is not the counts of vertices, faces and edges", shown(text))));
     };
     // The least a vertex and a face take: "0 0 0" and "3 0 0 0" with a line end, though the last may lack one.
-    let least = vertex_count
-        .saturating_mul(6)
-        .saturating_add(face_count.saturating_mul(2));
+    let least = vertex_count.saturating_mul(6).saturating_add(face_count.saturating_mul(2));
     if least > bytes.len() {
-        let found =
-            format!("{vertex_count} vertices and {face_count} faces take at least {least} bytes");
-        return Err(at_line(
-            line,
-            format!("{found}, but the file has {}: truncated", bytes.len()),
-        ));
+        let found = format!("{vertex_count} vertices and {face_count} faces take at least {least} bytes");
+        return Err(at_line(line, format!("{found}, but the file has {}: truncated", bytes.len())));
     }
     let mut vertices = Vec::with_capacity(vertex_count);
     for i in 0..vertex_count {
         let Some((line, text)) = lines.next() else {
-            return Err(Fault::new(
-                "",
-                format!("{vertex_count} vertices are named, the file ends after {i}"),
-            ));
+            return Err(Fault::new("", format!("{vertex_count} vertices are named, the file ends after {i}")));
         };
         vertices.push(position(line, words(text))?);
     }
@@ -84,18 +51,12 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut polygon = Vec::new();
     for i in 0..face_count {
         let Some((line, text)) = lines.next() else {
-            return Err(Fault::new(
-                "",
-                format!("{face_count} faces are named, the file ends after {i}"),
-            ));
+            return Err(Fault::new("", format!("{face_count} faces are named, the file ends after {i}")));
         };
         let mut w = words(text);
         let head = w.next().unwrap_or_default();
         let Some(n) = parse::<usize>(head) else {
-            return Err(at_line(
-                line,
-                format!("{} is not a number of corners", shown(head)),
-            ));
+            return Err(at_line(line, format!("{} is not a number of corners", shown(head))));
         };
         polygon.clear();
         for k in 0..n {
@@ -106,10 +67,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
                 Some(v) if (v as usize) < vertices.len() => polygon.push(v),
                 _ => {
                     let found = format!("{} is not a vertex", shown(word));
-                    return Err(at_line(
-                        line,
-                        format!("{found}: they run from 0 to {}", vertices.len().max(1) - 1),
-                    ));
+                    return Err(at_line(line, format!("{found}: they run from 0 to {}", vertices.len().max(1) - 1)));
                 }
             }
         }
@@ -137,10 +95,7 @@ mod tests {
     fn counts_beside_the_word_or_without_it() {
         let body = "3 1 3\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
         for head in ["OFF ", "off\n", "", "NOFF\n"] {
-            assert_eq!(
-                read(format!("{head}{body}").as_bytes()).unwrap().triangles,
-                [[0, 1, 2]]
-            );
+            assert_eq!(read(format!("{head}{body}").as_bytes()).unwrap().triangles, [[0, 1, 2]]);
         }
     }
 

@@ -39,24 +39,16 @@ fn cut() -> Fault {
 }
 
 fn pixels(size: [usize; 2]) -> Result<usize, Fault> {
-    let all = size[0]
-        .checked_mul(size[1])
-        .filter(|n| *n > 0 && *n <= MOST);
+    let all = size[0].checked_mul(size[1]).filter(|n| *n > 0 && *n <= MOST);
     all.ok_or_else(|| fault(format!("a picture of {} × {} pixels", size[0], size[1])))
 }
 
 /// What is packed, no more than `most` bytes of it.
 fn unpacked(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
     let mut out = Vec::new();
-    let read = ZlibDecoder::new(packed)
-        .take(most as u64)
-        .read_to_end(&mut out);
+    let read = ZlibDecoder::new(packed).take(most as u64).read_to_end(&mut out);
     read.map_err(|e| fault(format!("its pixels do not unpack: {e}")))?;
-    if out.len() < most {
-        Err(cut())
-    } else {
-        Ok(out)
-    }
+    if out.len() < most { Err(cut()) } else { Ok(out) }
 }
 
 /// The numbers of a row of samples of some bits, the highest first.
@@ -78,8 +70,7 @@ fn grey(row: &[f64], channels: usize) -> Result<Vec<f64>, Fault> {
     let each = row.chunks_exact(channels).map(|p| {
         let colours = &p[..channels - usize::from(channels.is_multiple_of(2))];
         let same = colours.iter().all(|v| *v == colours[0]);
-        same.then_some(p[0])
-            .ok_or_else(|| fault("a picture in colours; a grade needs grey ones"))
+        same.then_some(p[0]).ok_or_else(|| fault("a picture in colours; a grade needs grey ones"))
     });
     each.collect()
 }
@@ -89,10 +80,7 @@ fn png(bytes: &[u8]) -> Result<Picture, Fault> {
     loop {
         let head = bytes.get(at..at + 8).ok_or_else(cut)?;
         let long = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
-        let data = bytes
-            .get(at + 8..)
-            .and_then(|b| b.get(..long))
-            .ok_or_else(cut)?;
+        let data = bytes.get(at + 8..).and_then(|b| b.get(..long)).ok_or_else(cut)?;
         match &head[4..] {
             b"IHDR" => header = Some(data),
             b"IDAT" => packed.extend_from_slice(data),
@@ -110,9 +98,7 @@ fn png(bytes: &[u8]) -> Result<Picture, Fault> {
         4 => 2,
         6 => 4,
         _ => {
-            return Err(fault(
-                "a picture with a palette of colours; a grade needs grey ones",
-            ));
+            return Err(fault("a picture with a palette of colours; a grade needs grey ones"));
         }
     };
     if h[12] != 0 {
@@ -170,11 +156,7 @@ impl Tiff<'_> {
     fn number(&self, at: usize, long: usize) -> Result<usize, Fault> {
         let b = self.bytes.get(at..at + long).ok_or_else(cut)?;
         let next = |n: usize, b: &u8| n << 8 | usize::from(*b);
-        Ok(if self.little {
-            b.iter().rev().fold(0, next)
-        } else {
-            b.iter().fold(0, next)
-        })
+        Ok(if self.little { b.iter().rev().fold(0, next) } else { b.iter().fold(0, next) })
     }
 
     /// The numbers of an entry of a directory.
@@ -188,22 +170,13 @@ impl Tiff<'_> {
         if count > self.bytes.len() {
             return Err(cut());
         }
-        let from = if count * long <= 4 {
-            at + 8
-        } else {
-            self.number(at + 8, 4)?
-        };
-        (0..count)
-            .map(|i| self.number(from + i * long, long))
-            .collect()
+        let from = if count * long <= 4 { at + 8 } else { self.number(at + 8, 4)? };
+        (0..count).map(|i| self.number(from + i * long, long)).collect()
     }
 }
 
 fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
-    let file = Tiff {
-        bytes,
-        little: bytes[0] == b'I',
-    };
+    let file = Tiff { bytes, little: bytes[0] == b'I' };
     let (mut next, mut seen, mut out) = (file.number(4, 4)?, Vec::new(), Vec::new());
     while next != 0 {
         if seen.contains(&next) {
@@ -221,9 +194,7 @@ fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
             Ok(None)
         };
         let one = |wanted: usize, usual: usize| -> Result<usize, Fault> {
-            Ok(tag(wanted)?
-                .and_then(|v| v.first().copied())
-                .unwrap_or(usual))
+            Ok(tag(wanted)?.and_then(|v| v.first().copied()).unwrap_or(usual))
         };
         let size = [one(256, 0)?, one(257, 0)?];
         let all = pixels(size)?;
@@ -244,9 +215,7 @@ fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
             )));
         }
         if step != 1 && !(step == 2 && format < 3) {
-            return Err(fault(format!(
-                "a TIFF with predictor {step}; save it without one"
-            )));
+            return Err(fault(format!("a TIFF with predictor {step}; save it without one")));
         }
         let Some(starts) = tag(273)? else {
             return Err(fault("a TIFF in tiles; save it in strips"));
@@ -257,17 +226,12 @@ fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
         for (i, start) in starts.iter().enumerate() {
             let here = rows.min(size[1].saturating_sub(i * rows)) * wide;
             let long = lengths.get(i).copied().unwrap_or(here);
-            let packed = bytes
-                .get(*start..)
-                .and_then(|b| b.get(..long))
-                .ok_or_else(cut)?;
+            let packed = bytes.get(*start..).and_then(|b| b.get(..long)).ok_or_else(cut)?;
             let strip = match packing {
                 1 => packed.get(..here).ok_or_else(cut)?.to_vec(),
                 8 | 32946 => unpacked(packed, here)?,
                 other => {
-                    return Err(fault(format!(
-                        "a TIFF with compression {other}; save it without one, or deflated"
-                    )));
+                    return Err(fault(format!("a TIFF with compression {other}; save it without one, or deflated")));
                 }
             };
             for row in strip.chunks_exact(wide) {
@@ -280,11 +244,7 @@ fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
         out.push(Picture { size, values });
         next = file.number(next + 2 + 12 * count, 4)?;
     }
-    if out.is_empty() {
-        Err(fault("a TIFF without pictures"))
-    } else {
-        Ok(out)
-    }
+    if out.is_empty() { Err(fault("a TIFF without pictures")) } else { Ok(out) }
 }
 
 fn tiff_row(row: &[u8], bits: usize, format: usize, little: bool, steps: bool) -> Vec<f64> {
@@ -316,27 +276,13 @@ mod tests {
     use crate::render;
 
     /// A TIFF of pictures in one strip each, in either order of bytes.
-    fn tiff_of(
-        pictures: &[(usize, Vec<u8>)],
-        wide: usize,
-        format: usize,
-        little: bool,
-        packing: usize,
-    ) -> Vec<u8> {
+    fn tiff_of(pictures: &[(usize, Vec<u8>)], wide: usize, format: usize, little: bool, packing: usize) -> Vec<u8> {
         let put = |out: &mut Vec<u8>, v: usize, long: usize| {
             let b = (v as u32).to_be_bytes();
             let b = &b[4 - long..];
-            if little {
-                out.extend(b.iter().rev())
-            } else {
-                out.extend(b)
-            }
+            if little { out.extend(b.iter().rev()) } else { out.extend(b) }
         };
-        let mut out = if little {
-            b"II*\0".to_vec()
-        } else {
-            b"MM\0*".to_vec()
-        };
+        let mut out = if little { b"II*\0".to_vec() } else { b"MM\0*".to_vec() };
         let directory = 2 + 12 * 8 + 4;
         let mut at = 8;
         put(&mut out, at, 4);
@@ -345,8 +291,7 @@ mod tests {
             let data = match packing {
                 1 => data.clone(),
                 _ => {
-                    let mut z =
-                        flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+                    let mut z = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
                     std::io::Write::write_all(&mut z, data).expect("memory");
                     z.finish().expect("memory")
                 }
@@ -386,9 +331,7 @@ mod tests {
         let want: Vec<f64> = (0..37 * 23).map(|i| f64::from(level(i))).collect();
         assert_eq!(made, [Picture { size, values: want }]);
         let coloured: Vec<u8> = (0..37 * 23).flat_map(|i| [level(i), 0, 9]).collect();
-        let words = read_pictures(&render::png(&coloured, size))
-            .expect_err("colours")
-            .message;
+        let words = read_pictures(&render::png(&coloured, size)).expect_err("colours").message;
         assert!(words.contains("colours"), "{words}");
         for end in [3, 20, 60, bytes.len() - 13] {
             assert!(read_pictures(&bytes[..end]).is_err(), "{end}");
@@ -400,36 +343,20 @@ mod tests {
         for little in [true, false] {
             for packing in [1, 8] {
                 let short = |v: u16| {
-                    if little {
-                        v.to_le_bytes()
-                    } else {
-                        v.to_be_bytes()
-                    }
+                    if little { v.to_le_bytes() } else { v.to_be_bytes() }
                 };
                 let float = |v: f32| {
-                    if little {
-                        v.to_le_bytes()
-                    } else {
-                        v.to_be_bytes()
-                    }
+                    if little { v.to_le_bytes() } else { v.to_be_bytes() }
                 };
-                let eight = tiff_of(
-                    &[(8, vec![0, 1, 200, 255, 7, 9]), (8, vec![1; 6])],
-                    3,
-                    1,
-                    little,
-                    packing,
-                );
+                let eight = tiff_of(&[(8, vec![0, 1, 200, 255, 7, 9]), (8, vec![1; 6])], 3, 1, little, packing);
                 let made = read_pictures(&eight).expect("two");
                 assert_eq!(made[0].values, [0.0, 1.0, 200.0, 255.0, 7.0, 9.0]);
                 assert_eq!((made.len(), made[1].size), (2, [3, 2]));
                 let data: Vec<u8> = [1u16, 65535, 300, 0].into_iter().flat_map(short).collect();
-                let made =
-                    read_pictures(&tiff_of(&[(16, data)], 2, 1, little, packing)).expect("short");
+                let made = read_pictures(&tiff_of(&[(16, data)], 2, 1, little, packing)).expect("short");
                 assert_eq!(made[0].values, [1.0, 65535.0, 300.0, 0.0]);
                 let data: Vec<u8> = [0.5f32, -2.25].into_iter().flat_map(float).collect();
-                let made =
-                    read_pictures(&tiff_of(&[(32, data)], 1, 3, little, packing)).expect("float");
+                let made = read_pictures(&tiff_of(&[(32, data)], 1, 3, little, packing)).expect("float");
                 assert_eq!(made[0].values, [0.5, -2.25]);
                 for end in 4..eight.len() {
                     assert!(read_pictures(&eight[..end]).is_err(), "{end}");
@@ -441,12 +368,7 @@ mod tests {
         // The offset of the next picture is that of the first.
         let at = 8 + 2 + 12 * 8;
         ring[at] = 8;
-        assert!(
-            read_pictures(&ring)
-                .expect_err("ring")
-                .message
-                .contains("ring")
-        );
+        assert!(read_pictures(&ring).expect_err("ring").message.contains("ring"));
         assert!(read_pictures(b"GIF89a").is_err() && read_pictures(b"").is_err());
     }
 }

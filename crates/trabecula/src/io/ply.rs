@@ -15,10 +15,7 @@ use crate::mesh::Mesh;
 pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
     let (v, t) = (mesh.vertices.len(), mesh.triangles.len());
     if v > i32::MAX as usize {
-        return Err(invalid(format!(
-            "PLY holds at most {} vertices here, the mesh has {v}",
-            i32::MAX
-        )));
+        return Err(invalid(format!("PLY holds at most {} vertices here, the mesh has {v}", i32::MAX)));
     }
     write!(
         out,
@@ -116,17 +113,9 @@ fn header(bytes: &[u8]) -> Result<(Header, usize), Fault> {
         let text = &bytes[at..at + n];
         at += n + 1;
         let all: Vec<&[u8]> = words(text).collect();
-        let wrong = || {
-            at_line(
-                line,
-                format!("{} is not a line of a PLY header", shown(text)),
-            )
-        };
+        let wrong = || at_line(line, format!("{} is not a line of a PLY header", shown(text)));
         let count = |w| parse::<usize>(w).ok_or_else(wrong);
-        let kind = |w| {
-            Kind::named(w)
-                .ok_or_else(|| at_line(line, format!("unknown property type {}", shown(w))))
-        };
+        let kind = |w| Kind::named(w).ok_or_else(|| at_line(line, format!("unknown property type {}", shown(w))));
         match all.as_slice() {
             [b"ply"] if line == 1 => {}
             _ if line == 1 => break,
@@ -140,11 +129,7 @@ fn header(bytes: &[u8]) -> Result<(Header, usize), Fault> {
             }
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"element", name, n] => {
-                elements.push(Element {
-                    name: name.to_vec(),
-                    count: count(n)?,
-                    properties: Vec::new(),
-                });
+                elements.push(Element { name: name.to_vec(), count: count(n)?, properties: Vec::new() });
             }
             [b"property", rest @ ..] => {
                 let (list, k, name) = match rest {
@@ -153,25 +138,17 @@ fn header(bytes: &[u8]) -> Result<(Header, usize), Fault> {
                     _ => return Err(wrong()),
                 };
                 let element = elements.last_mut().ok_or_else(wrong)?;
-                element.properties.push(Property {
-                    name: name.to_vec(),
-                    list,
-                    kind: k,
-                });
+                element.properties.push(Property { name: name.to_vec(), list, kind: k });
             }
             [b"end_header"] => {
-                let encoding =
-                    encoding.ok_or_else(|| at_line(line, "the header names no format"))?;
+                let encoding = encoding.ok_or_else(|| at_line(line, "the header names no format"))?;
                 return Ok((Header { encoding, elements }, at));
             }
             _ => return Err(wrong()),
         }
     }
-    let what = if bytes.starts_with(b"ply") {
-        "the header has no end_header line"
-    } else {
-        "no \"ply\" in the first line"
-    };
+    let what =
+        if bytes.starts_with(b"ply") { "the header has no end_header line" } else { "no \"ply\" in the first line" };
     Err(Fault::new("", format!("{what}: truncated or not PLY")))
 }
 
@@ -184,38 +161,20 @@ struct Numbers<'a> {
 
 impl Numbers<'_> {
     fn next(&mut self, kind: Kind, what: &dyn Fn() -> String) -> Result<f64, Fault> {
-        let cut =
-            |at: usize| Fault::new("", format!("the file ends at byte {at}, within {}", what()));
+        let cut = |at: usize| Fault::new("", format!("the file ends at byte {at}, within {}", what()));
         if self.encoding == Encoding::Text {
             let rest = &self.bytes[self.at..];
-            let from = rest
-                .iter()
-                .position(|b| !b.is_ascii_whitespace())
-                .ok_or_else(|| cut(self.bytes.len()))?;
-            let len = rest[from..]
-                .iter()
-                .position(u8::is_ascii_whitespace)
-                .unwrap_or(rest.len() - from);
+            let from = rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or_else(|| cut(self.bytes.len()))?;
+            let len = rest[from..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - from);
             let word = &rest[from..from + len];
             self.at += from + len;
             return parse(word).ok_or_else(|| {
-                Fault::new(
-                    "",
-                    format!(
-                        "{} in {} (byte {}) is not a number",
-                        shown(word),
-                        what(),
-                        self.at - len
-                    ),
-                )
+                Fault::new("", format!("{} in {} (byte {}) is not a number", shown(word), what(), self.at - len))
             });
         }
         let mut b = [0; 8];
         let n = kind.size();
-        let from = self
-            .bytes
-            .get(self.at..self.at + n)
-            .ok_or_else(|| cut(self.bytes.len()))?;
+        let from = self.bytes.get(self.at..self.at + n).ok_or_else(|| cut(self.bytes.len()))?;
         self.at += n;
         b[..n].copy_from_slice(from);
         if self.encoding == Encoding::Big {
@@ -240,10 +199,7 @@ impl Numbers<'_> {
         if v >= 0.0 && v.fract() == 0.0 && v <= f64::from(u32::MAX) {
             Ok(v as usize)
         } else {
-            Err(Fault::new(
-                "",
-                format!("{v} in {} is not an index or count", what()),
-            ))
+            Err(Fault::new("", format!("{v} in {} is not an index or count", what())))
         }
     }
 
@@ -256,11 +212,7 @@ impl Numbers<'_> {
 /// Reads any PLY with vertices x, y, z and a face list `vertex_indices` or `vertex_index`.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let (header, at) = header(bytes)?;
-    let mut numbers = Numbers {
-        bytes,
-        at,
-        encoding: header.encoding,
-    };
+    let mut numbers = Numbers { bytes, at, encoding: header.encoding };
     let mut vertices: Vec<Vec3> = Vec::new();
     let mut faces: Vec<u32> = Vec::new(); // lists, each preceded by its length
     for element in &header.elements {
@@ -272,13 +224,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         let least: usize = element
             .properties
             .iter()
-            .map(|p| {
-                if header.encoding == Encoding::Text {
-                    2
-                } else {
-                    p.list.unwrap_or(p.kind).size()
-                }
-            })
+            .map(|p| if header.encoding == Encoding::Text { 2 } else { p.list.unwrap_or(p.kind).size() })
             .sum();
         if element.count.saturating_mul(least) > numbers.left() + 1 {
             return Err(Fault::new(
@@ -296,13 +242,8 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         let mut slots = [usize::MAX; 3];
         if is_vertex {
             for (slot, axis) in slots.iter_mut().zip(["x", "y", "z"]) {
-                let found = element
-                    .properties
-                    .iter()
-                    .position(|p| p.list.is_none() && p.name == axis.as_bytes());
-                *slot = found.ok_or_else(|| {
-                    Fault::new("", format!("the vertices have no property {axis}"))
-                })?;
+                let found = element.properties.iter().position(|p| p.list.is_none() && p.name == axis.as_bytes());
+                *slot = found.ok_or_else(|| Fault::new("", format!("the vertices have no property {axis}")))?;
             }
         }
         for i in 0..element.count {
@@ -313,18 +254,14 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
                     let v = numbers.next(property.kind, &what)?;
                     if let Some(a) = slots.iter().position(|s| *s == k) {
                         if !v.is_finite() {
-                            return Err(Fault::new(
-                                "",
-                                format!("{} has the coordinate {v}: not finite", what()),
-                            ));
+                            return Err(Fault::new("", format!("{} has the coordinate {v}: not finite", what())));
                         }
                         position[a] = v;
                     }
                     continue;
                 };
                 let n = numbers.whole(length, &what)?;
-                let corners =
-                    is_face && matches!(&*property.name, b"vertex_indices" | b"vertex_index");
+                let corners = is_face && matches!(&*property.name, b"vertex_indices" | b"vertex_index");
                 if corners {
                     faces.push(n as u32);
                 }
@@ -351,10 +288,7 @@ fn gather(vertices: &[Vec3], mut lists: &[u32]) -> Result<Mesh, Fault> {
         let (polygon, after) = rest.split_at(*n as usize);
         if let Some(v) = polygon.iter().find(|v| **v as usize >= vertices.len()) {
             let count = vertices.len();
-            return Err(Fault::new(
-                "",
-                format!("face {face} uses vertex {v}, but there are {count} (from 0)"),
-            ));
+            return Err(Fault::new("", format!("face {face} uses vertex {v}, but there are {count} (from 0)")));
         }
         joiner.fan(vertices, polygon)?;
         lists = after;
@@ -394,22 +328,18 @@ mod tests {
 
     #[test]
     fn big_endian() {
-        let mut bytes = b"ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\nproperty float y\nproperty \
+        let mut bytes =
+            b"ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\nproperty float y\nproperty \
                           char z\nelement face 1\nproperty list ushort short vertex_indices\nend_header\n"
-            .to_vec();
+                .to_vec();
         for (x, y, z) in [(0i16, 0f32, 0i8), (300, 0.0, -1), (0, 2.5, 0)] {
             bytes.extend(x.to_be_bytes());
             bytes.extend(y.to_be_bytes());
             bytes.push(z as u8);
         }
-        [3u16, 0, 1, 2]
-            .iter()
-            .for_each(|v| bytes.extend(v.to_be_bytes()));
+        [3u16, 0, 1, 2].iter().for_each(|v| bytes.extend(v.to_be_bytes()));
         let mesh = read(&bytes).unwrap();
-        assert_eq!(
-            mesh.vertices,
-            [[0.0; 3], [300.0, 0.0, -1.0], [0.0, 2.5, 0.0]]
-        );
+        assert_eq!(mesh.vertices, [[0.0; 3], [300.0, 0.0, -1.0], [0.0, 2.5, 0.0]]);
         refuses_damage("ply", &bytes, bytes.len());
     }
 
@@ -417,26 +347,13 @@ mod tests {
     fn wild_counts_and_indices_are_refused_before_memory_is_taken() {
         let head = "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float \
                     z\nend_header\n0 0 0\n";
-        assert!(
-            read(head.as_bytes())
-                .unwrap_err()
-                .message
-                .contains("4000000000 elements")
-        );
+        assert!(read(head.as_bytes()).unwrap_err().message.contains("4000000000 elements"));
         let mut bytes = Vec::new();
         write(&tetrahedron(), &mut bytes).unwrap();
         let n = bytes.len();
         bytes[n - 4..].copy_from_slice(&9i32.to_le_bytes());
-        assert_eq!(
-            read(&bytes).unwrap_err().message,
-            "face 3 uses vertex 9, but there are 4 (from 0)"
-        );
+        assert_eq!(read(&bytes).unwrap_err().message, "face 3 uses vertex 9, but there are 4 (from 0)");
         bytes[n - 4..].copy_from_slice(&(-1i32).to_le_bytes());
-        assert!(
-            read(&bytes)
-                .unwrap_err()
-                .message
-                .contains("-1 in face 3 of 4")
-        );
+        assert!(read(&bytes).unwrap_err().message.contains("-1 in face 3 of 4"));
     }
 }

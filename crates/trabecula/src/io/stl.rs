@@ -21,10 +21,7 @@ pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {
     let make = |range: std::ops::Range<usize>| {
         let mut bytes = Vec::with_capacity(range.len() * RECORD);
         for t in &mesh.triangles[range] {
-            push_record(
-                &mut bytes,
-                t.map(|v| mesh.vertices[v as usize].map(|x| x as f32)),
-            );
+            push_record(&mut bytes, t.map(|v| mesh.vertices[v as usize].map(|x| x as f32)));
         }
         bytes
     };
@@ -45,9 +42,7 @@ pub fn write_pieces<W: Write>(
     let make = |range: std::ops::Range<usize>| {
         let mut bytes = Vec::new();
         for piece in range {
-            each(piece, &mut |t| {
-                push_record(&mut bytes, t.map(|p| p.map(|x| x as f32)))
-            });
+            each(piece, &mut |t| push_record(&mut bytes, t.map(|p| p.map(|x| x as f32))));
         }
         bytes
     };
@@ -57,21 +52,13 @@ pub fn write_pieces<W: Write>(
 
 /// A number of triangles as STL writes it.
 fn counted(count: usize) -> io::Result<u32> {
-    u32::try_from(count).map_err(|_| {
-        invalid(format!(
-            "STL holds at most {} triangles, the mesh has {count}",
-            u32::MAX
-        ))
-    })
+    u32::try_from(count).map_err(|_| invalid(format!("STL holds at most {} triangles, the mesh has {count}", u32::MAX)))
 }
 
 /// The header of a binary STL of `count` triangles. (It must not begin with "solid".)
 pub(crate) fn header(count: u32) -> [u8; HEADER] {
     let mut header = [b' '; HEADER];
-    let title = concat!(
-        "Binary STL, lengths in mm, by trabecula ",
-        env!("CARGO_PKG_VERSION")
-    );
+    let title = concat!("Binary STL, lengths in mm, by trabecula ", env!("CARGO_PKG_VERSION"));
     header[..title.len()].copy_from_slice(title.as_bytes());
     header[80..].copy_from_slice(&count.to_le_bytes());
     header
@@ -81,31 +68,11 @@ pub(crate) fn header(count: u32) -> [u8; HEADER] {
 #[inline]
 pub(crate) fn push_record(out: &mut Vec<u8>, t: [[f32; 3]; 3]) {
     let [a, b, c] = t;
-    let (u, v) = (
-        [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
-        [c[0] - a[0], c[1] - a[1], c[2] - a[2]],
-    );
-    let n = [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ];
+    let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     let long = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
     let s = if long > 0.0 { 1.0 / long } else { 0.0 };
-    let floats = [
-        n[0] * s,
-        n[1] * s,
-        n[2] * s,
-        a[0],
-        a[1],
-        a[2],
-        b[0],
-        b[1],
-        b[2],
-        c[0],
-        c[1],
-        c[2],
-    ];
+    let floats = [n[0] * s, n[1] * s, n[2] * s, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
     let mut record = [0u8; RECORD];
     for (slot, v) in record.chunks_exact_mut(4).zip(floats) {
         slot.copy_from_slice(&v.to_le_bytes());
@@ -115,20 +82,13 @@ pub(crate) fn push_record(out: &mut Vec<u8>, t: [[f32; 3]; 3]) {
 
 /// Reads either kind. A file whose size fits the count it names is binary, whatever its first word.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let named = bytes
-        .get(80..HEADER)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let named = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let expected = named.map(|n| HEADER as u64 + u64::from(n) * RECORD as u64);
     if expected == Some(bytes.len() as u64) {
         return binary(&bytes[HEADER..]);
     }
-    let start = bytes
-        .iter()
-        .position(|b| !b.is_ascii_whitespace())
-        .unwrap_or(bytes.len());
-    let solid = bytes[start..]
-        .get(..5)
-        .is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    let start = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(bytes.len());
+    let solid = bytes[start..].get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
     // A text file has no zero byte; a binary one has several in its header or count.
     if solid && !bytes[..bytes.len().min(1024)].contains(&0) {
         return ascii(bytes);
@@ -140,10 +100,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
                 "the header names {n} triangles, which take {e} bytes, but the file has {}: truncated or not STL",
                 bytes.len()
             ),
-            _ => format!(
-                "{} bytes: a binary STL has at least 84, and an ASCII one begins with \"solid\"",
-                bytes.len()
-            ),
+            _ => format!("{} bytes: a binary STL has at least 84, and an ASCII one begins with \"solid\"", bytes.len()),
         },
     ))
 }
@@ -155,10 +112,7 @@ fn binary(records: &[u8]) -> Result<Mesh, Fault> {
         let corners = [12, 24, 36].map(|k| [at(k), at(k + 4), at(k + 8)].map(f64::from));
         if let Some(v) = corners.iter().flatten().find(|v| !v.is_finite()) {
             let byte = HEADER + i * RECORD;
-            return Err(Fault::new(
-                "",
-                format!("triangle {i} (byte {byte}) has the coordinate {v}: not finite"),
-            ));
+            return Err(Fault::new("", format!("triangle {i} (byte {byte}) has the coordinate {v}: not finite")));
         }
         joiner.triangle(corners)?;
     }
@@ -190,10 +144,7 @@ fn ascii(bytes: &[u8]) -> Result<Mesh, Fault> {
                     facet = true;
                     corners.clear();
                     // The normal is not read: the corners' order is what counts.
-                    while rest
-                        .peek()
-                        .is_some_and(|w| !w.eq_ignore_ascii_case(b"outer"))
-                    {
+                    while rest.peek().is_some_and(|w| !w.eq_ignore_ascii_case(b"outer")) {
                         rest.next();
                     }
                 }
@@ -202,28 +153,19 @@ fn ascii(bytes: &[u8]) -> Result<Mesh, Fault> {
                 (b"endfacet", true) if facet => {
                     let Ok(triangle) = <[_; 3]>::try_from(corners.as_slice()) else {
                         let n = corners.len();
-                        return Err(at_line(
-                            line,
-                            format!("a facet of {n} vertices: STL has three"),
-                        ));
+                        return Err(at_line(line, format!("a facet of {n} vertices: STL has three")));
                     };
                     joiner.triangle(triangle)?;
                     facet = false;
                 }
                 _ => {
-                    return Err(at_line(
-                        line,
-                        format!("{} is not expected here", shown(word)),
-                    ));
+                    return Err(at_line(line, format!("{} is not expected here", shown(word))));
                 }
             }
         }
     }
     match open {
-        Some(line) => Err(Fault::new(
-            "",
-            format!("the solid of line {line} has no endsolid: cut off at line {last}"),
-        )),
+        Some(line) => Err(Fault::new("", format!("the solid of line {line} has no endsolid: cut off at line {last}"))),
         None => Ok(joiner.finish()),
     }
 }
@@ -247,10 +189,7 @@ mod tests {
         assert_eq!(back.volume(), mesh.volume());
         assert_eq!((back.vertices.len(), back.triangles.len()), (4, 4));
         // The first triangle is (0, 2, 1) of the corner at the origin: it looks down.
-        assert_eq!(
-            bytes[HEADER..HEADER + 12],
-            [0.0f32, 0.0, -1.0].map(f32::to_le_bytes).concat()
-        );
+        assert_eq!(bytes[HEADER..HEADER + 12], [0.0f32, 0.0, -1.0].map(f32::to_le_bytes).concat());
         refuses_damage("stl", &bytes, bytes.len());
         // Binary even where the header says otherwise.
         bytes[..5].copy_from_slice(b"solid");
@@ -270,11 +209,6 @@ mod tests {
         let mut bytes = Vec::new();
         write(&tetrahedron(), &mut bytes).unwrap();
         bytes[HEADER + 62..HEADER + 66].copy_from_slice(&f32::NAN.to_le_bytes());
-        assert!(
-            read(&bytes)
-                .unwrap_err()
-                .message
-                .contains("triangle 1 (byte 134)")
-        );
+        assert!(read(&bytes).unwrap_err().message.contains("triangle 1 (byte 134)"));
     }
 }

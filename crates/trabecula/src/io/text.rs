@@ -11,10 +11,7 @@ pub struct Lines<'a> {
 impl<'a> Lines<'a> {
     /// The lines of `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Lines {
-            rest: bytes,
-            line: 0,
-        }
+        Lines { rest: bytes, line: 0 }
     }
 }
 
@@ -34,11 +31,7 @@ impl<'a> Iterator for Lines<'a> {
                 break (all.len(), all.len());
             };
             let end = from + n;
-            let after = if all[end..].starts_with(b"\r\n") {
-                end + 2
-            } else {
-                end + 1
-            };
+            let after = if all[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
             if end == 0 || all[end - 1] != b'\\' {
                 break (end, after);
             }
@@ -52,8 +45,7 @@ impl<'a> Iterator for Lines<'a> {
 
 /// The words of a line: what lies between spaces (and joining backslashes).
 pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(|b| b.is_ascii_whitespace() || *b == b'\\')
-        .filter(|w| !w.is_empty())
+    line.split(|b| b.is_ascii_whitespace() || *b == b'\\').filter(|w| !w.is_empty())
 }
 
 /// What was found, for a message: at most 24 characters of it.
@@ -79,10 +71,7 @@ pub fn parse<T: core::str::FromStr>(word: &[u8]) -> Option<T> {
 /// The next word as a finite number.
 pub fn coordinate(line: usize, word: Option<&[u8]>) -> Result<f64, Fault> {
     let Some(word) = word else {
-        return Err(at_line(
-            line,
-            "a coordinate is missing: expected three numbers",
-        ));
+        return Err(at_line(line, "a coordinate is missing: expected three numbers"));
     };
     match parse::<f64>(word) {
         Some(v) if v.is_finite() => Ok(v),
@@ -92,15 +81,8 @@ pub fn coordinate(line: usize, word: Option<&[u8]>) -> Result<f64, Fault> {
 }
 
 /// The next three words as a position.
-pub fn position<'a>(
-    line: usize,
-    mut words: impl Iterator<Item = &'a [u8]>,
-) -> Result<[f64; 3], Fault> {
-    Ok([
-        coordinate(line, words.next())?,
-        coordinate(line, words.next())?,
-        coordinate(line, words.next())?,
-    ])
+pub fn position<'a>(line: usize, mut words: impl Iterator<Item = &'a [u8]>) -> Result<[f64; 3], Fault> {
+    Ok([coordinate(line, words.next())?, coordinate(line, words.next())?, coordinate(line, words.next())?])
 }
 
 #[cfg(test)]
@@ -109,32 +91,16 @@ mod tests {
 
     #[test]
     fn lines_end_in_any_of_the_three_ways_and_join_by_backslash() {
-        let got: Vec<_> = Lines::new(b"a\r\nb\rc\n\nd \\\n e\nf")
-            .map(|(n, l)| (n, words(l).count(), l.len()))
-            .collect();
-        assert_eq!(
-            got,
-            [
-                (1, 1, 1),
-                (2, 1, 1),
-                (3, 1, 1),
-                (4, 0, 0),
-                (5, 2, 6),
-                (7, 1, 1)
-            ]
-        );
+        let got: Vec<_> =
+            Lines::new(b"a\r\nb\rc\n\nd \\\n e\nf").map(|(n, l)| (n, words(l).count(), l.len())).collect();
+        assert_eq!(got, [(1, 1, 1), (2, 1, 1), (3, 1, 1), (4, 0, 0), (5, 2, 6), (7, 1, 1)]);
     }
 
     #[test]
     fn numbers_must_be_finite() {
         assert_eq!(position(1, words(b"1 -2e1 .5")).unwrap(), [1.0, -20.0, 0.5]);
         for bad in [&b"1 2"[..], b"1 nan 3", b"1 2 1e999", b"1 2 x\xff"] {
-            assert!(
-                position(9, words(bad))
-                    .unwrap_err()
-                    .message
-                    .starts_with("line 9: ")
-            );
+            assert!(position(9, words(bad)).unwrap_err().message.starts_with("line 9: "));
         }
     }
 }

@@ -34,26 +34,16 @@ const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 /// The model is deflated in pieces on all threads; the pieces join to one stream, since each ends at a byte.
 pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
     if mesh.vertices.len() >= i32::MAX as usize || mesh.triangles.len() >= i32::MAX as usize {
-        return Err(invalid(format!(
-            "3MF counts to {}: the mesh has more vertices or triangles",
-            i32::MAX
-        )));
+        return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
     let mut model = zip::Entry::new(MODEL);
     let mut head = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\" \
          xmlns:trabecula=\"urn:trabecula:design\">\n"
     );
-    let facts = [
-        ("Title", &meta.title),
-        ("Application", &meta.application),
-        ("trabecula:Design", &meta.design),
-    ];
+    let facts = [("Title", &meta.title), ("Application", &meta.application), ("trabecula:Design", &meta.design)];
     for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
-        head.push_str(&format!(
-            "<metadata name=\"{name}\">{}</metadata>\n",
-            xml::escaped(text)
-        ));
+        head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", xml::escaped(text)));
     }
     head.push_str("<resources>\n<object id=\"1\" type=\"model\">\n<mesh>\n<vertices>\n");
     model.push(zip::deflate(head.as_bytes()));

@@ -14,9 +14,7 @@ pub fn write_vti<W: Write>(voxels: &Voxels, out: &mut W) -> io::Result<()> {
     let [x, y, z] = voxels.shape;
     let count = voxels.solid.len();
     if x.checked_mul(y).and_then(|n| n.checked_mul(z)) != Some(count) {
-        return Err(invalid(format!(
-            "a grid of {x} × {y} × {z} does not have {count} voxels"
-        )));
+        return Err(invalid(format!("a grid of {x} × {y} × {z} does not have {count} voxels")));
     }
     let ([ox, oy, oz], step) = (voxels.origin, voxels.step);
     write!(
@@ -44,34 +42,13 @@ mod tests {
 
     #[test]
     fn the_data_follow_their_length() {
-        let voxels = Voxels {
-            origin: [-1.0, 0.5, 0.0],
-            step: 0.25,
-            shape: [2, 1, 2],
-            solid: vec![1, 2, 3, 4],
-        };
+        let voxels = Voxels { origin: [-1.0, 0.5, 0.0], step: 0.25, shape: [2, 1, 2], solid: vec![1, 2, 3, 4] };
         let mut bytes = Vec::new();
         write_vti(&voxels, &mut bytes).unwrap();
-        let at = bytes
-            .windows(13)
-            .position(|w| w == b"\n_\x04\0\0\0\0\0\0\0\x01\x02\x03")
-            .unwrap();
+        let at = bytes.windows(13).position(|w| w == b"\n_\x04\0\0\0\0\0\0\0\x01\x02\x03").unwrap();
         assert_eq!(bytes[at + 13], 4);
         let head = String::from_utf8_lossy(&bytes[..at]).to_string();
-        assert!(
-            head.contains(
-                r#"WholeExtent="0 2 0 1 0 2" Origin="-1 0.5 0" Spacing="0.25 0.25 0.25""#
-            )
-        );
-        assert!(
-            write_vti(
-                &Voxels {
-                    solid: vec![0; 3],
-                    ..voxels
-                },
-                &mut bytes
-            )
-            .is_err()
-        );
+        assert!(head.contains(r#"WholeExtent="0 2 0 1 0 2" Origin="-1 0.5 0" Spacing="0.25 0.25 0.25""#));
+        assert!(write_vti(&Voxels { solid: vec![0; 3], ..voxels }, &mut bytes).is_err());
     }
 }

@@ -92,18 +92,12 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
     let appended = find(bytes, b"<AppendedData");
     // What comes after may be raw bytes and is no XML.
     let head = &bytes[..appended.unwrap_or(bytes.len())];
-    let mut layout = Layout {
-        big: false,
-        wide: false,
-        zlib: false,
-        appended: None,
-    };
+    let mut layout = Layout { big: false, wide: false, zlib: false, appended: None };
     if let Some(at) = appended {
         let rest = &bytes[at..];
         let end = find(rest, b">").ok_or_else(|| fault("the file ends early: truncated"))?;
         let base64 = attribute(&rest[13..end], "encoding").is_some_and(|e| &*e == b"base64");
-        let from =
-            find(&rest[end..], b"_").ok_or_else(|| fault("the appended data are missing"))?;
+        let from = find(&rest[end..], b"_").ok_or_else(|| fault("the appended data are missing"))?;
         layout.appended = Some((&rest[end + from + 1..], base64));
     }
     let mut scanner = Scanner::of(head, "VTK file");
@@ -111,20 +105,13 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
     let (mut kind, mut extent, mut origin, mut step) = (String::new(), None, [0.0; 3], [1.0; 3]);
     let (mut points, mut cells) = (0, 0);
     let (mut root, mut pieces) = (false, 0);
-    let text = |of: &[u8], name: &str| {
-        attribute(of, name).map(|v| String::from_utf8_lossy(&v).into_owned())
-    };
+    let text = |of: &[u8], name: &str| attribute(of, name).map(|v| String::from_utf8_lossy(&v).into_owned());
     let three = |of: &[u8], name: &str| -> Result<Option<Vec3>, Fault> {
         let Some(t) = text(of, name) else {
             return Ok(None);
         };
-        let v: Vec<f64> = t
-            .split_whitespace()
-            .filter_map(|w| w.parse().ok())
-            .collect();
-        v.try_into()
-            .map(Some)
-            .map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
+        let v: Vec<f64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+        v.try_into().map(Some).map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
     };
     loop {
         let event = match scanner.next() {
@@ -134,10 +121,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
             Err(_) if appended.is_some() => break,
             Err(e) => return Err(e),
         };
-        let Event::Start {
-            name, attributes, ..
-        } = event
-        else {
+        let Event::Start { name, attributes, .. } = event else {
             continue;
         };
         match name {
@@ -150,9 +134,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
                     None => false,
                     Some("vtkZLibDataCompressor") => true,
                     Some(other) => {
-                        return Err(fault(format!(
-                            "compressed by {other}; save it compressed by zlib or not at all"
-                        )));
+                        return Err(fault(format!("compressed by {other}; save it compressed by zlib or not at all")));
                     }
                 };
                 if kind != "ImageData" && kind != "UnstructuredGrid" {
@@ -165,19 +147,12 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
                 origin = three(attributes, "Origin")?.unwrap_or(origin);
                 step = three(attributes, "Spacing")?.unwrap_or(step);
                 let t = text(attributes, "WholeExtent").unwrap_or_default();
-                let v: Vec<i64> = t
-                    .split_whitespace()
-                    .filter_map(|w| w.parse().ok())
-                    .collect();
+                let v: Vec<i64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
                 extent = <[i64; 6]>::try_from(v).ok();
             }
             b"Piece" => {
                 pieces += 1;
-                let number = |n: &str| {
-                    text(attributes, n)
-                        .and_then(|t| t.parse().ok())
-                        .unwrap_or(0usize)
-                };
+                let number = |n: &str| text(attributes, n).and_then(|t| t.parse().ok()).unwrap_or(0usize);
                 (points, cells) = (number("NumberOfPoints"), number("NumberOfCells"));
             }
             b"PointData" | b"CellData" | b"Points" | b"Cells" => {
@@ -189,13 +164,9 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
                 raw.push(Raw {
                     name: text(attributes, "Name").unwrap_or_default(),
                     kind: text(attributes, "type").unwrap_or_default(),
-                    components: text(attributes, "NumberOfComponents")
-                        .and_then(|t| t.parse().ok())
-                        .unwrap_or(1),
+                    components: text(attributes, "NumberOfComponents").and_then(|t| t.parse().ok()).unwrap_or(1),
                     format: text(attributes, "format").unwrap_or_else(|| "ascii".into()),
-                    offset: text(attributes, "offset")
-                        .and_then(|t| t.parse().ok())
-                        .unwrap_or(0),
+                    offset: text(attributes, "offset").and_then(|t| t.parse().ok()).unwrap_or(0),
                     text: &head[from..end],
                     section: section.clone(),
                 });
@@ -204,9 +175,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
         }
     }
     if !root {
-        return Err(fault(
-            "no VTK file: it begins neither with \"# vtk\" nor has an element VTKFile",
-        ));
+        return Err(fault("no VTK file: it begins neither with \"# vtk\" nor has an element VTKFile"));
     }
     if pieces != 1 {
         return Err(fault(format!("a file of {pieces} pieces; save it as one")));
@@ -214,8 +183,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
     let mut arrays = Vec::new();
     let (mut place, mut connectivity, mut offsets, mut types) = (None, None, None, None);
     for r in &raw {
-        let values = decode(r, &layout)
-            .map_err(|f| fault(format!("array \"{}\": {}", r.name, f.message)))?;
+        let values = decode(r, &layout).map_err(|f| fault(format!("array \"{}\": {}", r.name, f.message)))?;
         match (r.section.as_str(), r.name.as_str()) {
             ("Points", _) => place = Some(values),
             ("Cells", "connectivity") => connectivity = Some(values),
@@ -232,15 +200,10 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
     }
     let shape = if kind == "ImageData" {
         let e = extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
-        let nodes =
-            core::array::from_fn(|a| (e[2 * a + 1] - e[2 * a] + 1).clamp(1, 1 << 40) as usize);
+        let nodes = core::array::from_fn(|a| (e[2 * a + 1] - e[2 * a] + 1).clamp(1, 1 << 40) as usize);
         points = nodes.iter().product();
         cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).product();
-        Shape::Image {
-            origin: core::array::from_fn(|a| origin[a] + e[2 * a] as f64 * step[a]),
-            step,
-            nodes,
-        }
+        Shape::Image { origin: core::array::from_fn(|a| origin[a] + e[2 * a] as f64 * step[a]), step, nodes }
     } else {
         let missing = |what: &str| fault(format!("the grid has no {what}"));
         let place = place.ok_or_else(|| missing("points"))?;
@@ -256,12 +219,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
                 types.len()
             )));
         }
-        Shape::Mesh(Elements::of_numbers(
-            &place,
-            &connectivity,
-            &offsets,
-            &types,
-        )?)
+        Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?)
     };
     check(&arrays, points, cells)?;
     Ok(Data { shape, arrays })
@@ -270,11 +228,7 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
 /// Refuses arrays that do not have a tuple for each point or cell.
 pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(), Fault> {
     for a in arrays {
-        let (count, what) = if a.of_cells {
-            (cells, "cells")
-        } else {
-            (points, "points")
-        };
+        let (count, what) = if a.of_cells { (cells, "cells") } else { (points, "points") };
         if count.checked_mul(a.components) != Some(a.values.len()) {
             return Err(fault(format!(
                 "array \"{}\" has {} numbers; {count} {what} of {} components need {}",
@@ -291,30 +245,16 @@ pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(),
 fn decode(r: &Raw, layout: &Layout) -> Result<Vec<f64>, Fault> {
     let bytes = match r.format.as_str() {
         "ascii" => {
-            let words = r
-                .text
-                .split(u8::is_ascii_whitespace)
-                .filter(|w| !w.is_empty());
+            let words = r.text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
             return words
-                .map(|w| {
-                    super::text::parse(w)
-                        .ok_or_else(|| fault(format!("{} is not a number", shown(w))))
-                })
+                .map(|w| super::text::parse(w).ok_or_else(|| fault(format!("{} is not a number", shown(w)))))
                 .collect();
         }
         "binary" => blocks(&unbase64(r.text, layout)?, layout)?,
         "appended" => {
-            let (all, base64) = layout
-                .appended
-                .ok_or_else(|| fault("the file has no appended data"))?;
-            let from = all
-                .get(r.offset..)
-                .ok_or_else(|| fault("its data begin after the end of the file"))?;
-            if base64 {
-                blocks(&unbase64(from, layout)?, layout)?
-            } else {
-                blocks(from, layout)?
-            }
+            let (all, base64) = layout.appended.ok_or_else(|| fault("the file has no appended data"))?;
+            let from = all.get(r.offset..).ok_or_else(|| fault("its data begin after the end of the file"))?;
+            if base64 { blocks(&unbase64(from, layout)?, layout)? } else { blocks(from, layout)? }
         }
         other => return Err(fault(format!("the format \"{other}\" is not known"))),
     };
@@ -368,15 +308,10 @@ fn blocks(bytes: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
         return Ok(bytes.get(width..end).ok_or_else(cut)?.to_vec());
     }
     let count = header(bytes, 0, layout)?;
-    let mut at = count
-        .checked_add(3)
-        .and_then(|n| n.checked_mul(width))
-        .ok_or_else(cut)?;
+    let mut at = count.checked_add(3).and_then(|n| n.checked_mul(width)).ok_or_else(cut)?;
     let mut out = Vec::new();
     for i in 0..count {
-        let end = at
-            .checked_add(header(bytes, 3 + i, layout)?)
-            .ok_or_else(cut)?;
+        let end = at.checked_add(header(bytes, 3 + i, layout)?).ok_or_else(cut)?;
         let block = bytes.get(at..end).ok_or_else(cut)?;
         flate2::read::ZlibDecoder::new(block)
             .read_to_end(&mut out)
@@ -443,9 +378,7 @@ mod tests {
     #[test]
     fn a_hexahedron_is_cut_into_its_whole_volume() {
         let data = read_vtk(HEX.as_bytes()).unwrap();
-        let Shape::Mesh(elements) = &data.shape else {
-            panic!("mesh")
-        };
+        let Shape::Mesh(elements) = &data.shape else { panic!("mesh") };
         let (points, (tets, of)) = (&elements.points, elements.tets());
         let volume: f64 = tets
             .iter()
@@ -456,32 +389,21 @@ mod tests {
             })
             .sum();
         assert!((volume - 1.0).abs() < 1e-15 && of.iter().all(|c| *c == 0));
-        assert_eq!(
-            data.arrays[0].values,
-            (0..8).map(f64::from).collect::<Vec<_>>()
-        );
-        assert_eq!(
-            (data.arrays[1].of_cells, data.arrays[1].components),
-            (true, 6)
-        );
+        assert_eq!(data.arrays[0].values, (0..8).map(f64::from).collect::<Vec<_>>());
+        assert_eq!((data.arrays[1].of_cells, data.arrays[1].components), (true, 6));
     }
 
     #[test]
     fn encodings_agree_and_damage_is_refused() {
         let base64 = |b: &[u8]| {
-            const D: &[u8; 64] =
-                b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+            const D: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
             let mut out = String::new();
             for c in b.chunks(3) {
                 let v = u32::from(c[0]) << 16
                     | u32::from(*c.get(1).unwrap_or(&0)) << 8
                     | u32::from(*c.get(2).unwrap_or(&0));
                 for i in 0..4 {
-                    out.push(if i <= c.len() {
-                        D[(v >> (18 - 6 * i) & 63) as usize] as char
-                    } else {
-                        '='
-                    });
+                    out.push(if i <= c.len() { D[(v >> (18 - 6 * i) & 63) as usize] as char } else { '=' });
                 }
             }
             out
@@ -492,40 +414,22 @@ mod tests {
             "format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>",
             &format!("format=\"binary\">{plain}</DataArray></PointData>"),
         );
-        assert_eq!(
-            read_vtk(inline.as_bytes()).unwrap(),
-            read_vtk(HEX.as_bytes()).unwrap()
-        );
+        assert_eq!(read_vtk(inline.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
         let mut packed = Vec::new();
-        flate2::read::ZlibEncoder::new(&values[..], flate2::Compression::default())
-            .read_to_end(&mut packed)
-            .unwrap();
-        let heads: Vec<u8> = [1u32, 32, 0, packed.len() as u32]
-            .iter()
-            .flat_map(|v| v.to_le_bytes())
-            .collect();
+        flate2::read::ZlibEncoder::new(&values[..], flate2::Compression::default()).read_to_end(&mut packed).unwrap();
+        let heads: Vec<u8> = [1u32, 32, 0, packed.len() as u32].iter().flat_map(|v| v.to_le_bytes()).collect();
         // Other arrays are ASCII still; the compressor is named for the file.
         let text = format!("{}{}", base64(&heads), base64(&packed));
-        let zlib = inline.replace(&plain, &text).replace(
-            "version=\"0.1\"",
-            "version=\"0.1\" compressor=\"vtkZLibDataCompressor\"",
-        );
-        assert_eq!(
-            read_vtk(zlib.as_bytes()).unwrap(),
-            read_vtk(HEX.as_bytes()).unwrap()
-        );
+        let zlib = inline
+            .replace(&plain, &text)
+            .replace("version=\"0.1\"", "version=\"0.1\" compressor=\"vtkZLibDataCompressor\"");
+        assert_eq!(read_vtk(zlib.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
         let raw = HEX.replace(
             "format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>",
             "format=\"appended\" offset=\"0\"/></PointData>",
         );
         let raw = raw.replace("</VTKFile>", "<AppendedData encoding=\"raw\">_");
-        let raw = [
-            raw.as_bytes(),
-            &32u32.to_le_bytes(),
-            &values,
-            b"</AppendedData></VTKFile>",
-        ]
-        .concat();
+        let raw = [raw.as_bytes(), &32u32.to_le_bytes(), &values, b"</AppendedData></VTKFile>"].concat();
         assert_eq!(read_vtk(&raw).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
         for bytes in [inline.as_bytes(), &raw] {
             for n in (0..bytes.len() - 40).step_by(7) {

@@ -10,17 +10,10 @@ use crate::tets::TetMesh;
 /// zones, where there are any, as `zone`.
 ///
 /// **Errors**: what `out` reports; `InvalidInput` if an array does not have a number for each tetrahedron.
-pub fn write_vtu<W: Write>(
-    mesh: &TetMesh,
-    arrays: &[(&str, Vec<f64>)],
-    out: &mut W,
-) -> io::Result<()> {
+pub fn write_vtu<W: Write>(mesh: &TetMesh, arrays: &[(&str, Vec<f64>)], out: &mut W) -> io::Result<()> {
     let (nodes, tets) = (mesh.nodes.len(), mesh.tets.len());
     if let Some((name, of)) = arrays.iter().find(|(_, of)| of.len() != tets) {
-        return Err(super::invalid(format!(
-            "array \"{name}\" has {} numbers for {tets} tetrahedra",
-            of.len()
-        )));
+        return Err(super::invalid(format!("array \"{name}\" has {} numbers for {tets} tetrahedra", of.len())));
     }
     let zones = (!mesh.zones.is_empty()).then_some(&mesh.zones);
     let mut at = 0;
@@ -60,25 +53,9 @@ pub fn write_vtu<W: Write>(
     if let Some(zones) = zones {
         block(zones.iter().flat_map(|v| v.to_le_bytes()).collect())?;
     }
-    block(
-        mesh.nodes
-            .iter()
-            .flatten()
-            .flat_map(|v| v.to_le_bytes())
-            .collect(),
-    )?;
-    block(
-        mesh.tets
-            .iter()
-            .flatten()
-            .flat_map(|v| v.to_le_bytes())
-            .collect(),
-    )?;
-    block(
-        (1..=tets as i64)
-            .flat_map(|i| (4 * i).to_le_bytes())
-            .collect(),
-    )?;
+    block(mesh.nodes.iter().flatten().flat_map(|v| v.to_le_bytes()).collect())?;
+    block(mesh.tets.iter().flatten().flat_map(|v| v.to_le_bytes()).collect())?;
+    block((1..=tets as i64).flat_map(|i| (4 * i).to_le_bytes()).collect())?;
     // 10 is VTK_TETRA.
     block(vec![10; tets])?;
     out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
@@ -93,32 +70,18 @@ mod tests {
     #[test]
     fn what_is_written_is_read_back() {
         let mesh = TetMesh {
-            nodes: vec![
-                [0.1, 0.0, -3.0],
-                [1.0, 0.0, 0.0],
-                [0.0, 1.0, 0.0],
-                [0.0, 0.0, 1.0],
-                [1.0; 3],
-            ],
+            nodes: vec![[0.1, 0.0, -3.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]],
             tets: vec![[0, 1, 2, 3], [1, 4, 2, 3]],
             zones: vec![7, 3],
         };
         let mut bytes = Vec::new();
         write_vtu(&mesh, &[("angle", vec![0.3, 1e-9])], &mut bytes).unwrap();
         let data = read_vtk(&bytes).unwrap();
-        let Shape::Mesh(elements) = &data.shape else {
-            panic!("mesh")
-        };
+        let Shape::Mesh(elements) = &data.shape else { panic!("mesh") };
         let (read, of) = elements.tet_mesh(false).unwrap();
-        assert_eq!(
-            (read.nodes, read.tets, of),
-            (mesh.nodes.clone(), mesh.tets.clone(), vec![0, 1])
-        );
+        assert_eq!((read.nodes, read.tets, of), (mesh.nodes.clone(), mesh.tets.clone(), vec![0, 1]));
         assert_eq!(data.arrays[0].values, [0.3, 1e-9]);
-        assert_eq!(
-            (data.arrays[1].name.as_str(), &data.arrays[1].values),
-            ("zone", &vec![7.0, 3.0])
-        );
+        assert_eq!((data.arrays[1].name.as_str(), &data.arrays[1].values), ("zone", &vec![7.0, 3.0]));
         assert!(write_vtu(&mesh, &[("angle", vec![0.3])], &mut bytes).is_err());
     }
 }

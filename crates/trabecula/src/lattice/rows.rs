@@ -29,11 +29,7 @@ impl<'a> Rows<'a> {
             (Some(_), None) => Rows::Points(lattice, *block),
             (None, None) => {
                 let row = || vec![0.0; block.axes[0].len()];
-                Rows::Phases(
-                    series,
-                    Box::new(lattice.map.rows(block)),
-                    [row(), row(), row()],
-                )
+                Rows::Phases(series, Box::new(lattice.map.rows(block)), [row(), row(), row()])
             }
         }
     }
@@ -58,10 +54,7 @@ impl<'a> Rows<'a> {
                 let [xs, ys, zs] = block.axes;
                 // Blocks wider than a word are wanted whole.
                 let here = |i: &usize| wanted == u64::MAX || wanted >> i & 1 == 1;
-                let points: Vec<Vec3> = (0..xs.len())
-                    .filter(here)
-                    .map(|i| [xs[i], ys[j], zs[k]])
-                    .collect();
+                let points: Vec<Vec3> = (0..xs.len()).filter(here).map(|i| [xs[i], ys[j], zs[k]]).collect();
                 let mut values = vec![0.0; points.len()];
                 lattice.cores(&points, &mut values);
                 for (i, v) in (0..xs.len()).filter(here).zip(values) {
@@ -117,32 +110,15 @@ impl RowWaves {
                 }
             }
             let scaled = |a: f64| (t.amplitude * turn(a).0, t.amplitude * turn(a).1);
-            along_y.push(
-                block.axes[1]
-                    .iter()
-                    .map(|y| scaled(k[1] * y + phase))
-                    .collect(),
-            );
+            along_y.push(block.axes[1].iter().map(|y| scaled(k[1] * y + phase)).collect());
             along_z.push(block.axes[2].iter().map(|z| turn(k[2] * z)).collect());
         }
         let along_x = numbers
             .iter()
-            .map(|n| {
-                block.axes[0]
-                    .iter()
-                    .map(|x| turn(n * x))
-                    .map(|(c, s)| (c as f32, s as f32))
-                    .unzip()
-            })
+            .map(|n| block.axes[0].iter().map(|x| turn(n * x)).map(|(c, s)| (c as f32, s as f32)).unzip())
             .collect();
         let rows = vec![vec![(0.0, 0.0); block.axes[1].len()]; groups.len()];
-        RowWaves {
-            along_x,
-            groups,
-            along_y,
-            along_z,
-            rows,
-        }
+        RowWaves { along_x, groups, along_y, along_z, rows }
     }
 
     /// Finds the complex amplitudes of the rows in layer k.

@@ -26,11 +26,7 @@ impl Spread {
         let n = values.len();
         let mean = values.iter().sum::<f64>() / n as f64;
         values.sort_by(f64::total_cmp);
-        Spread {
-            mean,
-            p95: values[(95 * (n - 1)).div_ceil(100)],
-            max: values[n - 1],
-        }
+        Spread { mean, p95: values[(95 * (n - 1)).div_ceil(100)], max: values[n - 1] }
     }
 }
 
@@ -98,19 +94,12 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
         crate::math::cross(relative[0], relative[1]),
     ];
     let least = density.abs() / spectral_norm(&cofactors);
-    let shear = [(0, 1), (0, 2), (1, 2)]
-        .map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs())
-        .into_iter()
-        .fold(0.0, f64::max);
+    let shear = [(0, 1), (0, 2), (1, 2)].map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs()).into_iter().fold(0.0, f64::max);
     Misfit {
         angle: core::array::from_fn(|i| angle(j[i], k[i])),
         spacing: core::array::from_fn(|i| norm(j[i]) / norm(k[i])),
         shear,
-        anisotropy: if least > 0.0 {
-            greatest / least
-        } else {
-            f64::INFINITY
-        },
+        anisotropy: if least > 0.0 { greatest / least } else { f64::INFINITY },
         density,
     }
 }
@@ -119,11 +108,7 @@ impl Distortion {
     /// All but the density. |curl Kᵢ| λᵢ² comes beside.
     pub(super) fn of(found: &[Misfit], curl: Vec<f64>, (turn, turn_at): (f64, Vec3)) -> Distortion {
         let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(found.iter().map(f).collect());
-        let outside = found
-            .iter()
-            .flat_map(|f| f.spacing)
-            .filter(|s| s.max(1.0 / s) > 1.5)
-            .count();
+        let outside = found.iter().flat_map(|f| f.spacing).filter(|s| s.max(1.0 / s) > 1.5).count();
         Distortion {
             angle: [0, 1, 2].map(|i| axis(&|f| f.angle[i])),
             spacing: [0, 1, 2].map(|i| Spread {
@@ -148,11 +133,7 @@ pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
     for k in k {
         let slope = |a: usize| {
             let lo = if at[a] > 0 { n - strides[a] } else { n };
-            let hi = if at[a] + 1 < grid.shape[a] {
-                n + strides[a]
-            } else {
-                n
-            };
+            let hi = if at[a] + 1 < grid.shape[a] { n + strides[a] } else { n };
             let span = (hi - lo) as f64 / strides[a] as f64 * grid.step[a];
             [0, 1, 2].map(|c| (k[hi][c] - k[lo][c]) / span)
         };
@@ -176,10 +157,7 @@ pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64
             if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
                 return (0.0, n);
             }
-            let pairs = frames[n]
-                .as_flattened()
-                .iter()
-                .zip(frames[m].as_flattened());
+            let pairs = frames[n].as_flattened().iter().zip(frames[m].as_flattened());
             let trace: f64 = pairs.map(|(a, b)| a * b).sum();
             let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
             (angle * share, n)
@@ -190,10 +168,7 @@ pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64
             Ordering::Equal if b.1 < a.1 => b,
             _ => a,
         };
-        let found = (0..grid.len())
-            .into_par_iter()
-            .map(angle)
-            .reduce(|| (0.0, usize::MAX), greater);
+        let found = (0..grid.len()).into_par_iter().map(angle).reduce(|| (0.0, usize::MAX), greater);
         if found.0 > most.0 {
             let (p, q) = (grid.node(found.1), grid.node(found.1 + apart * strides[a]));
             most = (found.0, Aabb::EMPTY.with(p).with(q).center());

@@ -7,8 +7,7 @@ use super::grid::Grid;
 use crate::fault::{Fault, number};
 use crate::grade::Grade;
 use crate::math::{
-    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose,
-    unit,
+    IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
 
 /// Which way a cell is turned at each place. A frame's columns are the directions of the cell's axes in space.
@@ -47,11 +46,7 @@ impl Orientation {
                     &mut along,
                     |_| 1.0,
                     |_, v, to| {
-                        if dot(*v, *to) < 0.0 {
-                            scale(*v, -1.0)
-                        } else {
-                            *v
-                        }
+                        if dot(*v, *to) < 0.0 { scale(*v, -1.0) } else { *v }
                     },
                 );
                 Ok(along.into_iter().map(turned_from_z).collect())
@@ -59,20 +54,15 @@ impl Orientation {
             Orientation::Frame { x, z } => squared(x, z, nodes),
             Orientation::Stress(of) => {
                 let values = columns(of, nodes, "stress")?;
-                let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) =
-                    values.iter().map(principal).unzip();
+                let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) = values.iter().map(principal).unzip();
                 let sure: Vec<f64> = gaps.iter().map(|g| g[0].min(g[1]).min(g[2])).collect();
                 if gaps.iter().all(|g| *g == [0.0; 3]) {
-                    let message = "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
+                    let message =
+                        "the stress is the same in all directions, or zero, everywhere: it has no principal directions";
                     return Err(Fault::new("stress", message));
                 }
                 let turns = cube();
-                comb(
-                    grid,
-                    &mut frames,
-                    |n| sure[n],
-                    |n, f, to| settled(f, &gaps[n], to, &turns),
-                );
+                comb(grid, &mut frames, |n| sure[n], |n, f, to| settled(f, &gaps[n], to, &turns));
                 Ok(frames)
             }
         }
@@ -97,9 +87,7 @@ impl Orientation {
             Orientation::Stress(of) => {
                 let (values, turns) = (columns(of, points, "stress")?, cube());
                 let frames = values.iter().map(principal).zip(like);
-                Ok(frames
-                    .map(|((f, gaps), l)| settled(&f, &gaps, l, &turns))
-                    .collect())
+                Ok(frames.map(|((f, gaps), l)| settled(&f, &gaps, l, &turns)).collect())
             }
         }
     }
@@ -107,18 +95,13 @@ impl Orientation {
 
 /// The frames of first and third axes.
 fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
-    let (x, z) = (
-        vectors(x, points, "frame.x")?,
-        vectors(z, points, "frame.z")?,
-    );
+    let (x, z) = (vectors(x, points, "frame.x")?, vectors(z, points, "frame.z")?);
     let both = x.into_iter().zip(z).enumerate();
     both.map(|(n, (x, z))| {
         let x = sub(x, scale(z, dot(x, z)));
         if norm(x) < 1e-6 {
-            let message = format!(
-                "the first and the third axis are parallel at {}; give two that differ",
-                place(points[n])
-            );
+            let message =
+                format!("the first and the third axis are parallel at {}; give two that differ", place(points[n]));
             return Err(Fault::new("frame.x", message));
         }
         let x = unit(x);
@@ -128,11 +111,7 @@ fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>,
 }
 
 /// Values of some grades at points, side by side.
-fn columns<const N: usize>(
-    of: &[Grade; N],
-    points: &[Vec3],
-    key: &str,
-) -> Result<Vec<[f64; N]>, Fault> {
+fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
     let mut out = vec![[0.0; N]; points.len()];
     let mut values = vec![0.0; points.len()];
     for (c, grade) in of.iter().enumerate() {
@@ -161,10 +140,7 @@ fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fau
         if norm(*v) < 1e-12 {
             return Err(Fault::new(
                 key,
-                format!(
-                    "the vector is zero at {}; it needs a direction all over the region's bounds",
-                    place(*p)
-                ),
+                format!("the vector is zero at {}; it needs a direction all over the region's bounds", place(*p)),
             ));
         }
         *v = unit(*v);
@@ -183,11 +159,7 @@ fn turned_from_z(d: Vec3) -> Mat3 {
         return [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
     }
     let s = 1.0 / (1.0 + z);
-    transpose(&[
-        [1.0 - x * x * s, -x * y * s, -x],
-        [-x * y * s, 1.0 - y * y * s, -y],
-        [x, y, z],
-    ])
+    transpose(&[[1.0 - x * x * s, -x * y * s, -x], [-x * y * s, 1.0 - y * y * s, -y], [x, y, z]])
 }
 
 /// A gap between principal values, over the greatest of them, below which they count as equal.
@@ -233,14 +205,7 @@ fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
 /// The 24 turns of a cube.
 fn cube() -> Vec<Mat3> {
     let mut all = Vec::new();
-    for p in [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ] {
+    for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         for signs in 0..8 {
             let mut m = [[0.0; 3]; 3];
             for a in 0..3 {
@@ -256,16 +221,9 @@ fn cube() -> Vec<Mat3> {
 
 /// Of the frames that differ from `f` by a turn of the cube, the one that is turned least from `to`.
 fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
-    let agree = |m: &Mat3| -> f64 {
-        m.as_flattened()
-            .iter()
-            .zip(to.as_flattened())
-            .map(|(a, b)| a * b)
-            .sum()
-    };
+    let agree = |m: &Mat3| -> f64 { m.as_flattened().iter().zip(to.as_flattened()).map(|(a, b)| a * b).sum() };
     let all = turns.iter().map(|t| product(f, t));
-    all.max_by(|a, b| agree(a).total_cmp(&agree(b)))
-        .unwrap_or(*f)
+    all.max_by(|a, b| agree(a).total_cmp(&agree(b))).unwrap_or(*f)
 }
 
 /// The frame at a node whose neighbour has the frame `to`: the principal one nearest to it, as far as there is one. Where
@@ -278,15 +236,9 @@ fn settled(f: &Mat3, gaps: &Vec3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
             let i = sure.iter().position(|s| *s).unwrap_or(0);
             let axis = [f[0][i], f[1][i], f[2][i]];
             let columns = transpose(to);
-            let near = columns
-                .iter()
-                .max_by(|a, b| dot(**a, axis).abs().total_cmp(&dot(**b, axis).abs()));
+            let near = columns.iter().max_by(|a, b| dot(**a, axis).abs().total_cmp(&dot(**b, axis).abs()));
             let from = *near.unwrap_or(&columns[0]);
-            let axis = if dot(from, axis) < 0.0 {
-                scale(axis, -1.0)
-            } else {
-                axis
-            };
+            let axis = if dot(from, axis) < 0.0 { scale(axis, -1.0) } else { axis };
             product(&least_turn(from, axis), to)
         }
         _ => *to,
@@ -343,16 +295,9 @@ fn comb<T: Copy + FirstOf>(
     let strides = grid.strides();
     let mut seen = vec![false; values.len()];
     let mut heap = BinaryHeap::new();
-    let start = (0..values.len())
-        .max_by(|&a, &b| sure(a).total_cmp(&sure(b)).then(b.cmp(&a)))
-        .unwrap_or(0);
+    let start = (0..values.len()).max_by(|&a, &b| sure(a).total_cmp(&sure(b)).then(b.cmp(&a))).unwrap_or(0);
     values[start] = agree(start, &values[start], &T::FIRST);
-    heap.push(Step {
-        sure: sure(start),
-        behind: sure(start),
-        node: start,
-        from: start,
-    });
+    heap.push(Step { sure: sure(start), behind: sure(start), node: start, from: start });
     while let Some(Step { node, from, .. }) = heap.pop() {
         if core::mem::replace(&mut seen[node], true) {
             continue;
@@ -363,12 +308,7 @@ fn comb<T: Copy + FirstOf>(
             let below = (at[a] > 0).then(|| node - strides[a]);
             let above = (at[a] + 1 < grid.shape[a]).then(|| node + strides[a]);
             for next in below.into_iter().chain(above).filter(|&n| !seen[n]) {
-                heap.push(Step {
-                    sure: sure(next),
-                    behind: sure(node),
-                    node: next,
-                    from: node,
-                });
+                heap.push(Step { sure: sure(next), behind: sure(node), node: next, from: node });
             }
         }
     }
@@ -396,22 +336,14 @@ mod tests {
     }
 
     fn grid() -> (Grid, Vec<Vec3>) {
-        let b = Aabb {
-            min: [1.0, 2.0, 3.0],
-            max: [5.0, 5.0, 6.0],
-        };
+        let b = Aabb { min: [1.0, 2.0, 3.0], max: [5.0, 5.0, 6.0] };
         let g = Grid::over(&b, [12, 9, 8]);
         let nodes = (0..g.len()).map(|n| g.node(n)).collect();
         (g, nodes)
     }
 
     fn angle(a: &Mat3, b: &Mat3) -> f64 {
-        let trace: f64 = a
-            .as_flattened()
-            .iter()
-            .zip(b.as_flattened())
-            .map(|(a, b)| a * b)
-            .sum();
+        let trace: f64 = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum();
         ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
     }
 
@@ -425,21 +357,13 @@ mod tests {
             let (f, d) = (frame(p), [p[0] - 3.05, 10.0, -8.0]);
             let m = product(
                 &f,
-                &product(
-                    &[
-                        [d[0], 0.0, 0.0],
-                        [0.0, 6.1 - p[0] - 3.05, 0.0],
-                        [0.0, 0.0, d[2]],
-                    ],
-                    &transpose(&f),
-                ),
+                &product(&[[d[0], 0.0, 0.0], [0.0, 6.1 - p[0] - 3.05, 0.0], [0.0, 0.0, d[2]]], &transpose(&f)),
             );
             [m[0][0], m[1][1], m[2][2], m[1][2], m[0][2], m[0][1]]
         };
         let turns = cube();
         assert_eq!(turns.len(), 24);
-        let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) =
-            nodes.iter().map(|p| principal(&tensor(*p))).unzip();
+        let (mut frames, gaps): (Vec<Mat3>, Vec<Vec3>) = nodes.iter().map(|p| principal(&tensor(*p))).unzip();
         comb(
             &g,
             &mut frames,
@@ -449,16 +373,8 @@ mod tests {
         let by = product(&transpose(&frame(nodes[0])), &frames[0]);
         for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
             // The eigenvectors' rounding over the gap; where values agree, the way to the next node that is sure.
-            let within = if gaps.iter().all(|g| *g > DOUBT) {
-                1e-3
-            } else {
-                15.0
-            };
-            assert!(
-                angle(f, &product(&frame(*p), &by)) < within,
-                "{} {within}",
-                angle(f, &product(&frame(*p), &by))
-            );
+            let within = if gaps.iter().all(|g| *g > DOUBT) { 1e-3 } else { 15.0 };
+            assert!(angle(f, &product(&frame(*p), &by)) < within, "{} {within}", angle(f, &product(&frame(*p), &by)));
             assert!((determinant(f) - 1.0).abs() < 1e-12);
         }
     }
@@ -474,9 +390,7 @@ mod tests {
             let tilt = if p[0] < 3.0 { 0.0 } else { 3.0 };
             let size = if p[0] > 4.6 { 0.0 } else { 10.0 };
             let e = unit(cross(n, [0.0, 0.0, 1.0]));
-            let m = |i: usize, j: usize| {
-                size * n[i] * n[j] + (if size > 0.0 { tilt } else { 0.0 }) * e[i] * e[j]
-            };
+            let m = |i: usize, j: usize| size * n[i] * n[j] + (if size > 0.0 { tilt } else { 0.0 }) * e[i] * e[j];
             [m(0, 0), m(1, 1), m(2, 2), m(1, 2), m(0, 2), m(0, 1)]
         };
         let component = |c: usize| {
@@ -488,34 +402,18 @@ mod tests {
                 remap: Vec::new(),
             }
         };
-        let frames = Orientation::Stress(core::array::from_fn(component))
-            .frames(&g, &nodes)
-            .expect("frames");
+        let frames = Orientation::Stress(core::array::from_fn(component)).frames(&g, &nodes).expect("frames");
         for (n, f) in frames.iter().enumerate() {
             assert!((determinant(f) - 1.0).abs() < 1e-9);
             if nodes[n][0] < 4.6 {
-                let most = (0..3)
-                    .map(|i| dot([f[0][i], f[1][i], f[2][i]], axis(nodes[n])).abs())
-                    .fold(0.0, f64::max);
+                let most = (0..3).map(|i| dot([f[0][i], f[1][i], f[2][i]], axis(nodes[n])).abs()).fold(0.0, f64::max);
                 assert!(most > 1.0 - 1e-9, "{most}");
             }
             for s in g.strides() {
-                if n >= s
-                    && g.index(n - s)
-                        .iter()
-                        .zip(g.index(n))
-                        .filter(|(a, b)| **a != *b)
-                        .count()
-                        == 1
-                {
+                if n >= s && g.index(n - s).iter().zip(g.index(n)).filter(|(a, b)| **a != *b).count() == 1 {
                     // The axis turns from node to node, and so does what the ways there make of the rest; another of the 24
                     // frames would be 45 degrees away or more.
-                    assert!(
-                        angle(f, &frames[n - s]) < 30.0,
-                        "{} {:?}",
-                        angle(f, &frames[n - s]),
-                        nodes[n]
-                    );
+                    assert!(angle(f, &frames[n - s]) < 30.0, "{} {:?}", angle(f, &frames[n - s]), nodes[n]);
                 }
             }
         }
@@ -525,33 +423,17 @@ mod tests {
     fn directions_are_lines_and_frames_are_orthonormal() {
         let (g, nodes) = grid();
         // The sign flips in the middle; lines do not care.
-        let of = [
-            formula("sin(x)*(y-3.3)"),
-            formula("0.5*(y-3.3)"),
-            formula("cos(x)*(y-3.3)"),
-        ];
-        let frames = Orientation::Direction(of)
-            .frames(&g, &nodes)
-            .expect("frames");
+        let of = [formula("sin(x)*(y-3.3)"), formula("0.5*(y-3.3)"), formula("cos(x)*(y-3.3)")];
+        let frames = Orientation::Direction(of).frames(&g, &nodes).expect("frames");
         for (n, f) in frames.iter().enumerate() {
             let want = unit([nodes[n][0].sin(), 0.5, nodes[n][0].cos()]);
             let z = apply(f, [0.0, 0.0, 1.0]);
             assert!((dot(z, want).abs() - 1.0).abs() < 1e-12);
-            assert!(
-                dot(
-                    z,
-                    apply(&frames[n - usize::from(n % 12 > 0)], [0.0, 0.0, 1.0])
-                ) > 0.5
-            );
+            assert!(dot(z, apply(&frames[n - usize::from(n % 12 > 0)], [0.0, 0.0, 1.0])) > 0.5);
             let ff = product(f, &transpose(f));
             assert!(angle(&ff, &IDENTITY) < 1e-5);
         }
         let zero = Orientation::Direction([formula("x-1"), formula("y-2"), formula("z-3")]);
-        assert!(
-            zero.frames(&g, &nodes)
-                .expect_err("zero")
-                .message
-                .contains("(1.0000, 2.0000, 3.0000)")
-        );
+        assert!(zero.frames(&g, &nodes).expect_err("zero").message.contains("(1.0000, 2.0000, 3.0000)"));
     }
 }

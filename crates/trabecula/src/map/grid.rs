@@ -14,11 +14,7 @@ impl Grid {
     /// A grid over the box with so many nodes along each axis (at least two).
     pub fn over(b: &Aabb, shape: [usize; 3]) -> Grid {
         let size = b.size();
-        Grid {
-            origin: b.min,
-            step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64),
-            shape,
-        }
+        Grid { origin: b.min, step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape }
     }
 
     pub fn len(&self) -> usize {
@@ -44,9 +40,7 @@ impl Grid {
     /// The weight of the trapezoid rule at node `n`: halved for each face of the box that it lies in.
     pub fn trapezoid(&self, n: usize) -> f64 {
         let at = self.index(n);
-        (0..3)
-            .filter(|&a| at[a] == 0 || at[a] + 1 == self.shape[a])
-            .fold(1.0, |w, _| 0.5 * w)
+        (0..3).filter(|&a| at[a] == 0 || at[a] + 1 == self.shape[a]).fold(1.0, |w, _| 0.5 * w)
     }
 
     /// The number (from 2·3·5-smooth lengths plus one, so that transforms are fast) at or above `n`.

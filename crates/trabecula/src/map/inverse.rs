@@ -81,9 +81,7 @@ pub(super) fn whole(v: f64) -> i32 {
 }
 
 pub(super) fn corners(b: &Aabb) -> [Vec3; 8] {
-    core::array::from_fn(|i| {
-        core::array::from_fn(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] })
-    })
+    core::array::from_fn(|i| core::array::from_fn(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] }))
 }
 
 /// Newton's method, no step longer than a wavelength.
@@ -117,9 +115,7 @@ fn seeds(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
     let mut u = vec![[0.0; 3]; count[0] + 1];
     for k in 0..=count[2] {
         for j in 0..=count[1] {
-            let row: Vec<Vec3> = (0..=count[0])
-                .map(|i| [at(i, 0), at(j, 1), at(k, 2)])
-                .collect();
+            let row: Vec<Vec3> = (0..=count[0]).map(|i| [at(i, 0), at(j, 1), at(k, 2)]).collect();
             map.phases(&row, &mut u);
             for (p, u) in row.iter().zip(&u) {
                 let off = norm(u.map(|v| v - v.floor() - 0.5));
@@ -150,10 +146,7 @@ mod tests {
 
     #[test]
     fn positions_have_the_phases_that_were_asked_for() {
-        let bounds = Aabb {
-            min: [-10.0; 3],
-            max: [10.0; 3],
-        };
+        let bounds = Aabb { min: [-10.0; 3], max: [10.0; 3] };
         let turn = Grade::Formula(Formula::parse("3*x").expect("formula"));
         let still = Grade::Constant(0.0);
         let wave = Grade::Constant(3.0);
@@ -175,16 +168,11 @@ mod tests {
             .expect("map")
         };
         let affine = Affine::spartan([2.0, 3.0, 4.0], [10.0, 20.0, 30.0], [0.5; 3]).expect("map");
-        for map in [
-            Map::Affine(affine),
-            Map::Phase(Arc::new(phase)),
-            Map::Round(round(false)),
-            Map::Round(round(true)),
-        ] {
+        for map in [Map::Affine(affine), Map::Phase(Arc::new(phase)), Map::Round(round(false)), Map::Round(round(true))]
+        {
             let cells = map.cells(&bounds);
             for i in 1..200 {
-                let p = [0.8191725, 0.6710436, 0.5497005]
-                    .map(|s| 18.0 * (s * f64::from(i)).fract() - 9.0);
+                let p = [0.8191725, 0.6710436, 0.5497005].map(|s| 18.0 * (s * f64::from(i)).fract() - 9.0);
                 let mut u = [[0.0; 3]];
                 map.phases(&[p], &mut u);
                 let home = map.canonical(u[0].map(whole));

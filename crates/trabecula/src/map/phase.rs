@@ -14,9 +14,7 @@ use super::tilt::Tilt;
 use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::{
-    Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
-};
+use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -94,8 +92,7 @@ impl Phase {
         check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
         let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| {
             let of = frames.iter().zip(&wavelength);
-            of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i]))
-                .collect()
+            of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
         });
         let close = closeness(&grid, &depth, wanted.weight.as_ref(), &nodes)?;
         let ratio = wanted.angle_weight;
@@ -119,13 +116,9 @@ impl Phase {
             })
             .collect();
         let keep = LOOKS as f64 / within.len().max(1) as f64;
-        let looked: Vec<usize> = (within.iter().copied())
-            .filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
-            .collect();
-        let jacobians: Vec<Mat3> = looked
-            .par_iter()
-            .map(|&n| spline.jacobian(nodes[n]).1)
-            .collect();
+        let looked: Vec<usize> =
+            (within.iter().copied()).filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep).collect();
+        let jacobians: Vec<Mat3> = looked.par_iter().map(|&n| spline.jacobian(nodes[n]).1).collect();
         let found: Vec<_> = (looked.par_iter().zip(&jacobians))
             .map(|(&n, j)| {
                 let wanted = [k[0][n], k[1][n], k[2][n]];
@@ -133,12 +126,8 @@ impl Phase {
             })
             .collect();
         let curl = (looked.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
-        let range = wavelength
-            .iter()
-            .flatten()
-            .fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| {
-                [a.min(*w), b.max(*w)]
-            });
+        let range =
+            wavelength.iter().flatten().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         let turn = distortion::turning(&grid, &frames, &inside, range[1]);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
@@ -157,20 +146,13 @@ impl Phase {
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = spline.jacobian(bounds.center()).1;
-        let extremes = [
-            (0..lengths.len()).min_by(by_length),
-            (0..lengths.len()).max_by(by_length),
-        ];
+        let extremes = [(0..lengths.len()).min_by(by_length), (0..lengths.len()).max_by(by_length)];
         Ok(Phase {
             spline,
             wanted: wanted.clone(),
             shift,
             wavelength: range,
-            mean: if within.is_empty() {
-                wavelength[0]
-            } else {
-                scale(average, 1.0 / within.len() as f64)
-            },
+            mean: if within.is_empty() { wavelength[0] } else { scale(average, 1.0 / within.len() as f64) },
             steepest,
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
@@ -258,23 +240,15 @@ fn grid(bounds: &Aabb, wanted: &Wanted, step: Option<f64>) -> Result<Grid, Fault
         (0..g.len()).map(|n| g.node(n)).collect()
     };
     let all = wavelengths(&wanted.wavelength, &coarse)?;
-    let least = all
-        .iter()
-        .flatten()
-        .fold(f64::INFINITY, |m: f64, w| m.min(*w));
-    let shape = |h: f64| {
-        size.map(|s| Grid::handy(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST)))
-    };
+    let least = all.iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
+    let shape = |h: f64| size.map(|s| Grid::handy(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST)));
     let count = |shape: [usize; 3]| shape.map(|n| n as f64).iter().product::<f64>();
     match step {
         Some(h) => {
             if !(h > 0.0 && h.is_finite()) {
                 return Err(Fault::new(
                     "step",
-                    format!(
-                        "{} mm; the spacing of the grid is a positive, finite length",
-                        number(h)
-                    ),
+                    format!("{} mm; the spacing of the grid is a positive, finite length", number(h)),
                 ));
             }
             let rough = size.iter().map(|s| s / h).product::<f64>();
@@ -356,10 +330,7 @@ fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Res
             middles.push(n);
         }
     }
-    let points: Vec<Vec3> = middles
-        .iter()
-        .map(|&n| add(grid.node(n), scale(grid.step, 0.5)))
-        .collect();
+    let points: Vec<Vec3> = middles.iter().map(|&n| add(grid.node(n), scale(grid.step, 0.5))).collect();
     let between = wavelengths(of, &points)?;
     for ((n, w), p) in middles.iter().zip(&between).zip(&points) {
         let far = n + strides.iter().sum::<usize>();
@@ -374,12 +345,7 @@ fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Res
 }
 
 /// The roots of the weights of nodes: how close they are to the region, and what is asked for. `None` if all are one.
-fn closeness(
-    grid: &Grid,
-    depth: &[f64],
-    weight: Option<&Grade>,
-    nodes: &[Vec3],
-) -> Result<Option<Vec<f64>>, Fault> {
+fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3]) -> Result<Option<Vec<f64>>, Fault> {
     let fall = FALL * grid.step.into_iter().fold(0.0, f64::max);
     let mut roots = vec![1.0; nodes.len()];
     if let Some(weight) = weight.filter(|w| w.constant().is_none()) {
@@ -403,26 +369,16 @@ fn closeness(
         return Ok(None);
     }
     let near = |d: &f64| (-d.max(0.0) / fall).exp();
-    let roots = roots
-        .iter()
-        .zip(depth)
-        .map(|(w, d)| (w * near(d)).max(FAINT));
+    let roots = roots.iter().zip(depth).map(|(w, d)| (w * near(d)).max(FAINT));
     Ok(Some(roots.collect()))
 }
 
 /// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
 /// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by s².
-fn integrate(
-    grid: &Grid,
-    k: &[Vec<Vec3>; 3],
-    s: Option<&[f64]>,
-    ratio: f64,
-) -> ([Vec<f64>; 3], Mat3, usize) {
+fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> ([Vec<f64>; 3], Mat3, usize) {
     let even = (ratio != 1.0 && s.is_none()).then(|| vec![1.0; grid.len()]);
     let s = s.or(even.as_deref());
-    let weights: Vec<f64> = (0..grid.len())
-        .map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n]))
-        .collect();
+    let weights: Vec<f64> = (0..grid.len()).map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n])).collect();
     let whole: f64 = weights.iter().sum();
     let poisson = Poisson::new(*grid);
     let solved: Vec<(Vec<f64>, Vec3, usize)> = k
@@ -430,10 +386,7 @@ fn integrate(
         .map(|k| {
             // From a first value on, so that a K that does not vary has exactly itself as its mean.
             let first = k[0];
-            let off = k
-                .iter()
-                .zip(&weights)
-                .fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
+            let off = k.iter().zip(&weights).fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
             let mean = add(first, scale(off, 1.0 / whole));
             let rest: Vec<Vec3> = k.iter().map(|k| sub(*k, mean)).collect();
             let (mut f, steps) = match s {
@@ -455,29 +408,18 @@ fn integrate(
     let mean = [solved[0].1, solved[1].1, solved[2].1];
     let steps = solved.iter().map(|s| s.2).max().unwrap_or(0);
     let mut values = solved.into_iter().map(|s| s.0);
-    (
-        core::array::from_fn(|_| values.next().unwrap_or_default()),
-        mean,
-        steps,
-    )
+    (core::array::from_fn(|_| values.next().unwrap_or_default()), mean, steps)
 }
 
 /// Refuses a map that turns inside out at a node or between nodes in the region.
-fn refuse_folds(
-    grid: &Grid,
-    spline: &Spline,
-    distortion: &Distortion,
-    inside: &[bool],
-) -> Result<(), Fault> {
+fn refuse_folds(grid: &Grid, spline: &Spline, distortion: &Distortion, inside: &[bool]) -> Result<(), Fault> {
     let at_node = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
     let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
     let far: usize = strides.iter().sum();
     let between = || {
         (0..grid.len())
             .into_par_iter()
-            .filter(|&n| {
-                (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far]
-            })
+            .filter(|&n| (0..3).all(|a| grid.index(n)[a] + 1 < grid.shape[a]) && inside[n] && inside[n + far])
             .map(|n| add(grid.node(n), half))
             .find_first(|p| determinant(&spline.jacobian(*p).1) <= 0.0)
     };

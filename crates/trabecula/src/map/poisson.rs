@@ -34,9 +34,7 @@ pub(super) struct Poisson {
 impl Poisson {
     pub fn new(grid: Grid) -> Poisson {
         let mut planner = FftPlannerScalar::new();
-        let plans = grid
-            .shape
-            .map(|n| planner.plan_fft(2 * (n - 1), FftDirection::Forward));
+        let plans = grid.shape.map(|n| planner.plan_fft(2 * (n - 1), FftDirection::Forward));
         let modes = core::array::from_fn(|a| {
             let n = grid.shape[a];
             let mode = |m: usize| {
@@ -57,12 +55,7 @@ impl Poisson {
 
     /// As `integrate`, the square of an edge counting as the product of `s` at its ends, and errors across K more or less than
     /// those along it, if there is a tilt. Also the number of steps taken, and the residual left, relative to the first.
-    pub fn integrate_weighted(
-        &self,
-        k: &[Vec3],
-        s: &[f64],
-        tilt: Option<&Tilt>,
-    ) -> (Vec<f64>, usize, f64) {
+    pub fn integrate_weighted(&self, k: &[Vec3], s: &[f64], tilt: Option<&Tilt>) -> (Vec<f64>, usize, f64) {
         let n = self.grid.len();
         let t: Vec<f64> = (0..n).map(|i| self.grid.trapezoid(i)).collect();
         let dot = |a: &[f64], b: &[f64]| -> f64 {
@@ -81,32 +74,20 @@ impl Poisson {
         let shift = potential.iter().map(|q| q.max(0.0)).sum::<f64>() / n as f64;
         let operator = |v: &[f64]| {
             let mut out = self.apply(v);
-            out.par_iter_mut()
-                .zip(v)
-                .zip(&potential)
-                .for_each(|((o, v), q)| *o += q * v);
+            out.par_iter_mut().zip(v).zip(&potential).for_each(|((o, v), q)| *o += q * v);
             if let Some(tilt) = tilt {
                 let phi: Vec<f64> = v.iter().zip(s).map(|(v, s)| v / s).collect();
                 let more = tilt.apply(&phi);
-                out.iter_mut()
-                    .zip(more.iter().zip(s))
-                    .for_each(|(o, (m, s))| *o += m / s);
+                out.iter_mut().zip(more.iter().zip(s)).for_each(|(o, (m, s))| *o += m / s);
             }
             out
         };
-        let mut v: Vec<f64> = self
-            .integrate(k)
-            .iter()
-            .zip(s)
-            .map(|(f, s)| f * s)
-            .collect();
+        let mut v: Vec<f64> = self.integrate(k).iter().zip(s).map(|(f, s)| f * s).collect();
         let mut r = operator(&v);
         let mut f = self.divergence(k, Some(s));
         if let Some(tilt) = tilt {
             let more = tilt.wanted(k);
-            f.iter_mut()
-                .zip(more.iter().zip(s))
-                .for_each(|(f, (m, s))| *f += m / s);
+            f.iter_mut().zip(more.iter().zip(s)).for_each(|(f, (m, s))| *f += m / s);
         }
         let scale = dot(&f, &f).sqrt();
         r.iter_mut().zip(&f).for_each(|(r, f)| *r = f - *r);
@@ -134,9 +115,7 @@ impl Poisson {
             r.iter_mut().zip(&q).for_each(|(r, q)| *r -= alpha * q);
             z = precondition(&r);
             let next = dot(&r, &z);
-            p.iter_mut()
-                .zip(&z)
-                .for_each(|(p, z)| *p = z + next / rz * *p);
+            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + next / rz * *p);
             rz = next;
             steps += 1;
             left = dot(&r, &r).sqrt() / first;
@@ -156,16 +135,8 @@ impl Poisson {
                 let n = row * nx + i;
                 for a in 0..3 {
                     let (c, last) = (if a == 0 { i } else { at[a] }, g.shape[a] - 1);
-                    let below = if c == 0 {
-                        n + strides[a]
-                    } else {
-                        n - strides[a]
-                    };
-                    let above = if c == last {
-                        n - strides[a]
-                    } else {
-                        n + strides[a]
-                    };
+                    let below = if c == 0 { n + strides[a] } else { n - strides[a] };
+                    let above = if c == last { n - strides[a] } else { n + strides[a] };
                     *o += over[a] * (2.0 * v[n] - v[below] - v[above]);
                 }
             }
@@ -183,9 +154,7 @@ impl Poisson {
                 let at = g.index(n);
                 let mut sum = 0.0;
                 for a in 0..3 {
-                    let edge = |m: usize| {
-                        s.map_or(1.0, |s| s[m]) * (k[n][a] + k[m][a]) / (2.0 * g.step[a])
-                    };
+                    let edge = |m: usize| s.map_or(1.0, |s| s[m]) * (k[n][a] + k[m][a]) / (2.0 * g.step[a]);
                     sum += match at[a] {
                         0 => -2.0 * edge(n + strides[a]),
                         c if c + 1 == g.shape[a] => 2.0 * edge(n - strides[a]),
@@ -253,17 +222,15 @@ fn pair(plan: &dyn Fft<f64>, n: usize, lines: &mut [f64], work: &mut [Complex64]
 fn turn(from: &[f64], to: &mut [f64], n: usize) {
     const SLAB: usize = 8;
     let rows = from.len() / n;
-    to.par_chunks_mut(SLAB * rows)
-        .enumerate()
-        .for_each(|(slab, to)| {
-            let width = to.len() / rows;
-            for (r, line) in from.chunks_exact(n).enumerate() {
-                let piece = &line[slab * SLAB..slab * SLAB + width];
-                for (i, v) in piece.iter().enumerate() {
-                    to[i * rows + r] = *v;
-                }
+    to.par_chunks_mut(SLAB * rows).enumerate().for_each(|(slab, to)| {
+        let width = to.len() / rows;
+        for (r, line) in from.chunks_exact(n).enumerate() {
+            let piece = &line[slab * SLAB..slab * SLAB + width];
+            for (i, v) in piece.iter().enumerate() {
+                to[i * rows + r] = *v;
             }
-        });
+        }
+    });
 }
 
 #[cfg(test)]
@@ -274,18 +241,13 @@ mod tests {
     fn noise(seed: u64) -> impl FnMut() -> f64 {
         let mut s = seed;
         move || {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         }
     }
 
     fn grid(shape: [usize; 3], size: Vec3) -> Grid {
-        let b = Aabb {
-            min: [-1.0, 0.5, 2.0],
-            max: core::array::from_fn(|a| [-1.0, 0.5, 2.0][a] + size[a]),
-        };
+        let b = Aabb { min: [-1.0, 0.5, 2.0], max: core::array::from_fn(|a| [-1.0, 0.5, 2.0][a] + size[a]) };
         Grid::over(&b, shape)
     }
 
@@ -299,9 +261,7 @@ mod tests {
     fn the_iteration_of_the_paper_ends_where_the_direct_solution_is() {
         let g = grid([9, 11, 8], [2.0, 3.0, 1.4]);
         let mut random = noise(3);
-        let k: Vec<Vec3> = (0..g.len())
-            .map(|_| [random(), random(), random()])
-            .collect();
+        let k: Vec<Vec3> = (0..g.len()).map(|_| [random(), random(), random()]).collect();
         let direct = Poisson::new(g).integrate(&k);
         let strides = g.strides();
         let weight = g.step.map(|h| 1.0 / (h * h));
@@ -313,12 +273,8 @@ mod tests {
                         let (h, s) = (g.step[a], strides[a]);
                         match at[a] {
                             0 => f[n + s] - h / 2.0 * (k[n + s][a] + k[n][a]),
-                            c if c + 1 == g.shape[a] => {
-                                f[n - s] + h / 2.0 * (k[n][a] + k[n - s][a])
-                            }
-                            _ => {
-                                (f[n - s] + f[n + s]) / 2.0 - h / 4.0 * (k[n + s][a] - k[n - s][a])
-                            }
+                            c if c + 1 == g.shape[a] => f[n - s] + h / 2.0 * (k[n][a] + k[n - s][a]),
+                            _ => (f[n - s] + f[n + s]) / 2.0 - h / 4.0 * (k[n + s][a] - k[n - s][a]),
                         }
                     };
                     (0..3).map(|a| weight[a] * each(a)).sum::<f64>() / weight.iter().sum::<f64>()
@@ -331,13 +287,10 @@ mod tests {
         for _ in 0..6000 {
             // Half way: the plain iteration leaves the checkerboard for ever.
             let next = sweep(&f);
-            f.iter_mut()
-                .zip(&next)
-                .for_each(|(f, n)| *f = 0.5 * (*f + n));
+            f.iter_mut().zip(&next).for_each(|(f, n)| *f = 0.5 * (*f + n));
         }
         let weights: Vec<f64> = (0..g.len()).map(|n| g.trapezoid(n)).collect();
-        let mean =
-            f.iter().zip(&weights).map(|(f, w)| f * w).sum::<f64>() / weights.iter().sum::<f64>();
+        let mean = f.iter().zip(&weights).map(|(f, w)| f * w).sum::<f64>() / weights.iter().sum::<f64>();
         f.iter_mut().for_each(|f| *f -= mean);
         assert!(largest(&f, &direct) < 1e-10, "{}", largest(&f, &direct));
     }
@@ -365,11 +318,7 @@ mod tests {
             let once = start.elapsed().as_secs_f64();
             // Half the squares of the steps times the right-hand side, and the mean of the six neighbours.
             let h = g.step[0];
-            let right: Vec<f64> = direct
-                .divergence(&k, None)
-                .iter()
-                .map(|v| v * h * h / 6.0)
-                .collect();
+            let right: Vec<f64> = direct.divergence(&k, None).iter().map(|v| v * h * h / 6.0).collect();
             let strides = g.strides();
             let sweep = |f: &[f64], out: &mut [f64]| {
                 out.par_chunks_mut(n).enumerate().for_each(|(row, out)| {
@@ -402,17 +351,12 @@ mod tests {
                 let off = |i: usize| f[i] - exact[i];
                 let mean = (0..f.len()).map(|i| off(i) * g.trapezoid(i)).sum::<f64>()
                     / (0..f.len()).map(|i| g.trapezoid(i)).sum::<f64>();
-                let worst = (0..f.len())
-                    .map(|i| (off(i) - mean).abs())
-                    .fold(0.0, f64::max);
+                let worst = (0..f.len()).map(|i| (off(i) - mean).abs()).fold(0.0, f64::max);
                 if worst * core::f64::consts::TAU < 0.01 {
                     break;
                 }
             }
-            println!(
-                "{n}³: direct {once:.4} s, {sweeps} sweeps {spent:.3} s, ratio {:.0}",
-                spent / once
-            );
+            println!("{n}³: direct {once:.4} s, {sweeps} sweeps {spent:.3} s, ratio {:.0}", spent / once);
         }
     }
 
@@ -440,12 +384,8 @@ mod tests {
         let g = grid([14, 12, 11], [2.0, 3.0, 1.4]);
         let p = Poisson::new(g);
         let mut random = noise(5);
-        let k: Vec<Vec3> = (0..g.len())
-            .map(|_| [random(), random(), random()])
-            .collect();
-        let s: Vec<f64> = (0..g.len())
-            .map(|n| (-2.0 * (g.node(n)[0].abs() - 0.3).max(0.0)).exp().max(1e-3))
-            .collect();
+        let k: Vec<Vec3> = (0..g.len()).map(|_| [random(), random(), random()]).collect();
+        let s: Vec<f64> = (0..g.len()).map(|n| (-2.0 * (g.node(n)[0].abs() - 0.3).max(0.0)).exp().max(1e-3)).collect();
         let (f, steps, left) = p.integrate_weighted(&k, &s, None);
         assert!(left < RESIDUAL && steps < 60, "{steps} steps, {left}");
         let strides = g.strides();
@@ -487,9 +427,7 @@ mod tests {
         let g = grid([11, 9, 8], [2.0, 3.0, 1.4]);
         let p = Poisson::new(g);
         let mut random = noise(9);
-        let k: Vec<Vec3> = (0..g.len())
-            .map(|_| [2.0 + random(), random(), random()])
-            .collect();
+        let k: Vec<Vec3> = (0..g.len()).map(|_| [2.0 + random(), random(), random()]).collect();
         let even = vec![1.0; g.len()];
         for ratio in [0.1, 10.0] {
             let tilt = Tilt::new(g, &k, ratio, &even).expect("tilted");
@@ -511,12 +449,10 @@ mod tests {
                     if (0..3).any(|a| at[a] + 1 == g.shape[a]) {
                         continue;
                     }
-                    let corner =
-                        |i: usize| n + (0..3).map(|a| (i >> a & 1) * strides[a]).sum::<usize>();
+                    let corner = |i: usize| n + (0..3).map(|a| (i >> a & 1) * strides[a]).sum::<usize>();
                     let mean = |a: usize| (0..8).map(|i| k[corner(i)][a]).sum::<f64>() / 8.0;
                     let slope = |a: usize| {
-                        let ends = (0..8)
-                            .map(|i| f[corner(i)] * if i >> a & 1 == 1 { 0.25 } else { -0.25 });
+                        let ends = (0..8).map(|i| f[corner(i)] * if i >> a & 1 == 1 { 0.25 } else { -0.25 });
                         ends.sum::<f64>() / g.step[a]
                     };
                     let want = [0, 1, 2].map(mean);
@@ -524,11 +460,7 @@ mod tests {
                     let long = want.iter().map(|v| v * v).sum::<f64>();
                     let along = (0..3).map(|a| want[a] * miss[a]).sum::<f64>().powi(2) / long;
                     let all: f64 = miss.iter().map(|m| m * m).sum();
-                    sum += if ratio > 1.0 {
-                        (ratio - 1.0) * (all - along)
-                    } else {
-                        (1.0 / ratio - 1.0) * along
-                    };
+                    sum += if ratio > 1.0 { (ratio - 1.0) * (all - along) } else { (1.0 / ratio - 1.0) * along };
                 }
                 sum
             };

@@ -41,20 +41,11 @@ impl Round {
     ///
     /// # Errors
     /// As `cylinder`; an odd number of cells.
-    pub fn sphere(
-        center: Vec3,
-        axis: Vec3,
-        wavelength: f64,
-        around: f64,
-        radii: [f64; 3],
-    ) -> Result<Round, Fault> {
+    pub fn sphere(center: Vec3, axis: Vec3, wavelength: f64, around: f64, radii: [f64; 3]) -> Result<Round, Fault> {
         if around % 2.0 != 0.0 && around.fract() == 0.0 {
             return Err(Fault::new(
                 "around",
-                format!(
-                    "{} cells around; half as many lie between the poles, so give an even number",
-                    number(around)
-                ),
+                format!("{} cells around; half as many lie between the poles, so give an even number", number(around)),
             ));
         }
         Round::new(center, axis, [wavelength; 2], around, radii, true)
@@ -72,10 +63,7 @@ impl Round {
             if !(w > 0.0 && w.is_finite()) {
                 return Err(Fault::new(
                     "wavelength",
-                    format!(
-                        "{} mm; a wavelength is a positive, finite length",
-                        number(w)
-                    ),
+                    format!("{} mm; a wavelength is a positive, finite length", number(w)),
                 ));
             }
         }
@@ -91,27 +79,16 @@ impl Round {
         if center.iter().chain(&axis).any(|v| !v.is_finite()) || norm(axis) == 0.0 {
             return Err(Fault::new(
                 "axis",
-                format!(
-                    "found {axis:?} through {center:?}; give finite numbers, and a direction that is not zero"
-                ),
+                format!("found {axis:?} through {center:?}; give finite numbers, and a direction that is not zero"),
             ));
         }
         let n = unit(axis);
         // Along z the directions across are x and y.
-        let least = (0..3)
-            .min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs()))
-            .unwrap_or(0);
+        let least = (0..3).min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
         let mut e = [0.0; 3];
         e[least] = 1.0;
         let x = unit(sub(e, scale(n, dot(e, n))));
-        Ok(Round {
-            center,
-            frame: [x, cross(n, x), n],
-            wavelength,
-            around,
-            sphere,
-            radii,
-        })
+        Ok(Round { center, frame: [x, cross(n, x), n], wavelength, around, sphere, radii })
     }
 
     /// Coordinates across and along the axis, and the distance from it.
@@ -127,11 +104,7 @@ impl Round {
         let turn = |a: f64| self.around * a / core::f64::consts::TAU;
         let round = turn(l[1].atan2(l[0]));
         if self.sphere {
-            [
-                r.hypot(l[2]) / self.wavelength[0],
-                round,
-                turn(r.atan2(l[2])),
-            ]
+            [r.hypot(l[2]) / self.wavelength[0], round, turn(r.atan2(l[2]))]
         } else {
             [r / self.wavelength[0], round, l[2] / self.wavelength[1]]
         }
@@ -159,27 +132,18 @@ impl Round {
     /// Least and greatest cell along each phase that may have a part in the box, neighbours included.
     pub(super) fn cells(&self, b: &Aabb) -> [[i32; 2]; 3] {
         let places = corners(b).map(|p| self.local(p));
-        let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| {
-            places.iter().map(v).fold(f64::NEG_INFINITY, f64::max)
-        };
+        let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| places.iter().map(v).fold(f64::NEG_INFINITY, f64::max);
         let away = |l: &(Vec3, f64)| if self.sphere { l.1.hypot(l.0[2]) } else { l.1 };
         let far = most(&away);
         let near = away(&self.local(b.center())) - 0.5 * norm(b.size());
-        let radial = [
-            whole(near / self.wavelength[0]).max(1) - 1,
-            whole(far / self.wavelength[0]) + 1,
-        ];
+        let radial = [whole(near / self.wavelength[0]).max(1) - 1, whole(far / self.wavelength[0]) + 1];
         let last = if self.sphere {
             [0, self.around() / 2 - 1]
         } else {
             let (low, high) = (-most(&|l| -l.0[2]), most(&|l| l.0[2]));
             [low, high].map(|z| whole(z / self.wavelength[1]))
         };
-        let last = if self.sphere {
-            last
-        } else {
-            [last[0] - 1, last[1] + 1]
-        };
+        let last = if self.sphere { last } else { [last[0] - 1, last[1] + 1] };
         [radial, [0, self.around() - 1], last]
     }
 
@@ -199,17 +163,9 @@ impl Round {
             let s = r.hypot(l[2]);
             let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
             let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
-            [
-                scale(away, 1.0 / self.wavelength[0]),
-                round,
-                scale(down, turn / s),
-            ]
+            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
         } else {
-            [
-                scale(out, 1.0 / self.wavelength[0]),
-                round,
-                [0.0, 0.0, 1.0 / self.wavelength[1]],
-            ]
+            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
         };
         product(&local, &self.frame)
     }
@@ -221,11 +177,7 @@ impl Round {
     }
 
     fn stretch_at(&self, radius: f64) -> f64 {
-        let lengths = if self.sphere {
-            &self.wavelength[..1]
-        } else {
-            &self.wavelength[..]
-        };
+        let lengths = if self.sphere { &self.wavelength[..1] } else { &self.wavelength[..] };
         let along = lengths.iter().map(|w| 1.0 / w).fold(0.0, f64::max);
         along.max(self.around / (core::f64::consts::TAU * radius))
     }
@@ -238,27 +190,19 @@ impl Round {
     /// Least and greatest edge of a cell in the region, mm, the least at the mean distance from the axis.
     pub fn wavelengths(&self) -> [f64; 2] {
         let [a, b] = self.wavelength;
-        [
-            a.min(b).min(self.arc(self.radii[1])),
-            a.max(b).max(self.arc(self.radii[2])),
-        ]
+        [a.min(b).min(self.arc(self.radii[1])), a.max(b).max(self.arc(self.radii[2]))]
     }
 
     /// A Jacobian typical of the map, but for its rotation.
     pub fn typical(&self) -> Mat3 {
         let arc = self.arc(self.radii[1]);
         let last = if self.sphere { arc } else { self.wavelength[1] };
-        [
-            [1.0 / self.wavelength[0], 0.0, 0.0],
-            [0.0, 1.0 / arc, 0.0],
-            [0.0, 0.0, 1.0 / last],
-        ]
+        [[1.0 / self.wavelength[0], 0.0, 0.0], [0.0, 1.0 / arc, 0.0], [0.0, 0.0, 1.0 / last]]
     }
 
     /// The Jacobians nearest to the axis and farthest from it in the region.
     pub fn extremes(&self) -> [Mat3; 2] {
-        [self.radii[2], self.radii[0]]
-            .map(|r| self.jacobian(add(self.center, scale(self.frame[0], r))))
+        [self.radii[2], self.radii[0]].map(|r| self.jacobian(add(self.center, scale(self.frame[0], r))))
     }
 
     /// The largest stretch at the mean distance from the axis, turns per mm.
@@ -273,17 +217,14 @@ mod tests {
     use crate::math::spectral_norm;
 
     fn places() -> impl Iterator<Item = Vec3> {
-        (1..400).map(|i| {
-            [0.8191725, 0.6710436, 0.5497005].map(|s| 20.0 * (s * f64::from(i)).fract() - 10.0)
-        })
+        (1..400).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| 20.0 * (s * f64::from(i)).fract() - 10.0))
     }
 
     #[test]
     fn seams_close_and_jacobians_agree_with_differences() {
         let axis = [0.3, -0.2, 0.9];
         for map in [
-            Round::cylinder([1.0, 2.0, 3.0], axis, [2.0, 3.0], 12.0, [1.0, 5.0, 9.0])
-                .expect("cylinder"),
+            Round::cylinder([1.0, 2.0, 3.0], axis, [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder"),
             Round::sphere([1.0, 2.0, 3.0], axis, 2.0, 12.0, [1.0, 5.0, 9.0]).expect("sphere"),
         ] {
             for p in places() {
@@ -309,26 +250,15 @@ mod tests {
                 }
             }
         }
-        let plain = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0, 3.0], 12.0, [1.0, 5.0, 9.0])
-            .expect("cylinder");
+        let plain = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder");
         let u = plain.phase([0.0, 4.0, 6.0]);
         assert!(norm(sub(u, [2.0, 3.0, 2.0])) < 1e-14, "{u:?}");
-        assert_eq!(
-            plain.stretch(&Aabb {
-                min: [-1.0; 3],
-                max: [1.0; 3]
-            }),
-            f64::INFINITY
-        );
+        assert_eq!(plain.stretch(&Aabb { min: [-1.0; 3], max: [1.0; 3] }), f64::INFINITY);
     }
 
     #[test]
     fn what_does_not_close_is_refused() {
-        let make = |around| {
-            Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0; 2], around, [1.0; 3])
-                .err()
-                .map(|f| f.at)
-        };
+        let make = |around| Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0; 2], around, [1.0; 3]).err().map(|f| f.at);
         for n in [0.0, 2.5, f64::NAN, -3.0] {
             assert_eq!(make(n).as_deref(), Some("around"));
         }

@@ -41,24 +41,14 @@ impl Spline {
         let shape = grid.shape.map(|n| n + 2);
         let coefficients = {
             let [a, b, c] = values;
-            let made: Vec<Vec<f64>> = [a, b, c]
-                .into_par_iter()
-                .map(|v| coefficients(v, grid.shape))
-                .collect();
+            let made: Vec<Vec<f64>> = [a, b, c].into_par_iter().map(|v| coefficients(v, grid.shape)).collect();
             let mut made = made.into_iter();
             core::array::from_fn(|_| made.next().unwrap_or_default())
         };
-        let mut spline = Spline {
-            grid,
-            shape,
-            coefficients,
-            stretch: Vec::new(),
-        };
+        let mut spline = Spline { grid, shape, coefficients, stretch: Vec::new() };
         let [nx, ny, nz] = spline.blocks();
-        spline.stretch = (0..nx * ny * nz)
-            .into_par_iter()
-            .map(|i| spline.stretch_of([i % nx, i / nx % ny, i / nx / ny]))
-            .collect();
+        spline.stretch =
+            (0..nx * ny * nz).into_par_iter().map(|i| spline.stretch_of([i % nx, i / nx % ny, i / nx / ny])).collect();
         spline
     }
 
@@ -84,11 +74,7 @@ impl Spline {
         for (v, d) in value.iter_mut().zip(slope) {
             *v += beyond * d;
         }
-        Spot {
-            first,
-            value,
-            slope: slope.map(|d| d / h),
-        }
+        Spot { first, value, slope: slope.map(|d| d / h) }
     }
 
     /// u at points.
@@ -142,8 +128,7 @@ impl Spline {
         let s = self.strides();
         let base = BLOCK * (at[0] + at[1] * s[1] + at[2] * s[2]);
         // Coefficients that count.
-        let n: [usize; 3] =
-            core::array::from_fn(|a| BLOCK.min(self.grid.shape[a] - 1 - BLOCK * at[a]) + 3);
+        let n: [usize; 3] = core::array::from_fn(|a| BLOCK.min(self.grid.shape[a] - 1 - BLOCK * at[a]) + 3);
         let (mut middle, mut half) = ([[0.0; 3]; 3], 0.0);
         for (i, c) in self.coefficients.iter().enumerate() {
             for a in 0..3 {
@@ -233,12 +218,7 @@ impl Spline {
             t.push(at);
             match pieces.last_mut() {
                 Some(p) if p.first == first && p.beyond == beyond => p.to = n + 1,
-                _ => pieces.push(Piece {
-                    beyond,
-                    first,
-                    from: n,
-                    to: n + 1,
-                }),
+                _ => pieces.push(Piece { beyond, first, from: n, to: n + 1 }),
             }
         }
         Rows {
@@ -291,11 +271,7 @@ impl Rows<'_> {
             for j in 0..ny {
                 let base = x0 + (y0 + j) * sy + z.first * sz;
                 let row = |k: usize| &c[base + k * sz..][..nx];
-                blend(
-                    [row(0), row(1), row(2), row(3)],
-                    &z.value,
-                    &mut layer[j * nx..][..nx],
-                );
+                blend([row(0), row(1), row(2), row(3)], &z.value, &mut layer[j * nx..][..nx]);
             }
         }
     }
@@ -334,14 +310,7 @@ fn cubics(line: &[f64], pieces: &[Piece], t: &[f64], out: &mut [f64]) {
         ];
         match p.beyond {
             0 => (a[2], a[3]) = (0.0, 0.0),
-            2 => {
-                a = [
-                    (c[1] + 4.0 * c[2] + c[3]) / 6.0,
-                    (c[3] - c[1]) / 2.0,
-                    0.0,
-                    0.0,
-                ]
-            }
+            2 => a = [(c[1] + 4.0 * c[2] + c[3]) / 6.0, (c[3] - c[1]) / 2.0, 0.0, 0.0],
             _ => {}
         }
         for (o, t) in out[p.from..p.to].iter_mut().zip(&t[p.from..p.to]) {
@@ -359,24 +328,14 @@ fn along(row: &[f64], w: &[f64; 4]) -> f64 {
 #[inline]
 fn weights(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
-    [
-        s * s * s / 6.0,
-        (4.0 + t * t * (3.0 * t - 6.0)) / 6.0,
-        (4.0 + s * s * (3.0 * s - 6.0)) / 6.0,
-        t * t * t / 6.0,
-    ]
+    [s * s * s / 6.0, (4.0 + t * t * (3.0 * t - 6.0)) / 6.0, (4.0 + s * s * (3.0 * s - 6.0)) / 6.0, t * t * t / 6.0]
 }
 
 /// The derivatives of `weights`.
 #[inline]
 fn slopes(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
-    [
-        -s * s / 2.0,
-        t * (3.0 * t - 4.0) / 2.0,
-        s * (4.0 - 3.0 * s) / 2.0,
-        t * t / 2.0,
-    ]
+    [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, s * (4.0 - 3.0 * s) / 2.0, t * t / 2.0]
 }
 
 /// A bound of the spectral norm, at most a seventh above it: λ of the greatest of M Mᵀ, to the eighth, is at most the sum
@@ -448,20 +407,13 @@ mod tests {
     use crate::math::{norm, spectral_norm, sub};
 
     fn grid() -> Grid {
-        let b = Aabb {
-            min: [-1.0, 0.5, 2.0],
-            max: [2.0, 2.5, 4.4],
-        };
+        let b = Aabb { min: [-1.0, 0.5, 2.0], max: [2.0, 2.5, 4.4] };
         Grid::over(&b, [9, 7, 6])
     }
 
     fn bent(p: Vec3) -> Vec3 {
         let [x, y, z] = p;
-        [
-            x + 0.3 * (y + 0.4 * z).sin(),
-            1.4 * y - 0.2 * (x * 0.8).cos() * z,
-            0.7 * z + 0.1 * x * y,
-        ]
+        [x + 0.3 * (y + 0.4 * z).sin(), 1.4 * y - 0.2 * (x * 0.8).cos() * z, 0.7 * z + 0.1 * x * y]
     }
 
     fn spline(f: impl Fn(Vec3) -> Vec3) -> Spline {
@@ -473,15 +425,11 @@ mod tests {
     fn places() -> Vec<Vec3> {
         let mut s = 9u64;
         let mut next = || {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 11) as f64 / (1u64 << 53) as f64
         };
         // In the box and about it.
-        (0..500)
-            .map(|_| [-2.0 + 5.0 * next(), 3.5 * next(), 1.0 + 4.5 * next()])
-            .collect()
+        (0..500).map(|_| [-2.0 + 5.0 * next(), 3.5 * next(), 1.0 + 4.5 * next()]).collect()
     }
 
     #[test]
@@ -496,10 +444,7 @@ mod tests {
             assert!(norm(sub(u[0], bent(g.node(n)))) < 1e-13);
         }
         for p in places() {
-            let b = Aabb {
-                min: [-1.0, 0.5, 2.0],
-                max: [2.0, 2.5, 4.4],
-            };
+            let b = Aabb { min: [-1.0, 0.5, 2.0], max: [2.0, 2.5, 4.4] };
             if b.distance(p) == 0.0 {
                 let mut u = [[0.0; 3]];
                 c.values(&[p], &mut u);
@@ -527,8 +472,7 @@ mod tests {
                 }
             }
         }
-        let axis =
-            |from: f64, n: usize| -> Vec<f64> { (0..n).map(|i| from + 0.13 * i as f64).collect() };
+        let axis = |from: f64, n: usize| -> Vec<f64> { (0..n).map(|i| from + 0.13 * i as f64).collect() };
         let (x, y, z) = (axis(-2.0, 40), axis(0.0, 25), axis(1.0, 30));
         let block = Block { axes: [&x, &y, &z] };
         let mut rows = s.rows(&block);
@@ -553,11 +497,7 @@ mod tests {
         let s = spline(bent);
         let p = places();
         for pair in p.windows(2) {
-            let b = Aabb {
-                min: pair[0],
-                max: pair[0],
-            }
-            .with(pair[1]);
+            let b = Aabb { min: pair[0], max: pair[0] }.with(pair[1]);
             let bound = s.stretch(&b);
             for i in 0..27 {
                 let t = [i % 3, i / 3 % 3, i / 9].map(|v| f64::from(v) / 2.0);

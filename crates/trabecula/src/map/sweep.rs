@@ -86,21 +86,12 @@ impl Sweep {
         let Path { points, closed, .. } = path;
         let least = if *closed { 3 } else { 2 };
         if points.len() < least || points.iter().flatten().any(|v| !v.is_finite()) {
-            let message = format!(
-                "{} points; a line to sweep along needs at least {least}, of finite numbers",
-                points.len()
-            );
+            let message =
+                format!("{} points; a line to sweep along needs at least {least}, of finite numbers", points.len());
             return Err(Fault::new("points", message));
         }
-        if let Some(w) = path
-            .wavelength
-            .iter()
-            .find(|w| !(**w > 0.0 && w.is_finite()))
-        {
-            let message = format!(
-                "{} mm; a wavelength is a positive, finite length",
-                number(*w)
-            );
+        if let Some(w) = path.wavelength.iter().find(|w| !(**w > 0.0 && w.is_finite())) {
+            let message = format!("{} mm; a wavelength is a positive, finite length", number(*w));
             return Err(Fault::new("wavelength", message));
         }
         let (spans, end) = spline(points, *closed)?;
@@ -126,11 +117,7 @@ impl Sweep {
     /// The spline at t: place, first and second derivative. Straight on beyond the ends of an open line.
     fn curve(&self, t: f64) -> (Vec3, Vec3, Vec3) {
         let end = self.end;
-        let inside = if self.closed {
-            t.rem_euclid(end)
-        } else {
-            t.clamp(0.0, end)
-        };
+        let inside = if self.closed { t.rem_euclid(end) } else { t.clamp(0.0, end) };
         let i = self.spans.partition_point(|s| s.0 <= inside).max(1) - 1;
         let (from, [a, b, c, d]) = self.spans[i];
         let x = inside - from;
@@ -154,35 +141,20 @@ impl Sweep {
         let end = self.end;
         let starts = self.spans.iter().map(|s| s.0);
         let bounds: Vec<f64> = starts.chain([end]).collect();
-        let ts = bounds
-            .windows(2)
-            .flat_map(|w| (0..FINE).map(move |i| w[0] + (w[1] - w[0]) * i as f64 / FINE as f64));
+        let ts = bounds.windows(2).flat_map(|w| (0..FINE).map(move |i| w[0] + (w[1] - w[0]) * i as f64 / FINE as f64));
         let ts: Vec<f64> = ts.chain([end]).collect();
         let (start, slope, _) = self.curve(0.0);
         let tangent = unit(slope);
         let wanted = normal.unwrap_or_else(|| {
-            let least = (0..3).fold(0, |m, a| {
-                if tangent[a].abs() < tangent[m].abs() {
-                    a
-                } else {
-                    m
-                }
-            });
+            let least = (0..3).fold(0, |m, a| if tangent[a].abs() < tangent[m].abs() { a } else { m });
             core::array::from_fn(|a| if a == least { 1.0 } else { 0.0 })
         });
         let flat = sub(wanted, scale(tangent, dot(wanted, tangent)));
         if !(norm(flat) > 1e-6 * norm(wanted) && norm(flat).is_finite()) {
-            let message =
-                format!("{wanted:?} lies along the line at its start; give a direction across it");
+            let message = format!("{wanted:?} lies along the line at its start; give a direction across it");
             return Err(Fault::new("normal", message));
         }
-        let mut knots = vec![Knot {
-            t: 0.0,
-            place: start,
-            tangent,
-            normal: unit(flat),
-            s: 0.0,
-        }];
+        let mut knots = vec![Knot { t: 0.0, place: start, tangent, normal: unit(flat), s: 0.0 }];
         for t in ts.into_iter().skip(1) {
             let last = knots[knots.len() - 1];
             // An end that is the start again is not taken round it.
@@ -190,13 +162,7 @@ impl Sweep {
             let tangent = unit(slope);
             let s = last.s + self.stretch_of(last.t, t);
             let normal = carried(&last, place, tangent);
-            knots.push(Knot {
-                t,
-                place,
-                tangent,
-                normal,
-                s,
-            });
+            knots.push(Knot { t, place, tangent, normal, s });
         }
         let last = knots[knots.len() - 1];
         self.length = last.s;
@@ -214,17 +180,10 @@ impl Sweep {
     /// The frame at t, after the knot before it.
     fn frame(&self, i: usize, t: f64, place: Vec3, tangent: Vec3, s: f64) -> [Vec3; 2] {
         let knot = &self.knots[i];
-        let n = if t == knot.t {
-            knot.normal
-        } else {
-            carried(knot, place, tangent)
-        };
+        let n = if t == knot.t { knot.normal } else { carried(knot, place, tangent) };
         let (sin, cos) = (self.twist * s).sin_cos();
         let m = cross(tangent, n);
-        [
-            add(scale(n, cos), scale(m, sin)),
-            sub(scale(m, cos), scale(n, sin)),
-        ]
+        [add(scale(n, cos), scale(m, sin)), sub(scale(m, cos), scale(n, sin))]
     }
 
     fn local(&self, p: Vec3) -> Local {
@@ -266,17 +225,10 @@ impl Sweep {
         let (c, first, second) = self.curve(t);
         let (d, speed) = (sub(p, c), norm(first));
         let tangent = scale(first, 1.0 / speed);
-        let bend = scale(
-            sub(second, scale(tangent, dot(second, tangent))),
-            1.0 / (speed * speed),
-        );
+        let bend = scale(sub(second, scale(tangent, dot(second, tangent))), 1.0 / (speed * speed));
         // Round a closed line t has one turn alone.
         let round = if self.closed { t.rem_euclid(end) } else { t };
-        let i = if round <= 0.0 {
-            0
-        } else {
-            self.knots.partition_point(|k| k.t <= round).clamp(1, last) - 1
-        };
+        let i = if round <= 0.0 { 0 } else { self.knots.partition_point(|k| k.t <= round).clamp(1, last) - 1 };
         let s = if !self.closed && round > end {
             self.length + (round - end) * speed
         } else if !self.closed && round < 0.0 {
@@ -285,13 +237,7 @@ impl Sweep {
             self.knots[i].s + self.stretch_of(self.knots[i].t, round)
         };
         let normals = self.frame(i, round, c, tangent, s);
-        Local {
-            s,
-            across: normals.map(|n| dot(d, n)),
-            tangent,
-            normals,
-            room: 1.0 - dot(bend, d),
-        }
+        Local { s, across: normals.map(|n| dot(d, n)), tangent, normals, room: 1.0 - dot(bend, d) }
     }
 
     /// The distance from the line, mm.
@@ -318,15 +264,7 @@ impl Sweep {
 
     /// A Jacobian typical of the map, but for its rotation.
     pub fn typical(&self) -> Mat3 {
-        core::array::from_fn(|i| {
-            core::array::from_fn(|j| {
-                if i == j {
-                    1.0 / self.wavelength[i]
-                } else {
-                    0.0
-                }
-            })
-        })
+        core::array::from_fn(|i| core::array::from_fn(|j| if i == j { 1.0 / self.wavelength[i] } else { 0.0 }))
     }
 
     /// The Jacobians where cells are shortest and longest.
@@ -398,16 +336,12 @@ impl Sweep {
         }
         let (c, first, _) = self.curve(t);
         let n = self.frame(i, t, c, unit(first), s);
-        Some(add(
-            c,
-            add(scale(n[0], u[0] * w[0]), scale(n[1], u[1] * w[1])),
-        ))
+        Some(add(c, add(scale(n[0], u[0] * w[0]), scale(n[1], u[1] * w[1]))))
     }
 
     /// How many cells a line that closes has along it.
     pub fn around(&self) -> Option<i32> {
-        self.closed
-            .then(|| (self.length / self.wavelength[2]).round() as i32)
+        self.closed.then(|| (self.length / self.wavelength[2]).round() as i32)
     }
 
     /// The range of cells that may have a part in the box.
@@ -417,10 +351,7 @@ impl Sweep {
         let across = |a: usize| [whole(-away / w[a]) - 1, whole(away / w[a]) + 1];
         let along = match self.around() {
             Some(n) => [0, n - 1],
-            None => [
-                whole(-away / w[2]) - 1,
-                whole((self.length + away) / w[2]) + 1,
-            ],
+            None => [whole(-away / w[2]) - 1, whole((self.length + away) / w[2]) + 1],
         };
         [across(0), across(1), along]
     }

@@ -148,9 +148,7 @@ impl Tets {
                 for j in lo[1]..=hi[1] {
                     for i in lo[0]..=hi[0] {
                         let at = [i, j, k];
-                        let middle: Vec3 = core::array::from_fn(|a| {
-                            self.boxes.min[a] + (at[a] as f64 + 0.5) * edge
-                        });
+                        let middle: Vec3 = core::array::from_fn(|a| self.boxes.min[a] + (at[a] as f64 + 0.5) * edge);
                         // The box lies outside a face if its nearest corner does; a little rounding is allowed for.
                         let out = planes.iter().any(|(n, d)| {
                             let reach = 0.500001 * edge * n.iter().map(|v| v.abs()).sum::<f64>();
@@ -180,11 +178,7 @@ impl Tets {
             }
         }
         while let Some(b) = queue.pop_front() {
-            let at = [
-                b % shape[0],
-                b / shape[0] % shape[1],
-                b / shape[0] / shape[1],
-            ];
+            let at = [b % shape[0], b / shape[0] % shape[1], b / shape[0] / shape[1]];
             for a in 0..3 {
                 for up in [false, true] {
                     if (up && at[a] + 1 == shape[a]) || (!up && at[a] == 0) {
@@ -406,11 +400,7 @@ fn planes(c: &[Vec3; 4]) -> [(Vec3, f64); 4] {
         let [p, q, r] = FACES[i].map(|k| c[k]);
         let n = cross(sub(q, p), sub(r, p));
         // The corner opposite lies inside, whatever the order.
-        let n = if dot(n, sub(c[i], p)) > 0.0 {
-            scale(n, -1.0)
-        } else {
-            n
-        };
+        let n = if dot(n, sub(c[i], p)) > 0.0 { scale(n, -1.0) } else { n };
         (n, dot(n, p))
     })
 }

@@ -35,12 +35,7 @@ impl Tilt {
         let cells = grid.shape.map(|n| n - 1);
         let across = ratio > 1.0;
         let more = if across { ratio } else { 1.0 / ratio } - 1.0;
-        let mut tilt = Tilt {
-            grid,
-            cells,
-            of: Vec::new(),
-            across,
-        };
+        let mut tilt = Tilt { grid, cells, of: Vec::new(), across };
         let each = (0..cells.iter().product()).into_par_iter().map(|c| {
             let near = tilt.corners(c);
             let wanted = near.iter().fold([0.0; 3], |m, n| add(m, k[*n]));

@@ -33,14 +33,8 @@ impl Bodies {
             root[v] = root[root[v] as usize];
         }
         let vertices = used.iter().filter(|u| **u).count();
-        let count = (0..root.len())
-            .filter(|&v| used[v] && root[v] as usize == v)
-            .count();
-        Bodies {
-            count,
-            vertices,
-            root,
-        }
+        let count = (0..root.len()).filter(|&v| used[v] && root[v] as usize == v).count();
+        Bodies { count, vertices, root }
     }
 
     /// For each triangle the number of its body, in the order of `volumes`.
@@ -103,10 +97,7 @@ pub(super) fn apart(mesh: &Mesh) -> Option<Mesh> {
                 apart.vertices.push(mesh.vertices[v as usize]);
             }
             let corners = &mut apart.triangles[t as usize];
-            corners
-                .iter_mut()
-                .filter(|c| **c == v)
-                .for_each(|c| *c = *name);
+            corners.iter_mut().filter(|c| **c == v).for_each(|c| *c = *name);
         }
     }
     Some(apart)
@@ -143,22 +134,12 @@ fn pinched(mesh: &Mesh) -> Vec<(u32, Vec<u32>)> {
 
 /// The number of fans that `triangles` form about vertex `v`: classes joined across edges at `v` that two of them share.
 /// Leaves the fan of each triangle, as the first of its class, in the second scratch.
-fn fans(
-    mesh: &Mesh,
-    v: u32,
-    triangles: &[u32],
-    (sides, root): &mut (Vec<(u32, u32)>, Vec<u32>),
-) -> usize {
+fn fans(mesh: &Mesh, v: u32, triangles: &[u32], (sides, root): &mut (Vec<(u32, u32)>, Vec<u32>)) -> usize {
     sides.clear();
     root.clear();
     root.extend(0..triangles.len() as u32);
     for (i, &t) in triangles.iter().enumerate() {
-        sides.extend(
-            mesh.triangles[t as usize]
-                .iter()
-                .filter(|w| **w != v)
-                .map(|&w| (w, i as u32)),
-        );
+        sides.extend(mesh.triangles[t as usize].iter().filter(|w| **w != v).map(|&w| (w, i as u32)));
     }
     sides.sort_unstable();
     let mut count = triangles.len();

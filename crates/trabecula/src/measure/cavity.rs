@@ -37,25 +37,19 @@ pub fn cavities(mesh: &Mesh) -> Vec<Cavity> {
         bounds[*name] = corners.iter().fold(bounds[*name], |b, p| b.with(*p));
         sides[*name].push(i as u32);
     }
-    let within = |inner: &Aabb, outer: &Aabb| {
-        (0..3).all(|a| inner.min[a] >= outer.min[a] && inner.max[a] <= outer.max[a])
-    };
+    let within =
+        |inner: &Aabb, outer: &Aabb| (0..3).all(|a| inner.min[a] >= outer.min[a] && inner.max[a] <= outer.max[a]);
     let mut found: Vec<Cavity> = (0..count)
         .into_par_iter()
         .filter(|&i| volumes[i] < 0.0)
         .map(|i| {
             // What may float in it stands in the way of a chord.
-            let floating =
-                (0..count).filter(|&j| volumes[j] > 0.0 && within(&bounds[j], &bounds[i]));
+            let floating = (0..count).filter(|&j| volumes[j] > 0.0 && within(&bounds[j], &bounds[i]));
             let walls: Vec<[Vec3; 3]> = std::iter::once(i)
                 .chain(floating)
                 .flat_map(|j| sides[j].iter().map(|t| mesh.corners(*t as usize)))
                 .collect();
-            Cavity {
-                volume: -volumes[i],
-                point: inside(&walls, sides[i].len()),
-                bounds: bounds[i],
-            }
+            Cavity { volume: -volumes[i], point: inside(&walls, sides[i].len()), bounds: bounds[i] }
         })
         .collect();
     found.sort_by(|a, b| b.volume.total_cmp(&a.volume));
@@ -72,8 +66,7 @@ fn inside(walls: &[[Vec3; 3]], own: usize) -> Vec3 {
         let along = unit(cross(sub(b, a), sub(c, a)));
         let length = walls.iter().filter_map(|w| hit(w, from, along));
         let length = length.fold(f64::INFINITY, f64::min);
-        (length.is_finite() && length > 0.0)
-            .then(|| (length, add(from, scale(along, length / 2.0))))
+        (length.is_finite() && length > 0.0).then(|| (length, add(from, scale(along, length / 2.0))))
     });
     let mut chords: Vec<(f64, Vec3)> = chords.collect();
     chords.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -126,10 +119,7 @@ mod tests {
         let found = cavities(&solid);
         assert_eq!(found.len(), 2);
         assert!((found[0].volume - 27.0).abs() < 1e-12 && (found[1].volume - 1.0).abs() < 1e-12);
-        assert_eq!(
-            (found[0].bounds.min, found[0].bounds.max),
-            ([4.0; 3], [7.0; 3])
-        );
+        assert_eq!((found[0].bounds.min, found[0].bounds.max), ([4.0; 3], [7.0; 3]));
         for (f, (lo, hi)) in found.iter().zip([(4.0, 7.0), (1.0, 2.0)]) {
             assert!(f.point.iter().all(|x| *x > lo && *x < hi), "{:?}", f.point);
         }

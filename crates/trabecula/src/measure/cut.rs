@@ -22,20 +22,13 @@ const FACING: [f64; 2] = [0.7, 0.3];
 /// by its corners and its direction.
 pub fn cut_triangles(mesh: &Mesh, region: &dyn Field) -> Vec<bool> {
     let mut off = vec![0.0; mesh.vertices.len()];
-    let parts = off
-        .par_chunks_mut(BATCH)
-        .zip(mesh.vertices.par_chunks(BATCH));
+    let parts = off.par_chunks_mut(BATCH).zip(mesh.vertices.par_chunks(BATCH));
     parts.for_each(|(off, points)| region.values(points, off));
     let place = |v: u32| mesh.vertices[v as usize];
-    let edges = mesh
-        .triangles
-        .iter()
-        .map(|t| norm(sub(place(t[1]), place(t[0]))));
+    let edges = mesh.triangles.iter().map(|t| norm(sub(place(t[1]), place(t[0]))));
     let near = STAND_OFF * edges.sum::<f64>() / mesh.triangles.len().max(1) as f64;
     let mut cut = vec![false; mesh.triangles.len()];
-    let parts = cut
-        .par_chunks_mut(BATCH)
-        .zip(mesh.triangles.par_chunks(BATCH));
+    let parts = cut.par_chunks_mut(BATCH).zip(mesh.triangles.par_chunks(BATCH));
     parts.for_each(|(cut, triangles)| {
         let middle = |t: &[u32; 3]| {
             let [a, b, c] = t.map(place);
@@ -69,9 +62,7 @@ mod tests {
     fn a_ball_cut_by_a_box_is_told_apart() {
         let solid = |region: crate::region::Region| Solid::new(region, None, 1.0);
         let ball = Sphere::new([0.0; 3], 1.0).expect("ball");
-        let mesh = surface(&solid(Arc::new(ball)), 0.07, &Silent)
-            .expect("surface")
-            .mesh;
+        let mesh = surface(&solid(Arc::new(ball)), 0.07, &Silent).expect("surface").mesh;
         assert!(cut_triangles(&mesh, &ball).iter().all(|c| *c));
         let elsewhere = Cuboid::new([-2.0; 3], [2.0; 3]).expect("box");
         assert!(cut_triangles(&mesh, &elsewhere).iter().all(|c| !*c));

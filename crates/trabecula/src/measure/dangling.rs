@@ -76,22 +76,11 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
     // In halves of cubes, so that a block is whole cubes.
     let half = CUBE as i64 / 2;
     let margin = (reach / step / half as f64).ceil() as i64 * half;
-    let counts = bounds
-        .size()
-        .map(|s| (s / step / CORE as f64).ceil().max(1.0) as i64);
+    let counts = bounds.size().map(|s| (s / step / CORE as f64).ceil().max(1.0) as i64);
     let corners: Vec<[i64; 3]> = (0..counts[2])
-        .flat_map(|z| {
-            (0..counts[1])
-                .flat_map(move |y| (0..counts[0]).map(move |x| [x, y, z].map(|n| n * CORE)))
-        })
+        .flat_map(|z| (0..counts[1]).flat_map(move |y| (0..counts[0]).map(move |x| [x, y, z].map(|n| n * CORE))))
         .collect();
-    let look = Look {
-        solid,
-        thin,
-        step,
-        margin,
-        from: bounds.min,
-    };
+    let look = Look { solid, thin, step, margin, from: bounds.min };
     let done = std::sync::atomic::AtomicU64::new(0);
     let found: Option<Vec<Vec<(f64, Vec3)>>> = corners
         .par_iter()
@@ -105,10 +94,7 @@ pub fn dangling(solid: &Solid, neck: f64, progress: &dyn Progress) -> Result<Dan
     Ok(Dangling {
         count: bits.len(),
         volume: bits.iter().fold(0.0, |sum, b| sum + b.0),
-        largest: bits
-            .iter()
-            .copied()
-            .reduce(|a, b| if b.0 > a.0 { b } else { a }),
+        largest: bits.iter().copied().reduce(|a, b| if b.0 > a.0 { b } else { a }),
         neck: thin,
         step,
     })
@@ -128,15 +114,11 @@ impl Look<'_> {
     fn block(&self, corner: [i64; 3]) -> Vec<(f64, Vec3)> {
         let side = (CORE + 2 * self.margin) as usize;
         // Half a step inwards, so that no point lies on a face of the bounds.
-        let place = |a: usize, n: usize| {
-            self.from[a] + ((corner[a] - self.margin + n as i64) as f64 + 0.5) * self.step
-        };
+        let place = |a: usize, n: usize| self.from[a] + ((corner[a] - self.margin + n as i64) as f64 + 0.5) * self.step;
         let axes: [Vec<f64>; 3] = [0, 1, 2].map(|a| (0..side).map(|n| place(a, n)).collect());
         let reach = self.margin as f64 * self.step;
-        let core = Aabb {
-            min: [0, 1, 2].map(|a| axes[a][0] + reach),
-            max: [0, 1, 2].map(|a| axes[a][side - 1] - reach),
-        };
+        let core =
+            Aabb { min: [0, 1, 2].map(|a| axes[a][0] + reach), max: [0, 1, 2].map(|a| axes[a][side - 1] - reach) };
         let region = self.solid.region.bound(&core);
         // Nothing of the region is here, or nothing of its surface near.
         if region.lo > 0.0 || region.hi < -reach {
@@ -174,13 +156,9 @@ impl Look<'_> {
         self.spread(&open, &mut owner, &mut bodies, side);
         let within = |i: usize| {
             let n = [i % side, i / side % side, i / side / side];
-            n.iter()
-                .all(|n| (self.margin..self.margin + CORE).contains(&(*n as i64)))
+            n.iter().all(|n| (self.margin..self.margin + CORE).contains(&(*n as i64)))
         };
-        let own = bodies
-            .iter()
-            .skip(1)
-            .filter(|b| b.bulges && b.is_within(self.margin as usize) && within(b.first));
+        let own = bodies.iter().skip(1).filter(|b| b.bulges && b.is_within(self.margin as usize) && within(b.first));
         own.map(|b| {
             let n = [b.first % side, b.first / side % side, b.first / side / side];
             let at = core::array::from_fn(|a| axes[a][n[a]]);
@@ -195,9 +173,7 @@ impl Look<'_> {
         let cubes = side / CUBE;
         let middle = |n: usize, a: usize| 0.5 * (axes[a][n * CUBE] + axes[a][n * CUBE + CUBE - 1]);
         let number = |i: usize| [i % cubes, i / cubes % cubes, i / cubes / cubes];
-        let middles: Vec<Vec3> = (0..cubes.pow(3))
-            .map(|i| core::array::from_fn(|a| middle(number(i)[a], a)))
-            .collect();
+        let middles: Vec<Vec3> = (0..cubes.pow(3)).map(|i| core::array::from_fn(|a| middle(number(i)[a], a))).collect();
         let mut distance = vec![0.0; middles.len()];
         self.solid.region.values(&middles, &mut distance);
         let around = 0.5 * (CUBE - 1) as f64 * 3f64.sqrt() * self.step;
@@ -258,20 +234,11 @@ struct Body {
 
 impl Body {
     fn at(first: usize) -> Body {
-        Body {
-            first,
-            size: 0,
-            min: [usize::MAX; 3],
-            max: [0; 3],
-            bulges: false,
-        }
+        Body { first, size: 0, min: [usize::MAX; 3], max: [0; 3], bulges: false }
     }
 
     fn reach(&mut self, i: usize, side: usize) {
-        for (a, n) in [i % side, i / side % side, i / side / side]
-            .into_iter()
-            .enumerate()
-        {
+        for (a, n) in [i % side, i / side % side, i / side / side].into_iter().enumerate() {
             self.min[a] = self.min[a].min(n);
             self.max[a] = self.max[a].max(n);
         }
@@ -307,9 +274,7 @@ mod tests {
     #[test]
     fn balls_that_hang_by_threads() {
         // A block with five balls on posts: three posts are thinner than half a millimetre.
-        let mut of: Vec<Region> = vec![Arc::new(
-            Cuboid::new([-10.0; 3], [10.0, 10.0, 0.0]).unwrap(),
-        )];
+        let mut of: Vec<Region> = vec![Arc::new(Cuboid::new([-10.0; 3], [10.0, 10.0, 0.0]).unwrap())];
         for (i, thick) in [0.3, 0.35, 0.4, 0.8, 1.2].into_iter().enumerate() {
             let x = 3.5 * i as f64 - 7.0;
             let post = Cylinder::new([x, 0.0, -1.0], [0.0, 0.0, 1.0], thick / 2.0, 2.0).unwrap();
@@ -323,11 +288,7 @@ mod tests {
         // whose number is off by less than a sixth of a step all over it.
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         let off = 4.0 * std::f64::consts::PI * found.step / 6.0;
-        assert!(
-            (found.volume / 3.0 - ball).abs() < off + 0.03,
-            "{}",
-            found.volume
-        );
+        assert!((found.volume / 3.0 - ball).abs() < off + 0.03, "{}", found.volume);
         let (largest, at) = found.largest.unwrap();
         assert!(largest < 1.2 * ball && (at[2] - 1.5).abs() < 1.0, "{at:?}");
     }

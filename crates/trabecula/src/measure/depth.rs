@@ -8,11 +8,7 @@ pub(super) fn depths(open: &[bool], shape: [usize; 3], step: f64) -> Vec<f32> {
     let far = 1e12f32;
     let mut d: Vec<f32> = open.iter().map(|o| if *o { 0.0 } else { far }).collect();
     let longest = nx.max(ny).max(nz);
-    let mut line = Line {
-        f: vec![0.0; longest],
-        v: vec![0; longest],
-        z: vec![0.0; longest + 1],
-    };
+    let mut line = Line { f: vec![0.0; longest], v: vec![0; longest], z: vec![0.0; longest + 1] };
     for l in 0..ny * nz {
         line.pass(&mut d[l * nx..(l + 1) * nx], nx, 1);
     }
@@ -22,9 +18,7 @@ pub(super) fn depths(open: &[bool], shape: [usize; 3], step: f64) -> Vec<f32> {
     for l in 0..nx * ny {
         line.pass(&mut d[l..], nz, nx * ny);
     }
-    d.into_iter()
-        .map(|d| ((d.sqrt() - 0.5).max(0.0) as f64 * step) as f32)
-        .collect()
+    d.into_iter().map(|d| ((d.sqrt() - 0.5).max(0.0) as f64 * step) as f32).collect()
 }
 
 /// Room for one line of the grid: its values, the parabolas of the envelope, and where they take over.

@@ -107,12 +107,7 @@ struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     fn new(progress: &'a dyn Progress, total: u64) -> Watch<'a> {
-        Watch {
-            progress,
-            done: AtomicU64::new(0),
-            total,
-            stop: AtomicBool::new(false),
-        }
+        Watch { progress, done: AtomicU64::new(0), total, stop: AtomicBool::new(false) }
     }
 
     /// One step more; whether to go on.
@@ -151,28 +146,18 @@ pub fn usual_step(surface: &Surface, region: Option<&Region>) -> f64 {
 /// # Errors
 /// A step that is no length, too coarse to show anything, or so fine that there would be more than 2³³ voxels; bounds
 /// that are not finite.
-pub fn voxels_for(
-    surface: &Surface,
-    region: Option<&Region>,
-    step: f64,
-) -> Result<[usize; 3], Fault> {
+pub fn voxels_for(surface: &Surface, region: Option<&Region>, step: f64) -> Result<[usize; 3], Fault> {
     let refuse = |message: String| Err(Fault::new("step", message));
     if !(step.is_finite() && step > 0.0) {
-        return refuse(format!(
-            "is {step}; it must be a finite number greater than 0, mm"
-        ));
+        return refuse(format!("is {step}; it must be a finite number greater than 0, mm"));
     }
     let b = bounds(surface, region);
     if b.is_empty() || !b.is_finite() {
-        let message =
-            "the mesh is empty, or the region has no end; there is nothing to lay voxels over";
+        let message = "the mesh is empty, or the region has no end; there is nothing to lay voxels over";
         return Err(Fault::new("", message));
     }
     let size = b.size();
-    let count = size
-        .iter()
-        .map(|s| (s / step).ceil().max(1.0))
-        .product::<f64>();
+    let count = size.iter().map(|s| (s / step).ceil().max(1.0)).product::<f64>();
     if count > MOST {
         let better = step * (count / (0.9 * MOST)).cbrt();
         return refuse(format!(
@@ -208,29 +193,22 @@ pub fn thickness(
         ));
     }
     if about.volume <= 0.0 && !mesh.triangles.is_empty() {
-        return refuse("the mesh is inside out or flat: its triangles must run counter-clockwise seen from outside".into());
+        return refuse(
+            "the mesh is inside out or flat: its triangles must run counter-clockwise seen from outside".into(),
+        );
     }
     let shape = voxels_for(surface, region, step).map_err(Stopped::Refused)?;
     let nz = shape[2];
     let middle = bounds(surface, region).center();
     let first = [0, 1, 2].map(|a| middle[a] - (shape[a] - 1) as f64 * step / 2.0);
-    let steps = nearest::PASSES
-        .iter()
-        .zip(shape)
-        .map(|(p, n)| p * n)
-        .sum::<usize>();
+    let steps = nearest::PASSES.iter().zip(shape).map(|(p, n)| p * n).sum::<usize>();
     let painted = nz * if region.is_some() { 4 } else { 2 };
     let watch = Watch::new(progress, (steps + painted) as u64);
 
     let scaled = Shape::new(mesh, first, step);
     let (x, (y, z)) = rayon::join(
         || Lines::new(&scaled, shape, 0),
-        || {
-            rayon::join(
-                || Lines::new(&scaled, shape, 1),
-                || Lines::new(&scaled, shape, 2),
-            )
-        },
+        || rayon::join(|| Lines::new(&scaled, shape, 1), || Lines::new(&scaled, shape, 2)),
     );
     let mut lines = [x, y, z];
     let mut sites = Vec::new();
@@ -238,12 +216,7 @@ pub fn thickness(
     if sites.len() >= lines::NONE as usize {
         return refuse("the surface is too large for this step; use a larger step".into());
     }
-    let mut grid = Grid {
-        first,
-        step,
-        shape,
-        solid: Bits::new(shape),
-    };
+    let mut grid = Grid { first, step, shape, solid: Bits::new(shape) };
     fill(&mut grid, &lines[0], &sites);
     if grid.solid.count() == 0 {
         return refuse(format!(
@@ -276,74 +249,51 @@ pub fn thickness(
             pore = Some(spread(&space, &watch)?);
         }
     }
-    Ok(Thickness {
-        step,
-        accuracy: ACCURACY * step,
-        wall,
-        pore,
-    })
+    Ok(Thickness { step, accuracy: ACCURACY * step, wall, pore })
 }
 
 /// The voxels whose centres are in the solid.
 fn fill(grid: &mut Grid, lines: &Lines, sites: &[lines::Site]) {
     let nx = grid.shape[0];
     let stride = grid.solid.stride;
-    grid.solid
-        .words
-        .par_chunks_mut(stride)
-        .enumerate()
-        .for_each(|(line, row)| {
-            for ends in sites[lines.of(line)].chunks(2) {
-                let [a, b] = [0, 1].map(|k| {
-                    let at = ends.get(k).map_or(nx as f32, |s| s.point[0]);
-                    at.ceil().clamp(0.0, nx as f32) as usize
-                });
-                for (w, mask) in bits::masks(a..b) {
-                    row[w] |= mask;
-                }
+    grid.solid.words.par_chunks_mut(stride).enumerate().for_each(|(line, row)| {
+        for ends in sites[lines.of(line)].chunks(2) {
+            let [a, b] = [0, 1].map(|k| {
+                let at = ends.get(k).map_or(nx as f32, |s| s.point[0]);
+                at.ceil().clamp(0.0, nx as f32) as usize
+            });
+            for (w, mask) in bits::masks(a..b) {
+                row[w] |= mask;
             }
-        });
+        }
+    });
 }
 
 /// The voxels whose centres are in the region and not in the solid.
 fn pores(grid: &Grid, region: &Region) -> Bits {
     let [nx, ny, _] = grid.shape;
-    let axes = [0, 1, 2].map(|a| {
-        (0..grid.shape[a])
-            .map(|i| grid.first[a] + i as f64 * grid.step)
-            .collect::<Vec<f64>>()
-    });
+    let axes =
+        [0, 1, 2].map(|a| (0..grid.shape[a]).map(|i| grid.first[a] + i as f64 * grid.step).collect::<Vec<f64>>());
     let mut pores = Bits::new(grid.shape);
     let stride = pores.stride;
-    pores
-        .words
-        .par_chunks_mut(stride * ny)
-        .zip(grid.solid.words.par_chunks(stride * ny))
-        .enumerate()
-        .for_each_init(
-            || vec![0f32; nx * ny],
-            |values, (z, (layer, solid))| {
-                let block = Block {
-                    axes: [&axes[0], &axes[1], &axes[2][z..=z]],
-                };
-                region.fill(&block, values);
-                for (i, _) in values.iter().enumerate().filter(|(_, v)| **v <= 0.0) {
-                    layer[i / nx * stride + i % nx / 64] |= 1 << (i % nx % 64);
-                }
-                layer.iter_mut().zip(solid).for_each(|(p, s)| *p &= !s);
-            },
-        );
+    pores.words.par_chunks_mut(stride * ny).zip(grid.solid.words.par_chunks(stride * ny)).enumerate().for_each_init(
+        || vec![0f32; nx * ny],
+        |values, (z, (layer, solid))| {
+            let block = Block { axes: [&axes[0], &axes[1], &axes[2][z..=z]] };
+            region.fill(&block, values);
+            for (i, _) in values.iter().enumerate().filter(|(_, v)| **v <= 0.0) {
+                layer[i / nx * stride + i % nx / 64] |= 1 << (i % nx % 64);
+            }
+            layer.iter_mut().zip(solid).for_each(|(p, s)| *p &= !s);
+        },
+    );
     pores
 }
 
 /// The distribution over a space.
 fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
     let balls = space.balls(watch)?;
-    let least = balls
-        .iter()
-        .filter_map(|b| b.wall)
-        .reduce(f32::min)
-        .map(|d| d / 2.0);
+    let least = balls.iter().filter_map(|b| b.wall).reduce(f32::min).map(|d| d / 2.0);
     let balls = space.needed(&balls);
     let mut radii = space.paint(&balls, watch)?;
     drop(balls);
@@ -358,11 +308,7 @@ fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
     let low = radii.iter().fold(f32::INFINITY, |m, r| m.min(*r));
     let high = radii.iter().fold(0f32, |m, r| m.max(*r));
     let mean = radii.iter().map(|r| diameter(*r)).sum::<f64>() / n as f64;
-    let square = radii
-        .iter()
-        .map(|r| (diameter(*r) - mean).powi(2))
-        .sum::<f64>()
-        / n as f64;
+    let square = radii.iter().map(|r| (diameter(*r) - mean).powi(2)).sum::<f64>() / n as f64;
     let width = round_up(diameter(high) / BARS);
     let bars = (diameter(high) / width).floor() as usize + 1;
     let mut counts = vec![0u64; bars];
@@ -384,8 +330,6 @@ fn spread(space: &Space, watch: &Watch) -> Result<Spread, Stopped> {
 /// The next of 1, 2, 5, 10 … with any power of ten.
 fn round_up(v: f64) -> f64 {
     let unit = 10f64.powf(v.log10().floor());
-    let of = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|k| k * unit >= v * (1.0 - 1e-12));
+    let of = [1.0, 2.0, 5.0].into_iter().find(|k| k * unit >= v * (1.0 - 1e-12));
     of.unwrap_or(10.0) * unit
 }

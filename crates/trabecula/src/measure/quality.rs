@@ -19,20 +19,13 @@ pub struct Quality {
 
 /// The quality of a mesh; `None` without triangles. Exact to rounding.
 pub fn quality(mesh: &Mesh) -> Option<Quality> {
-    let shapes: Vec<(f64, f64)> = (0..mesh.triangles.len())
-        .into_par_iter()
-        .map(|i| shape(mesh.corners(i)))
-        .collect();
+    let shapes: Vec<(f64, f64)> = (0..mesh.triangles.len()).into_par_iter().map(|i| shape(mesh.corners(i))).collect();
     let largest_aspect = shapes.iter().fold(1.0, |m: f64, s| m.max(s.1));
     let mut angles: Vec<f64> = shapes.into_iter().map(|s| s.0).collect();
     let smallest_angle = angles.iter().copied().reduce(f64::min)?;
     let place = angles.len() / 20;
     let (_, p05, _) = angles.select_nth_unstable_by(place, f64::total_cmp);
-    Some(Quality {
-        smallest_angle,
-        smallest_angle_p05: *p05,
-        largest_aspect,
-    })
+    Some(Quality { smallest_angle, smallest_angle_p05: *p05, largest_aspect })
 }
 
 /// Smallest angle (degrees) and aspect ratio of a triangle.
@@ -72,9 +65,7 @@ mod tests {
     #[test]
     fn meshes() {
         let q = quality(&cube([1.0; 3], 2.0)).expect("triangles");
-        assert!(
-            (q.smallest_angle - 45.0).abs() < 1e-12 && (q.smallest_angle_p05 - 45.0).abs() < 1e-12
-        );
+        assert!((q.smallest_angle - 45.0).abs() < 1e-12 && (q.smallest_angle_p05 - 45.0).abs() < 1e-12);
         // Legs 1: the inscribed circle has radius 1 − 1/√2.
         let aspect = 2f64.sqrt() / (12f64.sqrt() * (1.0 - 0.5f64.sqrt()));
         assert!((q.largest_aspect - aspect).abs() < 1e-12);

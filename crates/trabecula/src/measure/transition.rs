@@ -75,11 +75,7 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     let step = (solid.wavelength / FINE).max((volume / MOST).cbrt());
     let shape = size.map(|s| (s / step).ceil().max(1.0) as usize);
     let at = |i: usize| -> Vec3 {
-        let n = [
-            i % shape[0],
-            i / shape[0] % shape[1],
-            i / shape[0] / shape[1],
-        ];
+        let n = [i % shape[0], i / shape[0] % shape[1], i / shape[0] / shape[1]];
         core::array::from_fn(|a| b.min[a] + (n[a] as f64 + 0.5) * size[a] / shape[a] as f64)
     };
     let points = look(solid, blend, shape, &at);
@@ -96,18 +92,10 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     }
     pairs.sort_unstable();
     let found = windows(&points, 2.0 * blend.longest() / step);
-    pairs
-        .into_iter()
-        .map(|pair| transition(&points, &depth, &found, pair, step, &at))
-        .collect()
+    pairs.into_iter().map(|pair| transition(&points, &depth, &found, pair, step, &at)).collect()
 }
 
-fn look(
-    solid: &Solid,
-    blend: &Blend,
-    shape: [usize; 3],
-    at: &(dyn Fn(usize) -> Vec3 + Sync),
-) -> Points {
+fn look(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -> Vec3 + Sync)) -> Points {
     let n = blend.weights().len();
     let row = shape[0];
     let rows: Vec<Vec<Option<Point>>> = (0..shape[1] * shape[2])
@@ -142,10 +130,7 @@ fn look(
             found
         })
         .collect();
-    Points {
-        shape,
-        of: rows.into_iter().flatten().collect(),
-    }
+    Points { shape, of: rows.into_iter().flatten().collect() }
 }
 
 /// The fractions asked for and found about each point: means over a window that is a raised cosine along each axis and ends
@@ -155,8 +140,7 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
     let most = reach.floor() as usize;
     let share = |d: usize| (1.0 + (std::f64::consts::PI * d as f64 / reach).cos()) as f32;
     let window: Vec<f32> = (0..=most).map(share).collect();
-    let of =
-        |p: &Option<Point>| p.map_or([0.0; 3], |p| [1.0, p.asked, f32::from(u8::from(p.solid))]);
+    let of = |p: &Option<Point>| p.map_or([0.0; 3], |p| [1.0, p.asked, f32::from(u8::from(p.solid))]);
     let mut sums: Vec<[f32; 3]> = points.of.iter().map(of).collect();
     for (length, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
         let old = sums;
@@ -173,9 +157,7 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
             })
             .collect();
     }
-    sums.into_iter()
-        .map(|s| [s[1] / s[0].max(1e-30), s[2] / s[0].max(1e-30)])
-        .collect()
+    sums.into_iter().map(|s| [s[1] / s[0].max(1e-30), s[2] / s[0].max(1e-30)]).collect()
 }
 
 /// A body that has points in the transition itself, beside the two bits of the sides.
@@ -204,11 +186,7 @@ impl Bodies {
     fn join(&mut self, a: u32, b: u32) -> u8 {
         let (a, b) = (self.find(a), self.find(b));
         if a != b {
-            let (big, small) = if self.size[a as usize] >= self.size[b as usize] {
-                (a, b)
-            } else {
-                (b, a)
-            };
+            let (big, small) = if self.size[a as usize] >= self.size[b as usize] { (a, b) } else { (b, a) };
             self.parent[small as usize] = big;
             self.size[big as usize] += self.size[small as usize];
             self.sides[big as usize] |= self.sides[small as usize];
@@ -237,9 +215,7 @@ impl Bodies {
     /// Bodies that come into the transition, of the points that are in.
     fn pieces(&self, inside: &[bool]) -> usize {
         let own = |i: &usize| inside[*i] && self.parent[*i] as usize == *i;
-        (0..inside.len())
-            .filter(|i| own(i) && self.sides[*i] & WITHIN > 0)
-            .count()
+        (0..inside.len()).filter(|i| own(i) && self.sides[*i] & WITHIN > 0).count()
     }
 }
 
@@ -252,18 +228,14 @@ fn transition(
     at: &(dyn Fn(usize) -> Vec3 + Sync),
 ) -> Transition {
     let [nx, ny, nz] = points.shape;
-    let of_pair =
-        |p: &Point| p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == pair;
+    let of_pair = |p: &Point| p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == pair;
     // The share of the second of the pair.
     let second = |p: &Point| match p.first == pair[0] {
         true => p.share,
         false => 1.0 - p.share,
     };
     let all = || points.of.iter().flatten();
-    let (least, most) = all()
-        .filter(|p| of_pair(p))
-        .map(second)
-        .fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
+    let (least, most) = all().filter(|p| of_pair(p)).map(second).fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
     let alone = |i: usize| all().any(|p| p.share == 0.0 && p.first == pair[i]);
     let reach = match most - least > WAY {
         true => END * (most - least),
@@ -291,21 +263,11 @@ fn transition(
         count += 1;
     }
     let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && (of_pair(&p) || side(&p) > 0));
-    let mut order: Vec<u32> = (0..points.of.len() as u32)
-        .filter(|i| wanted(&points.of[*i as usize]))
-        .collect();
-    order.sort_unstable_by(|a, b| {
-        depth[*b as usize]
-            .total_cmp(&depth[*a as usize])
-            .then(a.cmp(b))
-    });
+    let mut order: Vec<u32> = (0..points.of.len() as u32).filter(|i| wanted(&points.of[*i as usize])).collect();
+    order.sort_unstable_by(|a, b| depth[*b as usize].total_cmp(&depth[*a as usize]).then(a.cmp(b)));
     let anew = || Bodies {
         parent: (0..points.of.len() as u32).collect(),
-        sides: points
-            .of
-            .iter()
-            .map(|p| p.as_ref().map_or(0, &side))
-            .collect(),
+        sides: points.of.iter().map(|p| p.as_ref().map_or(0, &side)).collect(),
         size: vec![1; points.of.len()],
     };
     let grow = |bodies: &mut Bodies, inside: &mut [bool], i: u32| {
@@ -341,18 +303,12 @@ fn transition(
     let mut dangling = (0, 0.0);
     if let Some((wide, _)) = neck {
         let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
-        for i in order
-            .iter()
-            .filter(|i| 2.0 * f64::from(depth[**i as usize]) >= THIN * wide)
-        {
+        for i in order.iter().filter(|i| 2.0 * f64::from(depth[**i as usize]) >= THIN * wide) {
             grow(&mut bodies, &mut inside, *i);
         }
         let (many, all) = bodies.apart(&inside);
         // Those that are loose hang by nothing.
-        dangling = (
-            many.saturating_sub(loose),
-            (all.saturating_sub(lost)) as f64 * cell,
-        );
+        dangling = (many.saturating_sub(loose), (all.saturating_sub(lost)) as f64 * cell);
     }
     Transition {
         between: pair.map(usize::from),
@@ -365,14 +321,7 @@ fn transition(
             .iter()
             .enumerate()
             .filter(|(_, s)| s[0] > 0.0)
-            .map(|(i, s)| {
-                [
-                    (i as f64 + 0.5) / BINS as f64,
-                    s[1] / s[0],
-                    s[2] / s[0],
-                    s[0],
-                ]
-            })
+            .map(|(i, s)| [(i as f64 + 0.5) / BINS as f64, s[1] / s[0], s[2] / s[0], s[0]])
             .collect(),
         step,
     }

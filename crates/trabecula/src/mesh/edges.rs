@@ -31,11 +31,7 @@ impl Edges {
     /// run down from its right, so that a direction costs no memory. Each span is then sorted on its own.
     pub(crate) fn count(mesh: &Mesh) -> Edges {
         let n = mesh.vertices.len();
-        let sides = || {
-            mesh.triangles
-                .iter()
-                .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-        };
+        let sides = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         let mut start = vec![0usize; n + 1];
         let mut loops = 0;
         for (a, b) in sides() {

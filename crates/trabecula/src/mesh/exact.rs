@@ -26,9 +26,8 @@ pub(crate) fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
     let (rp, pr) = (r[0] * p[1], p[0] * r[1]);
     let (pq, qp) = (p[0] * q[1], q[0] * p[1]);
     let det = p[2] * (qr - rq) + q[2] * (rp - pr) + r[2] * (pq - qp);
-    let size = (qr.abs() + rq.abs()) * p[2].abs()
-        + (rp.abs() + pr.abs()) * q[2].abs()
-        + (pq.abs() + qp.abs()) * r[2].abs();
+    let size =
+        (qr.abs() + rq.abs()) * p[2].abs() + (rp.abs() + pr.abs()) * q[2].abs() + (pq.abs() + qp.abs()) * r[2].abs();
     if det.abs() > (7.0 + 56.0 * EPS) * EPS * size {
         return sign(det);
     }
@@ -38,12 +37,8 @@ pub(crate) fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
 #[cold]
 fn exact3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
     let [p, q, r] = [a, b, c].map(|v| [0, 1, 2].map(|k| Expansion::difference(v[k], d[k])));
-    let minor =
-        |u: &[Expansion; 3], v: &[Expansion; 3]| u[0].times(&v[1]).minus(&v[0].times(&u[1]));
-    p[2].times(&minor(&q, &r))
-        .plus(&q[2].times(&minor(&r, &p)))
-        .plus(&r[2].times(&minor(&p, &q)))
-        .sign()
+    let minor = |u: &[Expansion; 3], v: &[Expansion; 3]| u[0].times(&v[1]).minus(&v[0].times(&u[1]));
+    p[2].times(&minor(&q, &r)).plus(&q[2].times(&minor(&r, &p))).plus(&r[2].times(&minor(&p, &q))).sign()
 }
 
 /// The turn a → b → c in the plane: 1 left, −1 right, 0 straight.
@@ -144,10 +139,7 @@ mod tests {
         assert_eq!(orient3d(o, x, y, [0.3, 0.4, 0.0]), 0);
         assert_eq!(orient2d([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]), 1);
         assert_eq!(plane_axis(o, x, y), Some(2));
-        assert_eq!(
-            plane_axis(o, [0.1; 3], [0.7; 3].map(|v: f64| v / 7.0)),
-            None
-        );
+        assert_eq!(plane_axis(o, [0.1; 3], [0.7; 3].map(|v: f64| v / 7.0)), None);
     }
 
     #[test]
@@ -160,30 +152,9 @@ mod tests {
                 let want = (j - i).signum() as i8;
                 assert_eq!(orient2d([12.0, 12.0], [24.0, 24.0], p), want, "{i} {j}");
                 let lift = |p: [f64; 2]| [p[0], p[1], 0.0];
-                let side = orient3d(
-                    [12.0, 12.0, 0.0],
-                    [24.0, 24.0, 0.0],
-                    lift(p),
-                    [7.0, 7.0, 1e-300],
-                );
-                assert_eq!(
-                    side,
-                    -orient3d(
-                        [24.0, 24.0, 0.0],
-                        [12.0, 12.0, 0.0],
-                        lift(p),
-                        [7.0, 7.0, 1e-300]
-                    )
-                );
-                assert_eq!(
-                    orient3d(
-                        [12.0, 12.0, 1.0],
-                        [24.0, 24.0, 3.0],
-                        lift(p),
-                        [12.0, 12.0, -5.0]
-                    ),
-                    want
-                );
+                let side = orient3d([12.0, 12.0, 0.0], [24.0, 24.0, 0.0], lift(p), [7.0, 7.0, 1e-300]);
+                assert_eq!(side, -orient3d([24.0, 24.0, 0.0], [12.0, 12.0, 0.0], lift(p), [7.0, 7.0, 1e-300]));
+                assert_eq!(orient3d([12.0, 12.0, 1.0], [24.0, 24.0, 3.0], lift(p), [12.0, 12.0, -5.0]), want);
             }
         }
     }
@@ -192,9 +163,7 @@ mod tests {
     fn exact_tests_are_antisymmetric_and_agree_with_integers() {
         let mut s = 1u64;
         let mut next = || {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 60) as i128 - 8
         };
         for _ in 0..20_000 {

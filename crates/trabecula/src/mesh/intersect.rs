@@ -18,15 +18,9 @@ const LEAF: usize = 4;
 /// other, a triangle given twice. Triangles without area are left out (`defects` counts them). Vertices are common
 /// when they have the same index.
 pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
-    let mut order: Vec<u32> = (0..mesh.triangles.len() as u32)
-        .into_par_iter()
-        .filter(|&i| !degenerate(mesh, i as usize))
-        .collect();
-    let boxes: Vec<Aabb> = mesh
-        .triangles
-        .par_iter()
-        .map(|t| bounds(t.map(|v| mesh.vertices[v as usize])))
-        .collect();
+    let mut order: Vec<u32> =
+        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
+    let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| bounds(t.map(|v| mesh.vertices[v as usize]))).collect();
     let Some(tree) = Tree::build(&boxes, &mut order) else {
         return 0;
     };
@@ -39,8 +33,7 @@ pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
             let b = &boxes[i as usize];
             tree.visit(b, &mut |range| {
                 for &j in &order[range] {
-                    if j > i && overlap(b, &boxes[j as usize]) && meet(mesh, i as usize, j as usize)
-                    {
+                    if j > i && overlap(b, &boxes[j as usize]) && meet(mesh, i as usize, j as usize) {
                         found.fetch_add(1, Ordering::Relaxed);
                     }
                 }
@@ -52,9 +45,7 @@ pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
 
 /// Whether no two triangles of a small mesh meet elsewhere than in their common vertices or edge, and none is flat.
 pub fn is_embedded(mesh: &Mesh) -> bool {
-    let boxes: Vec<Aabb> = (0..mesh.triangles.len())
-        .map(|i| bounds(mesh.corners(i)))
-        .collect();
+    let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
     (0..boxes.len()).all(|i| {
         let meets = |j| overlap(&boxes[i], &boxes[j]) && meet(mesh, i, j);
         !degenerate(mesh, i) && !(0..i).any(meets)
@@ -63,19 +54,11 @@ pub fn is_embedded(mesh: &Mesh) -> bool {
 
 /// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
 /// same for any number of threads. Triangles without area are left out.
-pub(crate) fn near_pairs<T: Send>(
-    mesh: &Mesh,
-    margin: f64,
-    f: impl Fn(usize, usize) -> Option<T> + Sync,
-) -> Vec<T> {
-    let mut order: Vec<u32> = (0..mesh.triangles.len() as u32)
-        .into_par_iter()
-        .filter(|&i| !degenerate(mesh, i as usize))
-        .collect();
-    let boxes: Vec<Aabb> = (0..mesh.triangles.len())
-        .into_par_iter()
-        .map(|i| bounds(mesh.corners(i)).grown(margin))
-        .collect();
+pub(crate) fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) -> Option<T> + Sync) -> Vec<T> {
+    let mut order: Vec<u32> =
+        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
+    let boxes: Vec<Aabb> =
+        (0..mesh.triangles.len()).into_par_iter().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
     let Some(tree) = Tree::build(&boxes, &mut order) else {
         return Vec::new();
     };
@@ -119,16 +102,10 @@ impl Tree {
     }
 
     fn split(boxes: &[Aabb], order: &mut [u32], first: usize) -> Tree {
-        let bounds = order
-            .iter()
-            .fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
         let range = (first, first + order.len());
         if order.len() <= LEAF {
-            return Tree {
-                bounds,
-                range,
-                children: None,
-            };
+            return Tree { bounds, range, children: None };
         }
         let size = bounds.size();
         let axis = (0..3).fold(0, |a, k| if size[k] > size[a] { k } else { a });
@@ -137,21 +114,11 @@ impl Tree {
         order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
         let (left, right) = order.split_at_mut(half);
         let children = if range.1 - range.0 > 4096 {
-            rayon::join(
-                || Tree::split(boxes, left, first),
-                || Tree::split(boxes, right, first + half),
-            )
+            rayon::join(|| Tree::split(boxes, left, first), || Tree::split(boxes, right, first + half))
         } else {
-            (
-                Tree::split(boxes, left, first),
-                Tree::split(boxes, right, first + half),
-            )
+            (Tree::split(boxes, left, first), Tree::split(boxes, right, first + half))
         };
-        Tree {
-            bounds,
-            range,
-            children: Some(Box::new(children)),
-        }
+        Tree { bounds, range, children: Some(Box::new(children)) }
     }
 
     /// Calls `leaf` with the span of every leaf whose box touches `b`.
@@ -210,13 +177,8 @@ fn crosses(a: Vec3, b: Vec3, t: [Vec3; 3]) -> bool {
         return false;
     }
     if sa == 0 && sb == 0 {
-        return plane_axis(t[0], t[1], t[2]).is_some_and(|axis| {
-            crosses_flat(
-                drop_axis(a, axis),
-                drop_axis(b, axis),
-                t.map(|c| drop_axis(c, axis)),
-            )
-        });
+        return plane_axis(t[0], t[1], t[2])
+            .is_some_and(|axis| crosses_flat(drop_axis(a, axis), drop_axis(b, axis), t.map(|c| drop_axis(c, axis))));
     }
     // The line meets the plane in one point, within the triangle unless it passes sides on different hands.
     let sides = [0, 1, 2].map(|k| orient3d(a, b, t[k], t[(k + 1) % 3]));
@@ -238,8 +200,7 @@ fn segments_meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     let (sa, sb) = (orient2d(c, d, a), orient2d(c, d, b));
     if [sa, sb, sc, sd] == [0; 4] {
         // On one line: they meet where their extents do on both axes.
-        return (0..2)
-            .all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
+        return (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
     }
     sa * sb <= 0 && sc * sd <= 0
 }
@@ -282,81 +243,21 @@ mod tests {
     #[test]
     fn pairs_without_common_vertices() {
         for (t, want, what) in [
-            (
-                [[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [5.0, 5.0, 0.5]],
-                1,
-                "an edge pierces",
-            ),
-            (
-                [[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [2.0, 1.0, 1.0]],
-                0,
-                "above, parallel",
-            ),
-            (
-                [[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [5.0, 5.0, 0.5]],
-                0,
-                "beside",
-            ),
-            (
-                [[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]],
-                1,
-                "a corner on the inside",
-            ),
-            (
-                [[2.0, 0.0, 0.0], [2.0, -1.0, 1.0], [2.0, -1.0, -1.0]],
-                1,
-                "a corner on a side",
-            ),
-            (
-                [[2.0, 0.0, -1.0], [2.0, 0.0, 1.0], [2.0, -1.0, 0.0]],
-                1,
-                "a side across a side",
-            ),
-            (
-                [[1.0, 0.5, 0.0], [2.0, 0.5, 0.0], [1.0, 1.5, 0.0]],
-                1,
-                "in the plane, within",
-            ),
-            (
-                [[-1.0, -1.0, 0.0], [9.0, -1.0, 0.0], [-1.0, 9.0, 0.0]],
-                1,
-                "in the plane, around",
-            ),
-            (
-                [[1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [2.0, 1.0, 0.0]],
-                1,
-                "in the plane, across",
-            ),
-            (
-                [[5.0, 5.0, 0.0], [6.0, 5.0, 0.0], [5.0, 6.0, 0.0]],
-                0,
-                "in the plane, apart",
-            ),
-            (
-                [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 0.0]],
-                1,
-                "in the plane, along a side",
-            ),
-            (
-                [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 1.0]],
-                1,
-                "hinged along a part of a side",
-            ),
-            (
-                [[2.0, 2.0, 0.0], [3.0, 3.0, 0.0], [3.0, 3.0, 1.0]],
-                1,
-                "a corner on the long side",
-            ),
-            (
-                [[2.0, 2.0, 1e-300], [3.0, 3.0, 1.0], [3.0, 2.0, 1.0]],
-                0,
-                "a hair above the long side",
-            ),
-            (
-                [[0.0, 0.0, 1e-17], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]],
-                0,
-                "a hair above a corner",
-            ),
+            ([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [5.0, 5.0, 0.5]], 1, "an edge pierces"),
+            ([[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [2.0, 1.0, 1.0]], 0, "above, parallel"),
+            ([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [5.0, 5.0, 0.5]], 0, "beside"),
+            ([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]], 1, "a corner on the inside"),
+            ([[2.0, 0.0, 0.0], [2.0, -1.0, 1.0], [2.0, -1.0, -1.0]], 1, "a corner on a side"),
+            ([[2.0, 0.0, -1.0], [2.0, 0.0, 1.0], [2.0, -1.0, 0.0]], 1, "a side across a side"),
+            ([[1.0, 0.5, 0.0], [2.0, 0.5, 0.0], [1.0, 1.5, 0.0]], 1, "in the plane, within"),
+            ([[-1.0, -1.0, 0.0], [9.0, -1.0, 0.0], [-1.0, 9.0, 0.0]], 1, "in the plane, around"),
+            ([[1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [2.0, 1.0, 0.0]], 1, "in the plane, across"),
+            ([[5.0, 5.0, 0.0], [6.0, 5.0, 0.0], [5.0, 6.0, 0.0]], 0, "in the plane, apart"),
+            ([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 0.0]], 1, "in the plane, along a side"),
+            ([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 1.0]], 1, "hinged along a part of a side"),
+            ([[2.0, 2.0, 0.0], [3.0, 3.0, 0.0], [3.0, 3.0, 1.0]], 1, "a corner on the long side"),
+            ([[2.0, 2.0, 1e-300], [3.0, 3.0, 1.0], [3.0, 2.0, 1.0]], 0, "a hair above the long side"),
+            ([[0.0, 0.0, 1e-17], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]], 0, "a hair above a corner"),
         ] {
             assert_eq!(pair(T, t), want, "{what}");
         }
@@ -366,51 +267,15 @@ mod tests {
     fn pairs_with_a_common_vertex() {
         let o = [0.0; 3];
         for (t, want, what) in [
-            (
-                [o, [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]],
-                0,
-                "in the plane, opposite",
-            ),
-            (
-                [o, [1.0, 2.0, 0.0], [2.0, 1.0, 0.0]],
-                1,
-                "in the plane, within",
-            ),
-            (
-                [o, [8.0, 1.0, 0.0], [8.0, 2.0, 0.0]],
-                1,
-                "in the plane, through the far side",
-            ),
-            (
-                [o, [8.0, 0.0, 0.0], [8.0, -2.0, 0.0]],
-                1,
-                "in the plane, along a side",
-            ),
-            (
-                [o, [0.0, -1.0, 1.0], [0.0, -1.0, -1.0]],
-                0,
-                "upright, outside",
-            ),
-            (
-                [o, [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]],
-                1,
-                "upright, through the inside",
-            ),
-            (
-                [o, [9.0, 9.0, 1.0], [9.0, 9.0, -1.0]],
-                1,
-                "upright, through the whole",
-            ),
-            (
-                [o, [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]],
-                1,
-                "a side lies in it",
-            ),
-            (
-                [o, [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]],
-                1,
-                "a side lies on its side",
-            ),
+            ([o, [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], 0, "in the plane, opposite"),
+            ([o, [1.0, 2.0, 0.0], [2.0, 1.0, 0.0]], 1, "in the plane, within"),
+            ([o, [8.0, 1.0, 0.0], [8.0, 2.0, 0.0]], 1, "in the plane, through the far side"),
+            ([o, [8.0, 0.0, 0.0], [8.0, -2.0, 0.0]], 1, "in the plane, along a side"),
+            ([o, [0.0, -1.0, 1.0], [0.0, -1.0, -1.0]], 0, "upright, outside"),
+            ([o, [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]], 1, "upright, through the inside"),
+            ([o, [9.0, 9.0, 1.0], [9.0, 9.0, -1.0]], 1, "upright, through the whole"),
+            ([o, [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]], 1, "a side lies in it"),
+            ([o, [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]], 1, "a side lies on its side"),
             ([o, [1.0, 1.0, 1.0], [1.0, 2.0, 1.0]], 0, "rising"),
         ] {
             assert_eq!(pair(T, t), want, "{what}");
@@ -450,9 +315,7 @@ mod tests {
     fn random_triangles_agree_with_all_pairs() {
         let mut s = 5u64;
         let mut next = || {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 61) as f64
         };
         // Corners on a grid of 8³: touching, coplanar and repeated cases abound.
@@ -466,9 +329,7 @@ mod tests {
         let mut all = 0;
         for i in 0..100 {
             for j in i + 1..100 {
-                all += usize::from(
-                    !degenerate(&mesh, i) && !degenerate(&mesh, j) && meet(&mesh, i, j),
-                );
+                all += usize::from(!degenerate(&mesh, i) && !degenerate(&mesh, j) && meet(&mesh, i, j));
             }
         }
         assert!(all > 50);

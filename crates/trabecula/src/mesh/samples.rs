@@ -18,8 +18,7 @@ pub fn torus(n: u32, m: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..n {
         for j in 0..m {
-            let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)]
-                .map(|t| t * core::f64::consts::TAU);
+            let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)].map(|t| t * core::f64::consts::TAU);
             let r = 2.0 + v.cos();
             mesh.vertices.push([r * u.cos(), r * u.sin(), v.sin()]);
             let at = |i: u32, j: u32| (i % n) * m + j % m;
@@ -36,8 +35,7 @@ pub fn join(parts: &[Mesh]) -> Mesh {
     for p in parts {
         let shift = all.vertices.len() as u32;
         all.vertices.extend(&p.vertices);
-        all.triangles
-            .extend(p.triangles.iter().map(|t| t.map(|v| v + shift)));
+        all.triangles.extend(p.triangles.iter().map(|t| t.map(|v| v + shift)));
     }
     all
 }

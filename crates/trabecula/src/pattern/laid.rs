@@ -58,16 +58,8 @@ impl Laid {
     pub fn new(pattern: Pattern, fillet: Fillet) -> Result<Laid, Fault> {
         pattern.check()?;
         let [u, v, w] = pattern.steps.map(|s| s.0);
-        let size = pattern
-            .nodes
-            .iter()
-            .map(|h| norm(h.center))
-            .fold(0.0, f64::max);
-        let free = [
-            u.commutes(&v, size) && u.commutes(&w, size),
-            v.commutes(&w, size),
-            true,
-        ];
+        let size = pattern.nodes.iter().map(|h| norm(h.center)).fold(0.0, f64::max);
+        let free = [u.commutes(&v, size) && u.commutes(&w, size), v.commutes(&w, size), true];
         let classes: [Classes; 3] = core::array::from_fn(|a| Classes {
             count: pattern.steps[a].1 as usize,
             ends: free[a].then(|| {
@@ -75,8 +67,7 @@ impl Laid {
                 most.unwrap_or(0) as usize
             }),
         });
-        let different =
-            classes.iter().map(|c| c.len() as f64).product::<f64>() * pattern.nodes.len() as f64;
+        let different = classes.iter().map(|c| c.len() as f64).product::<f64>() * pattern.nodes.len() as f64;
         if different > MOST {
             let message = format!(
                 "{} hubs of this pattern differ from each other; at most {} are made: turn and scale about one axis, or \
@@ -97,13 +88,8 @@ impl Laid {
                         let b = star.bounds();
                         let aside = [right - b.min[0], 0.0, 0.0];
                         right += b.size()[0];
-                        star.hubs
-                            .iter_mut()
-                            .for_each(|h| h.center = add(h.center, aside));
-                        kinds.push(Kind {
-                            hub: first as usize,
-                            aside,
-                        });
+                        star.hubs.iter_mut().for_each(|h| h.center = add(h.center, aside));
+                        kinds.push(Kind { hub: first as usize, aside });
                         graph.hubs.extend(star.hubs);
                         graph.beams.extend(star.beams.into_iter().map(|mut b| {
                             b.ends = b.ends.map(|e| e + first);
@@ -120,8 +106,7 @@ impl Laid {
         });
         let smallest = |s: &(Similarity, u32)| s.0.scale.powi(s.1 as i32 - 1).min(1.0);
         let least = pattern.steps.iter().map(smallest).product();
-        let thick =
-            pattern.nodes.iter().map(|h| h.radius).sum::<f64>() / pattern.nodes.len() as f64;
+        let thick = pattern.nodes.iter().map(|h| h.radius).sum::<f64>() / pattern.nodes.len() as f64;
         let mut laid = Laid {
             classes,
             kinds,
@@ -146,10 +131,7 @@ impl Laid {
     fn undo(&self, step: usize, n: usize) -> Similarity {
         match self.undone[step].get(n) {
             Some(done) => *done,
-            None => Similarity {
-                shift: scale(self.pattern.steps[step].0.shift, -(n as f64)),
-                ..Similarity::STILL
-            },
+            None => Similarity { shift: scale(self.pattern.steps[step].0.shift, -(n as f64)), ..Similarity::STILL },
         }
     }
 
@@ -165,10 +147,7 @@ impl Laid {
             kinds_at(a, b).fold(Aabb::EMPTY, |all, m| {
                 let kind = &self.kinds[m];
                 let b = self.quadors.hold(kind.hub).grown(self.cap);
-                all.union(Aabb {
-                    min: sub(b.min, kind.aside),
-                    max: sub(b.max, kind.aside),
-                })
+                all.union(Aabb { min: sub(b.min, kind.aside), max: sub(b.max, kind.aside) })
             })
         };
         let steps = self.pattern.steps;
@@ -177,11 +156,7 @@ impl Laid {
             let ((by, _), (first, n)) = (&steps[step], self.classes[step].members(class));
             let power = |n: usize| self.undo(step, n).inverse();
             let last = first + n - 1;
-            let between = if by.moves() {
-                first..first
-            } else {
-                first..last
-            };
+            let between = if by.moves() { first..first } else { first..last };
             let ends = carried(&power(first), &b).union(carried(&power(last), &b));
             between.fold(ends, |all, n| all.union(carried(&power(n), &b)))
         };
@@ -214,10 +189,7 @@ impl Laid {
         let nodes = self.pattern.nodes.len();
         self.places(p, &mut |_, first, home, s| {
             self.kinds[first..first + nodes].iter().all(|kind| {
-                let seen = Aabb {
-                    min: add(home.min, kind.aside),
-                    max: add(home.max, kind.aside),
-                };
+                let seen = Aabb { min: add(home.min, kind.aside), max: add(home.max, kind.aside) };
                 found(kind, seen, s)
             })
         });
@@ -279,10 +251,7 @@ impl Laid {
     pub fn contains(&self, p: Vec3) -> bool {
         let mut inside = false;
         self.near(&Aabb { min: p, max: p }, &mut |kind, q, _| {
-            inside = self
-                .quadors
-                .hub(kind.hub)
-                .holds(sub(q.min, self.quadors.center(kind.hub)));
+            inside = self.quadors.hub(kind.hub).holds(sub(q.min, self.quadors.center(kind.hub)));
             !inside
         });
         inside
@@ -320,11 +289,7 @@ impl Laid {
         let sum = |step: usize, class: usize| {
             let s = self.pattern.steps[step].0.scale.powi(3);
             let (first, n) = self.classes[step].members(class);
-            let all = if s == 1.0 {
-                n as f64
-            } else {
-                (s.powi(n as i32) - 1.0) / (s - 1.0)
-            };
+            let all = if s == 1.0 { n as f64 } else { (s.powi(n as i32) - 1.0) / (s - 1.0) };
             s.powi(first as i32) * all
         };
         let each = self.kinds.iter().enumerate().map(|(m, kind)| {
@@ -349,9 +314,7 @@ impl Laid {
             return Err(Fault::new("", message));
         }
         let each = self.kinds().1;
-        let parts = each
-            .par_iter()
-            .map(|(hub, n)| Ok(n * self.quadors.hub_volume(*hub)?));
+        let parts = each.par_iter().map(|(hub, n)| Ok(n * self.quadors.hub_volume(*hub)?));
         let parts = parts.collect::<Result<Vec<f64>, Fault>>()?;
         Ok(parts.iter().sum())
     }
@@ -402,17 +365,11 @@ fn carried(by: &Similarity, b: &Aabb) -> Aabb {
         return *b;
     }
     if by.moves() {
-        return Aabb {
-            min: add(b.min, by.shift),
-            max: add(b.max, by.shift),
-        };
+        return Aabb { min: add(b.min, by.shift), max: add(b.max, by.shift) };
     }
     let (middle, half) = (by.apply(b.center()), scale(b.size(), 0.5 * by.scale));
     let reach = apply(&by.turn.map(|row| row.map(f64::abs)), half);
-    Aabb {
-        min: sub(middle, reach),
-        max: add(middle, reach),
-    }
+    Aabb { min: sub(middle, reach), max: add(middle, reach) }
 }
 
 /// The repeats n for which a part of p, n steps undone, may lie in b: by division where a step only moves, else all.

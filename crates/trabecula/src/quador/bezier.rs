@@ -17,11 +17,7 @@ pub struct Bezier<const D: usize> {
 impl<const D: usize> Bezier<D> {
     /// The place at t in [0, 1].
     pub fn at(&self, t: f64) -> [f64; D] {
-        let (a, b, c) = (
-            (1.0 - t) * (1.0 - t),
-            2.0 * self.weight * t * (1.0 - t),
-            t * t,
-        );
+        let (a, b, c) = ((1.0 - t) * (1.0 - t), 2.0 * self.weight * t * (1.0 - t), t * t);
         let [p, q, r] = &self.points;
         core::array::from_fn(|i| (a * p[i] + b * q[i] + c * r[i]) / (a + b + c))
     }
@@ -40,16 +36,7 @@ impl<const D: usize> Bezier<D> {
         let middle = self.at(0.5);
         let beside = |p: [f64; D]| core::array::from_fn(|i| (p[i] + w * q[i]) / (1.0 + w));
         let weight = ((1.0 + w) / 2.0).sqrt();
-        [
-            Bezier {
-                points: [p, beside(p), middle],
-                weight,
-            },
-            Bezier {
-                points: [middle, beside(r), r],
-                weight,
-            },
-        ]
+        [Bezier { points: [p, beside(p), middle], weight }, Bezier { points: [middle, beside(r), r], weight }]
     }
 
     /// Appends places along it, without the first, so that no chord is further than `chord` from it.
@@ -91,11 +78,7 @@ fn fullness(w: f64) -> f64 {
         return sum;
     }
     let s = y.abs().sqrt();
-    if y > 0.0 {
-        (w.acos() - w * s) / (s * y)
-    } else {
-        (w.acosh() - w * s) / (s * y)
-    }
+    if y > 0.0 { (w.acos() - w * s) / (s * y) } else { (w.acosh() - w * s) / (s * y) }
 }
 
 /// An arc of a conic or, where a plane cuts a quadric along a straight line, a segment.
@@ -124,25 +107,15 @@ impl Path {
             return Some(Path::Curved(conic));
         }
         let aside = cross(normal, tangent);
-        let slope = [
-            2.0 * dot(q.half_slope(from), aside),
-            2.0 * q.form(tangent, aside),
-        ];
-        (slope[0] != 0.0).then_some(Path::Straight {
-            from,
-            along: tangent,
-            slope,
-            end: f64::INFINITY,
-        })
+        let slope = [2.0 * dot(q.half_slope(from), aside), 2.0 * q.form(tangent, aside)];
+        (slope[0] != 0.0).then_some(Path::Straight { from, along: tangent, slope, end: f64::INFINITY })
     }
 
     /// The first parameter beyond the start where an affine function with this value there and gradient vanishes; with `zero`
     /// the start itself, where it is known to, is not meant.
     pub fn first(&self, value: f64, gradient: Vec3, zero: bool) -> Option<f64> {
         match self {
-            Path::Curved(c) => c
-                .roots([value, dot(gradient, c.e[0]), dot(gradient, c.e[1])], zero)
-                .next(),
+            Path::Curved(c) => c.roots([value, dot(gradient, c.e[0]), dot(gradient, c.e[1])], zero).next(),
             Path::Straight { along, .. } => {
                 let t = -value / dot(gradient, *along);
                 (!zero && t > 0.0 && t.is_finite()).then_some(t)
@@ -174,9 +147,7 @@ impl Path {
     pub fn at(&self, share: f64) -> Vec3 {
         match self {
             Path::Curved(c) => c.at(share * c.end),
-            Path::Straight {
-                from, along, end, ..
-            } => add(*from, scale(*along, share * end)),
+            Path::Straight { from, along, end, .. } => add(*from, scale(*along, share * end)),
         }
     }
 
@@ -184,10 +155,7 @@ impl Path {
     pub fn curves(&self) -> Vec<Bezier<3>> {
         match self {
             Path::Curved(c) => curves(c, 0.0, c.end),
-            Path::Straight { .. } => vec![Bezier {
-                points: [self.at(0.0), self.at(0.5), self.at(1.0)],
-                weight: 1.0,
-            }],
+            Path::Straight { .. } => vec![Bezier { points: [self.at(0.0), self.at(0.5), self.at(1.0)], weight: 1.0 }],
         }
     }
 }
@@ -199,14 +167,8 @@ pub(super) fn curves(c: &Conic, from: f64, to: f64) -> Vec<Bezier<3>> {
     let mut todo = vec![(from, to, 12)];
     while let Some((a, b, depth)) = todo.pop() {
         let ((s, t), (u, v)) = (a.sin_cos(), b.sin_cos());
-        let form = |(s, t): (f64, f64), (u, v): (f64, f64)| {
-            c.m[0] * t * v + c.m[1] * (s * v + t * u) + c.m[2] * s * u
-        };
-        let (aa, ab, bb) = (
-            form((s, t), (s, t)),
-            form((s, t), (u, v)),
-            form((u, v), (u, v)),
-        );
+        let form = |(s, t): (f64, f64), (u, v): (f64, f64)| c.m[0] * t * v + c.m[1] * (s * v + t * u) + c.m[2] * s * u;
+        let (aa, ab, bb) = (form((s, t), (s, t)), form((s, t), (u, v)), form((u, v), (u, v)));
         let weight = ab / (aa * bb).sqrt() * aa.signum();
         if depth > 0 && (weight.is_nan() || weight < 0.5) {
             let m = (a + b) / 2.0;
@@ -215,20 +177,10 @@ pub(super) fn curves(c: &Conic, from: f64, to: f64) -> Vec<Bezier<3>> {
             continue;
         }
         let place = |along: f64, aside: f64, d: f64| {
-            add(
-                c.v,
-                add(
-                    scale(c.e[0], -c.q * along / d),
-                    scale(c.e[1], -c.q * aside / d),
-                ),
-            )
+            add(c.v, add(scale(c.e[0], -c.q * along / d), scale(c.e[1], -c.q * aside / d)))
         };
         out.push(Bezier {
-            points: [
-                place(s * t, s * s, aa),
-                place((s * v + t * u) / 2.0, s * u, ab),
-                place(u * v, u * u, bb),
-            ],
+            points: [place(s * t, s * s, aa), place((s * v + t * u) / 2.0, s * u, ab), place(u * v, u * u, bb)],
             weight,
         });
     }
@@ -262,24 +214,15 @@ mod tests {
 
     #[test]
     fn the_area_beside_an_arc_is_its_closed_form() {
-        for w in [
-            0.01, 0.3, 0.5, 0.9, 0.947, 0.95, 0.999_999, 1.0, 1.000_001, 1.04, 1.06, 2.0, 30.0,
-        ] {
-            let b = Bezier {
-                points: [[0.0, 0.0], [1.7, -0.8], [2.0, 0.5]],
-                weight: w,
-            };
+        for w in [0.01, 0.3, 0.5, 0.9, 0.947, 0.95, 0.999_999, 1.0, 1.000_001, 1.04, 1.06, 2.0, 30.0] {
+            let b = Bezier { points: [[0.0, 0.0], [1.7, -0.8], [2.0, 0.5]], weight: w };
             let (got, want) = (b.bulge(), sampled(&b));
             assert!((got - want).abs() < 1e-10 * want.abs(), "{w}: {got} {want}");
         }
         // A sector of a circle.
         let alpha = FRAC_PI_3;
         let b = Bezier {
-            points: [
-                [alpha.cos(), -alpha.sin()],
-                [1.0 / alpha.cos(), 0.0],
-                [alpha.cos(), alpha.sin()],
-            ],
+            points: [[alpha.cos(), -alpha.sin()], [1.0 / alpha.cos(), 0.0], [alpha.cos(), alpha.sin()]],
             weight: alpha.cos(),
         };
         let want = 2.0 * alpha - (2.0 * alpha).sin();
@@ -288,10 +231,7 @@ mod tests {
 
     #[test]
     fn halves_are_the_same_curve() {
-        let b = Bezier {
-            points: [[0.0, 0.0], [1.7, -0.8], [2.0, 0.5]],
-            weight: 1.7,
-        };
+        let b = Bezier { points: [[0.0, 0.0], [1.7, -0.8], [2.0, 0.5]], weight: 1.7 };
         let [p, q] = b.halves();
         let both = p.bulge() + q.bulge();
         let m = b.at(0.5);
@@ -304,23 +244,14 @@ mod tests {
 
     #[test]
     fn a_circle_is_four_curves_and_its_area() {
-        let q = Quadric {
-            m: crate::math::IDENTITY,
-            b: [0.0; 3],
-            c: -4.0,
-        };
+        let q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -4.0 };
         let (n, from) = ([0.0, 0.0, 1.0], [2.0, 0.0, 0.0]);
-        let path = Path::new(&q, n, from, onward(&q, n, from))
-            .and_then(|p| p.until(None))
-            .expect("a circle");
+        let path = Path::new(&q, n, from, onward(&q, n, from)).and_then(|p| p.until(None)).expect("a circle");
         let curves = path.curves();
         assert_eq!(curves.len(), 4);
         let mut twice = 0.0;
         for c in curves {
-            let b = Bezier::<2> {
-                points: c.points.map(|p| [p[0], p[1]]),
-                weight: c.weight,
-            };
+            let b = Bezier::<2> { points: c.points.map(|p| [p[0], p[1]]), weight: c.weight };
             let [p, _, r] = b.points;
             twice += p[0] * r[1] - p[1] * r[0] + b.bulge();
         }

@@ -52,13 +52,8 @@ fn bounds(hub: &Hub, complex: &Complex, face: &Face) -> Aabb {
         let s = &hub.stubs[stub as usize];
         let low = points.map(|p| dot(p, s.axis)).fold(s.split, f64::min);
         let side = s.axis.map(|a| s.thickest() * (1.0 - a * a).max(0.0).sqrt());
-        let ends = Aabb::EMPTY
-            .with(scale(s.axis, low))
-            .with(scale(s.axis, s.split));
-        return Aabb {
-            min: sub(ends.min, side),
-            max: add(ends.max, side),
-        };
+        let ends = Aabb::EMPTY.with(scale(s.axis, low)).with(scale(s.axis, s.split));
+        return Aabb { min: sub(ends.min, side), max: add(ends.max, side) };
     }
     let outline = points.fold(Aabb::EMPTY, Aabb::with);
     match face.quadric.extremes() {
@@ -93,11 +88,7 @@ fn clear(value: f64, slope: f64, bend: f64) -> f64 {
 impl Quadors {
     /// Prepares to find nearest places.
     pub fn nearest(&self) -> Nearest<'_> {
-        Nearest {
-            quadors: self,
-            bounds: self.bounds(),
-            hubs: (0..self.len()).map(|_| OnceLock::new()).collect(),
-        }
+        Nearest { quadors: self, bounds: self.bounds(), hubs: (0..self.len()).map(|_| OnceLock::new()).collect() }
     }
 
     /// No nearer than this to the surface of a hub's part: to its box, and by the value and slope of S − N.
@@ -111,14 +102,12 @@ impl Quadors {
             clear(q, norm(g), 1.0)
         } else if of.sharp {
             let s = dot(x, x) - of.radius * of.radius;
-            of.stubs
-                .iter()
-                .fold(clear(s.max(0.0), 2.0 * norm(x), 0.0), |least, stub| {
-                    let v = stub.g.at(x);
-                    let slope = sub(scale(x, 2.0), scale(stub.g.a, 2.0 * v));
-                    let bend = dot(stub.g.a, stub.g.a) - 1.0;
-                    least.min(clear((s - v * v).max(0.0), norm(slope), bend))
-                })
+            of.stubs.iter().fold(clear(s.max(0.0), 2.0 * norm(x), 0.0), |least, stub| {
+                let v = stub.g.at(x);
+                let slope = sub(scale(x, 2.0), scale(stub.g.a, 2.0 * v));
+                let bend = dot(stub.g.a, stub.g.a) - 1.0;
+                least.min(clear((s - v * v).max(0.0), norm(slope), bend))
+            })
         } else {
             clear(q, norm(g), ball.bend - 1.0)
         };
@@ -171,10 +160,7 @@ impl Nearest<'_> {
     /// A point that is none, and hubs near it that have no closed form.
     pub fn closest(&self, p: Vec3) -> Result<Closest, Fault> {
         if !p.iter().all(|v| v.is_finite()) {
-            return Err(Fault::new(
-                "point",
-                "is not a position: give three finite numbers, mm",
-            ));
+            return Err(Fault::new("point", "is not a position: give three finite numbers, mm"));
         }
         let q = self.quadors;
         // The field is of the size of the distance; where it is not, all is looked at once more, farther out.
@@ -183,10 +169,7 @@ impl Nearest<'_> {
         let mut best: Option<Closest> = None;
         let mut seen: Vec<u32> = Vec::new();
         loop {
-            let near = Aabb {
-                min: p.map(|v| v - reach),
-                max: p.map(|v| v + reach),
-            };
+            let near = Aabb { min: p.map(|v| v - reach), max: p.map(|v| v + reach) };
             let found = q.index.touching(&near, usize::MAX / 64).unwrap_or_default();
             let mut hubs: Vec<(f64, u32)> = found
                 .into_iter()
@@ -223,13 +206,7 @@ impl Nearest<'_> {
     }
 
     /// Takes what is nearer on a hub: feet that are nearest to their quadrics, and on creases. What else there may be is for later.
-    fn on_hub(
-        &self,
-        h: usize,
-        p: Vec3,
-        best: &mut Option<Closest>,
-        later: &mut Vec<Rest>,
-    ) -> Result<(), Fault> {
+    fn on_hub(&self, h: usize, p: Vec3, best: &mut Option<Closest>, later: &mut Vec<Rest>) -> Result<(), Fault> {
         let faces = self.faces(h)?;
         let (hub, center) = (self.quadors.hub(h), self.quadors.center(h));
         let x = sub(p, center);
@@ -250,12 +227,7 @@ impl Nearest<'_> {
                 break;
             }
             let f = &faces.patches[patch];
-            let mut rest = Rest {
-                hub: h,
-                patch,
-                bound,
-                told: false,
-            };
+            let mut rest = Rest { hub: h, patch, bound, told: false };
             if let Some(foot) = f.axes.nearest(x) {
                 if beaten(foot.away, best) {
                     continue;
@@ -377,11 +349,7 @@ mod tests {
             }
             for _ in 0..60 {
                 let m = (lo + hi) / 2.0;
-                if hub.value(scale(way, m)) < 0.0 {
-                    lo = m
-                } else {
-                    hi = m
-                }
+                if hub.value(scale(way, m)) < 0.0 { lo = m } else { hi = m }
             }
             let x = scale(way, lo);
             if hub.value(x).abs() < 1e-9 && hub.before_split(x) {
@@ -416,10 +384,7 @@ mod tests {
                 };
                 let c = near.closest(p).expect("a foot");
                 let d = c.distance.abs();
-                let least = cloud
-                    .iter()
-                    .map(|x| norm(sub(*x, p)))
-                    .fold(f64::INFINITY, f64::min);
+                let least = cloud.iter().map(|x| norm(sub(*x, p))).fold(f64::INFINITY, f64::min);
                 assert!(d <= least + 1e-9, "{p:?}: {c:?} {least}");
                 assert_eq!(c.distance < 0.0, q.contains(p), "{p:?} {c:?}");
                 assert!(q.value(c.at).abs() < 1e-8, "{c:?} {}", q.value(c.at));

@@ -49,10 +49,8 @@ impl Quadors {
                     let place = |[p, q]: [Vec3; 2], s: f64| add(p, scale(sub(q, p), s));
                     let (x, y) = (place(axis(a), s), place(axis(b), t));
                     let thick = self.thick(a, s) + self.thick(b, t);
-                    (norm(sub(x, y)) < thick * (1.0 - 1e-9)).then_some(Collision {
-                        beams: [a as u32, b as u32],
-                        at: scale(add(x, y), 0.5),
-                    })
+                    (norm(sub(x, y)) < thick * (1.0 - 1e-9))
+                        .then_some(Collision { beams: [a as u32, b as u32], at: scale(add(x, y), 0.5) })
                 })
                 .collect::<Vec<_>>()
         };
@@ -109,11 +107,7 @@ fn nearest([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> [f64; 2] {
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
     let (uw, vw) = (dot(u, w), dot(v, w));
     let cross = uu * vv - uv * uv;
-    let s = if cross > 1e-12 * uu * vv {
-        ((uv * vw - vv * uw) / cross).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let s = if cross > 1e-12 * uu * vv { ((uv * vw - vv * uw) / cross).clamp(0.0, 1.0) } else { 0.0 };
     let t = ((uv * s + vw) / vv).clamp(0.0, 1.0);
     [((uv * t - uw) / uu).clamp(0.0, 1.0), t]
 }
@@ -126,18 +120,9 @@ mod tests {
     use crate::graph::{Beam, Graph, Hub, Profile};
 
     fn lone(ends: &[[Vec3; 2]]) -> Quadors {
-        let hubs = ends.iter().flatten().map(|&center| Hub {
-            center,
-            radius: 0.5,
-        });
-        let beams = (0..ends.len() as u32).map(|i| Beam {
-            ends: [2 * i, 2 * i + 1],
-            profile: Profile::Cone,
-        });
-        let graph = Graph {
-            hubs: hubs.collect(),
-            beams: beams.collect(),
-        };
+        let hubs = ends.iter().flatten().map(|&center| Hub { center, radius: 0.5 });
+        let beams = (0..ends.len() as u32).map(|i| Beam { ends: [2 * i, 2 * i + 1], profile: Profile::Cone });
+        let graph = Graph { hubs: hubs.collect(), beams: beams.collect() };
         Quadors::new(&graph, Fillet::None).expect("beams")
     }
 
@@ -166,10 +151,7 @@ mod tests {
         let ends: Vec<[Vec3; 2]> = (0..120)
             .map(|_| {
                 let p = [0; 3].map(|_| 30.0 * random.next());
-                [
-                    p,
-                    add(p, scale(random.direction(), 2.0 + 6.0 * random.next())),
-                ]
+                [p, add(p, scale(random.direction(), 2.0 + 6.0 * random.next()))]
             })
             .collect();
         let found = lone(&ends).collisions();

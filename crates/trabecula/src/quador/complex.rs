@@ -90,10 +90,7 @@ impl Complex {
         if hub.stubs.len() > 64 {
             return Err(Fault::new(
                 "",
-                format!(
-                    "{} beams meet in it: closed forms are made for up to 64",
-                    hub.stubs.len()
-                ),
+                format!("{} beams meet in it: closed forms are made for up to 64", hub.stubs.len()),
             ));
         }
         let unresolved = || {
@@ -148,10 +145,7 @@ impl Complex {
         for (i, a) in self.arcs.iter().enumerate() {
             let [p, q] = a.ends;
             let chord = |v: Vec3| norm(sub(v, self.vertices[p as usize].at));
-            if p != q
-                && chord(self.vertices[q as usize].at) < least
-                && chord(a.conic.at(a.conic.end / 2.0)) < least
-            {
+            if p != q && chord(self.vertices[q as usize].at) < least && chord(a.conic.at(a.conic.end / 2.0)) < least {
                 gone[i] = true;
                 unite(&mut to, p, q);
             }
@@ -172,10 +166,7 @@ impl Complex {
         for (i, a) in self.arcs.iter().enumerate() {
             if !gone[i] {
                 arc_name[i] = arcs.len() as u32;
-                arcs.push(Arc {
-                    ends: a.ends.map(|v| name[find(&mut to, v) as usize]),
-                    ..*a
-                });
+                arcs.push(Arc { ends: a.ends.map(|v| name[find(&mut to, v) as usize]), ..*a });
             }
         }
         let mut faces = self.faces;
@@ -184,10 +175,6 @@ impl Complex {
             l.iter_mut().for_each(|(a, _)| *a = arc_name[*a as usize]);
         }
         faces.retain(|f| f.loops.is_empty() || f.loops.iter().any(|l| !l.is_empty()));
-        Complex {
-            vertices,
-            arcs,
-            faces,
-        }
+        Complex { vertices, arcs, faces }
     }
 }

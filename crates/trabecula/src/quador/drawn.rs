@@ -52,11 +52,7 @@ pub(super) struct Part {
 /// A direction across an axis, the same for an axis and its opposite. Where it changes no usual direction lies, so that beams that
 /// are equal but for rounding have it in common.
 pub(super) fn across(axis: Vec3) -> Vec3 {
-    let pole = if axis[0].abs() < 0.618_034 {
-        [1.0, 0.0, 0.0]
-    } else {
-        [0.0, 1.0, 0.0]
-    };
+    let pole = if axis[0].abs() < 0.618_034 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     unit(sub(pole, scale(axis, dot(pole, axis))))
 }
 
@@ -140,13 +136,7 @@ impl Drawn<'_> {
             // As many corners as sides on every rim, so that a hub counts as a ball with a hole for each.
             euler += *count as i64 * (2 - hub.stubs.len() as i64);
         }
-        Figures {
-            triangles: self.triangles(),
-            volume,
-            area,
-            euler,
-            pieces: self.quadors.pieces(),
-        }
+        Figures { triangles: self.triangles(), volume, area, euler, pieces: self.quadors.pieces() }
     }
 
     pub(super) fn part(&self, hub: usize) -> &Part {
@@ -165,8 +155,7 @@ impl Drawn<'_> {
                 let n = quadors.ring(s.beam as usize, self.chord) as u32;
                 let from = *first.entry(s.beam).or_insert_with(|| {
                     let from = mesh.vertices.len() as u32;
-                    mesh.vertices
-                        .extend(quadors.rim(s.beam as usize, self.chord));
+                    mesh.vertices.extend(quadors.rim(s.beam as usize, self.chord));
                     from
                 });
                 names.extend(from..from + n);
@@ -181,8 +170,7 @@ impl Drawn<'_> {
                     "the mesh would have more than two billion points: allow a larger chord error",
                 ));
             }
-            mesh.triangles
-                .extend(part.triangles.iter().map(|t| t.map(|v| names[v as usize])));
+            mesh.triangles.extend(part.triangles.iter().map(|t| t.map(|v| names[v as usize])));
         }
         Ok(mesh)
     }
@@ -212,11 +200,7 @@ impl Part {
         let rims: Vec<Vec<Vec3>> = (hub.stubs.iter().zip(rings))
             .map(|(s, &n)| {
                 // The beam's own frame runs from its first end.
-                let axis = if s.end == 0 {
-                    s.axis
-                } else {
-                    scale(s.axis, -1.0)
-                };
+                let axis = if s.end == 0 { s.axis } else { scale(s.axis, -1.0) };
                 let radius = s.squared(s.split).max(0.0).sqrt();
                 let middle = scale(s.axis, s.split);
                 circle(axis, n, radius).map(|x| add(middle, x)).collect()
@@ -224,9 +208,7 @@ impl Part {
             .collect();
         let mut facets = Facets::new(hub, complex, &rims, chord)?;
         // Points of a rim are on its circle.
-        let sagitta = |(s, n): (&Stub, &usize)| {
-            s.squared(s.split).max(0.0).sqrt() * (1.0 - (PI / *n as f64).cos())
-        };
+        let sagitta = |(s, n): (&Stub, &usize)| s.squared(s.split).max(0.0).sqrt() * (1.0 - (PI / *n as f64).cos());
         let rims_off = hub.stubs.iter().zip(rings).map(sagitta).fold(0.0, f64::max);
         let error = facets.refine()?.max(rims_off);
         Some(Part {

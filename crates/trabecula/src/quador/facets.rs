@@ -81,15 +81,8 @@ const PLACES: usize = 32;
 impl<'a> Facets<'a> {
     /// A hub's faces in few triangles, to be made finer up to a chord error, given the points of its rims, stub by stub; `None` if
     /// an outline crosses itself.
-    pub fn new(
-        hub: &'a Hub<'a>,
-        complex: &'a Complex,
-        rims: &[Vec<Vec3>],
-        chord: f64,
-    ) -> Option<Facets<'a>> {
-        TURNS
-            .iter()
-            .find_map(|&turn| Facets::drawn(hub, complex, rims, (chord, turn)))
+    pub fn new(hub: &'a Hub<'a>, complex: &'a Complex, rims: &[Vec<Vec3>], chord: f64) -> Option<Facets<'a>> {
+        TURNS.iter().find_map(|&turn| Facets::drawn(hub, complex, rims, (chord, turn)))
     }
 
     fn drawn(
@@ -115,8 +108,7 @@ impl<'a> Facets<'a> {
             let n = rim.len() as u32;
             firsts.push(first);
             for k in 0..n {
-                out.sides
-                    .insert(key(first + k, first + (k + 1) % n), Side::Rim);
+                out.sides.insert(key(first + k, first + (k + 1) % n), Side::Rim);
             }
             first += n;
         }
@@ -161,9 +153,7 @@ impl<'a> Facets<'a> {
             round += angle(t);
         }
         for (rim, s) in rims.iter().zip(hub.stubs) {
-            round += (0..rim.len())
-                .map(|k| angle([s.axis, rim[k], rim[(k + 1) % rim.len()]]).abs())
-                .sum::<f64>();
+            round += (0..rim.len()).map(|k| angle([s.axis, rim[k], rim[(k + 1) % rim.len()]]).abs()).sum::<f64>();
         }
         if (round - 4.0 * core::f64::consts::PI).abs() > 1e-6 {
             return None;
@@ -218,8 +208,7 @@ impl<'a> Facets<'a> {
                     let center = |arc: u32| add(place(arc, 0.0), place(arc, 0.5));
                     let plane = &arcs[earlier as usize].plane;
                     let off = (dot(plane.a, r) + plane.b).abs() / norm(plane.a);
-                    near(scale(center(earlier), 0.5), scale(center(later), 0.5))
-                        && off < MERGE * self.hub.radius
+                    near(scale(center(earlier), 0.5), scale(center(later), 0.5)) && off < MERGE * self.hub.radius
                 } else if same {
                     near(p, r) && near(q, s)
                 } else {
@@ -227,11 +216,7 @@ impl<'a> Facets<'a> {
                 }
             });
             if a != b && twin {
-                twins[later as usize] = Some(Twin {
-                    of: earlier,
-                    same,
-                    face: number,
-                });
+                twins[later as usize] = Some(Twin { of: earlier, same, face: number });
             }
         }
         twins

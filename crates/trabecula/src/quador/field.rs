@@ -15,11 +15,7 @@ impl Quadors {
     /// proportional, as a square root would not be smooth.
     #[inline]
     fn length(&self, q: f64) -> f64 {
-        if q < 0.0 {
-            q / (2.0 * self.scale)
-        } else {
-            q / ((q + self.scale * self.scale).sqrt() + self.scale)
-        }
+        if q < 0.0 { q / (2.0 * self.scale) } else { q / ((q + self.scale * self.scale).sqrt() + self.scale) }
     }
 
     #[inline]
@@ -55,20 +51,15 @@ impl Quadors {
             let hub = self.hub(i as usize);
             let x = sub(p, ball.center);
             let (q, g) = hub.gradient(x);
-            let steep = if q < 0.0 {
-                self.scale
-            } else {
-                (q + self.scale * self.scale).sqrt()
-            };
+            let steep = if q < 0.0 { self.scale } else { (q + self.scale * self.scale).sqrt() };
             let mut here = (self.length(q), scale(g, 0.5 / steep));
             let beyond = hub.beyond(x);
             if beyond.0 > here.0 {
                 here = beyond;
             }
             if away > 0.0 && away > here.0 {
-                let out = [0, 1, 2].map(|a| {
-                    (p[a] - ball.bounds.max[a]).max(0.0) - (ball.bounds.min[a] - p[a]).max(0.0)
-                });
+                let out =
+                    [0, 1, 2].map(|a| (p[a] - ball.bounds.max[a]).max(0.0) - (ball.bounds.min[a] - p[a]).max(0.0));
                 here = (away, scale(out, 1.0 / away));
             }
             if here.0 < least.0 {
@@ -134,16 +125,8 @@ impl Quadors {
             m.max(along.min(s.g.at(x) + reach(s.g.a)))
         });
         hi = hi.max(past);
-        let apart = [0, 1, 2].map(|a| {
-            (ball.bounds.min[a] - b.max[a])
-                .max(b.min[a] - ball.bounds.max[a])
-                .max(0.0)
-        });
-        let farthest = [0, 1, 2].map(|a| {
-            (ball.bounds.min[a] - b.min[a])
-                .max(b.max[a] - ball.bounds.max[a])
-                .max(0.0)
-        });
+        let apart = [0, 1, 2].map(|a| (ball.bounds.min[a] - b.max[a]).max(b.min[a] - ball.bounds.max[a]).max(0.0));
+        let farthest = [0, 1, 2].map(|a| (ball.bounds.min[a] - b.min[a]).max(b.max[a] - ball.bounds.max[a]).max(0.0));
         let apart = dot(apart, apart).sqrt();
         if apart > 0.0 {
             lo = lo.max(apart);
@@ -176,8 +159,7 @@ impl Field for Quadors {
             return Interval::new(f64::NEG_INFINITY, self.cap);
         };
         let cap = Interval::new(self.cap, self.cap);
-        near.into_iter()
-            .fold(cap, |least, i| least.min(self.hub_bound(i as usize, b)))
+        near.into_iter().fold(cap, |least, i| least.min(self.hub_bound(i as usize, b)))
     }
 
     fn edged(&self) -> bool {
@@ -185,11 +167,7 @@ impl Field for Quadors {
     }
 
     fn slope(&self) -> f64 {
-        let thick = self
-            .balls
-            .iter()
-            .map(|b| b.radius)
-            .fold(self.scale, f64::max);
+        let thick = self.balls.iter().map(|b| b.radius).fold(self.scale, f64::max);
         2.0 * thick / self.scale
     }
 }

@@ -38,19 +38,11 @@ const DEGENERATE: f64 = 1e-5;
 impl Axes {
     pub(super) fn new(q: &Quadric) -> Axes {
         let (m, turn) = eigen(&q.m);
-        Axes {
-            turn,
-            m,
-            b: apply(&turn, q.b),
-            c: q.c,
-        }
+        Axes { turn, m, b: apply(&turn, q.b), c: q.c }
     }
 
     fn value(&self, x: Vec3) -> f64 {
-        self.c
-            + (0..3)
-                .map(|i| x[i] * (self.m[i] * x[i] + 2.0 * self.b[i]))
-                .sum::<f64>()
+        self.c + (0..3).map(|i| x[i] * (self.m[i] * x[i] + 2.0 * self.b[i])).sum::<f64>()
     }
 
     fn half_slope(&self, x: Vec3) -> Vec3 {
@@ -133,8 +125,7 @@ impl Axes {
                 continue;
             }
             let ratio = [1, 2].map(|i| self.m[(k + i) % 3] / m);
-            let end = (ratio.iter().filter(|r| **r > 0.0))
-                .fold(f64::INFINITY, |e, r| e.min(1.0 / r - 1.0));
+            let end = (ratio.iter().filter(|r| **r > 0.0)).fold(f64::INFINITY, |e, r| e.min(1.0 / r - 1.0));
             let mut low = own / (far - own);
             if low < DEGENERATE && end > 0.0 {
                 return false;
@@ -150,11 +141,7 @@ impl Axes {
             }
             let mut high = end;
             for _ in 0..60 {
-                let t = if high.is_finite() {
-                    0.5 * (low + high)
-                } else {
-                    2.0 * low + 1.0
-                };
+                let t = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low + 1.0 };
                 match before(t) {
                     None => high = t,
                     Some(true) => low = t,
@@ -199,8 +186,7 @@ impl Axes {
             let q = self.value(x);
             let near = norm(off) <= 1e-13 * size && q.abs() <= 1e-13 * size * norm(g);
             if near || round == 5 {
-                return (norm(off) <= 1e-8 * size && q.abs() <= 1e-10 * size * norm(g))
-                    .then_some(x);
+                return (norm(off) <= 1e-8 * size && q.abs() <= 1e-10 * size * norm(g)).then_some(x);
             }
             let mut rows = [[0.0; 5]; 4];
             for i in 0..3 {
@@ -225,10 +211,7 @@ impl Axes {
 
 /// The solution of four linear equations; `None` if they are dependent but for rounding.
 fn solve(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
-    let largest = rows
-        .iter()
-        .flat_map(|r| &r[..4])
-        .fold(0.0f64, |a, v| a.max(v.abs()));
+    let largest = rows.iter().flat_map(|r| &r[..4]).fold(0.0f64, |a, v| a.max(v.abs()));
     for c in 0..4 {
         let best = (c..4).max_by(|&i, &j| rows[i][c].abs().total_cmp(&rows[j][c].abs()))?;
         rows.swap(c, best);

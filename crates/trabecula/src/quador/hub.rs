@@ -30,10 +30,7 @@ impl Affine {
     /// self + s · o.
     #[inline]
     pub fn plus(&self, s: f64, o: &Affine) -> Affine {
-        Affine {
-            a: add(self.a, scale(o.a, s)),
-            b: self.b + s * o.b,
-        }
+        Affine { a: add(self.a, scale(o.a, s)), b: self.b + s * o.b }
     }
 }
 
@@ -80,13 +77,7 @@ impl Stub {
         let [a, b, _] = self.section;
         let ends = self.squared(0.0).max(self.squared(self.cut));
         let top = -b / (2.0 * a);
-        if a < 0.0 && top > 0.0 && top < self.cut {
-            ends.max(self.squared(top))
-        } else {
-            ends
-        }
-        .max(0.0)
-        .sqrt()
+        if a < 0.0 && top > 0.0 && top < self.cut { ends.max(self.squared(top)) } else { ends }.max(0.0).sqrt()
     }
 }
 
@@ -123,11 +114,7 @@ impl Hub<'_> {
                 let g = s.g.at(x);
                 if g > most {
                     most = g;
-                    best = Grown {
-                        value: g * g,
-                        gradient: scale(s.g.a, 2.0 * g),
-                        active: 1 << (i & 63),
-                    };
+                    best = Grown { value: g * g, gradient: scale(s.g.a, 2.0 * g), active: 1 << (i & 63) };
                 }
             }
             return best;
@@ -200,10 +187,7 @@ impl Hub<'_> {
     #[inline]
     pub fn gradient(&self, x: Vec3) -> (f64, Vec3) {
         let n = self.grown(x);
-        (
-            dot(x, x) - self.radius * self.radius - n.value,
-            sub(scale(x, 2.0), n.gradient),
-        )
+        (dot(x, x) - self.radius * self.radius - n.value, sub(scale(x, 2.0), n.gradient))
     }
 
     /// How far x lies beyond where the hub's formula holds (positive beyond), mm: along the stub that it is nearest to in the
@@ -224,11 +208,7 @@ impl Hub<'_> {
             let (g, along) = (s.g.at(x), dot(s.axis, x) - s.cut);
             let lead = g - if g == first { second } else { first };
             if along.min(lead) > most.0 {
-                most = if along < lead {
-                    (along, s.axis)
-                } else {
-                    (lead, s.g.a)
-                };
+                most = if along < lead { (along, s.axis) } else { (lead, s.g.a) };
             }
         }
         most
@@ -255,10 +235,7 @@ impl Hub<'_> {
     /// A box that holds the hub's part with the stubs up to their cuts: fillets lie in the hull of ball and stubs.
     pub fn bounds(&self) -> Aabb {
         let r = self.radius;
-        let mut b = Aabb {
-            min: [-r; 3],
-            max: [r; 3],
-        };
+        let mut b = Aabb { min: [-r; 3], max: [r; 3] };
         for s in self.stubs {
             let thick = s.thickest();
             for a in 0..3 {
@@ -274,11 +251,7 @@ impl Hub<'_> {
     /// A bound of the curvature of N: half its second derivative along any unit vector is at most this.
     pub fn bend(&self) -> f64 {
         if self.sharp {
-            return self
-                .stubs
-                .iter()
-                .map(|s| dot(s.g.a, s.g.a))
-                .fold(0.0, f64::max);
+            return self.stubs.iter().map(|s| dot(s.g.a, s.g.a)).fold(0.0, f64::max);
         }
         let mut m = [[0.0; 3]; 3];
         let (mut sum, mut t) = ([0.0; 3], 1.0);
@@ -311,15 +284,9 @@ impl Hub<'_> {
         }
         let across = scale(across, 1.0 / sin);
         // Where G is g for both: (u, v) = o + g e along the first axis and across it.
-        let (o, e) = (
-            [p.contact, (q.contact - cos * p.contact) / sin],
-            [1.0 / kp, (1.0 / kq - cos / kp) / sin],
-        );
+        let (o, e) = ([p.contact, (q.contact - cos * p.contact) / sin], [1.0 / kp, (1.0 / kq - cos / kp) / sin]);
         let two = e[0] * e[0] + e[1] * e[1] - 2.0 / (1.0 + tau);
-        let (one, none) = (
-            o[0] * e[0] + o[1] * e[1],
-            o[0] * o[0] + o[1] * o[1] - self.radius * self.radius,
-        );
+        let (one, none) = (o[0] * e[0] + o[1] * e[1], o[0] * o[0] + o[1] * o[1] - self.radius * self.radius);
         if none >= 0.0 {
             return None;
         }
@@ -335,22 +302,12 @@ impl Hub<'_> {
         let x = [o[0] + g * e[0], o[1] + g * e[1]];
         let (a, b) = ([kp, 0.0], [kq * cos, kq * sin]);
         let y = g / (1.0 + tau);
-        let slope = [
-            2.0 * (x[0] - y * (a[0] + b[0])),
-            2.0 * (x[1] - y * (a[1] + b[1])),
-        ];
+        let slope = [2.0 * (x[0] - y * (a[0] + b[0])), 2.0 * (x[1] - y * (a[1] + b[1]))];
         let steep = slope[0].hypot(slope[1]);
         let along = [-slope[1] / steep, slope[0] / steep];
-        let (ta, tb) = (
-            a[0] * along[0] + a[1] * along[1],
-            b[0] * along[0] + b[1] * along[1],
-        );
+        let (ta, tb) = (a[0] * along[0] + a[1] * along[1], b[0] * along[0] + b[1] * along[1]);
         let second = 2.0 - 2.0 * (ta * ta - 2.0 * tau * ta * tb + tb * tb) / (1.0 - tau * tau);
-        let radius = if second < 0.0 {
-            -steep / second
-        } else {
-            f64::INFINITY
-        };
+        let radius = if second < 0.0 { -steep / second } else { f64::INFINITY };
         Some((add(scale(p.axis, x[0]), scale(across, x[1])), radius))
     }
 
@@ -388,11 +345,7 @@ impl Hub<'_> {
         let ([a, b, c], d) = (p.section, p.contact);
         let (m, n) = (sin * (-a * d - b / 2.0), sin * (-b * d / 2.0 - c));
         let w = d * cos - q.contact;
-        let (two, one, none) = (
-            m * m - w * w * a,
-            2.0 * m * n - w * w * b,
-            n * n - w * w * c,
-        );
+        let (two, one, none) = (m * m - w * w * a, 2.0 * m * n - w * w * b, n * n - w * w * c);
         let root = (one * one - 4.0 * two * none).max(0.0).sqrt();
         let s = -(one + root.copysign(one)) / 2.0;
         for at in [s / two, none / s] {

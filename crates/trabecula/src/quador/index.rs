@@ -60,12 +60,7 @@ impl Index {
         out
     }
 
-    fn each_cell(
-        &mut self,
-        lo: [usize; 3],
-        hi: [usize; 3],
-        f: &mut impl FnMut(usize, &mut Vec<u32>),
-    ) {
+    fn each_cell(&mut self, lo: [usize; 3], hi: [usize; 3], f: &mut impl FnMut(usize, &mut Vec<u32>)) {
         for z in lo[2]..=hi[2] {
             for y in lo[1]..=hi[1] {
                 for x in lo[0]..=hi[0] {
@@ -88,10 +83,7 @@ impl Index {
     }
 
     fn range(&self, b: &Aabb) -> ([usize; 3], [usize; 3]) {
-        (
-            [0, 1, 2].map(|a| self.step(a, b.min[a])),
-            [0, 1, 2].map(|a| self.step(a, b.max[a])),
-        )
+        ([0, 1, 2].map(|a| self.step(a, b.min[a])), [0, 1, 2].map(|a| self.step(a, b.max[a])))
     }
 
     /// The boxes in the cell of a point: all that may hold it. Nothing is missed outside the grid either, where there are none.
@@ -115,9 +107,7 @@ impl Index {
             for y in lo[1]..=hi[1] {
                 let row = self.cell([lo[0], y, z]);
                 let end = row + hi[0] - lo[0] + 1;
-                out.extend_from_slice(
-                    &self.items[self.starts[row] as usize..self.starts[end] as usize],
-                );
+                out.extend_from_slice(&self.items[self.starts[row] as usize..self.starts[end] as usize]);
                 if out.len() > 32 * most {
                     return None;
                 }
@@ -150,16 +140,13 @@ impl Index {
             return out;
         }
         // Columns along the axis that the plane is steepest to, and where it passes through each.
-        let a = (0..3)
-            .max_by(|&i, &j| normal[i].abs().total_cmp(&normal[j].abs()))
-            .unwrap_or(2);
+        let a = (0..3).max_by(|&i, &j| normal[i].abs().total_cmp(&normal[j].abs())).unwrap_or(2);
         let (b, c) = ((a + 1) % 3, (a + 2) % 3);
         let edge = |axis: usize| 1.0 / self.per[axis];
         let reach = 0.5 * (normal[b].abs() * edge(b) + normal[c].abs() * edge(c));
         for i in 0..self.cells[b] {
             for j in 0..self.cells[c] {
-                let middle =
-                    |axis: usize, k: usize| self.origin[axis] + (k as f64 + 0.5) * edge(axis);
+                let middle = |axis: usize, k: usize| self.origin[axis] + (k as f64 + 0.5) * edge(axis);
                 let rest = level - normal[b] * middle(b, i) - normal[c] * middle(c, j);
                 let (at, half) = (rest / normal[a], reach / normal[a].abs() + 1e-9 * edge(a));
                 let end = self.origin[a] + self.cells[a] as f64 * edge(a);
@@ -171,9 +158,7 @@ impl Index {
                 for k in self.step(a, at - half)..=self.step(a, at + half) {
                     cell[a] = k;
                     let at = self.cell(cell);
-                    out.extend_from_slice(
-                        &self.items[self.starts[at] as usize..self.starts[at + 1] as usize],
-                    );
+                    out.extend_from_slice(&self.items[self.starts[at] as usize..self.starts[at + 1] as usize]);
                 }
             }
         }
@@ -188,10 +173,7 @@ impl Index {
             return;
         }
         let size = [0, 1, 2].map(|a| self.cells[a] as f64 / self.per[a]);
-        let all = Aabb {
-            min: self.origin,
-            max: [0, 1, 2].map(|a| self.origin[a] + size[a]),
-        };
+        let all = Aabb { min: self.origin, max: [0, 1, 2].map(|a| self.origin[a] + size[a]) };
         let Some((from, _)) = super::query::crossed(&all, origin, way) else {
             return;
         };
@@ -207,14 +189,9 @@ impl Index {
                     (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / way[a]
                 }
             });
-            let a = (0..3)
-                .min_by(|&a, &b| leave[a].total_cmp(&leave[b]))
-                .unwrap_or(0);
+            let a = (0..3).min_by(|&a, &b| leave[a].total_cmp(&leave[b])).unwrap_or(0);
             let c = self.cell(at);
-            if !f(
-                &self.items[self.starts[c] as usize..self.starts[c + 1] as usize],
-                leave[a],
-            ) || leave[a].is_infinite()
+            if !f(&self.items[self.starts[c] as usize..self.starts[c + 1] as usize], leave[a]) || leave[a].is_infinite()
             {
                 return;
             }

@@ -46,15 +46,7 @@ impl Mass {
         let c = self.centroid();
         let about = |i: usize, j: usize| self.second[i][j] - self.volume * c[i] * c[j];
         let trace: f64 = (0..3).map(|i| about(i, i)).sum();
-        [0, 1, 2].map(|i| {
-            [0, 1, 2].map(|j| {
-                if i == j {
-                    trace - about(i, i)
-                } else {
-                    -about(i, j)
-                }
-            })
-        })
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| if i == j { trace - about(i, i) } else { -about(i, j) }))
     }
 
     /// The same solid moved by `by`.
@@ -63,8 +55,7 @@ impl Mass {
         for i in 0..3 {
             out.first[i] += self.volume * by[i];
             for j in 0..3 {
-                out.second[i][j] +=
-                    self.first[i] * by[j] + by[i] * self.first[j] + self.volume * by[i] * by[j];
+                out.second[i][j] += self.first[i] * by[j] + by[i] * self.first[j] + self.volume * by[i] * by[j];
             }
         }
         out
@@ -94,8 +85,7 @@ impl Mass {
             for j in 0..3 {
                 let square = s.axis[i] * s.axis[j];
                 let same = f64::from(i == j);
-                self.second[i][j] +=
-                    z / 5.0 * disc * (z * z * square + (same - square) * s.squared(z) / 4.0);
+                self.second[i][j] += z / 5.0 * disc * (z * z * square + (same - square) * s.squared(z) / 4.0);
             }
         }
     }
@@ -124,21 +114,14 @@ pub(super) struct Order {
 }
 
 /// Enough for 1e-10: of two rules that agree the better is nearer to what is right than to the other.
-pub(super) const USUAL: Order = Order {
-    nodes: &[7, 10, 14],
-    differ: 1e-10,
-};
+pub(super) const USUAL: Order = Order { nodes: &[7, 10, 14], differ: 1e-10 };
 
 /// What parts that no number of halvings brings to agree may come to, of the hub's volume (and area, and second moment).
 const DOUBT: f64 = 1e-10;
 
 /// Integrals over a hub's part about its centre, with `ALL` unset only the volume; `None` if a face cannot be seen whole, or parts
 /// do not come to agree.
-pub(super) fn hub_mass<const ALL: bool>(
-    hub: &Hub,
-    complex: &Complex,
-    order: Order,
-) -> Option<Mass> {
+pub(super) fn hub_mass<const ALL: bool>(hub: &Hub, complex: &Complex, order: Order) -> Option<Mass> {
     let mut out = Mass::default();
     if complex.arcs.is_empty() {
         let r = hub.radius;
@@ -150,11 +133,7 @@ pub(super) fn hub_mass<const ALL: bool>(
         return Some(out);
     }
     // A guess of the whole, for what is small beside it.
-    let mut size = Mass {
-        volume: hub.radius.powi(3),
-        area: hub.radius.powi(2),
-        ..Mass::default()
-    };
+    let mut size = Mass { volume: hub.radius.powi(3), area: hub.radius.powi(2), ..Mass::default() };
     size.second[0][0] = hub.radius.powi(5);
     for s in hub.stubs {
         let square = s.squared(s.split);
@@ -163,17 +142,9 @@ pub(super) fn hub_mass<const ALL: bool>(
         size.second[0][0] += square * s.split.powi(3);
         out.rim::<ALL>(s, PI * square);
     }
-    let middles: Vec<Vec3> = (complex.arcs.iter())
-        .map(|a| a.conic.at(a.conic.end / 2.0))
-        .collect();
+    let middles: Vec<Vec3> = (complex.arcs.iter()).map(|a| a.conic.at(a.conic.end / 2.0)).collect();
     let ends: Vec<f64> = (complex.arcs.iter())
-        .map(|a| {
-            if a.conic.end < PI {
-                1.0 / a.conic.end.tan()
-            } else {
-                f64::NEG_INFINITY
-            }
-        })
+        .map(|a| if a.conic.end < PI { 1.0 / a.conic.end.tan() } else { f64::NEG_INFINITY })
         .collect();
     // What lies to the left and to the right of each arc.
     let mut sides = vec![[0; 2]; complex.arcs.len()];
@@ -185,11 +156,7 @@ pub(super) fn hub_mass<const ALL: bool>(
         sheets.push(Sheet::new(hub, complex, face, (&middles, &ends))?);
     }
     let differ = order.differ / complex.arcs.len() as f64;
-    let work = Work {
-        nodes: order.nodes,
-        differ,
-        size,
-    };
+    let work = Work { nodes: order.nodes, differ, size };
     for (arc, of) in complex.arcs.iter().zip(sides) {
         let of = of.map(|s| &sheets[s]);
         let ends = arc.ends.map(|v| complex.vertices[v as usize].at);
@@ -207,13 +174,7 @@ struct Work {
 
 impl Work {
     /// What the faces to the left and the right of a seam between two vertices have of it.
-    fn seam<const ALL: bool>(
-        &self,
-        conic: &Conic,
-        ends: [Vec3; 2],
-        of: [&Sheet; 2],
-        out: &mut Mass,
-    ) {
+    fn seam<const ALL: bool>(&self, conic: &Conic, ends: [Vec3; 2], of: [&Sheet; 2], out: &mut Mass) {
         // Where vertices were made one, what is left between them and the seam.
         let (first, last) = (conic.v, conic.at(conic.end));
         for (x, by) in [(ends[0], sub(first, ends[0])), (last, sub(ends[1], last))] {
@@ -226,11 +187,7 @@ impl Work {
             let at = |p: usize| conic.end / parts * p as f64;
             let run = conic.run(at(p), at(p + 1));
             let part = |n, along: [f64; 2], across: [f64; 2]| {
-                if ALL {
-                    swept(conic, &run, of, n, along, across)
-                } else {
-                    closed(&run, &seam, n, along)
-                }
+                if ALL { swept(conic, &run, of, n, along, across) } else { closed(&run, &seam, n, along) }
             };
             self.settle::<ALL>(&part, [0.0, 1.0], [0.0, 1.0], 16, out);
         }
@@ -253,9 +210,7 @@ impl Work {
                 return volume;
             }
             let area = (a.area - b.area).abs() / self.size.area;
-            volume
-                .max(area)
-                .max((trace(a) - trace(b)).abs() / self.size.second[0][0])
+            volume.max(area).max((trace(a) - trace(b)).abs() / self.size.second[0][0])
         };
         let nodes = self.nodes;
         let (mut rough, mut fine) = (Mass::default(), part(nodes[0], along, across));
@@ -296,21 +251,11 @@ fn closed(run: &Run, seam: &Seam, n: usize, [from, to]: [f64; 2]) -> Mass {
         let (x, dx) = run.at(from + t * (to - from));
         sum += w * seam.at(x, dx);
     }
-    Mass {
-        volume: sum * (to - from) / 3.0,
-        ..Mass::default()
-    }
+    Mass { volume: sum * (to - from) / 3.0, ..Mass::default() }
 }
 
 /// All of the surface between a seam and where its faces are seen from.
-fn swept(
-    conic: &Conic,
-    run: &Run,
-    of: [&Sheet; 2],
-    n: usize,
-    along: [f64; 2],
-    across: [f64; 2],
-) -> Mass {
+fn swept(conic: &Conic, run: &Run, of: [&Sheet; 2], n: usize, along: [f64; 2], across: [f64; 2]) -> Mass {
     let mut out = Mass::default();
     let size = (along[1] - along[0]) * (across[1] - across[0]);
     for &(t, w) in gauss(n) {
@@ -344,8 +289,7 @@ impl Quadors {
     /// Beams that overlap too far for closed forms.
     pub fn mass(&self) -> Result<Mass, Fault> {
         let (classes, each) = self.each::<true>()?;
-        let all =
-            (classes.of.iter().enumerate()).map(|(i, &c)| each[c as usize].moved(self.center(i)));
+        let all = (classes.of.iter().enumerate()).map(|(i, &c)| each[c as usize].moved(self.center(i)));
         Ok(all.fold(Mass::default(), |sum, m| sum.plus(&m)))
     }
 
@@ -363,14 +307,8 @@ impl Quadors {
     fn each<const ALL: bool>(&self) -> Result<(Classes, Vec<Mass>), Fault> {
         self.exact()?;
         let classes = self.classes();
-        let of = |&i: &usize| {
-            hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i))
-        };
-        let each = classes
-            .sample
-            .par_iter()
-            .map(of)
-            .collect::<Result<_, _>>()?;
+        let of = |&i: &usize| hub_mass::<ALL>(&self.hub(i), &self.complex(i)?, USUAL).ok_or_else(|| tangled(i));
+        let each = classes.sample.par_iter().map(of).collect::<Result<_, _>>()?;
         Ok((classes, each))
     }
 

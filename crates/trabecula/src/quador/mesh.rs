@@ -26,13 +26,7 @@ fn check(chord: f64) -> Result<(), Fault> {
     if chord > 0.0 && chord.is_finite() {
         return Ok(());
     }
-    Err(Fault::new(
-        "chord",
-        format!(
-            "{} mm is no chord error: give a finite number above zero",
-            number(chord)
-        ),
-    ))
+    Err(Fault::new("chord", format!("{} mm is no chord error: give a finite number above zero", number(chord))))
 }
 
 impl Quadors {
@@ -48,14 +42,11 @@ impl Quadors {
         let coarse = chord.max(COARSE * self.scale);
         let classes = self.classes();
         let step = classes.sample.len().div_ceil(LOOKS);
-        let each = (0..classes.sample.len())
-            .into_par_iter()
-            .step_by(step)
-            .map(|c| {
-                let part = self.part(classes.sample[c], coarse)?;
-                let n = classes.count[c] as f64;
-                Ok([n * part.triangles.len() as f64, n])
-            });
+        let each = (0..classes.sample.len()).into_par_iter().step_by(step).map(|c| {
+            let part = self.part(classes.sample[c], coarse)?;
+            let n = classes.count[c] as f64;
+            Ok([n * part.triangles.len() as f64, n])
+        });
         let each = each.collect::<Result<Vec<[f64; 2]>, Fault>>()?;
         let sum = |k: usize| each.iter().map(|e| e[k]).sum::<f64>();
         let hub = sum(0) / sum(1) * coarse / chord;
@@ -86,12 +77,7 @@ impl Quadors {
     pub fn drawn(&self, chord: f64) -> Result<Drawn<'_>, Fault> {
         check(chord)?;
         self.exact()?;
-        let mut drawn = Drawn {
-            quadors: self,
-            classes: self.classes(),
-            parts: Vec::new(),
-            chord,
-        };
+        let mut drawn = Drawn { quadors: self, classes: self.classes(), parts: Vec::new(), chord };
         // Where beams that nearly touch would cross, all is drawn finer.
         for finer in [1.0, 0.5, 0.25, 0.125] {
             drawn.chord = chord * finer;
@@ -118,9 +104,7 @@ impl Drawn<'_> {
         for i in 0..quadors.len() {
             let hub = quadors.hub(i);
             let other = |s: &Stub| quadors.ends[s.beam as usize][1 - s.end] as usize;
-            let near: Vec<usize> = core::iter::once(i)
-                .chain(hub.stubs.iter().map(other))
-                .collect();
+            let near: Vec<usize> = core::iter::once(i).chain(hub.stubs.iter().map(other)).collect();
             for (n, &a) in near.iter().enumerate() {
                 for &b in &near[n + 1..] {
                     let [a, b] = [a.min(b), a.max(b)];
@@ -132,9 +116,7 @@ impl Drawn<'_> {
                     });
                     if !apart {
                         let [x, y, z] = by.map(|v| (v * per).round() as i64);
-                        pairs
-                            .entry([ca as i64, cb as i64, x, y, z])
-                            .or_insert([a, b]);
+                        pairs.entry([ca as i64, cb as i64, x, y, z]).or_insert([a, b]);
                     }
                 }
             }
@@ -157,8 +139,7 @@ impl Drawn<'_> {
                 if quadors.ends[s.beam as usize][1 - s.end] as usize == other {
                     // All but the points of this rim are short of the plane.
                     let short = |(k, p): (usize, &Vec3)| {
-                        (from..from + n).contains(&k)
-                            || dot(*p, s.axis) < s.split - 1e-9 * quadors.scale
+                        (from..from + n).contains(&k) || dot(*p, s.axis) < s.split - 1e-9 * quadors.scale
                     };
                     return of(i).0.points.iter().enumerate().all(short);
                 }
@@ -170,10 +151,7 @@ impl Drawn<'_> {
             return false;
         }
         let common = ends
-            .map(|(part, center)| Aabb {
-                min: add(part.bounds.min, center),
-                max: add(part.bounds.max, center),
-            })
+            .map(|(part, center)| Aabb { min: add(part.bounds.min, center), max: add(part.bounds.max, center) })
             .into_iter()
             .reduce(Aabb::intersection)
             .unwrap_or(Aabb::EMPTY);

@@ -50,10 +50,7 @@ type Side = (Bezier<3>, Option<u32>);
 impl Patch {
     /// The place of (s, t).
     pub fn at(&self, [s, t]: [f64; 2]) -> Vec3 {
-        let b = add(
-            self.origin,
-            add(scale(self.axes[0], s), scale(self.axes[1], t)),
-        );
+        let b = add(self.origin, add(scale(self.axes[0], s), scale(self.axes[1], t)));
         let (bb, ab) = (self.quadric.at(b), 2.0 * self.polar());
         scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab))
     }
@@ -96,13 +93,7 @@ impl Patch {
         let ab = 2.0 * self.polar();
         let [s, t] = self.range();
         // Polar forms of 1, s, s² at the pairs of ends that the control points stand for.
-        let blossom = |[a, b]: [f64; 2]| {
-            [
-                [1.0, a, a * a],
-                [1.0, (a + b) / 2.0, a * b],
-                [1.0, b, b * b],
-            ]
-        };
+        let blossom = |[a, b]: [f64; 2]| [[1.0, a, a * a], [1.0, (a + b) / 2.0, a * b], [1.0, b, b * b]];
         let (ss, tt) = (blossom(s), blossom(t));
         let mut net = ([[[0.0; 3]; 3]; 3], [[0.0; 3]; 3]);
         for i in 0..3 {
@@ -122,30 +113,10 @@ impl Patch {
     }
 
     /// A patch seen from a pole; `None` if a side runs through the pole's tangent plane, where (s, t) are infinite.
-    fn seen_from(
-        face: u32,
-        quadric: Quadric,
-        pole: Vec3,
-        origin: Vec3,
-        sides: &[Vec<Side>],
-    ) -> Option<Patch> {
+    fn seen_from(face: u32, quadric: Quadric, pole: Vec3, origin: Vec3, sides: &[Vec<Side>]) -> Option<Patch> {
         let n = quadric.half_slope(pole);
-        let u = unit(cross(
-            n,
-            if n[0].abs() < 0.6 * norm(n) {
-                [1.0, 0.0, 0.0]
-            } else {
-                [0.0, 1.0, 0.0]
-            },
-        ));
-        let mut patch = Patch {
-            face,
-            quadric,
-            pole,
-            origin,
-            axes: [u, cross(unit(n), u)],
-            trims: Vec::new(),
-        };
+        let u = unit(cross(n, if n[0].abs() < 0.6 * norm(n) { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
+        let mut patch = Patch { face, quadric, pole, origin, axes: [u, cross(unit(n), u)], trims: Vec::new() };
         for walked in sides {
             let mut loops = Vec::new();
             let mut todo: Vec<(Side, u32)> = walked.iter().rev().map(|s| (*s, 6)).collect();
@@ -162,10 +133,7 @@ impl Patch {
                     todo.push(((first, arc), depth.checked_sub(1)?));
                     continue;
                 }
-                let flat = Bezier {
-                    points: seen.map(|s| s.0),
-                    weight,
-                };
+                let flat = Bezier { points: seen.map(|s| s.0), weight };
                 loops.push(Trim { space, flat, arc });
             }
             patch.trims.push(loops);
@@ -176,14 +144,7 @@ impl Patch {
     /// The patch of a simply connected piece of a face, seen from across the hub or, failing that, from somewhere near there.
     fn across(face: u32, quadric: Quadric, origin: Vec3, sides: &[Vec<Side>]) -> Option<Patch> {
         let normal = unit(quadric.half_slope(origin));
-        let u = unit(cross(
-            normal,
-            if normal[0].abs() < 0.6 {
-                [1.0, 0.0, 0.0]
-            } else {
-                [0.0, 1.0, 0.0]
-            },
-        ));
+        let u = unit(cross(normal, if normal[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
         let v = cross(normal, u);
         // Through the quadric's own middle, the hub's, and along the normal.
         let middle = scale(apply(&inverse(&quadric.m), quadric.b), -1.0);
@@ -221,23 +182,16 @@ impl Complex {
         if let Some(stub) = face.rim {
             let stub = &hub.stubs[stub as usize];
             // Where a seam turns back at one azimuth it does not at another.
-            let ways = [3, 4, 6]
-                .into_iter()
-                .flat_map(|n| (0..5).map(move |k| (n, k)));
-            return ways
-                .map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k)))
-                .find_map(|(n, first)| {
-                    sectors(self, face, stub, n, first)?
-                        .into_iter()
-                        .map(|(origin, sides)| Patch::across(number, q, origin, &[sides]))
-                        .collect()
-                });
+            let ways = [3, 4, 6].into_iter().flat_map(|n| (0..5).map(move |k| (n, k)));
+            return ways.map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k))).find_map(|(n, first)| {
+                sectors(self, face, stub, n, first)?
+                    .into_iter()
+                    .map(|(origin, sides)| Patch::across(number, q, origin, &[sides]))
+                    .collect()
+            });
         }
-        let sides: Vec<Vec<Side>> = face
-            .loops
-            .iter()
-            .map(|l| l.iter().flat_map(|w| self.sides(*w, None)).collect())
-            .collect();
+        let sides: Vec<Vec<Side>> =
+            face.loops.iter().map(|l| l.iter().flat_map(|w| self.sides(*w, None)).collect()).collect();
         if face.label == 0 {
             // A ball is seen from the middle of a stub; a lone one by halves.
             let Some(s) = hub.stubs.first() else {
@@ -278,19 +232,9 @@ impl Complex {
 
 /// A stub's face, cut by half-planes about its axis: a place in the middle of each sector, and its sides. `None` if the seam
 /// turns back across one of them.
-fn sectors(
-    complex: &Complex,
-    face: &Face,
-    stub: &Stub,
-    count: usize,
-    first: f64,
-) -> Option<Vec<(Vec3, Vec<Side>)>> {
+fn sectors(complex: &Complex, face: &Face, stub: &Stub, count: usize, first: f64) -> Option<Vec<(Vec3, Vec<Side>)>> {
     let (q, axis) = (&face.quadric, stub.axis);
-    let pole = if axis[0].abs() < 0.6 {
-        [1.0, 0.0, 0.0]
-    } else {
-        [0.0, 1.0, 0.0]
-    };
+    let pole = if axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     let side = unit(cross(axis, pole));
     let other = cross(axis, side);
     let azimuth = |k: usize| first + TAU * k as f64 / count as f64;
@@ -303,10 +247,7 @@ fn sectors(
         let mut stops: Vec<(f64, usize)> = Vec::new();
         for k in 0..count {
             let m = across(azimuth(k));
-            for t in conic.roots(
-                [dot(m, conic.v), dot(m, conic.e[0]), dot(m, conic.e[1])],
-                false,
-            ) {
+            for t in conic.roots([dot(m, conic.v), dot(m, conic.e[0]), dot(m, conic.e[1])], false) {
                 if t < conic.end && dot(conic.at(t), along(azimuth(k))) > 0.0 {
                     stops.push((t, k));
                 }
@@ -349,11 +290,7 @@ fn sectors(
     let meridian = |k: usize| {
         let (from, m) = (corners[k % count], across(azimuth(k)));
         let way = onward(q, m, from);
-        let up = if dot(way, axis) > 0.0 {
-            way
-        } else {
-            scale(way, -1.0)
-        };
+        let up = if dot(way, axis) > 0.0 { way } else { scale(way, -1.0) };
         let path = Path::new(q, m, from, up)?;
         let end = path.first(dot(axis, from) - stub.split, axis, false)?;
         path.until(Some(end))
@@ -371,8 +308,7 @@ fn sectors(
         let cuts = up.curves().into_iter().chain(rim.curves()).chain(down);
         out[k].1.extend(cuts.map(|c| (c, None)));
         let way = along((azimuth(k) + azimuth(k + 1)) / 2.0);
-        let height =
-            (dot(corners[k], axis) + dot(corners[(k + 1) % count], axis)) / 4.0 + stub.split / 2.0;
+        let height = (dot(corners[k], axis) + dot(corners[(k + 1) % count], axis)) / 4.0 + stub.split / 2.0;
         let rho = stub.squared(height).max(0.0).sqrt();
         out[k].0 = add(scale(axis, height), scale(way, rho));
     }
@@ -415,20 +351,12 @@ mod tests {
                     for share in [0.0, 0.21, 0.5, 0.84, 1.0] {
                         // The side lies on the face, in space and by its parameters.
                         let x = t.space.at(share);
-                        assert!(
-                            p.quadric.at(x).abs() < 1e-9 * size * size,
-                            "{}",
-                            p.quadric.at(x)
-                        );
+                        assert!(p.quadric.at(x).abs() < 1e-9 * size * size, "{}", p.quadric.at(x));
                         let y = p.at(t.flat.at(share));
                         assert!(p.quadric.at(y).abs() < 1e-9 * size * size);
                         assert!(hub.value(y).abs() < 1e-8 * size * size, "{}", hub.value(y));
                         let there = p.parameters(x);
-                        assert!(
-                            norm(sub(p.at(there), x)) < 1e-8 * size,
-                            "{x:?} {:?}",
-                            p.at(there)
-                        );
+                        assert!(norm(sub(p.at(there), x)) < 1e-8 * size, "{x:?} {:?}", p.at(there));
                         // The net gives the same place.
                         let at = p.parameters(y);
                         let bernstein = |a: usize| {
@@ -454,9 +382,11 @@ mod tests {
                 }
             }
             // Inside the sides of a face the label is its own.
-            let inner = p.trims.iter().flatten().fold([0.0; 2], |m, t| {
-                [m[0] + t.flat.points[0][0], m[1] + t.flat.points[0][1]]
-            });
+            let inner = p
+                .trims
+                .iter()
+                .flatten()
+                .fold([0.0; 2], |m, t| [m[0] + t.flat.points[0][0], m[1] + t.flat.points[0][1]]);
             let n = p.trims.iter().flatten().count() as f64;
             if face.label.count_ones() == 2 && p.trims[0].len() == 4 {
                 let x = p.at(inner.map(|v| v / n));
@@ -464,10 +394,7 @@ mod tests {
             }
         }
         if left == 0 {
-            assert!(
-                walked.iter().all(|w| *w >= 2),
-                "each arc is walked from both sides: {walked:?}"
-            );
+            assert!(walked.iter().all(|w| *w >= 2), "each arc is walked from both sides: {walked:?}");
         }
         (patches.len(), left)
     }
@@ -478,11 +405,7 @@ mod tests {
         let (mut made, mut left) = (0, 0);
         for n in 0..=12 {
             for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
-                let graph = if n == 0 {
-                    star(1.0, &[], |_| Profile::Cone)
-                } else {
-                    random_star(&mut random, n)
-                };
+                let graph = if n == 0 { star(1.0, &[], |_| Profile::Cone) } else { random_star(&mut random, n) };
                 let q = Quadors::new(&graph, fillet).expect("a star");
                 for i in 0..q.len() {
                     if q.overlaps().iter().any(|o| o.hub == i) {
@@ -496,38 +419,22 @@ mod tests {
             }
         }
         let ends: Vec<_> = six().into_iter().map(|u| (u, 10.0, 1.0)).collect();
-        let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.7))
-            .expect("a star");
+        let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.7)).expect("a star");
         let complex = q.complex(0).expect("a hub");
         // Six stubs in thirds, twelve fillets, eight corners.
         assert_eq!(check(&q.hub(0), &complex), (38, 0));
-        assert!(
-            made > 1000 && left == 0,
-            "{made} patches, {left} faces left out"
-        );
+        assert!(made > 1000 && left == 0, "{made} patches, {left} faces left out");
     }
 
     #[test]
     fn the_matrix_is_the_quadric_elsewhere() {
-        let mut q = Quadric {
-            m: crate::math::IDENTITY,
-            b: [0.1, -0.2, 0.3],
-            c: -1.0,
-        };
-        q.square(
-            -0.7,
-            &super::super::hub::Affine {
-                a: [1.0, 2.0, -0.5],
-                b: 0.3,
-            },
-        );
+        let mut q = Quadric { m: crate::math::IDENTITY, b: [0.1, -0.2, 0.3], c: -1.0 };
+        q.square(-0.7, &super::super::hub::Affine { a: [1.0, 2.0, -0.5], b: 0.3 });
         let (center, x) = ([3.0, -1.0, 2.0], [0.3, 0.8, -0.4]);
         let m = matrix(&q, center);
         let y = add(center, x);
         let h = [y[0], y[1], y[2], 1.0];
-        let value: f64 = (0..4)
-            .map(|i| (0..4).map(|j| h[i] * m[i][j] * h[j]).sum::<f64>())
-            .sum();
+        let value: f64 = (0..4).map(|i| (0..4).map(|j| h[i] * m[i][j] * h[j]).sum::<f64>()).sum();
         assert!((value - q.at(x)).abs() < 1e-12);
     }
 }

@@ -46,20 +46,14 @@ impl Pencil {
             if !(r > 0.0 && r.is_finite()) {
                 return Err(Fault::new(
                     "hub",
-                    format!(
-                        "a hub of radius {} mm is no ball: give a finite number above zero",
-                        number(r)
-                    ),
+                    format!("a hub of radius {} mm is no ball: give a finite number above zero", number(r)),
                 ));
             }
         }
         if !(length > 0.0 && length.is_finite()) {
             return Err(Fault::new(
                 "",
-                format!(
-                    "a beam {} mm long has no direction: its two hubs must differ",
-                    number(length)
-                ),
+                format!("a beam {} mm long has no direction: its two hubs must differ", number(length)),
             ));
         }
         let [big, small] = [radii[0].max(radii[1]), radii[0].min(radii[1])];
@@ -75,25 +69,15 @@ impl Pencil {
                 ),
             ));
         }
-        let family = Pencil {
-            length,
-            radii,
-            lambda: 1.0,
-        };
+        let family = Pencil { length, radii, lambda: 1.0 };
         let (lo, hi) = family.interval();
         let lambda = family.solve(profile)?;
         if lambda > lo && lambda < hi {
             return Ok(Pencil { lambda, ..family });
         }
         let (asked, range) = match profile {
-            Profile::Mid(r) => (
-                format!("a radius of {} mm at mid length", number(r)),
-                family.mid_range(),
-            ),
-            Profile::Waist(r) => (
-                format!("a waist of {} mm", number(r)),
-                (0.0, family.waist_range()),
-            ),
+            Profile::Mid(r) => (format!("a radius of {} mm at mid length", number(r)), family.mid_range()),
+            Profile::Waist(r) => (format!("a waist of {} mm", number(r)), (0.0, family.waist_range())),
             _ => (format!("lambda {}", number(lambda)), (lo, hi)),
         };
         Err(Fault::new(
@@ -104,11 +88,7 @@ impl Pencil {
                 number(radii[1]),
                 number(length),
                 number(range.0),
-                if range.1.is_finite() {
-                    number(range.1)
-                } else {
-                    "any large number".into()
-                }
+                if range.1.is_finite() { number(range.1) } else { "any large number".into() }
             ),
         ))
     }
@@ -116,10 +96,7 @@ impl Pencil {
     /// The open interval of λ in which the quadric touches both balls along real circles and has no pinch between them:
     /// L²/((L + r)² − R²) < λ < L²/(L² − (r + R)²), the upper end infinite where the balls overlap.
     pub fn interval(&self) -> (f64, f64) {
-        let [big, small] = [
-            self.radii[0].max(self.radii[1]),
-            self.radii[0].min(self.radii[1]),
-        ];
+        let [big, small] = [self.radii[0].max(self.radii[1]), self.radii[0].min(self.radii[1])];
         let l2 = self.length * self.length;
         let open = l2 - (big + small) * (big + small);
         (
@@ -203,23 +180,14 @@ impl Pencil {
         let (lo, hi) = self.interval();
         let e = self.skew();
         // ρ² at mid length falls with λ up to L/|e| and then rises.
-        let at = |lambda: f64| {
-            Pencil { lambda, ..*self }
-                .squared(self.length / 2.0)
-                .max(0.0)
-                .sqrt()
-        };
+        let at = |lambda: f64| Pencil { lambda, ..*self }.squared(self.length / 2.0).max(0.0).sqrt();
         let turn = self.length / e.abs();
         let end = match () {
             () if hi.is_finite() => at(hi),
             () if e == 0.0 => 0.0,
             () => f64::INFINITY,
         };
-        let least = if turn > lo && turn < hi {
-            at(turn)
-        } else {
-            at(lo).min(end)
-        };
+        let least = if turn > lo && turn < hi { at(turn) } else { at(lo).min(end) };
         (least, at(lo).max(end))
     }
 
@@ -230,9 +198,7 @@ impl Pencil {
             return self.radii[0];
         }
         let lambda = self.length / (self.length - e.abs());
-        let w2 = self.length * self.length / (4.0 * lambda)
-            - self.power()
-            - e * e / (4.0 * (lambda - 1.0));
+        let w2 = self.length * self.length / (4.0 * lambda) - self.power() - e * e / (4.0 * (lambda - 1.0));
         w2.max(0.0).sqrt()
     }
 
@@ -245,11 +211,7 @@ impl Pencil {
     /// [A, B, C] of ρ² = A z² + B z + C, z from the centre of an end towards the other.
     pub fn section(&self, end: usize) -> [f64; 3] {
         let (d, r) = (self.contact(end), self.radii[end]);
-        [
-            self.lambda - 1.0,
-            -2.0 * self.lambda * d,
-            r * r + self.lambda * d * d,
-        ]
+        [self.lambda - 1.0, -2.0 * self.lambda * d, r * r + self.lambda * d * d]
     }
 
     /// ρ² at z from the first centre, mm².
@@ -263,11 +225,7 @@ impl Pencil {
     pub fn split(&self) -> f64 {
         let polar = |end: usize| {
             let (d, r) = (self.contact(end), self.radii[end]);
-            if d > 0.0 {
-                d + r * r / (self.lambda * d)
-            } else {
-                f64::INFINITY
-            }
+            if d > 0.0 { d + r * r / (self.lambda * d) } else { f64::INFINITY }
         };
         self.middle().max(self.length - polar(1)).min(polar(0))
     }
@@ -278,13 +236,7 @@ impl Pencil {
         let (z1, z2) = (self.contact(0), self.length - self.contact(1));
         let ends = self.squared(z1).min(self.squared(z2));
         let vertex = -b / (2.0 * a);
-        if a > 0.0 && vertex > z1 && vertex < z2 {
-            ends.min(self.squared(vertex))
-        } else {
-            ends
-        }
-        .max(0.0)
-        .sqrt()
+        if a > 0.0 && vertex > z1 && vertex < z2 { ends.min(self.squared(vertex)) } else { ends }.max(0.0).sqrt()
     }
 
     /// What kind of quadric it is.
@@ -313,9 +265,7 @@ mod tests {
     use super::*;
 
     fn random(seed: &mut u64) -> f64 {
-        *seed = seed
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*seed >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -335,25 +285,17 @@ mod tests {
     fn both_balls_give_the_same_quadric_and_it_touches_them() {
         let mut seed = 3;
         for (length, radii) in pairs() {
-            let family = Pencil {
-                length,
-                radii,
-                lambda: 1.0,
-            };
+            let family = Pencil { length, radii, lambda: 1.0 };
             let (lo, hi) = family.interval();
             let s = 0.001 + 0.998 * random(&mut seed);
             let lambda = 1.0 / ((1.0 - s) / lo + s / hi);
-            let p =
-                Pencil::new(length, radii, Profile::Lambda(lambda)).expect("inside the interval");
+            let p = Pencil::new(length, radii, Profile::Lambda(lambda)).expect("inside the interval");
             let ([a1, b1, c1], [a2, b2, c2]) = (p.section(0), p.section(1));
             for k in 0..5 {
                 let z = length * f64::from(k) / 4.0;
                 let (u, v) = (z, length - z);
                 let (one, two) = ((a1 * u + b1) * u + c1, (a2 * v + b2) * v + c2);
-                assert!(
-                    (one - two).abs() <= 1e-13 * (1.0 + lambda) * (1.0 + length * length),
-                    "{p:?}"
-                );
+                assert!((one - two).abs() <= 1e-13 * (1.0 + lambda) * (1.0 + length * length), "{p:?}");
             }
             for end in 0..2 {
                 let (d, r) = (p.contact(end), radii[end]);
@@ -370,11 +312,7 @@ mod tests {
     #[test]
     fn outside_the_interval_there_is_none() {
         for (length, radii) in pairs() {
-            let family = Pencil {
-                length,
-                radii,
-                lambda: 1.0,
-            };
+            let family = Pencil { length, radii, lambda: 1.0 };
             let (lo, hi) = family.interval();
             let real = |lambda: f64| {
                 let p = Pencil { lambda, ..family };
@@ -382,8 +320,7 @@ mod tests {
                 let (z1, z2) = (p.contact(0), length - p.contact(1));
                 p.contact(0).abs() < radii[0]
                     && p.contact(1).abs() < radii[1]
-                    && (0..=steps)
-                        .all(|i| p.squared(z1 + (z2 - z1) * f64::from(i) / f64::from(steps)) > 0.0)
+                    && (0..=steps).all(|i| p.squared(z1 + (z2 - z1) * f64::from(i) / f64::from(steps)) > 0.0)
             };
             assert!(real(lo * 1.001 + 1e-9) || lo * 1.001 > hi);
             assert!(!real(lo * 0.999));
@@ -398,19 +335,12 @@ mod tests {
     #[test]
     fn a_profile_is_what_it_says() {
         for (length, radii) in pairs() {
-            let family = Pencil {
-                length,
-                radii,
-                lambda: 1.0,
-            };
+            let family = Pencil { length, radii, lambda: 1.0 };
             let (thin, thick) = family.mid_range();
             for s in [0.2, 0.5, 0.9] {
                 let r = thin + s * (thick.min(3.0) - thin);
                 let p = Pencil::new(length, radii, Profile::Mid(r)).expect("in the range");
-                assert!(
-                    (p.squared(length / 2.0).sqrt() - r).abs() < 1e-9 * r,
-                    "{p:?} {r}"
-                );
+                assert!((p.squared(length / 2.0).sqrt() - r).abs() < 1e-9 * r, "{p:?} {r}");
                 let w = s * family.waist_range();
                 if length > (radii[0] + radii[1]) * 1.001 && w > 1e-6 {
                     let p = Pencil::new(length, radii, Profile::Waist(w)).expect("in the range");
@@ -418,14 +348,10 @@ mod tests {
                 }
             }
             // The cone is straight: the square of ρ has no real discriminant but zero.
-            let [a, b, c] = Pencil::new(length, radii, Profile::Cone)
-                .expect("always")
-                .section(0);
+            let [a, b, c] = Pencil::new(length, radii, Profile::Cone).expect("always").section(0);
             assert!((b * b - 4.0 * a * c).abs() < 1e-12 * (1.0 + b * b));
             assert!(Pencil::new(length, radii, Profile::Mid(thick * 1.01)).is_err());
-            assert!(
-                Pencil::new(length, radii, Profile::Waist(family.waist_range() * 1.01)).is_err()
-            );
+            assert!(Pencil::new(length, radii, Profile::Waist(family.waist_range() * 1.01)).is_err());
         }
     }
 
@@ -433,14 +359,9 @@ mod tests {
     fn worked_numbers() {
         let p = Pencil::new(4.0, [1.0, 1.0], Profile::Mid(0.6)).expect("valid");
         assert!((p.lambda - 1.190_476_190_476).abs() < 1e-12);
-        assert!(
-            (p.contact(0) - 0.32).abs() < 1e-14
-                && (p.squared(0.32).sqrt() - 0.947_417_542_6).abs() < 1e-10
-        );
+        assert!((p.contact(0) - 0.32).abs() < 1e-14 && (p.squared(0.32).sqrt() - 0.947_417_542_6).abs() < 1e-10);
         let p = Pencil::new(3.0, [1.0, 0.5], Profile::Cone).expect("valid");
-        assert!(
-            (p.contact(0) - 1.0 / 6.0).abs() < 1e-14 && (p.contact(1) + 1.0 / 12.0).abs() < 1e-14
-        );
+        assert!((p.contact(0) - 1.0 / 6.0).abs() < 1e-14 && (p.contact(1) + 1.0 / 12.0).abs() < 1e-14);
         assert!((p.squared(1.5).sqrt() - 0.760_638_829_3).abs() < 1e-10);
         assert_eq!(p.kind(), Kind::Cone);
         assert!(Pencil::new(3.0, [1.0, 0.5], Profile::Cylinder).is_err());

@@ -80,11 +80,7 @@ impl Quadric {
 
 /// What a hub is made of where the stubs of `label` are active: its quadric, and σ.
 pub fn piece(hub: &Hub, label: u64) -> (Quadric, Affine) {
-    let mut q = Quadric {
-        m: crate::math::IDENTITY,
-        b: [0.0; 3],
-        c: -hub.radius * hub.radius,
-    };
+    let mut q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -hub.radius * hub.radius };
     let (mut sigma, mut t) = (Affine::default(), 1.0);
     for (i, s) in hub.stubs.iter().enumerate() {
         if label >> i & 1 == 0 {
@@ -149,10 +145,7 @@ impl Conic {
     pub fn at(&self, theta: f64) -> Vec3 {
         let (s, c) = theta.sin_cos();
         let f = -self.q * s / (self.m[0] * c * c + 2.0 * self.m[1] * s * c + self.m[2] * s * s);
-        add(
-            self.v,
-            add(scale(self.e[0], f * c), scale(self.e[1], f * s)),
-        )
+        add(self.v, add(scale(self.e[0], f * c), scale(self.e[1], f * s)))
     }
 
     /// The place at θ and its derivative.
@@ -163,14 +156,9 @@ impl Conic {
         let dd = 2.0 * ((self.m[2] - self.m[0]) * s * c + self.m[1] * (c * c - s * s));
         let f = -self.q / d;
         let g = f * dd / d;
-        let at = add(
-            self.v,
-            add(scale(self.e[0], f * s * c), scale(self.e[1], f * s * s)),
-        );
-        let slope = add(
-            scale(self.e[0], f * (c * c - s * s) - g * s * c),
-            scale(self.e[1], 2.0 * f * s * c - g * s * s),
-        );
+        let at = add(self.v, add(scale(self.e[0], f * s * c), scale(self.e[1], f * s * s)));
+        let slope =
+            add(scale(self.e[0], f * (c * c - s * s) - g * s * c), scale(self.e[1], 2.0 * f * s * c - g * s * s));
         (at, slope)
     }
 
@@ -178,39 +166,18 @@ impl Conic {
     /// in order. With `zero` the start itself, where the function is known to vanish, is not among them.
     pub fn roots(&self, f: [f64; 3], zero: bool) -> impl Iterator<Item = f64> {
         let f0 = if zero { 0.0 } else { f[0] };
-        let c = [
-            f0 * self.m[0],
-            2.0 * f0 * self.m[1] - self.q * f[1],
-            f0 * self.m[2] - self.q * f[2],
-        ];
-        let found = if zero {
-            [angle(-c[1], c[2]), f64::NAN]
-        } else {
-            angles(c)
-        };
+        let c = [f0 * self.m[0], 2.0 * f0 * self.m[1] - self.q * f[1], f0 * self.m[2] - self.q * f[2]];
+        let found = if zero { [angle(-c[1], c[2]), f64::NAN] } else { angles(c) };
         let (a, b) = (found[0].min(found[1]), found[0].max(found[1]));
         let keep = move |t: &f64| *t > 0.0 && *t < core::f64::consts::PI;
-        [
-            a,
-            if found[0].is_nan() || found[1].is_nan() {
-                f64::NAN
-            } else {
-                b
-            },
-        ]
-        .into_iter()
-        .filter(keep)
+        [a, if found[0].is_nan() || found[1].is_nan() { f64::NAN } else { b }].into_iter().filter(keep)
     }
 
     /// The cotangent of the first angle of `roots`, which falls from ∞ at 0 to −∞ at π; −∞ if there is none.
     #[inline]
     pub fn first(&self, f: [f64; 3], zero: bool) -> f64 {
         let f0 = if zero { 0.0 } else { f[0] };
-        greatest([
-            f0 * self.m[0],
-            2.0 * f0 * self.m[1] - self.q * f[1],
-            f0 * self.m[2] - self.q * f[2],
-        ])
+        greatest([f0 * self.m[0], 2.0 * f0 * self.m[1] - self.q * f[1], f0 * self.m[2] - self.q * f[2]])
     }
 
     /// The cotangent of `open`, −∞ if there is none.
@@ -247,10 +214,7 @@ impl Run {
         let over = 1.0 / d;
         let f = -self.q * over;
         let g = f * dd * over;
-        let slope = [
-            f * (ds * c + s * dc) - g * s * c,
-            s * (2.0 * f * ds - g * s),
-        ];
+        let slope = [f * (ds * c + s * dc) - g * s * c, s * (2.0 * f * ds - g * s)];
         ([f * s * c, f * s * s], slope)
     }
 }
@@ -259,12 +223,7 @@ impl Conic {
     /// The part between two angles less than half a turn apart.
     pub(super) fn run(&self, from: f64, to: f64) -> Run {
         let ((s, c), (s1, c1)) = (from.sin_cos(), to.sin_cos());
-        Run {
-            q: self.q,
-            m: self.m,
-            from: [c, s],
-            by: [c1 - c, s1 - s],
-        }
+        Run { q: self.q, m: self.m, from: [c, s], by: [c1 - c, s1 - s] }
     }
 
     /// A vector of the plane.

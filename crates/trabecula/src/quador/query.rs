@@ -36,11 +36,7 @@ fn enters(hub: &Hub, o: Vec3, v: Vec3, from: f64, to: f64) -> Option<(f64, Vec3)
         let mut end = to;
         for (i, s) in hub.stubs.iter().enumerate() {
             let f = if hub.sharp {
-                let lead = if label == 0 {
-                    Default::default()
-                } else {
-                    hub.stubs[label.trailing_zeros() as usize].g
-                };
+                let lead = if label == 0 { Default::default() } else { hub.stubs[label.trailing_zeros() as usize].g };
                 s.g.plus(-1.0, &lead)
             } else {
                 s.g.plus(-s.share, &sigma)
@@ -110,16 +106,10 @@ impl Quadors {
                     continue;
                 };
                 let hub = self.hub(i as usize);
-                if let Some((t, normal)) =
-                    enters(&hub, sub(origin, ball.center), way, from.max(0.0), to)
+                if let Some((t, normal)) = enters(&hub, sub(origin, ball.center), way, from.max(0.0), to)
                     && best.is_none_or(|b| t < b.distance)
                 {
-                    best = Some(Hit {
-                        distance: t,
-                        at: add(origin, scale(way, t)),
-                        normal,
-                        hub: i as usize,
-                    });
+                    best = Some(Hit { distance: t, at: add(origin, scale(way, t)), normal, hub: i as usize });
                 }
             }
             best.is_none_or(|b| b.distance > until)

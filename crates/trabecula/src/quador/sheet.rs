@@ -74,12 +74,7 @@ fn adjugate(q: &Quadric) -> [Vec3; 3] {
 impl Sheet {
     /// The sheet of a face of a hub, given the places in the middle of all arcs and the cotangents of the angles at which they end.
     /// `None` if there is none from which all of the face is seen.
-    pub fn new(
-        hub: &Hub,
-        complex: &Complex,
-        face: &Face,
-        (middles, ends): (&[Vec3], &[f64]),
-    ) -> Option<Sheet> {
+    pub fn new(hub: &Hub, complex: &Complex, face: &Face, (middles, ends): (&[Vec3], &[f64])) -> Option<Sheet> {
         let q = &face.quadric;
         let arcs = || face.loops.iter().flatten().map(|&(a, _)| a as usize);
         if let Some(stub) = face.rim {
@@ -94,10 +89,7 @@ impl Sheet {
         }
         if face.label == 0 {
             // Opposite is the middle of a stub.
-            let stub = arcs()
-                .flat_map(|a| complex.arcs[a].sides)
-                .max()?
-                .trailing_zeros();
+            let stub = arcs().flat_map(|a| complex.arcs[a].sides).max()?.trailing_zeros();
             return Sheet::cap(q, scale(hub.stubs[stub as usize].axis, -hub.radius));
         }
         if face.loops.len() > 1 {
@@ -115,9 +107,7 @@ impl Sheet {
                 .filter_map(|base| Sheet::cap(q, base))
                 .find(|sheet| arcs().all(|a| sheet.clear(&complex.arcs[a].conic, ends[a], least)))
         };
-        seen(GOOD)
-            .or_else(|| Sheet::waist(q))
-            .or_else(|| seen(CLEAR))
+        seen(GOOD).or_else(|| Sheet::waist(q)).or_else(|| seen(CLEAR))
     }
 
     /// What is seen from opposite a place of a quadric.
@@ -135,9 +125,7 @@ impl Sheet {
         if !short(along) {
             // A cylinder's axis has no part in it.
             let rows = adjugate(q);
-            let axis = rows
-                .into_iter()
-                .max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
+            let axis = rows.into_iter().max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
             let mut filled = *q;
             let axis = unit(axis);
             filled.square(1.0, &super::hub::Affine { a: axis, b: 0.0 });
@@ -147,13 +135,7 @@ impl Sheet {
                 return None;
             }
         }
-        Some(Sheet {
-            quadric: *q,
-            base,
-            normal: g,
-            along,
-            form: Form::Cap(nu),
-        })
+        Some(Sheet { quadric: *q, base, normal: g, along, form: Form::Cap(nu) })
     }
 
     /// Whether all of a seam, which ends at the angle of this cotangent, is farther from what is opposite to B than a share of all
@@ -162,8 +144,7 @@ impl Sheet {
         let Form::Cap(nu) = self.form else {
             return false;
         };
-        let [v, e, f] = [sub(conic.v, self.base), conic.e[0], conic.e[1]]
-            .map(|v| 0.5 * nu * dot(self.normal, v));
+        let [v, e, f] = [sub(conic.v, self.base), conic.e[0], conic.e[1]].map(|v| 0.5 * nu * dot(self.normal, v));
         let start = 1.0 - least + v;
         start > 0.0 && conic.first([start, e, f], false) < end
     }
@@ -173,12 +154,8 @@ impl Sheet {
         let (m, axes) = eigen(&q.m);
         let last = (0..3).min_by(|&i, &j| m[i].total_cmp(&m[j]))?;
         let negative = m.iter().filter(|v| **v < 0.0).count();
-        let base = (0..3).fold([0.0; 3], |sum, i| {
-            sub(sum, scale(axes[i], dot(axes[i], q.b) / m[i]))
-        });
-        (negative == 1 && q.at(base) < 0.0)
-            .then(|| Sheet::sleeve(q, base, axes[last], axes[last]))
-            .flatten()
+        let base = (0..3).fold([0.0; 3], |sum, i| sub(sum, scale(axes[i], dot(axes[i], q.b) / m[i])));
+        (negative == 1 && q.at(base) < 0.0).then(|| Sheet::sleeve(q, base, axes[last], axes[last])).flatten()
     }
 
     /// A ring about the axis through the middles of its sections parallel to one of its ends.
@@ -194,11 +171,7 @@ impl Sheet {
 
     /// About the axis through a place, where sections normal to `normal` have their middles.
     fn sleeve(q: &Quadric, base: Vec3, along: Vec3, normal: Vec3) -> Option<Sheet> {
-        let section = [
-            -q.form(along, along),
-            -2.0 * dot(q.half_slope(base), along),
-            -q.at(base),
-        ];
+        let section = [-q.form(along, along), -2.0 * dot(q.half_slope(base), along), -q.at(base)];
         let normal = scale(normal, 1.0 / dot(normal, along));
         normal.iter().all(|v| v.is_finite()).then_some(Sheet {
             quadric: *q,
@@ -213,10 +186,7 @@ impl Sheet {
     pub fn short(&self, x: Vec3, by: Vec3) -> f64 {
         let y = sub(x, self.base);
         let (turn, zeta) = (cross(y, by), dot(self.normal, y));
-        let [over, under] = self
-            .form
-            .quotient()
-            .map(|[a, b, c]| (c * zeta + b) * zeta + a);
+        let [over, under] = self.form.quotient().map(|[a, b, c]| (c * zeta + b) * zeta + a);
         0.5 * dot(self.base, turn) + over / under * dot(self.along, turn)
     }
 
@@ -241,10 +211,7 @@ impl Sheet {
                 let z = zeta + u * (top - zeta);
                 let wide = (q(z) / q(zeta)).max(0.0).sqrt();
                 let eta = sub(y, scale(d, zeta));
-                (
-                    add(scale(eta, wide), scale(d, z)),
-                    (top - zeta) * turn / q(zeta),
-                )
+                (add(scale(eta, wide), scale(d, z)), (top - zeta) * turn / q(zeta))
             }
         };
         let place = add(self.base, place);
@@ -270,27 +237,18 @@ impl Seam {
         });
         let [base, along, height, over, under] =
             [0, 1, 2, 3, 4].map(|n| [0, 1, 2].map(|k| [each[0][n][k], each[1][n][k]]));
-        Seam {
-            base,
-            along,
-            height,
-            over,
-            under,
-        }
+        Seam { base, along, height, over, under }
     }
 
     /// The form of the first sheet less that of the second at a place of the plane with its derivative.
     #[inline(always)]
     pub fn at(&self, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) -> f64 {
         let turn = x * dy - y * dx;
-        let way = |c: &[[f64; 2]; 3], [a, b, d]: [f64; 3]| {
-            [0, 1].map(|k| c[0][k] * a + c[1][k] * b + c[2][k] * d)
-        };
+        let way = |c: &[[f64; 2]; 3], [a, b, d]: [f64; 3]| [0, 1].map(|k| c[0][k] * a + c[1][k] * b + c[2][k] * d);
         let base = way(&self.base, [dx, dy, turn]);
         let along = way(&self.along, [dx, dy, turn]);
         let zeta = way(&self.height, [1.0, x, y]);
-        let quadratic =
-            |c: &[[f64; 2]; 3]| [0, 1].map(|k| (c[2][k] * zeta[k] + c[1][k]) * zeta[k] + c[0][k]);
+        let quadratic = |c: &[[f64; 2]; 3]| [0, 1].map(|k| (c[2][k] * zeta[k] + c[1][k]) * zeta[k] + c[0][k]);
         let (over, under) = (quadratic(&self.over), quadratic(&self.under));
         let [a, b] = [0, 1].map(|k| base[k] + over[k] / under[k] * along[k]);
         a - b

@@ -38,38 +38,21 @@ impl Plane {
     /// A normal without direction, and numbers that are not finite.
     pub fn new(point: Vec3, normal: Vec3) -> Result<Plane, Fault> {
         if !point.iter().all(|v| v.is_finite()) {
-            return Err(Fault::new(
-                "point",
-                "is not a position: give three finite numbers, mm",
-            ));
+            return Err(Fault::new("point", "is not a position: give three finite numbers, mm"));
         }
         let length = norm(normal);
         if !(length > 0.0 && length.is_finite()) {
-            return Err(Fault::new(
-                "normal",
-                "has no direction: give three finite numbers, not all zero",
-            ));
+            return Err(Fault::new("normal", "has no direction: give three finite numbers, not all zero"));
         }
         let normal = scale(normal, 1.0 / length);
-        let pole = if normal[0].abs() < 0.9 {
-            [1.0, 0.0, 0.0]
-        } else {
-            [0.0, 1.0, 0.0]
-        };
+        let pole = if normal[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let u = unit(sub(pole, scale(normal, dot(pole, normal))));
-        Ok(Plane {
-            origin: scale(normal, dot(point, normal)),
-            axes: [u, cross(normal, u)],
-            normal,
-        })
+        Ok(Plane { origin: scale(normal, dot(point, normal)), axes: [u, cross(normal, u)], normal })
     }
 
     /// The place in space.
     pub fn place(&self, [u, v]: [f64; 2]) -> Vec3 {
-        add(
-            self.origin,
-            add(scale(self.axes[0], u), scale(self.axes[1], v)),
-        )
+        add(self.origin, add(scale(self.axes[0], u), scale(self.axes[1], v)))
     }
 
     /// (u, v) of what lies beneath or above it.
@@ -78,10 +61,7 @@ impl Plane {
     }
 
     fn moved(&self, by: f64) -> Plane {
-        Plane {
-            origin: add(self.origin, scale(self.normal, by)),
-            ..*self
-        }
+        Plane { origin: add(self.origin, scale(self.normal, by)), ..*self }
     }
 }
 
@@ -131,11 +111,7 @@ impl Slice {
 
 /// The signed area of a loop: about its first place, so that a loop far from the origin keeps its digits.
 fn area(arcs: &[Arc]) -> f64 {
-    let Some(o) = arcs
-        .first()
-        .and_then(|a| a.curves.first())
-        .map(|c| c.points[0])
-    else {
+    let Some(o) = arcs.first().and_then(|a| a.curves.first()).map(|c| c.points[0]) else {
         return 0.0;
     };
     let twice = |c: &Bezier<2>| {
@@ -166,10 +142,8 @@ impl Quadors {
             if let Some(o) = hubs.iter().find_map(|h| self.overlap(*h as usize)) {
                 return Err(o);
             }
-            let cut: Result<Vec<Vec<Chain>>, usize> = hubs
-                .par_iter()
-                .map(|&h| self.section(h as usize, &at, level).ok_or(h as usize))
-                .collect();
+            let cut: Result<Vec<Vec<Chain>>, usize> =
+                hubs.par_iter().map(|&h| self.section(h as usize, &at, level).ok_or(h as usize)).collect();
             let joined = cut.and_then(|cut| join(&at, self, &hubs, cut));
             match joined {
                 Ok(loops) => {
@@ -226,10 +200,7 @@ impl Quadors {
         (n > 64).then(|| {
             Fault::new(
                 format!("hubs[{hub}]"),
-                format!(
-                    "{} meet in it: closed forms are made for up to 64",
-                    counted(n, "beam")
-                ),
+                format!("{} meet in it: closed forms are made for up to 64", counted(n, "beam")),
             )
         })
     }
@@ -238,10 +209,7 @@ impl Quadors {
     fn gate(&self, hub: usize, stub: usize, plane: &Plane, level: f64) -> Gate {
         let s = &self.hub(hub).stubs[stub];
         let (p, ends) = (&self.pencils[s.beam as usize], self.ends[s.beam as usize]);
-        let along = sub(
-            self.balls[ends[1] as usize].center,
-            self.balls[ends[0] as usize].center,
-        );
+        let along = sub(self.balls[ends[1] as usize].center, self.balls[ends[0] as usize].center);
         let axis = scale(along, 1.0 / p.length);
         let n = plane.normal;
         let away = dot(n, self.balls[ends[0] as usize].center) + p.split() * dot(n, axis) - level;
@@ -255,10 +223,7 @@ impl Quadors {
         }
         let side = scale(side, 1.0 / sine);
         let half = p.squared(p.split()) - (away / sine) * (away / sine);
-        let center = add(
-            scale(s.axis, s.split),
-            scale(cross(axis, side), -away / sine),
-        );
+        let center = add(scale(s.axis, s.split), scale(cross(axis, side), -away / sine));
         if half > 0.0 {
             let half = scale(side, half.sqrt() * toward);
             Gate::Open([add(center, half), sub(center, half)])
@@ -270,9 +235,7 @@ impl Quadors {
     /// What a plane cuts out of a hub; `None` where that cannot be told.
     fn section(&self, hub: usize, plane: &Plane, level: f64) -> Option<Vec<Chain>> {
         let of = self.hub(hub);
-        let gates: Vec<Gate> = (0..of.stubs.len())
-            .map(|i| self.gate(hub, i, plane, level))
-            .collect();
+        let gates: Vec<Gate> = (0..of.stubs.len()).map(|i| self.gate(hub, i, plane, level)).collect();
         let b = self.balls[hub].bounds;
         let reach = norm(b.size());
         let height = level - dot(plane.normal, self.center(hub));
@@ -282,12 +245,7 @@ impl Quadors {
 }
 
 /// Joins what was cut out of hubs where their beams are parted; the hub where it fails.
-fn join(
-    plane: &Plane,
-    quadors: &Quadors,
-    hubs: &[u32],
-    cut: Vec<Vec<Chain>>,
-) -> Result<Vec<Vec<Arc>>, usize> {
+fn join(plane: &Plane, quadors: &Quadors, hubs: &[u32], cut: Vec<Vec<Chain>>) -> Result<Vec<Vec<Arc>>, usize> {
     let stub = |h: usize, i: u32| {
         let s = &quadors.hub(hubs[h] as usize).stubs[i as usize];
         (s.beam, s.end)
@@ -301,10 +259,7 @@ fn join(
             }
         }
     }
-    let mut cut: Vec<Vec<Option<Chain>>> = cut
-        .into_iter()
-        .map(|c| c.into_iter().map(Some).collect())
-        .collect();
+    let mut cut: Vec<Vec<Option<Chain>>> = cut.into_iter().map(|c| c.into_iter().map(Some).collect()).collect();
     let mut out = Vec::new();
     for h in 0..cut.len() {
         for c in 0..cut[h].len() {

@@ -11,10 +11,7 @@ pub(super) struct Random(pub u64);
 
 impl Random {
     pub(super) fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -29,25 +26,12 @@ impl Random {
 }
 
 /// A hub at the origin and one hub at the end of each beam.
-pub(super) fn star(
-    radius: f64,
-    ends: &[(Vec3, f64, f64)],
-    profile: impl Fn(usize) -> Profile,
-) -> Graph {
-    let mut hubs = vec![graph::Hub {
-        center: [0.0; 3],
-        radius,
-    }];
+pub(super) fn star(radius: f64, ends: &[(Vec3, f64, f64)], profile: impl Fn(usize) -> Profile) -> Graph {
+    let mut hubs = vec![graph::Hub { center: [0.0; 3], radius }];
     let mut beams = Vec::new();
     for (i, &(along, length, r)) in ends.iter().enumerate() {
-        hubs.push(graph::Hub {
-            center: scale(along, length),
-            radius: r,
-        });
-        beams.push(Beam {
-            ends: [0, i as u32 + 1],
-            profile: profile(i),
-        });
+        hubs.push(graph::Hub { center: scale(along, length), radius: r });
+        beams.push(Beam { ends: [0, i as u32 + 1], profile: profile(i) });
     }
     Graph { hubs, beams }
 }
@@ -62,10 +46,7 @@ pub(super) fn random_star(random: &mut Random, n: usize) -> Graph {
             axes.push(u);
         }
     }
-    let ends: Vec<_> = axes
-        .into_iter()
-        .map(|u| (u, 4.0 + 3.0 * random.next(), 0.3 + 0.3 * random.next()))
-        .collect();
+    let ends: Vec<_> = axes.into_iter().map(|u| (u, 4.0 + 3.0 * random.next(), 0.3 + 0.3 * random.next())).collect();
     let mid: Vec<f64> = ends.iter().map(|_| 0.25 + 0.2 * random.next()).collect();
     star(0.4 + 0.2 * random.next(), &ends, |i| Profile::Mid(mid[i]))
 }
@@ -86,21 +67,14 @@ fn brute(hub: &Hub, x: Vec3) -> f64 {
     let n = hub.stubs.len();
     let g: Vec<f64> = hub.stubs.iter().map(|s| s.g.at(x)).collect();
     let tau = |i: usize, j: usize| {
-        if i == j {
-            1.0
-        } else {
-            hub.stubs[i].share * hub.stubs[j].share
-        }
+        if i == j { 1.0 } else { hub.stubs[i].share * hub.stubs[j].share }
     };
     let mut best: f64 = 0.0;
     for set in 1u32..1 << n {
         let of: Vec<usize> = (0..n).filter(|i| set >> i & 1 == 1).collect();
         // R y = g on the set, by elimination.
         let m = of.len();
-        let mut a: Vec<Vec<f64>> = of
-            .iter()
-            .map(|&i| of.iter().map(|&j| tau(i, j)).chain([g[i]]).collect())
-            .collect();
+        let mut a: Vec<Vec<f64>> = of.iter().map(|&i| of.iter().map(|&j| tau(i, j)).chain([g[i]]).collect()).collect();
         for c in 0..m {
             for r in c + 1..m {
                 let f = a[r][c] / a[c][c];
@@ -124,30 +98,19 @@ fn brute(hub: &Hub, x: Vec3) -> f64 {
 fn the_fillet_is_the_greatest_over_all_sets_of_stubs() {
     let mut random = Random(1);
     for n in 1..=8 {
-        for fillet in [
-            Fillet::Auto,
-            Fillet::Tau(0.6),
-            Fillet::Alpha(0.1),
-            Fillet::None,
-        ] {
+        for fillet in [Fillet::Auto, Fillet::Tau(0.6), Fillet::Alpha(0.1), Fillet::None] {
             let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
             let mut hub = q.hub(0);
             hub.sharp = fillet == Fillet::None;
             for _ in 0..200 {
                 let x = scale(random.direction(), 3.0 * random.next());
                 let want = if hub.sharp {
-                    hub.stubs
-                        .iter()
-                        .map(|s| s.g.at(x).max(0.0).powi(2))
-                        .fold(0.0, f64::max)
+                    hub.stubs.iter().map(|s| s.g.at(x).max(0.0).powi(2)).fold(0.0, f64::max)
                 } else {
                     brute(&hub, x)
                 };
                 let got = hub.grown(x);
-                assert!(
-                    (got.value - want).abs() < 1e-12 * (1.0 + want),
-                    "{n} {fillet:?}: {got:?} {want}"
-                );
+                assert!((got.value - want).abs() < 1e-12 * (1.0 + want), "{n} {fillet:?}: {got:?} {want}");
                 assert!((hub.grown_value(x) - want).abs() < 1e-12 * (1.0 + want));
             }
         }
@@ -163,33 +126,21 @@ fn two_stubs_give_the_quadric_of_the_note() {
     assert!(q.shortfalls().is_empty());
     let hub = q.hub(0);
     for (x, n) in [
-        (
-            [1.154_700_538_379_251_7, 1.154_700_538_379_251_7, 0.0],
-            [0.5f64.sqrt(), 0.5f64.sqrt(), 0.0],
-        ),
+        ([1.154_700_538_379_251_7, 1.154_700_538_379_251_7, 0.0], [0.5f64.sqrt(), 0.5f64.sqrt(), 0.0]),
         ([5.0 / 3.0, 1.0, 0.0], [0.0, 1.0, 0.0]),
         ([1.0, 0.6, 0.8], [0.0, 0.6, 0.8]),
     ] {
         let (v, g) = hub.gradient(x);
-        assert!(
-            v.abs() < 1e-14 && norm(sub(unit(g), n)) < 1e-14,
-            "{x:?}: {v} {g:?}"
-        );
+        assert!(v.abs() < 1e-14 && norm(sub(unit(g), n)) < 1e-14, "{x:?}: {v} {g:?}");
     }
     let (x, radius) = hub.crotch(0, 1, 0.6).expect("they meet");
-    assert!(
-        (x[0] - 1.154_700_538_379_251_7).abs() < 1e-14
-            && (radius - 0.408_248_290_463_863_1).abs() < 1e-14
-    );
+    assert!((x[0] - 1.154_700_538_379_251_7).abs() < 1e-14 && (radius - 0.408_248_290_463_863_1).abs() < 1e-14);
     // Asking for that radius gives that fillet.
     let again = Quadors::new(&graph, Fillet::Radius(radius)).expect("a star");
-    assert!(
-        (again.hub(0).stubs[0].share.powi(2) - 0.6).abs() < 1e-12 && again.shortfalls().is_empty()
-    );
+    assert!((again.hub(0).stubs[0].share.powi(2) - 0.6).abs() < 1e-12 && again.shortfalls().is_empty());
     // The third cylinder closes the corner at 0.7817 on the diagonal.
     let ends: Vec<_> = six()[..3].iter().map(|&u| (u, 20.0, 1.0)).collect();
-    let q =
-        Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.6)).expect("a star");
+    let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.6)).expect("a star");
     assert!(q.hub(0).value([0.781_735_959_970_571_5; 3]).abs() < 1e-14);
 }
 
@@ -201,26 +152,17 @@ fn the_hub_is_once_differentiable() {
         let hub = q.hub(0);
         for _ in 0..50 {
             // Along a segment, where the set of stubs changes the gradient does not jump.
-            let (mut a, mut b) = (
-                scale(random.direction(), 2.0 * random.next()),
-                scale(random.direction(), 2.0 * random.next()),
-            );
+            let (mut a, mut b) =
+                (scale(random.direction(), 2.0 * random.next()), scale(random.direction(), 2.0 * random.next()));
             if hub.grown(a).active == hub.grown(b).active {
                 continue;
             }
             for _ in 0..50 {
                 let m = scale(add(a, b), 0.5);
-                if hub.grown(m).active == hub.grown(a).active {
-                    a = m
-                } else {
-                    b = m
-                }
+                if hub.grown(m).active == hub.grown(a).active { a = m } else { b = m }
             }
             let (u, v) = (hub.gradient(a).1, hub.gradient(b).1);
-            assert!(
-                norm(sub(u, v)) < 1e-10 * (1.0 + norm(u)),
-                "valence {n}: {u:?} {v:?}"
-            );
+            assert!(norm(sub(u, v)) < 1e-10 * (1.0 + norm(u)), "valence {n}: {u:?} {v:?}");
         }
     }
 }
@@ -242,10 +184,7 @@ fn fillets_end_before_the_beams_are_parted() {
                     let z = s.split * (1.0 + 1e-9);
                     let (sin, cos) = (f64::from(k) / 64.0 * core::f64::consts::TAU).sin_cos();
                     let rho = s.squared(z).sqrt();
-                    let x = add(
-                        scale(s.axis, z),
-                        add(scale(side, rho * cos), scale(other, rho * sin)),
-                    );
+                    let x = add(scale(s.axis, z), add(scale(side, rho * cos), scale(other, rho * sin)));
                     assert_eq!(hub.grown(x).active, 1 << i, "{n} {fillet:?}");
                     assert!(hub.value(x).abs() < 1e-12 * z * z);
                 }
@@ -264,16 +203,10 @@ pub(super) fn cubic(n: usize, jitter: f64) -> Graph {
         for y in 0..m {
             for x in 0..m {
                 let center = [x, y, z].map(|v| 10.0 * v as f64 + jitter * (random.next() - 0.5));
-                hubs.push(graph::Hub {
-                    center,
-                    radius: 1.0 + 0.2 * jitter * random.next(),
-                });
+                hubs.push(graph::Hub { center, radius: 1.0 + 0.2 * jitter * random.next() });
                 for (e, to) in [(x, [x + 1, y, z]), (y, [x, y + 1, z]), (z, [x, y, z + 1])] {
                     if e < n {
-                        beams.push(Beam {
-                            ends: [id(x, y, z), id(to[0], to[1], to[2])],
-                            profile: Profile::Cone,
-                        });
+                        beams.push(Beam { ends: [id(x, y, z), id(to[0], to[1], to[2])], profile: Profile::Cone });
                     }
                 }
             }
@@ -303,10 +236,7 @@ fn the_field_is_negative_in_the_solid_alone_and_continuous() {
             let ahead = q.value(add(p, scale(g[0], 1e-7)));
             let rise = (ahead - v) / 1e-7;
             assert!(
-                (rise - dot(g[0], g[0])).abs() < 2e-5
-                    || v > 0.9 * q.cap
-                    || g[0] == [0.0; 3]
-                    || kink(&q, p),
+                (rise - dot(g[0], g[0])).abs() < 2e-5 || v > 0.9 * q.cap || g[0] == [0.0; 3] || kink(&q, p),
                 "{fillet:?} {p:?}: {rise} {g:?}"
             );
         }
@@ -322,9 +252,7 @@ fn kink(q: &Quadors, p: Vec3) -> bool {
         g[0]
     };
     let g = slope(p);
-    six()
-        .into_iter()
-        .any(|u| norm(sub(slope(add(p, scale(u, 3e-6))), g)) > 1e-4)
+    six().into_iter().any(|u| norm(sub(slope(add(p, scale(u, 3e-6))), g)) > 1e-4)
 }
 
 #[test]
@@ -336,19 +264,13 @@ fn bounds_of_boxes_hold_every_value() {
         for _ in 0..3000 {
             let size = 0.05 * 100f64.powf(random.next());
             let min = [0; 3].map(|_| 26.0 * random.next() - 3.0);
-            let b = Aabb {
-                min,
-                max: min.map(|v| v + size * (0.2 + random.next())),
-            };
+            let b = Aabb { min, max: min.map(|v| v + size * (0.2 + random.next())) };
             let bound = q.bound(&b);
             told += usize::from(bound.lo > 0.0 || bound.hi < 0.0);
             for _ in 0..40 {
                 let p = [0, 1, 2].map(|a| b.min[a] + random.next() * (b.max[a] - b.min[a]));
                 let v = q.value(p);
-                assert!(
-                    v >= bound.lo && v <= bound.hi,
-                    "{fillet:?} {b:?}: {v} {bound:?}"
-                );
+                assert!(v >= bound.lo && v <= bound.hi, "{fillet:?} {b:?}: {v} {bound:?}");
             }
         }
         // Most small boxes are told to be empty or full.
@@ -363,52 +285,21 @@ fn faults_say_what_is_wrong() {
         let f = r.expect_err("refused");
         assert!(f.at == at && f.message.contains(words), "{f}");
     };
-    says(
-        Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto),
-        "beams[0].profile",
-        "between",
-    );
-    says(
-        Quadors::new(&two(Profile::Cylinder), Fillet::Auto),
-        "beams[0].profile",
-        "one radius",
-    );
-    says(
-        Quadors::new(&two(Profile::Cone), Fillet::Tau(1.0)),
-        "fillet",
-        "tau",
-    );
-    says(
-        Quadors::new(&two(Profile::Cone), Fillet::Radius(f64::NAN)),
-        "fillet",
-        "radius",
-    );
+    says(Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto), "beams[0].profile", "between");
+    says(Quadors::new(&two(Profile::Cylinder), Fillet::Auto), "beams[0].profile", "one radius");
+    says(Quadors::new(&two(Profile::Cone), Fillet::Tau(1.0)), "fillet", "tau");
+    says(Quadors::new(&two(Profile::Cone), Fillet::Radius(f64::NAN)), "fillet", "radius");
     let mut lost = two(Profile::Cone);
     lost.beams[0].ends[1] = 7;
     says(Quadors::new(&lost, Fillet::None), "beams[0]", "names hub 7");
     let mut same = two(Profile::Cone);
     same.hubs[1].center = [0.0; 3];
-    says(
-        Quadors::new(&same, Fillet::None),
-        "beams[0]",
-        "no direction",
-    );
+    says(Quadors::new(&same, Fillet::None), "beams[0]", "no direction");
     let mut odd = two(Profile::Cone);
     odd.hubs[0].center[1] = f64::NAN;
-    says(
-        Quadors::new(&odd, Fillet::None),
-        "hubs[0]",
-        "not a position",
-    );
+    says(Quadors::new(&odd, Fillet::None), "hubs[0]", "not a position");
     // Nearly parallel beams are built, but exact answers are refused.
-    let close = star(
-        1.0,
-        &[
-            ([1.0, 0.0, 0.0], 5.0, 1.0),
-            (unit([1.0, 0.1, 0.0]), 5.0, 1.0),
-        ],
-        |_| Profile::Cone,
-    );
+    let close = star(1.0, &[([1.0, 0.0, 0.0], 5.0, 1.0), (unit([1.0, 0.1, 0.0]), 5.0, 1.0)], |_| Profile::Cone);
     let q = Quadors::new(&close, Fillet::Auto).expect("built");
     assert!(q.exact().is_err() && !q.overlaps().is_empty());
 }
@@ -416,9 +307,7 @@ fn faults_say_what_is_wrong() {
 /// Faces by how many stubs shape them.
 fn census(c: &complex::Complex) -> Vec<usize> {
     let mut n = vec![0; 8];
-    c.faces
-        .iter()
-        .for_each(|f| n[f.label.count_ones() as usize] += 1);
+    c.faces.iter().for_each(|f| n[f.label.count_ones() as usize] += 1);
     while n.last() == Some(&0) {
         n.pop();
     }
@@ -433,14 +322,7 @@ fn equal(axes: &[Vec3], length: f64, fillet: Fillet) -> Quadors {
 /// All places whose coordinates are those given, with signs and orders as they may be.
 pub(super) fn orbit(v: Vec3) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
-    for p in [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ] {
+    for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         for s in 0..8 {
             let w = unit([0, 1, 2].map(|a| v[p[a]] * if s >> a & 1 == 1 { -1.0 } else { 1.0 }));
             if out.iter().all(|u| norm(sub(*u, w)) > 1e-9) {
@@ -455,27 +337,15 @@ pub(super) fn orbit(v: Vec3) -> Vec<Vec3> {
 fn hubs_of_the_usual_cells_have_their_faces() {
     let sc = equal(&six(), 10.0, Fillet::Tau(0.7));
     let c = complex::Complex::new(&sc.hub(0)).expect("a hub");
-    assert_eq!(
-        (c.vertices.len(), c.arcs.len(), census(&c)),
-        (24, 48, vec![0, 6, 12, 8])
-    );
+    assert_eq!((c.vertices.len(), c.arcs.len(), census(&c)), (24, 48, vec![0, 6, 12, 8]));
     let octet = equal(&orbit([1.0, 1.0, 0.0]), 10.0, Fillet::Tau(0.8));
-    assert_eq!(
-        census(&complex::Complex::new(&octet.hub(0)).expect("a hub")),
-        [0, 12, 24, 32, 6]
-    );
+    assert_eq!(census(&complex::Complex::new(&octet.hub(0)).expect("a hub")), [0, 12, 24, 32, 6]);
     let sharp = equal(&orbit([1.0, 1.0, 0.0]), 10.0, Fillet::None);
     let c = complex::Complex::new(&sharp.hub(0)).expect("a hub");
     // The edges of a rhombic dodecahedron, six of its corners of four.
-    assert_eq!(
-        (c.vertices.len(), c.arcs.len(), census(&c)),
-        (14, 24, vec![0, 12])
-    );
+    assert_eq!((c.vertices.len(), c.arcs.len(), census(&c)), (14, 24, vec![0, 12]));
     let bcc = equal(&orbit([1.0, 1.0, 1.0]), 10.0, Fillet::Tau(0.8));
-    println!(
-        "bcc {:?}",
-        census(&complex::Complex::new(&bcc.hub(0)).expect("a hub"))
-    );
+    println!("bcc {:?}", census(&complex::Complex::new(&bcc.hub(0)).expect("a hub")));
 }
 
 #[test]
@@ -491,8 +361,7 @@ fn seams_are_tangent_and_close_over_random_hubs() {
                     continue;
                 }
                 let hub = q.hub(0);
-                let c =
-                    complex::Complex::new(&hub).unwrap_or_else(|f| panic!("{n} {fillet:?}: {f}"));
+                let c = complex::Complex::new(&hub).unwrap_or_else(|f| panic!("{n} {fillet:?}: {f}"));
                 assert_eq!(c.euler(), 2);
                 hubs += 1;
                 for a in &c.arcs {
@@ -501,15 +370,10 @@ fn seams_are_tangent_and_close_over_random_hubs() {
                         let x = a.conic.at(a.conic.end * f64::from(k) / 6.0);
                         let size = 1.0 + dot(x, x);
                         assert!(
-                            l.at(x).abs() < 1e-11 * size && r.at(x).abs() < 1e-11 * size
-                                || hub.sharp,
+                            l.at(x).abs() < 1e-11 * size && r.at(x).abs() < 1e-11 * size || hub.sharp,
                             "{n} {fillet:?}"
                         );
-                        assert!(
-                            hub.value(x).abs() < 1e-9 * size,
-                            "{n} {fillet:?} {k}: {}",
-                            hub.value(x)
-                        );
+                        assert!(hub.value(x).abs() < 1e-9 * size, "{n} {fillet:?} {k}: {}", hub.value(x));
                         if !hub.sharp {
                             let bend = norm(sub(unit(l.half_slope(x)), unit(r.half_slope(x))));
                             worst = worst.max(bend);
@@ -553,10 +417,7 @@ fn rays_hit_the_surface_first_where_it_is() {
             assert!(q.value(h.at).abs() < 1e-9);
             let (mut v, mut g) = ([0.0], [[0.0; 3]]);
             q.gradients(&[add(h.at, scale(h.normal, 1e-9))], &mut v, &mut g);
-            assert!(
-                dot(h.normal, way) < 0.0
-                    && (norm(sub(unit(g[0]), h.normal)) < 1e-5 || fillet == Fillet::None)
-            );
+            assert!(dot(h.normal, way) < 0.0 && (norm(sub(unit(g[0]), h.normal)) < 1e-5 || fillet == Fillet::None));
         }
         assert!(hits > 800, "{hits}");
     }

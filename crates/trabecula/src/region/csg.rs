@@ -28,10 +28,7 @@ pub struct Offset {
 
 fn some(verb: &str, of: Vec<Region>) -> Result<List, Fault> {
     if of.is_empty() {
-        return Err(Fault::new(
-            "",
-            format!("{verb} of no regions: list at least one"),
-        ));
+        return Err(Fault::new("", format!("{verb} of no regions: list at least one")));
     }
     Ok(List::new(of))
 }
@@ -61,17 +58,12 @@ impl Offset {
     /// The region moved outwards by `by` mm. Errors if `by` is not finite.
     pub fn new(of: Region, by: f64) -> Result<Self, Fault> {
         if !by.is_finite() {
-            return Err(Fault::new(
-                "by",
-                format!("{by} mm is not a distance: give a finite number"),
-            ));
+            return Err(Fault::new("by", format!("{by} mm is not a distance: give a finite number")));
         }
         let mut planes = Vec::new();
         (0..3).for_each(|axis| of.planes(axis, &mut planes));
         // The moved coordinate, the distance and the difference each round once.
-        let snap = planes.iter().fold(0.0f64, |s, c| {
-            s.max(4.0 * f64::EPSILON * (c.abs() + by.abs()))
-        });
+        let snap = planes.iter().fold(0.0f64, |s, c| s.max(4.0 * f64::EPSILON * (c.abs() + by.abs())));
         Ok(Offset { of, by, snap })
     }
 
@@ -115,11 +107,7 @@ impl Join for Union {
         a.min(b)
     }
     fn extent(&self) -> Aabb {
-        let full = self
-            .regions()
-            .iter()
-            .map(|r| r.bounds())
-            .filter(|b| !b.is_empty());
+        let full = self.regions().iter().map(|r| r.bounds()).filter(|b| !b.is_empty());
         full.reduce(Aabb::union).unwrap_or(Aabb::EMPTY)
     }
 }
@@ -139,10 +127,7 @@ impl Join for Intersection {
         a.max(b)
     }
     fn extent(&self) -> Aabb {
-        self.regions()
-            .iter()
-            .map(|r| r.bounds())
-            .fold(Aabb::ALL, Aabb::intersection)
+        self.regions().iter().map(|r| r.bounds()).fold(Aabb::ALL, Aabb::intersection)
     }
 }
 
@@ -300,9 +285,7 @@ impl Field for Offset {
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         self.of.gradients(points, values, gradients);
-        values
-            .iter_mut()
-            .for_each(|v| *v = self.snapped(*v - self.by));
+        values.iter_mut().for_each(|v| *v = self.snapped(*v - self.by));
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
@@ -327,9 +310,7 @@ impl Shape for Offset {
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
         self.of.fill_level(block, self.by + level, out);
         let snap = self.snap as f32;
-        out.iter_mut()
-            .filter(|v| v.abs() <= snap)
-            .for_each(|v| *v = 0.0);
+        out.iter_mut().filter(|v| v.abs() <= snap).for_each(|v| *v = 0.0);
     }
 
     fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
@@ -337,11 +318,7 @@ impl Shape for Offset {
     }
 
     fn volume(&self) -> Option<f64> {
-        if self.by == 0.0 {
-            self.of.volume()
-        } else {
-            None
-        }
+        if self.by == 0.0 { self.of.volume() } else { None }
     }
 }
 
@@ -364,21 +341,11 @@ mod tests {
     fn combinations_keep_the_laws_of_a_shape() {
         let list = || parts().to_vec();
         check_shape("union", &Union::new(list()).unwrap(), 2.5, 0.0);
-        check_shape(
-            "intersection",
-            &Intersection::new(list()).unwrap(),
-            2.5,
-            0.0,
-        );
+        check_shape("intersection", &Intersection::new(list()).unwrap(), 2.5, 0.0);
         let difference: Region = Arc::new(Difference::new(list()).unwrap());
         check_shape("difference", difference.as_ref(), 2.5, 0.0);
         for by in [0.3, -0.3] {
-            check_shape(
-                "offset",
-                &Offset::new(difference.clone(), by).unwrap(),
-                2.5,
-                0.0,
-            );
+            check_shape("offset", &Offset::new(difference.clone(), by).unwrap(), 2.5, 0.0);
         }
     }
 
@@ -386,26 +353,9 @@ mod tests {
     fn values_at_known_points() {
         let [b, s, c] = parts();
         let p = [1.0, 0.2, 0.3];
-        assert_eq!(
-            Union::new(vec![b.clone(), s.clone()]).unwrap().value(p),
-            -0.9
-        );
-        assert!(
-            (Difference::new(vec![b.clone(), s.clone()])
-                .unwrap()
-                .value(p)
-                - 0.9)
-                .abs()
-                < 1e-15
-        );
-        assert!(
-            (Intersection::new(vec![b.clone(), c])
-                .unwrap()
-                .value([1.0, 0.0, 0.0])
-                - 0.6)
-                .abs()
-                < 1e-15
-        );
+        assert_eq!(Union::new(vec![b.clone(), s.clone()]).unwrap().value(p), -0.9);
+        assert!((Difference::new(vec![b.clone(), s.clone()]).unwrap().value(p) - 0.9).abs() < 1e-15);
+        assert!((Intersection::new(vec![b.clone(), c]).unwrap().value([1.0, 0.0, 0.0]) - 0.6).abs() < 1e-15);
         assert!((Offset::new(s, 0.5).unwrap().value(p) + 1.4).abs() < 1e-15);
         assert_eq!(Union::new(vec![b.clone()]).unwrap().volume(), b.volume());
     }
@@ -420,17 +370,10 @@ mod tests {
             let (mut z, mut x) = (Vec::new(), Vec::new());
             grown.planes(2, &mut z);
             grown.planes(0, &mut x);
-            assert!(
-                (z[1] - 7.7 - by).abs() < 1e-14 && (z[2] - 5.0 - by).abs() < 1e-14,
-                "{z:?}"
-            );
+            assert!((z[1] - 7.7 - by).abs() < 1e-14 && (z[2] - 5.0 - by).abs() < 1e-14, "{z:?}");
             assert_eq!(grown.value([8.0, 8.0, z[1]]), 0.0, "top moved by {by}");
             assert_eq!(grown.value([8.0, 8.0, z[0]]), 0.0, "bottom moved by {by}");
-            assert_eq!(
-                grown.value([4.0, 4.0, z[2]]),
-                0.0,
-                "floor of the hole moved by {by}"
-            );
+            assert_eq!(grown.value([4.0, 4.0, z[2]]), 0.0, "floor of the hole moved by {by}");
             assert_eq!(grown.value([x[1], 8.0, 2.0]), 0.0, "side moved by {by}");
         }
     }
@@ -441,20 +384,9 @@ mod tests {
         let open: Region = Arc::new(HalfSpace::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap());
         let i = Intersection::new(vec![b.clone(), open.clone()]).unwrap();
         assert_eq!(i.bounds().max, [1.2, 0.8, 0.0]);
-        assert!(
-            !Union::new(vec![b.clone(), open])
-                .unwrap()
-                .bounds()
-                .is_finite()
-        );
-        assert_eq!(
-            Difference::new(vec![b.clone(), s]).unwrap().bounds(),
-            b.bounds()
-        );
-        assert_eq!(
-            Offset::new(b.clone(), 0.5).unwrap().bounds(),
-            b.bounds().grown(0.5)
-        );
+        assert!(!Union::new(vec![b.clone(), open]).unwrap().bounds().is_finite());
+        assert_eq!(Difference::new(vec![b.clone(), s]).unwrap().bounds(), b.bounds());
+        assert_eq!(Offset::new(b.clone(), 0.5).unwrap().bounds(), b.bounds().grown(0.5));
     }
 
     #[test]
@@ -462,9 +394,6 @@ mod tests {
         assert!(Union::new(vec![]).is_err());
         assert!(Intersection::new(vec![]).is_err());
         assert!(Difference::new(vec![]).is_err());
-        assert_eq!(
-            Offset::new(parts()[0].clone(), f64::NAN).err().unwrap().at,
-            "by"
-        );
+        assert_eq!(Offset::new(parts()[0].clone(), f64::NAN).err().unwrap().at, "by");
     }
 }

@@ -76,16 +76,11 @@ impl MeshRegion {
     }
 
     fn within(Boundary { mesh, pairs, done }: Boundary) -> Self {
-        let faces: Vec<Face> = (0..mesh.triangles.len())
-            .map(|i| Face::new(mesh.corners(i)))
-            .collect();
+        let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
         let (tree, order) = Tree::new(&faces);
         let (normals, winding) = match pairs {
             Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
-            None => (
-                Normals::of_pieces(&faces, &order),
-                Some(Winding::new(&tree)),
-            ),
+            None => (Normals::of_pieces(&faces, &order), Some(Winding::new(&tree))),
         };
         MeshRegion {
             normals,
@@ -149,9 +144,7 @@ impl MeshRegion {
 ///
 /// Distances there are zero by `signed`, whichever triangle, edge or corner is found nearest.
 fn planes(faces: &[Face], bounds: &Aabb, axis: usize) -> Vec<f64> {
-    let flat = faces
-        .iter()
-        .filter(|f| f.corners.iter().all(|p| p[axis] == f.corners[0][axis]));
+    let flat = faces.iter().filter(|f| f.corners.iter().all(|p| p[axis] == f.corners[0][axis]));
     let mut areas: Vec<(f64, f64)> = flat
         .map(|f| {
             let [a, b, c] = f.corners;
@@ -162,10 +155,7 @@ fn planes(faces: &[Face], bounds: &Aabb, axis: usize) -> Vec<f64> {
     let [x, y, z] = bounds.size();
     let least = 0.01 * (x * y).max(y * z).max(z * x);
     let together = areas.chunk_by(|a, b| a.0 == b.0);
-    together
-        .filter(|g| g.iter().map(|f| f.1).sum::<f64>() >= least)
-        .map(|g| g[0].0)
-        .collect()
+    together.filter(|g| g.iter().map(|f| f.1).sum::<f64>() >= least).map(|g| g[0].0).collect()
 }
 
 impl Field for MeshRegion {
@@ -224,13 +214,7 @@ impl Shape for MeshRegion {
         let widest = |axis: &[f64]| axis.windows(2).fold(0.0f64, |m, w| m.max(w[1] - w[0]));
         let cell = norm(block.axes.map(widest));
         let shape = block.shape();
-        let mut fill = Fill {
-            region: self,
-            block,
-            level,
-            cell,
-            out,
-        };
+        let mut fill = Fill { region: self, block, level, cell, out };
         fill.part([0; 3], shape, 0, NOTHING);
     }
 
@@ -238,13 +222,8 @@ impl Shape for MeshRegion {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
             _ => {
-                let creases = self
-                    .creases
-                    .get_or_init(|| Arc::new(crease::creases(&self.mesh)));
-                out.push(face::Face {
-                    creases: creases.clone(),
-                    ..face::Face::distance(self.clone())
-                });
+                let creases = self.creases.get_or_init(|| Arc::new(crease::creases(&self.mesh)));
+                out.push(face::Face { creases: creases.clone(), ..face::Face::distance(self.clone()) });
                 face::Tree::Face(out.len() - 1)
             }
         }

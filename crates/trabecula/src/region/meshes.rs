@@ -23,10 +23,7 @@ pub(super) struct Meshes {
 
 impl List {
     pub fn new(of: Vec<Region>) -> List {
-        List {
-            of,
-            meshes: OnceLock::new(),
-        }
+        List { of, meshes: OnceLock::new() }
     }
 
     /// The meshes of the list as one, if there are several. `any`: whether the solid is what is in any, rather than all;
@@ -34,9 +31,7 @@ impl List {
     pub fn meshes(&self, any: bool, negated: impl Fn(usize) -> bool) -> Option<&Meshes> {
         let find = || {
             let meshes = self.of.iter().enumerate();
-            let meshes: Vec<_> = meshes
-                .filter_map(|(i, r)| Some((i, r.as_mesh()?)))
-                .collect();
+            let meshes: Vec<_> = meshes.filter_map(|(i, r)| Some((i, r.as_mesh()?))).collect();
             if meshes.len() < 2 {
                 return None;
             }
@@ -50,10 +45,7 @@ impl List {
             } else {
                 MeshRegion::combined(&plain, any, &less)
             };
-            Some(Meshes {
-                which: meshes.iter().map(|(i, _)| *i).collect(),
-                one: Arc::new(one?),
-            })
+            Some(Meshes { which: meshes.iter().map(|(i, _)| *i).collect(), one: Arc::new(one?) })
         };
         self.meshes.get_or_init(find).as_ref()
     }

@@ -40,13 +40,7 @@ pub struct HalfSpace {
 /// Refuses numbers that are not finite, naming the first.
 fn finite(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     match v.iter().find(|x| !x.is_finite()) {
-        Some(x) => Err(Fault::new(
-            at,
-            format!(
-                "{} is not a position: give three finite numbers, mm",
-                number(*x)
-            ),
-        )),
+        Some(x) => Err(Fault::new(at, format!("{} is not a position: give three finite numbers, mm", number(*x)))),
         None => Ok(v),
     }
 }
@@ -56,13 +50,7 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
     if v.is_finite() && v > 0.0 {
         Ok(v)
     } else {
-        Err(Fault::new(
-            at,
-            format!(
-                "{} mm is not a length: give a finite number above zero",
-                number(v)
-            ),
-        ))
+        Err(Fault::new(at, format!("{} mm is not a length: give a finite number above zero", number(v))))
     }
 }
 
@@ -70,10 +58,7 @@ fn length(at: &str, v: f64) -> Result<f64, Fault> {
 fn direction(at: &str, v: Vec3) -> Result<Vec3, Fault> {
     let largest = finite(at, v)?.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if largest == 0.0 {
-        return Err(Fault::new(
-            at,
-            "[0, 0, 0] has no direction: give a vector with a length",
-        ));
+        return Err(Fault::new(at, "[0, 0, 0] has no direction: give a vector with a length"));
     }
     if v.iter().filter(|x| **x != 0.0).count() == 1 {
         return Ok(v.map(|x| if x == 0.0 { 0.0 } else { x.signum() }));
@@ -88,15 +73,7 @@ fn coordinate_axis(n: Vec3) -> Option<usize> {
 
 /// The range of n · (p − o) over a box; rounding keeps the order of the terms, so it holds for computed values.
 fn along(b: &Aabb, o: Vec3, n: Vec3) -> Interval {
-    let end = |far: bool| {
-        [0, 1, 2].map(|a| {
-            if (n[a] > 0.0) == far {
-                b.max[a]
-            } else {
-                b.min[a]
-            }
-        })
-    };
+    let end = |far: bool| [0, 1, 2].map(|a| if (n[a] > 0.0) == far { b.max[a] } else { b.min[a] });
     Interval::new(dot(sub(end(false), o), n), dot(sub(end(true), o), n))
 }
 
@@ -116,11 +93,7 @@ fn apart(b: &Aabb, o: Vec3, axes: &[usize]) -> Interval {
 #[inline]
 fn joined<const N: usize>(q: [f64; N]) -> f64 {
     let inside = q.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-    if inside <= 0.0 {
-        inside
-    } else {
-        q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt()
-    }
+    if inside <= 0.0 { inside } else { q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt() }
 }
 
 /// The gradient of `joined`, the pieces' own gradients being `g`.
@@ -129,12 +102,7 @@ fn joined_gradient<const N: usize>(q: [f64; N], g: [Vec3; N]) -> Vec3 {
     if d > 0.0 {
         (0..N).fold([0.0; 3], |s, i| add(s, scale(g[i], q[i].max(0.0) / d)))
     } else {
-        (1..N)
-            .fold(
-                (q[0], g[0]),
-                |m, i| if q[i] > m.0 { (q[i], g[i]) } else { m },
-            )
-            .1
+        (1..N).fold((q[0], g[0]), |m, i| if q[i] > m.0 { (q[i], g[i]) } else { m }).1
     }
 }
 
@@ -157,15 +125,8 @@ impl Cuboid {
         finite("max", max)?;
         for (a, name) in ["x", "y", "z"].iter().enumerate() {
             if min[a] >= max[a] {
-                let found = format!(
-                    "{name} runs from {} to {} mm",
-                    number(min[a]),
-                    number(max[a])
-                );
-                return Err(Fault::new(
-                    "max",
-                    format!("{found}: each side of a box must have a length above zero"),
-                ));
+                let found = format!("{name} runs from {} to {} mm", number(min[a]), number(max[a]));
+                return Err(Fault::new("max", format!("{found}: each side of a box must have a length above zero")));
             }
         }
         Ok(Cuboid { min, max })
@@ -183,11 +144,7 @@ impl Cuboid {
     fn gradient(&self, p: Vec3) -> Vec3 {
         let mut g = [[0.0; 3]; 3];
         for a in 0..3 {
-            g[a][a] = if self.min[a] - p[a] > p[a] - self.max[a] {
-                -1.0
-            } else {
-                1.0
-            };
+            g[a][a] = if self.min[a] - p[a] > p[a] - self.max[a] { -1.0 } else { 1.0 };
         }
         joined_gradient(self.sides(p), g)
     }
@@ -207,10 +164,7 @@ impl Cuboid {
 
 impl Shape for Cuboid {
     fn bounds(&self) -> Aabb {
-        Aabb {
-            min: self.min,
-            max: self.max,
-        }
+        Aabb { min: self.min, max: self.max }
     }
 
     fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
@@ -228,12 +182,7 @@ impl Shape for Cuboid {
         if by > 0.0 {
             return rounded(self, by, out);
         }
-        let sides = (0..3).flat_map(|axis| {
-            [
-                (axis, self.min[axis] - by, false),
-                (axis, self.max[axis] + by, true),
-            ]
-        });
+        let sides = (0..3).flat_map(|axis| [(axis, self.min[axis] - by, false), (axis, self.max[axis] + by, true)]);
         Tree::All(sides.map(|s| flat(s, out)).collect())
     }
 
@@ -246,10 +195,7 @@ impl Shape for Cuboid {
 impl Sphere {
     /// The ball about a point (mm). Errors if a number is not finite or the radius not above zero.
     pub fn new(center: Vec3, radius: f64) -> Result<Self, Fault> {
-        Ok(Sphere {
-            center: finite("center", center)?,
-            radius: length("radius", radius)?,
-        })
+        Ok(Sphere { center: finite("center", center)?, radius: length("radius", radius)? })
     }
 
     #[inline]
@@ -270,11 +216,7 @@ impl Sphere {
 
 impl Shape for Sphere {
     fn bounds(&self) -> Aabb {
-        Aabb {
-            min: self.center,
-            max: self.center,
-        }
-        .grown(self.radius)
+        Aabb { min: self.center, max: self.center }.grown(self.radius)
     }
 
     fn level_planes(&self, _: usize, _: f64, _: &mut Vec<f64>) {}
@@ -300,10 +242,7 @@ impl HalfSpace {
     /// The side of the plane through `point` (mm) that `normal` (any length) points away from. Errors if a
     /// number is not finite or the normal is zero.
     pub fn new(point: Vec3, normal: Vec3) -> Result<Self, Fault> {
-        Ok(HalfSpace {
-            point: finite("point", point)?,
-            normal: direction("normal", normal)?,
-        })
+        Ok(HalfSpace { point: finite("point", point)?, normal: direction("normal", normal)? })
     }
 
     /// A point on the plane, mm.
@@ -334,11 +273,7 @@ impl Shape for HalfSpace {
     fn bounds(&self) -> Aabb {
         let mut b = Aabb::ALL;
         if let Some(a) = coordinate_axis(self.normal) {
-            *(if self.normal[a] > 0.0 {
-                &mut b.max[a]
-            } else {
-                &mut b.min[a]
-            }) = self.point[a];
+            *(if self.normal[a] > 0.0 { &mut b.max[a] } else { &mut b.min[a] }) = self.point[a];
         }
         b
     }
@@ -423,34 +358,13 @@ mod tests {
 
     fn shapes() -> Vec<(&'static str, Arc<dyn Shape>)> {
         vec![
-            (
-                "box",
-                Arc::new(Cuboid::new([-1.0, -2.0, 0.1], [1.3, 0.7, 2.0]).unwrap()),
-            ),
-            (
-                "z cylinder",
-                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [0.0, 0.0, 3.0], 0.8, 1.7).unwrap()),
-            ),
-            (
-                "-x cylinder",
-                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [-1.0, 0.0, 0.0], 0.8, 1.7).unwrap()),
-            ),
-            (
-                "cylinder",
-                Arc::new(Cylinder::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5], 0.8, 1.7).unwrap()),
-            ),
-            (
-                "ball",
-                Arc::new(Sphere::new([0.1, 0.2, -0.3], 1.1).unwrap()),
-            ),
-            (
-                "half-space",
-                Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5]).unwrap()),
-            ),
-            (
-                "y half-space",
-                Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [0.0, -7.0, 0.0]).unwrap()),
-            ),
+            ("box", Arc::new(Cuboid::new([-1.0, -2.0, 0.1], [1.3, 0.7, 2.0]).unwrap())),
+            ("z cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [0.0, 0.0, 3.0], 0.8, 1.7).unwrap())),
+            ("-x cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [-1.0, 0.0, 0.0], 0.8, 1.7).unwrap())),
+            ("cylinder", Arc::new(Cylinder::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5], 0.8, 1.7).unwrap())),
+            ("ball", Arc::new(Sphere::new([0.1, 0.2, -0.3], 1.1).unwrap())),
+            ("half-space", Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [1.0, 2.0, -1.5]).unwrap())),
+            ("y half-space", Arc::new(HalfSpace::new([0.1, 0.2, -0.3], [0.0, -7.0, 0.0]).unwrap())),
         ]
     }
 
@@ -470,17 +384,8 @@ mod tests {
         let c = Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 2.0, 10.0).unwrap();
         assert_eq!(at(&c, [0.0, 0.0, 5.0]), -2.0);
         assert_eq!(at(&c, [3.0, 4.0, 14.0]), 5.0);
-        assert_eq!(
-            at(&Sphere::new([1.0, 0.0, 0.0], 2.0).unwrap(), [4.0, 4.0, 0.0]),
-            3.0
-        );
-        assert_eq!(
-            at(
-                &HalfSpace::new([0.0, 0.0, 1.0], [0.0, 0.0, 9.0]).unwrap(),
-                [7.0, 8.0, 3.0]
-            ),
-            2.0
-        );
+        assert_eq!(at(&Sphere::new([1.0, 0.0, 0.0], 2.0).unwrap(), [4.0, 4.0, 0.0]), 3.0);
+        assert_eq!(at(&HalfSpace::new([0.0, 0.0, 1.0], [0.0, 0.0, 9.0]).unwrap(), [7.0, 8.0, 3.0]), 2.0);
         assert_eq!(b.volume(), Some(48.0));
         assert_eq!(c.volume(), Some(40.0 * PI));
     }
@@ -515,29 +420,12 @@ mod tests {
 
     #[test]
     fn bad_numbers_are_refused_where_they_stand() {
-        assert_eq!(
-            Cuboid::new([0.0; 3], [1.0, 0.0, 1.0]).unwrap_err().at,
-            "max"
-        );
-        assert_eq!(
-            Cuboid::new([f64::NAN, 0.0, 0.0], [1.0; 3]).unwrap_err().at,
-            "min"
-        );
+        assert_eq!(Cuboid::new([0.0; 3], [1.0, 0.0, 1.0]).unwrap_err().at, "max");
+        assert_eq!(Cuboid::new([f64::NAN, 0.0, 0.0], [1.0; 3]).unwrap_err().at, "min");
         assert_eq!(Sphere::new([0.0; 3], -1.0).unwrap_err().at, "radius");
-        assert_eq!(
-            Sphere::new([0.0; 3], f64::INFINITY).unwrap_err().at,
-            "radius"
-        );
-        assert_eq!(
-            Cylinder::new([0.0; 3], [0.0; 3], 1.0, 1.0).unwrap_err().at,
-            "axis"
-        );
-        assert_eq!(
-            Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 0.0)
-                .unwrap_err()
-                .at,
-            "height"
-        );
+        assert_eq!(Sphere::new([0.0; 3], f64::INFINITY).unwrap_err().at, "radius");
+        assert_eq!(Cylinder::new([0.0; 3], [0.0; 3], 1.0, 1.0).unwrap_err().at, "axis");
+        assert_eq!(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 0.0).unwrap_err().at, "height");
         assert_eq!(HalfSpace::new([0.0; 3], [0.0; 3]).unwrap_err().at, "normal");
     }
 

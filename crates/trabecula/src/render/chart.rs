@@ -31,10 +31,7 @@ pub fn charts(charts: &[Chart], size: [usize; 2]) -> Vec<u8> {
     if w == 0 || h == 0 || w.saturating_mul(h) > super::LARGEST {
         return Vec::new();
     }
-    let mut paper = Paper {
-        size,
-        rgb: PAPER.repeat(w * h),
-    };
+    let mut paper = Paper { size, rgb: PAPER.repeat(w * h) };
     let each = h / charts.len().max(1);
     for (i, chart) in charts.iter().enumerate() {
         paper.chart(chart, i * each, each);
@@ -48,13 +45,7 @@ impl Paper {
         let width = self.size[0].saturating_sub(left + 40);
         let room = height.saturating_sub(HEAD + below);
         let end = chart.edges.last().copied().unwrap_or(0.0);
-        let most = chart
-            .share
-            .iter()
-            .chain(&chart.wanted)
-            .copied()
-            .filter(|s| s.is_finite())
-            .fold(0.0, f64::max);
+        let most = chart.share.iter().chain(&chart.wanted).copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
         if width < 50 || room < 50 || !(end.is_finite() && end > 0.0 && most > 0.0) {
             return;
         }
@@ -62,8 +53,7 @@ impl Paper {
         let across = |v: f64| left + (width as f64 * (v / end).clamp(0.0, 1.0)).round() as usize;
         let step = nice(100.0 * most / 4.0);
         let full = (100.0 * most / step).ceil() * step;
-        let up =
-            |percent: f64| base - (room as f64 * (percent / full).clamp(0.0, 1.0)).round() as usize;
+        let up = |percent: f64| base - (room as f64 * (percent / full).clamp(0.0, 1.0)).round() as usize;
         let mut percent = 0.0;
         while percent <= full * (1.0 + 1e-9) {
             let y = up(percent);
@@ -90,13 +80,7 @@ impl Paper {
             self.write(&short(tick), x, base + 12, 0.5, INK);
             tick += step;
         }
-        self.write(
-            &chart.title,
-            left + width / 2,
-            base + 12 + 2 * LETTER,
-            0.5,
-            INK,
-        );
+        self.write(&chart.title, left + width / 2, base + 12 + 2 * LETTER, 0.5, INK);
         // Names on lines of their own, so that neighbours do not meet.
         let mut names = Vec::new();
         let marks = chart.marks.iter().filter(|m| m.1.is_finite());
@@ -105,11 +89,7 @@ impl Paper {
             self.fill([x, y + LETTER / 2], [x + 2, base], MARK);
             let text = format!("{name} {}", short(*at));
             let wide = text.chars().count() * PITCH;
-            let from = if x + 8 + wide < self.size[0] {
-                x + 8
-            } else {
-                x.saturating_sub(wide + 4)
-            };
+            let from = if x + 8 + wide < self.size[0] { x + 8 } else { x.saturating_sub(wide + 4) };
             names.push((text, from, y, wide));
         }
         for (text, x, y, wide) in names {
@@ -122,9 +102,7 @@ impl Paper {
 /// The next of 1, 2, 5, 10 … with any power of ten.
 fn nice(v: f64) -> f64 {
     let unit = 10f64.powf(v.log10().floor());
-    let of = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|k| k * unit >= v * (1.0 - 1e-9));
+    let of = [1.0, 2.0, 5.0].into_iter().find(|k| k * unit >= v * (1.0 - 1e-9));
     of.unwrap_or(10.0) * unit
 }
 
@@ -165,38 +143,21 @@ mod tests {
     #[test]
     fn odd_input_is_no_panic() {
         assert!(charts(&[], [0, 0]).is_empty());
-        for share in [
-            vec![],
-            vec![0.0],
-            vec![f64::NAN, f64::INFINITY],
-            vec![1e-30],
-        ] {
+        for share in [vec![], vec![0.0], vec![f64::NAN, f64::INFINITY], vec![1e-30]] {
             let mut odd = chart(share);
             odd.marks.push(("far".into(), f64::INFINITY));
             odd.marks.push(("far".into(), 1e300));
             for size in [[1, 1], [100, 5], [300, 300]] {
-                assert_eq!(
-                    charts(std::slice::from_ref(&odd), size).len(),
-                    3 * size[0] * size[1]
-                );
+                assert_eq!(charts(std::slice::from_ref(&odd), size).len(), 3 * size[0] * size[1]);
             }
         }
     }
 
     #[test]
     fn numbers_are_short() {
-        for (v, text) in [
-            (0.0, "0"),
-            (0.1, "0.1"),
-            (12.5, "12.5"),
-            (1234.0, "1234"),
-            (0.30000000000000004, "0.3"),
-        ] {
+        for (v, text) in [(0.0, "0"), (0.1, "0.1"), (12.5, "12.5"), (1234.0, "1234"), (0.30000000000000004, "0.3")] {
             assert_eq!(short(v), text);
         }
-        assert_eq!(
-            [0.9, 1.0, 1.3, 2.2, 6.0].map(nice),
-            [1.0, 1.0, 2.0, 5.0, 10.0]
-        );
+        assert_eq!([0.9, 1.0, 1.3, 2.2, 6.0].map(nice), [1.0, 1.0, 2.0, 5.0, 10.0]);
     }
 }

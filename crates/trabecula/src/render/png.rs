@@ -22,12 +22,7 @@ pub fn png(rgb: &[u8], size: [usize; 2]) -> Vec<u8> {
         for (kind, out) in [1u8, 2, 4, 0].into_iter().zip(&mut filtered) {
             filter(kind, &row, &above, out);
         }
-        let cost = |f: &&Vec<u8>| {
-            f[1..]
-                .iter()
-                .map(|b| u64::from((*b as i8).unsigned_abs()))
-                .sum::<u64>()
-        };
+        let cost = |f: &&Vec<u8>| f[1..].iter().map(|b| u64::from((*b as i8).unsigned_abs())).sum::<u64>();
         if let Some(best) = filtered.iter().min_by_key(cost) {
             // Writing to memory does not fail.
             let _ = deflater.write_all(best);
@@ -98,8 +93,7 @@ mod tests {
         let mut at = 8;
         let (mut size, mut data) = ((0, 0), Vec::new());
         while at < bytes.len() {
-            let word =
-                |i: usize| u32::from_be_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+            let word = |i: usize| u32::from_be_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
             let n = word(at) as usize;
             let mut crc = flate2::Crc::new();
             crc.update(&bytes[at + 4..at + 8 + n]);
@@ -112,22 +106,14 @@ mod tests {
             at += 12 + n;
         }
         let mut raw = Vec::new();
-        assert!(
-            flate2::read::ZlibDecoder::new(&data[..])
-                .read_to_end(&mut raw)
-                .is_ok()
-        );
+        assert!(flate2::read::ZlibDecoder::new(&data[..]).read_to_end(&mut raw).is_ok());
         let stride = 3 * size.0;
         let mut out = vec![0u8; stride * size.1];
         for y in 0..size.1 {
             let line = &raw[y * (stride + 1)..(y + 1) * (stride + 1)];
             for i in 0..stride {
                 let get = |dy: usize, di: usize| {
-                    if y < dy || i < di {
-                        0
-                    } else {
-                        out[(y - dy) * stride + i - di]
-                    }
+                    if y < dy || i < di { 0 } else { out[(y - dy) * stride + i - di] }
                 };
                 let guess = match line[0] {
                     0 => 0,
@@ -152,9 +138,6 @@ mod tests {
     #[test]
     fn odd_input_is_no_panic() {
         assert_eq!(decode(&png(&[], [0, 0])), (1, 1, vec![0; 3]));
-        assert_eq!(
-            decode(&png(&[9], [2, 2])).2,
-            [9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
-        );
+        assert_eq!(decode(&png(&[9], [2, 2])).2, [9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
     }
 }

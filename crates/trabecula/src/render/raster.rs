@@ -26,11 +26,7 @@ impl Raster {
     /// the result does not depend on the number of threads.
     pub(super) fn draw(surface: &Surface, camera: &Camera, size: [usize; 2]) -> Raster {
         let mesh = &surface.mesh;
-        let points: Vec<[f32; 3]> = mesh
-            .vertices
-            .par_iter()
-            .map(|p| camera.project(*p).map(|v| v as f32))
-            .collect();
+        let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();
         let rows = size[1].div_ceil(BAND);
         // Triangles by the bands they touch, chunk by chunk so that their order is kept.
         const CHUNK: usize = 1 << 16;
@@ -57,32 +53,20 @@ impl Raster {
             .collect();
         let mut near = vec![0.0f32; size[0] * size[1]];
         let mut triangle = vec![NONE; size[0] * size[1]];
-        near.par_chunks_mut(BAND * size[0])
-            .zip(triangle.par_chunks_mut(BAND * size[0]))
-            .enumerate()
-            .for_each(|(band, (near, triangle))| {
+        near.par_chunks_mut(BAND * size[0]).zip(triangle.par_chunks_mut(BAND * size[0])).enumerate().for_each(
+            |(band, (near, triangle))| {
                 for i in binned.iter().flat_map(|bins| &bins[band]) {
                     let corners = mesh.triangles[*i as usize].map(|v| points[v as usize]);
                     fill(corners, *i, size[0], band * BAND, near, triangle);
                 }
-            });
-        Raster {
-            size,
-            near,
-            triangle,
-        }
+            },
+        );
+        Raster { size, near, triangle }
     }
 }
 
 /// Draws one triangle into rows that begin at `first`.
-fn fill(
-    p: [[f32; 3]; 3],
-    id: u32,
-    width: usize,
-    first: usize,
-    near: &mut [f32],
-    triangle: &mut [u32],
-) {
+fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32], triangle: &mut [u32]) {
     let p = p.map(|c| [c[0], c[1] - first as f32, c[2]]);
     let [a, b, c] = p;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -93,10 +77,7 @@ fn fill(
     let span = |k: usize, end: usize| {
         let low = a[k].min(b[k]).min(c[k]) - 0.5;
         let high = a[k].max(b[k]).max(c[k]) - 0.5;
-        (
-            low.ceil().max(0.0) as usize,
-            ((high.floor() + 1.0).max(0.0) as usize).min(end),
-        )
+        (low.ceil().max(0.0) as usize, ((high.floor() + 1.0).max(0.0) as usize).min(end))
     };
     let (x0, x1) = span(0, width);
     let (y0, y1) = span(1, rows);

@@ -23,12 +23,7 @@ pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
 }
 
 /// Premultiplied colour and cover of each sample.
-pub(super) fn shade(
-    surface: &Surface,
-    camera: &Camera,
-    raster: &Raster,
-    tint: Option<&Tint>,
-) -> Vec<[f32; 4]> {
+pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster, tint: Option<&Tint>) -> Vec<[f32; 4]> {
     let normals = Normals::of(surface);
     let [w, h] = raster.size;
     let open = occlusion(camera, raster);
@@ -48,9 +43,7 @@ pub(super) fn shade(
             let flat = unit(area(surface, id as usize));
             let t = surface.mesh.triangles[id as usize].map(|v| v as usize);
             let k = weights(surface, id, p);
-            let n = (0..3).fold([0.0; 3], |n, i| {
-                add(n, scale(normals.at(surface, t[i], flat), k[i]))
-            });
+            let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(normals.at(surface, t[i], flat), k[i])));
             let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
             // An open mesh may show its inside.
             if dot(flat, eye) < 0.0 {
@@ -95,16 +88,7 @@ impl Shadows {
         let size = [Self::SIZE; 2];
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
-        let eye = Camera::new(
-            &surface.mesh.bounds(),
-            &surface.mesh.vertices,
-            &View {
-                size,
-                azimuth,
-                elevation,
-            },
-            size,
-        );
+        let eye = Camera::new(&surface.mesh.bounds(), &surface.mesh.vertices, &View { size, azimuth, elevation }, size);
         let raster = Raster::draw(surface, &eye, size);
         let texel = eye.distance / eye.focal;
         Shadows { eye, raster, texel }
@@ -112,25 +96,16 @@ impl Shadows {
 
     /// The share of the light that reaches a point of a face with this normal, softened over 5×5 samples.
     fn light(&self, p: Vec3, flat: Vec3) -> f32 {
-        let side = if dot(flat, self.eye.axes[2]) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let side = if dot(flat, self.eye.axes[2]) < 0.0 { -1.0 } else { 1.0 };
         // A step off the face and towards the light keeps the face from shading itself.
-        let lift = add(
-            scale(flat, side * 2.0 * self.texel),
-            scale(self.eye.axes[2], 2.5 * self.texel),
-        );
+        let lift = add(scale(flat, side * 2.0 * self.texel), scale(self.eye.axes[2], 2.5 * self.texel));
         let [x, y, near] = self.eye.project(add(p, lift));
         let (mut seen, mut all) = (0.0, 0.0);
         for j in -2i64..=2 {
             for i in -2i64..=2 {
                 let (x, y) = (x.floor() as i64 + 2 * i, y.floor() as i64 + 2 * j);
-                let inside =
-                    (0..Self::SIZE as i64).contains(&x) && (0..Self::SIZE as i64).contains(&y);
-                let hidden = inside
-                    && f64::from(self.raster.near[y as usize * Self::SIZE + x as usize]) > near;
+                let inside = (0..Self::SIZE as i64).contains(&x) && (0..Self::SIZE as i64).contains(&y);
+                let hidden = inside && f64::from(self.raster.near[y as usize * Self::SIZE + x as usize]) > near;
                 let weight = 1.0 / (1.0 + (i * i + j * j) as f32);
                 seen += if hidden { 0.0 } else { weight };
                 all += weight;
@@ -141,14 +116,7 @@ impl Shadows {
 }
 
 /// The light that leaves a surface towards the eye; `sun` is the share of the key light that reaches it.
-fn lit(
-    [n, eye, key]: [Vec3; 3],
-    sun: f32,
-    camera: &Camera,
-    colour: [f32; 3],
-    open: f32,
-    cut: bool,
-) -> [f32; 3] {
+fn lit([n, eye, key]: [Vec3; 3], sun: f32, camera: &Camera, colour: [f32; 3], open: f32, cut: bool) -> [f32; 3] {
     let fill = towards(camera, 0.85, 0.10, 0.55);
     let rim = towards(camera, 0.35, 0.45, -0.85);
     let diffuse = |l: Vec3| dot(n, l).max(0.0) as f32;
@@ -163,20 +131,12 @@ fn lit(
     let tint_sky = [0.86, 0.93, 1.00];
     let tint_ground = [0.82, 0.76, 0.70];
     core::array::from_fn(|k| {
-        let ambient =
-            open * open.sqrt() * 0.46 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
-        let direct =
-            shadow * (0.86 * sun * key_light * tint_key[k] + 0.16 * diffuse(fill) * tint_sky[k]);
-        let shine = open
-            * (0.13 * sun * gloss * tint_key[k]
-                + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
+        let ambient = open * open.sqrt() * 0.46 * (sky * tint_sky[k] + (1.0 - sky) * 0.75 * tint_ground[k]);
+        let direct = shadow * (0.86 * sun * key_light * tint_key[k] + 0.16 * diffuse(fill) * tint_sky[k]);
+        let shine = open * (0.13 * sun * gloss * tint_key[k] + (0.25 * diffuse(rim) + 0.08) * edge * tint_sky[k]);
         let v = colour[k] * (ambient + direct) + shine;
         // Highlights roll off instead of clipping.
-        if v > 0.75 {
-            0.75 + 0.25 * ((v - 0.75) / 0.25).tanh()
-        } else {
-            v
-        }
+        if v > 0.75 { 0.75 + 0.25 * ((v - 0.75) / 0.25).tanh() } else { v }
     })
 }
 
@@ -200,11 +160,8 @@ impl Normals {
                 (0..3).for_each(|k| sums[*v as usize][k] += n[k] as f32);
             }
         }
-        sums.par_iter_mut()
-            .for_each(|n| *n = unit(n.map(f64::from)).map(|c| c as f32));
-        let apart = |i: usize, v: u32| {
-            dot(unit(area(surface, i)), sums[v as usize].map(f64::from)) < Self::EDGE
-        };
+        sums.par_iter_mut().for_each(|n| *n = unit(n.map(f64::from)).map(|c| c as f32));
+        let apart = |i: usize, v: u32| dot(unit(area(surface, i)), sums[v as usize].map(f64::from)) < Self::EDGE;
         let mut edges = HashMap::new();
         for (i, t) in mesh.triangles.iter().enumerate() {
             for v in t.iter().filter(|v| apart(i, **v)) {
@@ -218,10 +175,7 @@ impl Normals {
                 }
             }
         }
-        Normals {
-            smooth: sums,
-            edges,
-        }
+        Normals { smooth: sums, edges }
     }
 
     /// The normal at a vertex of a face whose own is `flat`.
@@ -230,9 +184,7 @@ impl Normals {
             return self.smooth[vertex].map(f64::from);
         };
         let near = around.iter().map(|i| area(surface, *i as usize));
-        let sum = near
-            .filter(|n| dot(*n, flat) > Self::EDGE * norm(*n))
-            .fold([0.0; 3], add);
+        let sum = near.filter(|n| dot(*n, flat) > Self::EDGE * norm(*n)).fold([0.0; 3], add);
         if norm(sum) > 0.0 { unit(sum) } else { flat }
     }
 }
@@ -254,11 +206,7 @@ fn occlusion(camera: &Camera, raster: &Raster) -> Vec<f32> {
     let at = |x: usize, y: usize| (y * STRIDE).min(h - 1) * w + (x * STRIDE).min(w - 1);
     let point = |x: usize, y: usize| {
         let near = raster.near[at(x, y)];
-        let p = camera.unproject(
-            (x * STRIDE) as f64 + 0.5,
-            (y * STRIDE) as f64 + 0.5,
-            f64::from(near),
-        );
+        let p = camera.unproject((x * STRIDE) as f64 + 0.5, (y * STRIDE) as f64 + 0.5, f64::from(near));
         (near > 0.0).then_some(p)
     };
     let scene = camera.distance / 6.0;
@@ -333,14 +281,8 @@ fn screen_normal(
             (a, b) => a.or(b),
         }
     };
-    let dx = pick(
-        x.checked_sub(1).and_then(|x| point(x, y)),
-        (x + 1 < w).then(|| point(x + 1, y)).flatten(),
-    );
-    let dy = pick(
-        y.checked_sub(1).and_then(|y| point(x, y)),
-        (y + 1 < h).then(|| point(x, y + 1)).flatten(),
-    );
+    let dx = pick(x.checked_sub(1).and_then(|x| point(x, y)), (x + 1 < w).then(|| point(x + 1, y)).flatten());
+    let dy = pick(y.checked_sub(1).and_then(|y| point(x, y)), (y + 1 < h).then(|| point(x, y + 1)).flatten());
     match (dx, dy) {
         (Some(dx), Some(dy)) => unit(cross(dy, dx)),
         _ => camera.axes[2],
@@ -348,11 +290,7 @@ fn screen_normal(
 }
 
 /// Averages 4×4 samples of like depth, which takes out the pattern of the spiral.
-fn smoothed(
-    raw: &[f32],
-    [w, h]: [usize; 2],
-    near: impl Fn(usize, usize) -> f32 + Sync,
-) -> Vec<f32> {
+fn smoothed(raw: &[f32], [w, h]: [usize; 2], near: impl Fn(usize, usize) -> f32 + Sync) -> Vec<f32> {
     let mut out = raw.to_vec();
     out.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
         for (x, out) in row.iter_mut().enumerate() {

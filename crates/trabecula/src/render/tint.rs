@@ -15,14 +15,8 @@ pub struct Tint {
 }
 
 /// Stops of the scale in sRGB, evenly spaced: dark blue over green to yellow, of even steps in lightness.
-const STOPS: [[u8; 3]; 6] = [
-    [68, 1, 84],
-    [65, 68, 135],
-    [42, 120, 142],
-    [34, 168, 132],
-    [122, 209, 81],
-    [253, 231, 37],
-];
+const STOPS: [[u8; 3]; 6] =
+    [[68, 1, 84], [65, 68, 135], [42, 120, 142], [34, 168, 132], [122, 209, 81], [253, 231, 37]];
 
 impl Tint {
     /// The colour of a number, in linear light.
@@ -65,11 +59,7 @@ impl Tint {
 /// An sRGB byte as linear light.
 fn decode(v: u8) -> f32 {
     let s = f32::from(v) / 255.0;
-    if s <= 0.040_45 {
-        s / 12.92
-    } else {
-        ((s + 0.055) / 1.055).powf(2.4)
-    }
+    if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]
@@ -78,11 +68,7 @@ mod tests {
 
     #[test]
     fn the_ends_of_the_scale_are_its_stops() {
-        let tint = Tint {
-            title: String::new(),
-            values: Vec::new(),
-            span: [-1.0, 3.0],
-        };
+        let tint = Tint { title: String::new(), values: Vec::new(), span: [-1.0, 3.0] };
         let bytes = |v: f64| tint.colour(v).map(encode);
         assert_eq!(bytes(-1.0), STOPS[0]);
         assert_eq!(bytes(-1e9), STOPS[0]);

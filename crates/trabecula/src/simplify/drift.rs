@@ -35,15 +35,9 @@ pub struct Drift {
 
 impl Drift {
     /// The box that holds the zero vector alone.
-    const ZERO: Drift = Drift {
-        lo: [0.0; 3],
-        hi: [0.0; 3],
-    };
+    const ZERO: Drift = Drift { lo: [0.0; 3], hi: [0.0; 3] };
     /// No displacement at all yet.
-    pub const NONE: Drift = Drift {
-        lo: [f32::INFINITY; 3],
-        hi: [f32::NEG_INFINITY; 3],
-    };
+    pub const NONE: Drift = Drift { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
 
     /// The box with `other`, shifted by `s`, too.
     #[inline]
@@ -130,11 +124,7 @@ impl Patch {
             return false;
         }
         let n = scale(n, 1.0 / size);
-        let e = unit(if n[0].abs() < 0.6 {
-            cross(n, [1.0, 0.0, 0.0])
-        } else {
-            cross(n, [0.0, 1.0, 0.0])
-        });
+        let e = unit(if n[0].abs() < 0.6 { cross(n, [1.0, 0.0, 0.0]) } else { cross(n, [0.0, 1.0, 0.0]) });
         let f = cross(n, e);
         let o = self.w;
         let plane = |p: Vec3| {
@@ -197,9 +187,7 @@ impl Patch {
                 let Some(z) = height([w, rim[j], rim[after(j)]], p) else {
                     continue;
                 };
-                own.clone()
-                    .chain([m, m + 1])
-                    .for_each(|i| meet(new, i, j, z - p[2]));
+                own.clone().chain([m, m + 1]).for_each(|i| meet(new, i, j, z - p[2]));
                 found = true;
             }
             if !found {
@@ -223,15 +211,9 @@ impl Patch {
         }
         // Where sides of the patch cross spokes of the fan.
         self.sides.clear();
-        self.sides.push(Side {
-            ends: [u, v],
-            triangles: [m, m + 1],
-        });
+        self.sides.push(Side { ends: [u, v], triangles: [m, m + 1] });
         let mut side = |from_u: bool, i: usize, triangles| {
-            self.sides.push(Side {
-                ends: [if from_u { u } else { v }, rim[i]],
-                triangles,
-            });
+            self.sides.push(Side { ends: [if from_u { u } else { v }, rim[i]], triangles });
         };
         for i in 0..m {
             match i {
@@ -290,14 +272,8 @@ mod tests {
 
     /// A hexagon about u and v in the plane z = 0, u and v raised.
     fn patch(u: f64, v: f64, w: Vec3) -> Patch {
-        let rim = [
-            [0.5, 1.0, 0.0],
-            [-1.0, 0.6, 0.0],
-            [-1.0, -0.6, 0.0],
-            [0.5, -1.0, 0.0],
-            [2.0, -0.6, 0.0],
-            [2.0, 0.6, 0.0],
-        ];
+        let rim =
+            [[0.5, 1.0, 0.0], [-1.0, 0.6, 0.0], [-1.0, -0.6, 0.0], [0.5, -1.0, 0.0], [2.0, -0.6, 0.0], [2.0, 0.6, 0.0]];
         Patch {
             u: [0.0, 0.0, u],
             v: [1.0, 0.0, v],
@@ -346,10 +322,7 @@ mod tests {
         let mut p = patch(0.25, -0.1, [0.4, 0.15, 0.2]);
         assert!(p.carry(1.0));
         let m = p.rim.len();
-        let fan = |q: Vec3| {
-            (0..m)
-                .find_map(|j| height([p.w, p.rim[j], p.rim[(j + 1) % m]], q).map(|z| (j, z - q[2])))
-        };
+        let fan = |q: Vec3| (0..m).find_map(|j| height([p.w, p.rim[j], p.rim[(j + 1) % m]], q).map(|z| (j, z - q[2])));
         for i in 0..m + 2 {
             let [a, b, c] = match i {
                 6 => [p.u, p.v, p.rim[0]],

@@ -41,9 +41,7 @@ pub fn kept(links: &Links, places: &[Vec3], cut: &[bool]) -> Vec<bool> {
 
 /// Lets go of short runs of sharp edges that end freely on both sides.
 fn drop_specks(links: &Links, cut: &[bool], kept: &mut [bool]) {
-    let kept_from = |kept: &[bool], v: u32| -> Vec<u32> {
-        links.leaving(v).filter(|h| kept[*h as usize]).collect()
-    };
+    let kept_from = |kept: &[bool], v: u32| -> Vec<u32> { links.leaving(v).filter(|h| kept[*h as usize]).collect() };
     for h in 0..kept.len() as u32 {
         if !kept[h as usize] || kept_from(kept, links.from(h)).len() != 1 {
             continue;

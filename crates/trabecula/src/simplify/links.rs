@@ -52,23 +52,15 @@ impl Links {
         for h in 0..sides {
             let (a, b) = (origin(h), origin(next(h as u32) as usize));
             let from = start[b as usize] as usize..start[b as usize + 1] as usize;
-            let mut back = leaving[from]
-                .iter()
-                .filter(|g| origin(next(**g) as usize) == a);
+            let mut back = leaving[from].iter().filter(|g| origin(next(**g) as usize) == a);
             twin[h] = *back.next()?;
             if a == b || back.next().is_some() {
                 return None;
             }
         }
         let whole = (0..sides).all(|h| twin[twin[h] as usize] == h as u32);
-        let out = (0..n)
-            .map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE))
-            .collect();
-        whole.then_some(Links {
-            triangles,
-            twin,
-            out,
-        })
+        let out = (0..n).map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE)).collect();
+        whole.then_some(Links { triangles, twin, out })
     }
 
     /// The vertex that `h` leaves.
@@ -182,12 +174,7 @@ mod tests {
         for h in 0..24 {
             let mut links = Links::new(octahedron(), 6).expect("closed");
             links.collapse(h);
-            let left: Vec<[u32; 3]> = links
-                .triangles
-                .iter()
-                .copied()
-                .filter(|t| t[0] != NONE)
-                .collect();
+            let left: Vec<[u32; 3]> = links.triangles.iter().copied().filter(|t| t[0] != NONE).collect();
             assert_eq!(left.len(), 6);
             let fresh = Links::new(left, 6).expect("closed");
             for v in (0..6).filter(|v| links.out[*v as usize] != NONE) {

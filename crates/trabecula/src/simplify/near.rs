@@ -19,10 +19,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    const EMPTY: Bounds = Bounds {
-        min: [f32::INFINITY; 3],
-        max: [f32::NEG_INFINITY; 3],
-    };
+    const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
     /// The bounds of some places.
     pub fn of(places: &[Vec3]) -> Bounds {
@@ -81,12 +78,7 @@ impl Tree {
             b.grow(&boxes[2 * i + 1]);
             boxes[i] = b;
         }
-        Tree {
-            boxes,
-            leaves,
-            order: some.to_vec(),
-            leaf,
-        }
+        Tree { boxes, leaves, order: some.to_vec(), leaf }
     }
 
     /// Lets triangle `t` have the bounds `b`.
@@ -134,13 +126,7 @@ impl Prism {
     pub fn new(names: [u32; 3], places: [Vec3; 3]) -> Prism {
         let side = |k: usize| sub(places[(k + 1) % 3], places[k]);
         let normal = cross(side(0), side(1));
-        Prism {
-            names,
-            places,
-            normal,
-            walls: [0, 1, 2].map(|k| cross(side(k), normal)),
-            bounds: Bounds::of(&places),
-        }
+        Prism { names, places, normal, walls: [0, 1, 2].map(|k| cross(side(k), normal)), bounds: Bounds::of(&places) }
     }
 
     /// Whether another triangle meets this one elsewhere than in common corners or a common side. Exact: where no
@@ -188,18 +174,14 @@ impl Prism {
 
     #[cold]
     fn crosses(&self, names: [u32; 3], places: [Vec3; 3]) -> bool {
-        let mut pair = Mesh {
-            vertices: self.places.to_vec(),
-            triangles: vec![[0, 1, 2]],
-        };
-        let other =
-            core::array::from_fn(|k| match self.names.iter().position(|n| *n == names[k]) {
-                Some(c) => c as u32,
-                None => {
-                    pair.vertices.push(places[k]);
-                    pair.vertices.len() as u32 - 1
-                }
-            });
+        let mut pair = Mesh { vertices: self.places.to_vec(), triangles: vec![[0, 1, 2]] };
+        let other = core::array::from_fn(|k| match self.names.iter().position(|n| *n == names[k]) {
+            Some(c) => c as u32,
+            None => {
+                pair.vertices.push(places[k]);
+                pair.vertices.len() as u32 - 1
+            }
+        });
         pair.triangles.push(other);
         !is_embedded(&pair)
     }
@@ -213,9 +195,7 @@ mod tests {
     fn quick_answers_agree_with_the_exact_ones() {
         let mut s = 11u64;
         let mut next = |n: u64| {
-            s = s
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (s >> 33) % n
         };
         let (mut met, mut apart) = (0, 0);
@@ -238,11 +218,7 @@ mod tests {
             }
             let prism = Prism::new(a, at(a));
             let want = prism.crosses(b, at(b));
-            assert_eq!(
-                prism.meets(b, at(b), &Bounds::of(&at(b))),
-                want,
-                "{pool:?} {b:?}"
-            );
+            assert_eq!(prism.meets(b, at(b), &Bounds::of(&at(b))), want, "{pool:?} {b:?}");
             met += usize::from(want);
             apart += usize::from(!want);
         }
@@ -267,9 +243,7 @@ mod tests {
             }
         }
         found.clear();
-        tree.visit(&Bounds::of(&[[-50.0; 3]]), &mut Vec::new(), |t| {
-            found.push(t)
-        });
+        tree.visit(&Bounds::of(&[[-50.0; 3]]), &mut Vec::new(), |t| found.push(t));
         assert!(found.contains(&5));
     }
 }

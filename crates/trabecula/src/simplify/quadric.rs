@@ -58,11 +58,7 @@ impl Quadric {
     #[inline]
     fn times(&self, v: Vec3) -> Vec3 {
         let [xx, yy, zz, xy, xz, yz] = self.a;
-        [
-            xx * v[0] + xy * v[1] + xz * v[2],
-            xy * v[0] + yy * v[1] + yz * v[2],
-            xz * v[0] + yz * v[1] + zz * v[2],
-        ]
+        [xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2], xz * v[0] + yz * v[1] + zz * v[2]]
     }
 
     /// Its value at `p`; rounding may leave it a little below zero.
@@ -85,10 +81,7 @@ impl Quadric {
             xy * xz - yz * xx,
         ];
         let det = xx * minors[0] + xy * minors[3] + xz * minors[4];
-        (det > 0.0).then(|| Quadric {
-            a: minors.map(|m| m / det),
-            ..Quadric::default()
-        })
+        (det > 0.0).then(|| Quadric { a: minors.map(|m| m / det), ..Quadric::default() })
     }
 
     /// The place near `middle` where the value is least.
@@ -109,11 +102,7 @@ impl Quadric {
         let free = sub(middle, i.times(add(self.times(middle), self.b)));
         let along = i.times(g);
         let rise = dot(g, along);
-        if rise > 0.0 {
-            add(free, scale(along, (s - dot(g, free)) / rise))
-        } else {
-            free
-        }
+        if rise > 0.0 { add(free, scale(along, (s - dot(g, free)) / rise)) } else { free }
     }
 }
 
@@ -125,9 +114,7 @@ mod tests {
     fn three_planes_meet_in_a_corner() {
         let planes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]];
         let corner = [0.3, -2.0, 5.0];
-        let q = planes.iter().fold(Quadric::default(), |q, n| {
-            q.plus(&Quadric::plane(*n, corner, 2.0))
-        });
+        let q = planes.iter().fold(Quadric::default(), |q, n| q.plus(&Quadric::plane(*n, corner, 2.0)));
         assert!(q.at(corner).abs() < 1e-12);
         let p = [1.3, -1.0, 5.0];
         assert!((q.at(p) - 2.0 * (1.0 + 1.0 + 0.36)).abs() < 1e-12);

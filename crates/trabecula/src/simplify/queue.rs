@@ -24,10 +24,7 @@ pub struct Queue {
 impl Queue {
     /// An empty queue.
     pub fn new() -> Queue {
-        Queue {
-            buckets: vec![Vec::new(); (f32::INFINITY.to_bits() >> DROPPED) as usize + 1],
-            lowest: 0,
-        }
+        Queue { buckets: vec![Vec::new(); (f32::INFINITY.to_bits() >> DROPPED) as usize + 1], lowest: 0 }
     }
 
     /// Adds a candidate of cost `cost` ≥ 0.
@@ -59,10 +56,8 @@ mod tests {
     #[test]
     fn costs_come_out_in_order() {
         let mut q = Queue::new();
-        let costs: Vec<f64> = (0..1000u32)
-            .map(|i| f64::from(i * 7919 % 1000).powi(5) * 1e-9)
-            .chain([f64::INFINITY, 0.0])
-            .collect();
+        let costs: Vec<f64> =
+            (0..1000u32).map(|i| f64::from(i * 7919 % 1000).powi(5) * 1e-9).chain([f64::INFINITY, 0.0]).collect();
         for (i, c) in costs.iter().enumerate() {
             let edge = i as u32;
             q.push(*c, Candidate { edge, stamp: 0 });

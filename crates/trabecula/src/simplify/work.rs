@@ -61,13 +61,7 @@ struct Plan {
 
 impl Work {
     /// Starts from linked triangles; `exact` has the positions before they were rounded to `places`.
-    pub fn new(
-        links: Links,
-        places: Vec<Vec3>,
-        exact: &[Vec3],
-        cut: &[bool],
-        tolerance: f64,
-    ) -> Work {
+    pub fn new(links: Links, places: Vec<Vec3>, exact: &[Vec3], cut: &[bool], tolerance: f64) -> Work {
         let n = places.len();
         let count = links.triangles.len();
         let corners = |t: &[u32; 3]| t.map(|v| places[v as usize]);
@@ -85,8 +79,7 @@ impl Work {
                 quadrics[v] = quadrics[v].plus(&own);
                 if kept[3 * t + k] {
                     let side = sub(p[(k + 1) % 3], p[k]);
-                    let wall =
-                        Quadric::plane(unit(cross(side, normal)), p[k], HOLD * dot(side, side));
+                    let wall = Quadric::plane(unit(cross(side, normal)), p[k], HOLD * dot(side, side));
                     for w in [v, names[(k + 1) % 3] as usize] {
                         quadrics[w] = quadrics[w].plus(&wall);
                     }
@@ -134,9 +127,7 @@ impl Work {
         let live = (0..triangles.len() as u32).filter(|t| triangles[*t as usize][0] != NONE);
         let live: Vec<u32> = live.collect();
         let places = &self.places;
-        self.tree = Tree::new(triangles.len(), &live, |t| {
-            Bounds::of(&triangles[t].map(|v| places[v as usize]))
-        });
+        self.tree = Tree::new(triangles.len(), &live, |t| Bounds::of(&triangles[t].map(|v| places[v as usize])));
         self.planted = live.len();
     }
 
@@ -165,8 +156,7 @@ impl Work {
     }
 
     fn stamp(&self, h: u32) -> u32 {
-        self.versions[self.links.from(h) as usize]
-            .wrapping_add(self.versions[self.links.to(h) as usize])
+        self.versions[self.links.from(h) as usize].wrapping_add(self.versions[self.links.to(h) as usize])
     }
 
     fn push(&mut self, h: u32) {
@@ -302,11 +292,7 @@ impl Work {
         let middle = self.middle(h);
         let w = q.least_on(middle, g, six + dot(o, g));
         let (edge, off) = (sub(p.v, p.u), sub(w, middle));
-        let mut w = if dot(off, off) <= dot(edge, edge) {
-            w
-        } else {
-            middle
-        };
+        let mut w = if dot(off, off) <= dot(edge, edge) { w } else { middle };
         // What is flat along an axis stays so to the last bit.
         for k in 0..3 {
             if p.u[k] == p.v[k] && p.rim.iter().all(|r| r[k] == p.u[k]) {
@@ -349,13 +335,7 @@ impl Work {
             let (sides, twice) = (dot(x, x) + dot(y, y) + dot(z, z), norm(n));
             (2.0 * 3f64.sqrt() * twice / sides, n, twice)
         };
-        let old = |i: usize| {
-            [
-                if i < p.turn { p.u } else { p.v },
-                p.rim[i],
-                p.rim[after(i)],
-            ]
-        };
+        let old = |i: usize| [if i < p.turn { p.u } else { p.v }, p.rim[i], p.rim[after(i)]];
         self.normals.clear();
         let mut worst = f64::INFINITY;
         for i in 0..m {
@@ -398,11 +378,7 @@ impl Work {
     fn is_kept_spoke(&self, i: usize) -> bool {
         let spoke = prev(self.rim_edges[i]);
         // At the corners beside the edge two sides of the patch become one.
-        let other = if i == 0 || i == self.patch.turn {
-            prev(self.links.twin(spoke))
-        } else {
-            spoke
-        };
+        let other = if i == 0 || i == self.patch.turn { prev(self.links.twin(spoke)) } else { spoke };
         self.kept[spoke as usize] || self.kept[other as usize]
     }
 
@@ -429,10 +405,7 @@ impl Work {
         self.prisms.clear();
         for i in 0..m {
             let j = if i + 1 == m { 0 } else { i + 1 };
-            self.prisms.push(Prism::new(
-                [u, self.rim[i], self.rim[j]],
-                [p.w, p.rim[i], p.rim[j]],
-            ));
+            self.prisms.push(Prism::new([u, self.rim[i], self.rim[j]], [p.w, p.rim[i], p.rim[j]]));
         }
         let mut all = Bounds::of(&p.rim);
         all.grow(&Bounds::of(&[p.w]));
@@ -502,10 +475,6 @@ impl Work {
 fn from_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
     let (d, e) = (sub(b, a), sub(p, a));
     let long = dot(d, d);
-    let t = if long > 0.0 {
-        (dot(d, e) / long).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let t = if long > 0.0 { (dot(d, e) / long).clamp(0.0, 1.0) } else { 0.0 };
     norm(sub(e, scale(d, t)))
 }

@@ -22,18 +22,10 @@ pub(super) fn operations(symbol: &str) -> Result<Vec<Operation>, String> {
         Some(letter) => (true, letter),
         None => (false, lattice),
     };
-    let mut generators: Vec<Operation> = centring(letter)?
-        .iter()
-        .map(|t| Operation {
-            rotation: NONE,
-            translation: t.map(|t| t * 2),
-        })
-        .collect();
+    let mut generators: Vec<Operation> =
+        centring(letter)?.iter().map(|t| Operation { rotation: NONE, translation: t.map(|t| t * 2) }).collect();
     if inverse {
-        generators.push(Operation {
-            rotation: INVERSE,
-            translation: [0; 3],
-        });
+        generators.push(Operation { rotation: INVERSE, translation: [0; 3] });
     }
     let mut before = Before::default();
     for word in words {
@@ -54,12 +46,9 @@ fn origin(symbol: &str) -> Result<(&str, [i32; 3]), String> {
         return Ok((symbol, [0; 3]));
     };
     let inside = rest.trim_end().strip_suffix(')');
-    let numbers: Option<Vec<i32>> =
-        inside.and_then(|s| s.split_whitespace().map(|n| n.parse().ok()).collect());
+    let numbers: Option<Vec<i32>> = inside.and_then(|s| s.split_whitespace().map(|n| n.parse().ok()).collect());
     match numbers.as_deref() {
-        Some(&[x, y, z]) if [x, y, z].iter().all(|v| v.abs() < 12) => {
-            Ok((symbol, [x, y, z].map(|v| v * 2)))
-        }
+        Some(&[x, y, z]) if [x, y, z].iter().all(|v| v.abs() < 12) => Ok((symbol, [x, y, z].map(|v| v * 2))),
         _ => Err(format!(
             "\"({rest}\" is no shift of the origin; it is three whole numbers of twelfths, such as (0 0 1)"
         )),
@@ -141,27 +130,14 @@ fn generator(word: &str, before: &mut Before) -> Result<Operation, String> {
                     add
                 }
                 _ => {
-                    return wrong(
-                        "what follows the axis is a screw or the letters a b c n u v w d",
-                    );
+                    return wrong("what follows the axis is a screw or the letters a b c n u v w d");
                 }
             },
         };
         translation = [0, 1, 2].map(|i| translation[i] + add[i]);
     }
-    *before = Before {
-        count: before.count + 1,
-        order,
-        axis: along,
-    };
-    Ok(Operation {
-        rotation: if negative {
-            rotation.map(|r| r.map(|v| -v))
-        } else {
-            rotation
-        },
-        translation,
-    })
+    *before = Before { count: before.count + 1, order, axis: along };
+    Ok(Operation { rotation: if negative { rotation.map(|r| r.map(|v| -v)) } else { rotation }, translation })
 }
 
 /// A rotation about a principal axis, in a basis in which it is one of whole numbers.
@@ -196,10 +172,7 @@ fn diagonal(axis: usize, sum: bool) -> Rotation {
 fn closed(generators: &[Operation]) -> Result<Vec<Operation>, String> {
     /// No space group has more operations in a cell.
     const MOST: usize = 192;
-    let one = Operation {
-        rotation: NONE,
-        translation: [0; 3],
-    };
+    let one = Operation { rotation: NONE, translation: [0; 3] };
     let mut all = vec![one];
     let mut known: HashSet<Operation> = all.iter().copied().collect();
     let mut at = 0;

@@ -54,10 +54,8 @@ impl Group {
         }
         sums.retain(|_, roots| !vanishes(roots));
         if sums.is_empty() {
-            let message = format!(
-                "{hkl:?} is absent in {}: its sum over the group vanishes; choose other indices",
-                self.name
-            );
+            let message =
+                format!("{hkl:?} is absent in {}: its sum over the group vanishes; choose other indices", self.name);
             return Err(Fault::new("hkl", message));
         }
         // Re and Im of c e^{ia} and of the opposite wave's c′ e^{−ia}, as a cosine and a sine of a.
@@ -108,10 +106,7 @@ mod tests {
     fn parts(group: &str, hkl: [i32; 3]) -> String {
         let group = Group::named(group).expect(group);
         let is = |side| group.orbit(hkl, side).is_ok_and(|w| !w.is_empty());
-        [(Side::Re, "R"), (Side::Im, "I")]
-            .iter()
-            .map(|(side, word)| if is(*side) { *word } else { "" })
-            .collect()
+        [(Side::Re, "R"), (Side::Im, "I")].iter().map(|(side, word)| if is(*side) { *word } else { "" }).collect()
     }
 
     #[test]
@@ -137,15 +132,8 @@ mod tests {
         }
         assert_eq!(parts("227:1", [1, 1, 1]), "RI");
         assert_eq!(parts("227:1", [2, 2, 2]), "I");
-        let refused = Group::named("229")
-            .expect("group")
-            .orbit([1, 0, 0], Side::Re);
-        assert!(
-            refused
-                .expect_err("absent")
-                .message
-                .contains("absent in Im-3m")
-        );
+        let refused = Group::named("229").expect("group").orbit([1, 0, 0], Side::Re);
+        assert!(refused.expect_err("absent").message.contains("absent in Im-3m"));
     }
 
     #[test]
@@ -153,18 +141,12 @@ mod tests {
         let u = [0.137, 0.291, 0.843];
         let cosines = |v: Vec3| v.map(|x| sin_cos_turns(x).1);
         let [x, y, z] = cosines(u);
-        let p = Group::named("221")
-            .expect("group")
-            .orbit([1, 0, 0], Side::Re);
+        let p = Group::named("221").expect("group").orbit([1, 0, 0], Side::Re);
         assert!((at(&p.expect("present"), u) - (x + y + z)).abs() < 1e-14);
-        let fcc = Group::named("225")
-            .expect("group")
-            .orbit([1, 1, 1], Side::Re);
+        let fcc = Group::named("225").expect("group").orbit([1, 1, 1], Side::Re);
         assert!((at(&fcc.expect("present"), u) - 4.0 * x * y * z).abs() < 1e-14);
         let s = u.map(|v| sin_cos_turns(v).0);
-        let sines = Group::named("215")
-            .expect("group")
-            .orbit([1, 1, 1], Side::Im);
+        let sines = Group::named("215").expect("group").orbit([1, 1, 1], Side::Im);
         // sin a sin b sin c is minus a quarter of the four sines of the sums; the sign is the sum's own.
         let found = at(&sines.expect("present"), u);
         assert!((found.abs() - (4.0 * s[0] * s[1] * s[2]).abs()).abs() < 1e-14);

@@ -8,23 +8,14 @@ use crate::fault::Fault;
 /// The 24 symmetries of the tetrahedron of corners (1, −1, −1), (−1, 1, −1), (−1, −1, 1), (1, 1, 1): the signed
 /// permutations of the axes whose signs multiply to one.
 fn tetrahedral() -> Vec<Rotation> {
-    let orders = [
-        [0, 1, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [1, 0, 2],
-        [0, 2, 1],
-        [2, 1, 0],
-    ];
+    let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
     let signs = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]];
     let one = |order: [usize; 3], sign: [i32; 3]| {
         let mut r = [[0; 3]; 3];
         (0..3).for_each(|i| r[i][order[i]] = sign[i]);
         r
     };
-    let all = orders
-        .iter()
-        .flat_map(|o| signs.iter().map(|s| one(*o, *s)));
+    let all = orders.iter().flat_map(|o| signs.iter().map(|s| one(*o, *s)));
     all.collect()
 }
 
@@ -48,16 +39,10 @@ impl Group {
         };
         let mut by_rotation: HashMap<Rotation, Vec<[i32; 3]>> = HashMap::new();
         for o in &self.operations {
-            by_rotation
-                .entry(o.rotation)
-                .or_default()
-                .push(o.translation);
+            by_rotation.entry(o.rotation).or_default().push(o.translation);
         }
         let wanted = tetrahedral();
-        let missing: Vec<&Rotation> = wanted
-            .iter()
-            .filter(|r| !by_rotation.contains_key(*r))
-            .collect();
+        let missing: Vec<&Rotation> = wanted.iter().filter(|r| !by_rotation.contains_key(*r)).collect();
         if let Some(r) = missing.first() {
             let turned = |r: &Rotation| determinant(r) > 0;
             return none(if missing.iter().all(|r| !turned(r)) {
@@ -74,15 +59,10 @@ impl Group {
             by_rotation[r].contains(&by)
         };
         let steps = || (0..WHOLE).step_by(3);
-        let points =
-            steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
-        let sites: Vec<[i32; 3]> = points
-            .filter(|c| wanted.iter().all(|r| fixed(*c, r)))
-            .collect();
+        let points = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+        let sites: Vec<[i32; 3]> = points.filter(|c| wanted.iter().all(|r| fixed(*c, r))).collect();
         if sites.is_empty() {
-            return none(
-                "it has the rotations and the mirrors, but as screws and glides, or not through one point",
-            );
+            return none("it has the rotations and the mirrors, but as screws and glides, or not through one point");
         }
         Ok(sites)
     }

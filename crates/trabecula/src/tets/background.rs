@@ -68,20 +68,12 @@ pub struct Fit {
 ///
 /// **Errors**: a size that is not positive, so great that nothing is left of the region, or so small that there are more than
 /// twenty million tetrahedra.
-pub fn background(
-    region: &dyn Field,
-    bounds: &Aabb,
-    size: &Grade,
-    inside: &[Vec3],
-) -> Result<(TetMesh, Fit), Fault> {
+pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, Fit), Fault> {
     let mut sizes = vec![0.0; inside.len()];
     size.values(inside, &mut sizes);
     let wrong = |v: &&f64| !(v.is_finite() && **v > 0.0);
     if let Some(v) = sizes.iter().find(wrong) {
-        let message = format!(
-            "size is {} mm; it must be a finite number greater than 0",
-            number(*v)
-        );
+        let message = format!("size is {} mm; it must be a finite number greater than 0", number(*v));
         return Err(Fault::new("size", message));
     }
     let largest = sizes.iter().copied().fold(0.0, f64::max);
@@ -149,8 +141,5 @@ fn fitted(bounds: &Aabb, cube: f64) -> f64 {
         (-3..=3).map(move |d| 2.0 * l / (n + f64::from(d)).max(1.0))
     });
     let even = (-STEPS..=STEPS).map(|i| cube * (1.0 + FIT * f64::from(i) / f64::from(STEPS)));
-    exact
-        .chain(even)
-        .filter(|c| (c / cube - 1.0).abs() <= FIT)
-        .fold(cube, |m, c| if cost(c) < cost(m) { c } else { m })
+    exact.chain(even).filter(|c| (c / cube - 1.0).abs() <= FIT).fold(cube, |m, c| if cost(c) < cost(m) { c } else { m })
 }

@@ -46,16 +46,10 @@ impl TetMesh {
             ));
         }
         let count = self.nodes.len();
-        if let Some((i, n)) = first(&self.tets, |t| {
-            t.iter().copied().find(|n| *n as usize >= count)
-        }) {
-            return fault(format!(
-                "tetrahedron {i} names node {n}, but there are {count} nodes (counted from 0)"
-            ));
+        if let Some((i, n)) = first(&self.tets, |t| t.iter().copied().find(|n| *n as usize >= count)) {
+            return fault(format!("tetrahedron {i} names node {n}, but there are {count} nodes (counted from 0)"));
         }
-        if let Some((i, p)) = first(&self.nodes, |p| {
-            p.iter().any(|x| !x.is_finite()).then_some(*p)
-        }) {
+        if let Some((i, p)) = first(&self.nodes, |p| p.iter().any(|x| !x.is_finite()).then_some(*p)) {
             return fault(format!("node {i} is at {p:?}; coordinates must be finite"));
         }
         let before = self.nodes.len();
@@ -105,11 +99,7 @@ impl TetMesh {
             ))
         };
         if !flat.is_empty() {
-            return told(
-                &flat,
-                "are flat (no volume)",
-                "mesh again, or collapse them",
-            );
+            return told(&flat, "are flat (no volume)", "mesh again, or collapse them");
         }
         if inverted.is_empty() {
             return Ok(false);
@@ -270,10 +260,7 @@ fn pinched(boundary: &Mesh) -> usize {
         .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]].map(|[x, y]| [x.min(y), x.max(y)]))
         .collect();
     edges.sort_unstable();
-    edges
-        .chunk_by(|a, b| a == b)
-        .filter(|same| same.len() > 2)
-        .count()
+    edges.chunk_by(|a, b| a == b).filter(|same| same.len() > 2).count()
 }
 
 fn first<T, R>(of: &[T], f: impl Fn(&T) -> Option<R>) -> Option<(usize, R)> {
@@ -311,10 +298,7 @@ mod tests {
     fn a_sound_mesh_is_taken_as_it_is() {
         let (mesh, found) = cube().checked().unwrap();
         assert_eq!(mesh, cube());
-        let plain = Checked {
-            pieces: 1,
-            ..Checked::default()
-        };
+        let plain = Checked { pieces: 1, ..Checked::default() };
         assert_eq!(found, plain);
         let mut more = cube();
         more.nodes.insert(0, [9.0; 3]);
@@ -342,10 +326,7 @@ mod tests {
         refused(m, "node 5 is at [1.0, 0.0, NaN]");
         let mut m = cube();
         m.tets[2].swap(0, 1);
-        refused(
-            m,
-            "1 of 6 tetrahedra are inverted (negative volume), the first number 2 at",
-        );
+        refused(m, "1 of 6 tetrahedra are inverted (negative volume), the first number 2 at");
         let mut m = cube();
         m.tets.push([0, 1, 3, 2]);
         refused(m, "1 of 7 tetrahedra are flat");
@@ -361,10 +342,7 @@ mod tests {
         let mut m = cube();
         m.nodes.push(m.nodes[3]);
         m.tets[1] = [0, 8, 2, 7];
-        refused(
-            m,
-            "1 pair of nodes in one place, such as 3 and 8 at (1, 1, 0) mm",
-        );
+        refused(m, "1 pair of nodes in one place, such as 3 and 8 at (1, 1, 0) mm");
         let mut m = cube();
         m.zones = vec![1, 2];
         refused(m, "2 zones for 6 tetrahedra");
@@ -377,18 +355,12 @@ mod tests {
         m.nodes.push([0.5; 3]);
         m.tets[0] = [0, 1, 3, 8];
         m.tets.push([8, 1, 3, 7]);
-        refused(
-            m,
-            "1 node lies on a face or an edge of tetrahedra that do not have it (hanging)",
-        );
+        refused(m, "1 node lies on a face or an edge of tetrahedra that do not have it (hanging)");
         // Two cubes side by side, the square between them cut along its other diagonal.
         let mut m = cube();
         let second = cube();
-        let new: Vec<u32> = (0..8)
-            .map(|i| if i & 1 == 0 { i + 1 } else { 8 + i / 2 })
-            .collect();
-        m.nodes
-            .extend((0..4).map(|i| [2.0, f64::from(i & 1), f64::from(i >> 1)]));
+        let new: Vec<u32> = (0..8).map(|i| if i & 1 == 0 { i + 1 } else { 8 + i / 2 }).collect();
+        m.nodes.extend((0..4).map(|i| [2.0, f64::from(i & 1), f64::from(i >> 1)]));
         // Mirrored in y, so that the diagonals on both sides cross.
         let mirror = |i: u32| i ^ 2;
         m.tets.extend(second.tets.iter().map(|t| {
@@ -398,12 +370,7 @@ mod tests {
         refused(m, "the boundary meets itself");
         // A corner of one pushed into another.
         let mut m = cube();
-        m.nodes.extend([
-            [0.5, 0.5, 0.9],
-            [0.4, 0.4, 2.0],
-            [0.6, 0.3, 2.0],
-            [0.6, 0.6, 2.0],
-        ]);
+        m.nodes.extend([[0.5, 0.5, 0.9], [0.4, 0.4, 2.0], [0.6, 0.3, 2.0], [0.6, 0.6, 2.0]]);
         m.tets.push([8, 9, 10, 11]);
         let v = volume(m.corners(6));
         if v < 0.0 {

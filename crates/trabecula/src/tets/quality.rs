@@ -24,14 +24,7 @@ pub struct Spread {
 
 impl Spread {
     fn of(values: impl Iterator<Item = f64>) -> Spread {
-        let (mut s, mut n) = (
-            Spread {
-                min: f64::INFINITY,
-                mean: 0.0,
-                max: f64::NEG_INFINITY,
-            },
-            0usize,
-        );
+        let (mut s, mut n) = (Spread { min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }, 0usize);
         for v in values {
             (s.min, s.mean, s.max, n) = (s.min.min(v), s.mean + v, s.max.max(v), n + 1);
         }
@@ -108,14 +101,8 @@ pub fn dihedral_cosines(p: [Vec3; 4]) -> [f64; 6] {
 
 /// Aspect: longest edge over √24 times the radius of the inscribed ball; infinite without volume.
 pub fn aspect(p: [Vec3; 4]) -> f64 {
-    let longest = EDGES
-        .iter()
-        .map(|[a, b]| norm(sub(p[*a], p[*b])))
-        .fold(0.0, f64::max);
-    let area: f64 = FACES
-        .iter()
-        .map(|[a, b, c]| norm(cross(sub(p[*b], p[*a]), sub(p[*c], p[*a]))) / 2.0)
-        .sum();
+    let longest = EDGES.iter().map(|[a, b]| norm(sub(p[*a], p[*b]))).fold(0.0, f64::max);
+    let area: f64 = FACES.iter().map(|[a, b, c]| norm(cross(sub(p[*b], p[*a]), sub(p[*c], p[*a]))) / 2.0).sum();
     longest * area / (24f64.sqrt() * 3.0 * volume(p).abs())
 }
 
@@ -126,32 +113,20 @@ impl TetMesh {
             return None;
         }
         let degrees = |c: f64| c.clamp(-1.0, 1.0).acos().to_degrees();
-        let each: Vec<[f64; 6]> = (0..self.tets.len())
-            .into_par_iter()
-            .map(|i| dihedral_cosines(self.corners(i)).map(degrees))
-            .collect();
+        let each: Vec<[f64; 6]> =
+            (0..self.tets.len()).into_par_iter().map(|i| dihedral_cosines(self.corners(i)).map(degrees)).collect();
         let mut histogram = vec![0; 180 / STEP];
         for a in each.iter().flatten().filter(|a| !a.is_nan()) {
             histogram[(*a as usize / STEP).min(180 / STEP - 1)] += 1;
         }
-        let mut least: Vec<f64> = each
-            .iter()
-            .map(|a| a.iter().copied().fold(180.0, f64::min))
-            .collect();
-        let mut most: Vec<f64> = each
-            .iter()
-            .map(|a| a.iter().copied().fold(0.0, f64::max))
-            .collect();
+        let mut least: Vec<f64> = each.iter().map(|a| a.iter().copied().fold(180.0, f64::min)).collect();
+        let mut most: Vec<f64> = each.iter().map(|a| a.iter().copied().fold(0.0, f64::max)).collect();
         let slivers = least.iter().zip(&most);
-        let slivers = slivers
-            .filter(|(a, b)| **a < SLIVER || **b > 180.0 - SLIVER)
-            .count();
+        let slivers = slivers.filter(|(a, b)| **a < SLIVER || **b > 180.0 - SLIVER).count();
         least.sort_unstable_by(f64::total_cmp);
         most.sort_unstable_by(f64::total_cmp);
         let at = |of: &[f64], share: f64| of[((of.len() - 1) as f64 * share).round() as usize];
-        let volumes: Vec<f64> = (0..self.tets.len())
-            .map(|i| volume(self.corners(i)))
-            .collect();
+        let volumes: Vec<f64> = (0..self.tets.len()).map(|i| volume(self.corners(i))).collect();
         let lengths = (0..self.tets.len()).flat_map(|i| {
             let p = self.corners(i);
             EDGES.map(|[a, b]| norm(sub(p[a], p[b])))
@@ -187,10 +162,7 @@ impl TetMesh {
         let each = (0..self.tets.len()).into_par_iter().map(|i| {
             let p = self.corners(i);
             let most = dihedral_cosines(p).into_iter().fold(-1.0, f64::max);
-            (
-                most.clamp(-1.0, 1.0).acos().to_degrees(),
-                size_of(volume(p).abs()),
-            )
+            (most.clamp(-1.0, 1.0).acos().to_degrees(), size_of(volume(p).abs()))
         });
         each.unzip()
     }
@@ -210,12 +182,7 @@ mod tests {
     #[test]
     fn regular_and_right_tetrahedra() {
         let regular = TetMesh {
-            nodes: vec![
-                [1.0; 3],
-                [1.0, -1.0, -1.0],
-                [-1.0, 1.0, -1.0],
-                [-1.0, -1.0, 1.0],
-            ],
+            nodes: vec![[1.0; 3], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]],
             tets: vec![[0, 1, 3, 2]],
             zones: Vec::new(),
         };
@@ -224,11 +191,7 @@ mod tests {
         // Sums of a few products, each rounded once.
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs().max(1.0);
         assert!(near(q.dihedral.min, angle) && near(q.dihedral.max, angle));
-        assert!(
-            near(q.aspect.max, 1.0)
-                && near(q.size.mean, 8f64.sqrt())
-                && near(q.edge.min, 8f64.sqrt())
-        );
+        assert!(near(q.aspect.max, 1.0) && near(q.size.mean, 8f64.sqrt()) && near(q.edge.min, 8f64.sqrt()));
         assert_eq!((q.slivers, q.inverted, q.dihedral.histogram[7]), (0, 0, 6));
         // Six orthoschemes: 45, 60 and 90 degrees.
         let q = cube().quality().unwrap();

@@ -40,9 +40,7 @@ impl Tiling {
             let m = map.slopes(tet);
             let last = scale(add(add(m[0], m[1]), m[2]), -1.0);
             let m = [m[0], m[1], m[2], last];
-            (0..3).fold([0.0; 3], |s, i| {
-                add(s, scale(m[i + usize::from(i >= opposite)], g[i]))
-            })
+            (0..3).fold([0.0; 3], |s, i| add(s, scale(m[i + usize::from(i >= opposite)], g[i])))
         };
         let (mut sum, mut count, mut max) = (0.0, 0.0, 0.0f64);
         let step = (2 * map.len()).div_ceil(FACES);
@@ -64,10 +62,7 @@ impl Tiling {
                 }
             }
         }
-        (count > 0.0).then(|| Creases {
-            mean: sum / count,
-            max,
-        })
+        (count > 0.0).then(|| Creases { mean: sum / count, max })
     }
 
     /// ∂f/∂λ of the first three coordinates at points where f = t on the face on which the fourth is zero.
@@ -78,9 +73,7 @@ impl Tiling {
             let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
             [k[0], k[1], k[2], 0.0]
         };
-        let at: Vec<Bary> = (0..=n)
-            .flat_map(|a| (0..=a).map(move |b| place(a, b)))
-            .collect();
+        let at: Vec<Bary> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
         let v = stencil.values(&at);
         let mut found: Vec<Bary> = Vec::new();
         Grid { n }.each_triangle(|c, up| {
@@ -90,9 +83,7 @@ impl Tiling {
                 let (x, y) = (v[c[a]] - t, v[c[b]] - t);
                 if (x < 0.0) != (y < 0.0) {
                     let s = x / (x - y);
-                    found.push(core::array::from_fn(|i| {
-                        at[c[a]][i] + s * (at[c[b]][i] - at[c[a]][i])
-                    }));
+                    found.push(core::array::from_fn(|i| at[c[a]][i] + s * (at[c[b]][i] - at[c[a]][i])));
                 }
             }
         });

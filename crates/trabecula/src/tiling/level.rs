@@ -54,10 +54,7 @@ fn middle(stencil: &Stencil) -> Vec<(Bary, Bary)> {
     let cross = |[a, b]: &[usize; 2]| {
         let (x, y) = (nodes.values[*a], nodes.values[*b]);
         ((x < 0.0) != (y < 0.0)).then(|| {
-            let (p, q) = (
-                nodes.grid.bary(nodes.whole[*a]),
-                nodes.grid.bary(nodes.whole[*b]),
-            );
+            let (p, q) = (nodes.grid.bary(nodes.whole[*a]), nodes.grid.bary(nodes.whole[*b]));
             let s = x / (x - y);
             core::array::from_fn(|i| p[i] + s * (q[i] - p[i]))
         })
@@ -79,13 +76,7 @@ impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in each tetrahedron, and
     /// a node has the mean of the tetrahedra about it.
-    pub fn of(
-        map: &Tets,
-        stencil: &Stencil,
-        part: Part,
-        amount: Amount,
-        values: Vec<f64>,
-    ) -> Level {
+    pub fn of(map: &Tets, stencil: &Stencil, part: Part, amount: Amount, values: Vec<f64>) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
             Amount::Iso => v,
@@ -95,11 +86,7 @@ impl Level {
         if one && amount != Amount::Thickness {
             return Level::Same(level(values[0]));
         }
-        let mut values = if one {
-            vec![values[0]; map.nodes().len()]
-        } else {
-            values
-        };
+        let mut values = if one { vec![values[0]; map.nodes().len()] } else { values };
         values.par_iter_mut().for_each(|v| *v = level(*v));
         if amount == Amount::Thickness {
             let at = middle(stencil);
@@ -116,11 +103,7 @@ impl Level {
                 }
             }
             for (v, (sum, count)) in values.iter_mut().zip(about) {
-                *v *= if count > 0 {
-                    sum / f64::from(count)
-                } else {
-                    1.0
-                };
+                *v *= if count > 0 { sum / f64::from(count) } else { 1.0 };
             }
         }
         Level::Nodes(Arc::new(values))
@@ -141,9 +124,8 @@ impl Tiling {
         let tets = (0..self.map.len()).into_par_iter().step_by(step);
         let mut all: Vec<f64> = tets
             .flat_map_iter(|t| {
-                let one = move |(l, g): &(Bary, Bary)| {
-                    2.0 * self.level_at(t, *l) / (steepness(&self.map, t, g) / cell.scale)
-                };
+                let one =
+                    move |(l, g): &(Bary, Bary)| 2.0 * self.level_at(t, *l) / (steepness(&self.map, t, g) / cell.scale);
                 at.iter().map(one).collect::<Vec<f64>>()
             })
             .collect();

@@ -76,10 +76,7 @@ impl Size {
 
 impl Mixture {
     pub fn new(cells: &[Share], part: Part) -> Mixture {
-        Mixture {
-            sizes: STEPS.map(|n| Size::new(cells, n)),
-            part,
-        }
+        Mixture { sizes: STEPS.map(|n| Size::new(cells, n)), part }
     }
 
     /// The solid share of a tetrahedron, from the weights of the cells and the levels at its corners.
@@ -140,9 +137,7 @@ impl Level {
                 let ids = map.tet(*t);
                 let weights = weights(map, cells, *t);
                 let at = ids.map(|n| levels[n as usize]);
-                let moved = core::array::from_fn(|i| {
-                    at[i] + if free[ids[i] as usize] { NUDGE } else { 0.0 }
-                });
+                let moved = core::array::from_fn(|i| at[i] + if free[ids[i] as usize] { NUDGE } else { 0.0 });
                 let [now, then] = [at, moved].map(|l| mixture.share(&weights, l));
                 let wanted = ids.iter().map(|n| asked(*n)).sum::<f64>() / 4.0;
                 let count = ids.iter().filter(|n| free[**n as usize]).count();
@@ -165,11 +160,7 @@ impl Level {
                 most = most.max((lacks / volume).abs());
                 let to = levels[n] + (lacks / gains).clamp(-0.2, 0.2);
                 // The half-level of a sheet stays one.
-                levels[n] = if part == Part::Sheet {
-                    to.max(0.2 * levels[n])
-                } else {
-                    to
-                };
+                levels[n] = if part == Part::Sheet { to.max(0.2 * levels[n]) } else { to };
             }
             if most < NEAR {
                 break;
@@ -195,9 +186,7 @@ impl Tiling {
                 let c = &self.cells[one];
                 let fraction = |t: f64| c.stencil.fraction(self.part, t * c.scale);
                 let ends: [f64; 4] = levels.map(fraction);
-                let (lo, hi) = ends
-                    .iter()
-                    .fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+                let (lo, hi) = ends.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
                 // Corners and the middle: exact for what is quadratic in the level.
                 let middle = fraction(levels.iter().sum::<f64>() / 4.0);
                 let mean = (ends.iter().sum::<f64>() + 16.0 * middle) / 20.0;

@@ -32,19 +32,10 @@ fn formula(text: &str) -> Grade {
 
 /// From the first to the second over `width` mm about x = 0.
 fn step(width: f64) -> Weights {
-    Weights::between(
-        Grade::linear(
-            [1.0, 0.0, 0.0],
-            vec![[-width / 2.0, 0.0], [width / 2.0, 1.0]],
-        )
-        .expect("ramp"),
-    )
+    Weights::between(Grade::linear([1.0, 0.0, 0.0], vec![[-width / 2.0, 0.0], [width / 2.0, 1.0]]).expect("ramp"))
 }
 
-const BOUNDS: Aabb = Aabb {
-    min: [-24.0, -14.0, -14.0],
-    max: [24.0, 14.0, 14.0],
-};
+const BOUNDS: Aabb = Aabb { min: [-24.0, -14.0, -14.0], max: [24.0, 14.0, 14.0] };
 
 fn blend(of: &[Arc<Lattice>], weights: Weights, by: By) -> Blend {
     let of = of.iter().map(|l| Constituent::Lattice(l.clone())).collect();
@@ -85,66 +76,18 @@ fn fractions(blend: &Blend, points: &[Vec3]) -> [f64; 2] {
 fn pairs() -> Vec<(&'static str, [Arc<Lattice>; 2], Phases)> {
     use Part::{Lower, Sheet, Upper};
     let graded = |text: &str| Level::Fraction(formula(text));
-    let turned = made(
-        "gyroid",
-        Upper,
-        Level::Fraction(Grade::Constant(0.3)),
-        1.2,
-        [20.0, 30.0, 40.0],
-    );
+    let turned = made("gyroid", Upper, Level::Fraction(Grade::Constant(0.3)), 1.2, [20.0, 30.0, 40.0]);
     let wall = Level::Thickness(Grade::Constant(0.4));
     vec![
-        (
-            "networks",
-            [
-                share("primitive", Upper, 0.3, 4.0),
-                share("gyroid", Upper, 0.3, 4.0),
-            ],
-            Phases::Locked,
-        ),
-        (
-            "halves",
-            [
-                share("primitive", Upper, 0.3, 4.0),
-                share("iwp", Lower, 0.3, 2.0),
-            ],
-            Phases::Locked,
-        ),
-        (
-            "turned",
-            [turned, share("diamond", Upper, 0.3, 5.0)],
-            Phases::Independent,
-        ),
-        (
-            "beats",
-            [
-                share("primitive", Upper, 0.3, 4.0),
-                share("gyroid", Upper, 0.4, 4.1),
-            ],
-            Phases::Drifting,
-        ),
-        (
-            "sheets",
-            [
-                share("primitive", Sheet, 0.3, 4.0),
-                share("neovius", Sheet, 0.3, 5.0),
-            ],
-            Phases::Drifting,
-        ),
-        (
-            "sheet and network",
-            [
-                share("gyroid", Sheet, 0.3, 4.0),
-                share("gyroid", Lower, 0.4, 4.0),
-            ],
-            Phases::Locked,
-        ),
+        ("networks", [share("primitive", Upper, 0.3, 4.0), share("gyroid", Upper, 0.3, 4.0)], Phases::Locked),
+        ("halves", [share("primitive", Upper, 0.3, 4.0), share("iwp", Lower, 0.3, 2.0)], Phases::Locked),
+        ("turned", [turned, share("diamond", Upper, 0.3, 5.0)], Phases::Independent),
+        ("beats", [share("primitive", Upper, 0.3, 4.0), share("gyroid", Upper, 0.4, 4.1)], Phases::Drifting),
+        ("sheets", [share("primitive", Sheet, 0.3, 4.0), share("neovius", Sheet, 0.3, 5.0)], Phases::Drifting),
+        ("sheet and network", [share("gyroid", Sheet, 0.3, 4.0), share("gyroid", Lower, 0.4, 4.0)], Phases::Locked),
         (
             "wall and sheet",
-            [
-                made("gyroid", Sheet, wall, 4.0, [0.0; 3]),
-                share("diamond", Sheet, 0.3, 5.0),
-            ],
+            [made("gyroid", Sheet, wall, 4.0, [0.0; 3]), share("diamond", Sheet, 0.3, 5.0)],
             Phases::Drifting,
         ),
         (
@@ -173,10 +116,7 @@ fn the_fraction_is_held_through_every_transition() {
                 let at = [0.29 * wide * cell * f64::from(i), 0.37, -0.21];
                 let [found, asked] = fractions(&blend, &window(at, 2.0 * cell, 12_000));
                 // Twelve thousand even points tell a fraction to about 0.001.
-                assert!(
-                    (found - asked).abs() < 0.01,
-                    "{what}, {wide} cells, {i}: {found:.4} for {asked:.4}"
-                );
+                assert!((found - asked).abs() < 0.01, "{what}, {wide} cells, {i}: {found:.4} for {asked:.4}");
             }
         }
     }
@@ -185,10 +125,7 @@ fn the_fraction_is_held_through_every_transition() {
 /// Equation 16 as printed: two lattices of 0.30 give about 0.197 half-way (the seed's sum, by other means).
 #[test]
 fn by_value_material_is_lost_half_way() {
-    let of = [
-        share("primitive", Part::Upper, 0.3, 4.0),
-        share("gyroid", Part::Upper, 0.3, 4.0),
-    ];
+    let of = [share("primitive", Part::Upper, 0.3, 4.0), share("gyroid", Part::Upper, 0.3, 4.0)];
     let half = blend(&of, Weights::between(Grade::Constant(0.5)), By::Value);
     let [found, asked] = fractions(&half, &window([0.0; 3], 8.0, 40_000));
     assert!((asked - 0.3).abs() < 1e-9);
@@ -222,16 +159,9 @@ fn any_number_of_fields_takes_part() {
     let of = vec![
         Constituent::Lattice(share("gyroid", Part::Upper, 0.3, 4.0)),
         Constituent::Lattice(share("primitive", Part::Upper, 0.3, 4.0)),
-        Constituent::Field {
-            field: Arc::new(Balls),
-            wavelength: 3.0,
-        },
+        Constituent::Field { field: Arc::new(Balls), wavelength: 3.0 },
     ];
-    let weights = Weights::shares(vec![
-        formula("exp(-x/8)"),
-        formula("exp(-(y/12)^2)"),
-        formula("exp(x/8)"),
-    ]);
+    let weights = Weights::shares(vec![formula("exp(-x/8)"), formula("exp(-(y/12)^2)"), formula("exp(x/8)")]);
     let blend = Blend::new(of, weights, By::Fraction, &BOUNDS).expect("blend");
     // Balls of radius 1.4 in cubes of 3.
     let balls = 4.0 / 3.0 * std::f64::consts::PI * 1.4f64.powi(3) / 27.0;
@@ -239,18 +169,11 @@ fn any_number_of_fields_takes_part() {
         let points = window([1.7 * f64::from(i), 0.5, 0.3], 8.0, 20_000);
         let mut w = vec![0.0; 3 * points.len()];
         blend.weights().values(&points, &mut w);
-        let asked = w
-            .chunks_exact(3)
-            .map(|w| 0.3 * (w[0] + w[1]) + balls * w[2])
-            .sum::<f64>()
-            / points.len() as f64;
+        let asked = w.chunks_exact(3).map(|w| 0.3 * (w[0] + w[1]) + balls * w[2]).sum::<f64>() / points.len() as f64;
         let mut v = vec![0.0; points.len()];
         blend.values(&points, &mut v);
         let found = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
-        assert!(
-            (found - asked).abs() < 0.01,
-            "{i}: {found:.4} for {asked:.4}"
-        );
+        assert!((found - asked).abs() < 0.01, "{i}: {found:.4} for {asked:.4}");
     }
 }
 
@@ -265,10 +188,7 @@ fn lattices_pass_into_beams_with_their_fractions() {
         }
     }
     let text = "schema = 1\n[region.box]\nsize = [64, 36, 36]\n[beams.a]\ncell = \"octet\"\nradius = 0.45\nmap.affine.wavelength = 5";
-    let built = Design::from_toml(text)
-        .expect("text")
-        .build(&Nothing)
-        .expect("built");
+    let built = Design::from_toml(text).expect("text").build(&Nothing).expect("built");
     let beams = built.beams[0].1.field();
     let mut cell = window([0.0; 3], 0.0, 40_000);
     for (i, p) in cell.iter_mut().enumerate() {
@@ -279,13 +199,7 @@ fn lattices_pass_into_beams_with_their_fractions() {
     let own = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
     for (part, fraction) in [(Part::Sheet, 0.3), (Part::Sheet, 0.15), (Part::Upper, 0.3)] {
         let lattice = share("gyroid", part, fraction, 4.0);
-        let of = vec![
-            Constituent::Lattice(lattice),
-            Constituent::Field {
-                field: beams.clone(),
-                wavelength: 5.0,
-            },
-        ];
+        let of = vec![Constituent::Lattice(lattice), Constituent::Field { field: beams.clone(), wavelength: 5.0 }];
         let blend = Blend::new(of, step(15.0), By::Fraction, &BOUNDS).expect("blend");
         for i in -4..=4 {
             let points = window([1.7 * f64::from(i), 0.37, -0.21], 10.0, 20_000);
@@ -297,10 +211,7 @@ fn lattices_pass_into_beams_with_their_fractions() {
             blend.values(&points, &mut v);
             let found = v.iter().filter(|v| **v <= 0.0).count() as f64 / v.len() as f64;
             println!("{part:?} {fraction} {i}: {found:.4} for {asked:.4}");
-            assert!(
-                (found - asked).abs() < 0.01,
-                "{part:?} {fraction}, {i}: {found:.4} for {asked:.4}"
-            );
+            assert!((found - asked).abs() < 0.01, "{part:?} {fraction}, {i}: {found:.4} for {asked:.4}");
         }
     }
 }
@@ -319,21 +230,11 @@ fn what_lies_beyond_the_region_is_not_counted() {
         [lattice.a]\ncell.tet.name = \"diamond\"\npart = \"lower\"\nmap.tets.size = 3\nlevel.fraction = 0.3\n\
         [lattice.b]\ncell = \"gyroid\"\npart = \"upper\"\nmap.affine.wavelength = 4\nlevel.fraction = 0.3\n\
         [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[-12, 0.0], [12, 1]] }";
-    let built = Design::from_toml(text)
-        .expect("text")
-        .build(&Nothing)
-        .expect("built");
+    let built = Design::from_toml(text).expect("text").build(&Nothing).expect("built");
     let blend = built.blend.expect("blend").blend;
     for y in [-5.9, 0.0, 5.9] {
-        let points: Vec<Vec3> = (0..400)
-            .map(|i| {
-                [
-                    -11.9 + 0.5 * f64::from(i % 20),
-                    y,
-                    -5.7 + 0.6 * f64::from(i / 20),
-                ]
-            })
-            .collect();
+        let points: Vec<Vec3> =
+            (0..400).map(|i| [-11.9 + 0.5 * f64::from(i % 20), y, -5.7 + 0.6 * f64::from(i / 20)]).collect();
         let mut asked = vec![0.0; points.len()];
         blend.fractions(&points, &mut asked);
         let mean = asked.iter().sum::<f64>() / points.len() as f64;
@@ -349,10 +250,7 @@ fn alone_and_with_itself_a_lattice_is_itself() {
     for (what, of, _) in pairs() {
         let cell = of.iter().map(|l| l.map.longest()).fold(0.0, f64::max);
         let blend = blend(&of, step(cell), By::Fraction);
-        for (points, own) in [
-            ([-6.0 - cell, 0.0, 0.0], &of[0]),
-            ([6.0 + cell, 0.0, 0.0], &of[1]),
-        ] {
+        for (points, own) in [([-6.0 - cell, 0.0, 0.0], &of[0]), ([6.0 + cell, 0.0, 0.0], &of[1])] {
             let points = window(points, 6.0, 500);
             let (mut a, mut b) = (vec![0.0; 500], vec![0.0; 500]);
             blend.values(&points, &mut a);
@@ -367,12 +265,7 @@ fn alone_and_with_itself_a_lattice_is_itself() {
         let (mut a, mut b) = (vec![0.0; 4000], vec![0.0; 4000]);
         self::blend(&same, step(6.0), By::Value).values(&points, &mut a);
         of[0].values(&points, &mut b);
-        assert!(
-            a.iter()
-                .zip(&b)
-                .all(|(a, b)| a * b > 0.0 || (a - b).abs() < 1e-9),
-            "{what}"
-        );
+        assert!(a.iter().zip(&b).all(|(a, b)| a * b > 0.0 || (a - b).abs() < 1e-9), "{what}");
     }
 }
 
@@ -385,26 +278,17 @@ fn gradients_blocks_and_bounds_agree_with_values() {
             sides.push(Arc::new(whole));
             for field in sides {
                 let axis: Vec<f64> = (0..25).map(|i| 0.37 * f64::from(i) - 4.1).collect();
-                let block = Block {
-                    axes: [&axis, &axis[..9], &axis[3..12]],
-                };
+                let block = Block { axes: [&axis, &axis[..9], &axis[3..12]] };
                 let mut out = vec![0f32; block.len()];
                 field.fill(&block, &mut out);
                 for (i, v) in out.iter().enumerate() {
                     let p = [axis[i % 25], axis[i / 25 % 9], axis[3 + i / 225]];
                     // Cores in single precision, of up to some ten units.
-                    assert!(
-                        (f64::from(*v) - field.value(p)).abs() < 2e-5,
-                        "{what} {by:?}: {v} {}",
-                        field.value(p)
-                    );
+                    assert!((f64::from(*v) - field.value(p)).abs() < 2e-5, "{what} {by:?}: {v} {}", field.value(p));
                 }
                 for (i, p) in window([0.0; 3], 6.0, 300).into_iter().enumerate() {
                     let size = 0.01 * (i % 90) as f64;
-                    let b = Aabb {
-                        min: p,
-                        max: p.map(|x| x + size),
-                    };
+                    let b = Aabb { min: p, max: p.map(|x| x + size) };
                     let (bound, v) = (field.bound(&b), field.value(p.map(|x| x + 0.6 * size)));
                     assert!(bound.lo <= v && v <= bound.hi, "{what} {by:?}");
                     let (mut v, mut g) = ([0.0], [[0.0; 3]]);
@@ -419,11 +303,7 @@ fn gradients_blocks_and_bounds_agree_with_values() {
                         // Tables are linear from knot to knot: not across a crease.
                         if ((r - v[0]) - (v[0] - l)).abs() < 1e-7 {
                             let slope = (r - l) / (2.0 * h);
-                            assert!(
-                                (g[0][a] - slope).abs() < 2e-2,
-                                "{what} {by:?} at {p:?}: {} {slope}",
-                                g[0][a]
-                            );
+                            assert!((g[0][a] - slope).abs() < 2e-2, "{what} {by:?} at {p:?}: {} {slope}", g[0][a]);
                         }
                     }
                 }
@@ -440,10 +320,7 @@ fn bounds_tell_empty_places_within_transitions() {
             let field = blend(&of, step(30.0), by);
             let (mut told, mut clear) = (0, 0);
             for p in window([0.0; 3], 9.0, 400) {
-                let b = Aabb {
-                    min: p,
-                    max: p.map(|x| x + 0.1),
-                };
+                let b = Aabb { min: p, max: p.map(|x| x + 0.1) };
                 let v = field.value(p.map(|x| x + 0.03));
                 let r = field.bound(&b);
                 assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
@@ -452,10 +329,7 @@ fn bounds_tell_empty_places_within_transitions() {
                 let slope = Field::slope(&field);
                 clear += usize::from(v.abs() > 0.35 * slope);
             }
-            assert!(
-                told > 20 && 4 * told > clear,
-                "{what} {by:?}: {told} of {clear}"
-            );
+            assert!(told > 20 && 4 * told > clear, "{what} {by:?}: {told} of {clear}");
         }
     }
 }
@@ -477,15 +351,8 @@ fn surfaces_of_blends_are_whole() {
 
 #[test]
 fn a_transition_finer_than_the_grid_is_refused() {
-    let of = [
-        share("primitive", Part::Upper, 0.3, 4.0),
-        share("gyroid", Part::Upper, 0.3, 4.0),
-    ];
-    let mut solid = Solid::new(
-        cuboid([-4.0; 3], [4.0; 3]),
-        Some(Arc::new(blend(&of, step(0.2), By::Fraction))),
-        4.0,
-    );
+    let of = [share("primitive", Part::Upper, 0.3, 4.0), share("gyroid", Part::Upper, 0.3, 4.0)];
+    let mut solid = Solid::new(cuboid([-4.0; 3], [4.0; 3]), Some(Arc::new(blend(&of, step(0.2), By::Fraction))), 4.0);
     solid.transition = Some(0.2);
     let fault = surface(&solid, 0.25, &Silent).expect_err("too coarse");
     assert!(format!("{fault:?}").contains("transition"), "{fault:?}");

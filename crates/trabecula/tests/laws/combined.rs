@@ -10,9 +10,7 @@ use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::math::{Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
-use trabecula::region::{
-    Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
-};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
@@ -22,19 +20,11 @@ use super::crease::{angle, ball, block, boxes, creases, cylinder, far, moved, no
 /// A random polyhedron about the origin.
 fn polyhedron(some: &mut Random) -> Arc<MeshRegion> {
     let mut mesh = match some.below(7) {
-        0 => block(
-            some.between(0.6, 1.4),
-            some.between(0.6, 1.4),
-            some.between(0.4, 1.2),
-        ),
+        0 => block(some.between(0.6, 1.4), some.between(0.6, 1.4), some.between(0.4, 1.2)),
         1 => angle(),
         2 => notched(),
         3 => star(3 + some.below(4) as u32),
-        4 => cylinder(
-            3 + some.below(10) as u32,
-            some.between(0.5, 0.9),
-            some.between(0.5, 1.2),
-        ),
+        4 => cylinder(3 + some.below(10) as u32, some.between(0.5, 0.9), some.between(0.5, 1.2)),
         5 => cylinder(200, some.between(0.5, 0.9), some.between(0.5, 1.2)),
         _ => {
             let mut rough = ball(1);
@@ -49,11 +39,7 @@ fn polyhedron(some: &mut Random) -> Arc<MeshRegion> {
     for v in &mut mesh.vertices {
         *v = [0, 1, 2].map(|a| v[a] - center[a]);
     }
-    let turn = if some.share() < 0.2 {
-        [0.0; 3]
-    } else {
-        some.point(180.0)
-    };
+    let turn = if some.share() < 0.2 { [0.0; 3] } else { some.point(180.0) };
     let mesh = moved(mesh, turn, some.point(0.2));
     Arc::new(MeshRegion::new(mesh, Repair::Refuse).expect("clean"))
 }
@@ -67,33 +53,14 @@ fn other(some: &mut Random) -> (&'static str, Region) {
             ("box", cuboid(p, add(p, size)))
         }
         1 | 2 => {
-            let axis = if some.share() < 0.3 {
-                [0.0, 0.0, 1.0]
-            } else {
-                some.point(1.0)
-            };
-            let hole = Cylinder::new(
-                add(p, axis.map(|x| -2.0 * x)),
-                axis,
-                some.between(0.08, 0.4),
-                4.0,
-            );
+            let axis = if some.share() < 0.3 { [0.0, 0.0, 1.0] } else { some.point(1.0) };
+            let hole = Cylinder::new(add(p, axis.map(|x| -2.0 * x)), axis, some.between(0.08, 0.4), 4.0);
             ("cylinder", Arc::new(hole.expect("cylinder")))
         }
-        3 => (
-            "ball",
-            Arc::new(Sphere::new(p, some.between(0.3, 0.8)).expect("ball")),
-        ),
+        3 => ("ball", Arc::new(Sphere::new(p, some.between(0.3, 0.8)).expect("ball"))),
         4 => {
-            let normal = if some.share() < 0.3 {
-                [0.0, 0.0, 1.0]
-            } else {
-                some.point(1.0)
-            };
-            (
-                "half",
-                Arc::new(HalfSpace::new(p.map(|x| 0.5 * x), normal).expect("half-space")),
-            )
+            let normal = if some.share() < 0.3 { [0.0, 0.0, 1.0] } else { some.point(1.0) };
+            ("half", Arc::new(HalfSpace::new(p.map(|x| 0.5 * x), normal).expect("half-space")))
         }
         _ => {
             let mut mesh = polyhedron(some);
@@ -130,11 +97,7 @@ fn design(case: u64) -> Option<Design> {
     }
     let way = if way > 2 && kind == "half" { 1 } else { way };
     let own = mesh.clone() as Region;
-    let (first, second) = if way == 3 {
-        (beside.clone(), own.clone())
-    } else {
-        (own.clone(), beside.clone())
-    };
+    let (first, second) = if way == 3 { (beside.clone(), own.clone()) } else { (own.clone(), beside.clone()) };
     let pair = vec![first, second];
     let region: Region = match way {
         0 => Arc::new(Union::new(pair).expect("union")),
@@ -158,28 +121,12 @@ fn design(case: u64) -> Option<Design> {
         let tree = beside.clone().faces(0.0, &mut faces);
         solid = solid.with(Body { faces, tree });
     }
-    Some(Design {
-        mesh,
-        beside,
-        kind,
-        way,
-        region,
-        field,
-        skinned: inside == 3,
-        solid,
-        edge,
-    })
+    Some(Design { mesh, beside, kind, way, region, field, skinned: inside == 3, solid, edge })
 }
 
 impl Design {
     fn name(&self) -> String {
-        let verbs = [
-            "union",
-            "difference",
-            "intersection",
-            "taken from",
-            "kept in it",
-        ];
+        let verbs = ["union", "difference", "intersection", "taken from", "kept in it"];
         format!("{} {}", verbs[self.way], self.kind)
     }
 
@@ -282,11 +229,7 @@ fn tiles_agree_on_combined_meshes() {
 /// Boxes of a grid, those of one and of another body: all that is made of both is known exactly.
 #[test]
 fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
-    let at: [&[f64]; 3] = [
-        &[0.0, 0.5, 1.0, 1.6],
-        &[0.0, 0.3, 0.75, 1.0],
-        &[0.0, 0.35, 0.8, 1.3],
-    ];
+    let at: [&[f64]; 3] = [&[0.0, 0.5, 1.0, 1.6], &[0.0, 0.3, 0.75, 1.0], &[0.0, 0.35, 0.8, 1.3]];
     let in_one = |c: [usize; 3]| c[0] < 2 && c[2] < 2;
     let in_other = |c: [usize; 3]| c[0] > 0 && c[1] == 1 && c[2] > 0;
     for turn in [[0.0; 3], [17.0, 31.0, 47.0]] {
@@ -297,8 +240,7 @@ fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
         let mut both = one.clone();
         let first = both.vertices.len() as u32;
         both.vertices.extend(&other.vertices);
-        both.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| first + v)));
+        both.triangles.extend(other.triangles.iter().map(|t| t.map(|v| first + v)));
         let pair = || -> Vec<Region> {
             let all = [one.clone(), other.clone()];
             all.map(|m| region(m, Repair::Refuse) as Region).to_vec()
@@ -322,9 +264,7 @@ fn meshes_made_one_have_the_edges_of_the_exact_boundary() {
             let [found, direct] = [made.clone(), truth.clone()].map(|r| of(r, edge));
             check(name, &found);
             let [share, least] = [&found, &direct].map(|s| far(&truth, &s.mesh, edge));
-            println!(
-                "{name} {turn:?}: {share:.4} of the edges are off, {least:.4} of the exact boundary's"
-            );
+            println!("{name} {turn:?}: {share:.4} of the edges are off, {least:.4} of the exact boundary's");
             // The triangles differ, and with them what rounding does to a few cells.
             assert!(share < least + 0.01, "{name}: {share}, {least}");
         }
@@ -371,9 +311,7 @@ fn rims_of_holes_come_to_second_order() {
         check("a drilled block", &s);
         // Rims are where triangles that lie in one of the two faces of the block meet others: as far as points keep away
         // from nodes of the grid, and not at the block's own edges.
-        let places: Vec<Vec3> = (s.mesh.vertices.iter())
-            .map(|p| axes.map(|a| dot(a, sub(*p, center))))
-            .collect();
+        let places: Vec<Vec3> = (s.mesh.vertices.iter()).map(|p| axes.map(|a| dot(a, sub(*p, center)))).collect();
         let flat = |v: &u32| (places[*v as usize][2].abs() - half[2]).abs() < 1e-3 / n;
         let mut rims = HashSet::new();
         for t in s.mesh.triangles.iter().filter(|t| t.iter().all(flat)) {

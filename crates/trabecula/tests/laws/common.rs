@@ -14,9 +14,7 @@ use trabecula::map::{Affine, Map};
 use trabecula::math::Vec3;
 use trabecula::measure::{non_manifold_vertices, self_intersections, size};
 use trabecula::mesh::Mesh;
-use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union,
-};
+use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
 
 pub fn ball(center: Vec3, radius: f64) -> Region {
@@ -29,9 +27,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Region {
 
 /// Regions of all kinds, by three numbers about one.
 pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
-    let cylinder = |axis| {
-        Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region
-    };
+    let cylinder = |axis| Arc::new(Cylinder::new([s, -s, -t], axis, r * 0.7, 1.0 + t).expect("cylinder")) as Region;
     let block = || cuboid([-r, -1.0, -t], [t, r, 1.0]);
     match kind {
         0 => block(),
@@ -39,9 +35,7 @@ pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
         2 => cylinder([0.0, 0.0, 1.0]),
         3 => cylinder([0.3, 0.2 + s, 1.0]),
         4 => Arc::new(Union::new(vec![block(), ball([0.0; 3], r)]).expect("union")),
-        5 => {
-            Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference"))
-        }
+        5 => Arc::new(Difference::new(vec![block(), cylinder([1.0, 0.0, 0.0])]).expect("difference")),
         _ => {
             let half = HalfSpace::new([s, 0.0, 0.1], [s, 1.0, 0.5]).expect("half-space");
             let parts = vec![ball([0.0; 3], r), Arc::new(half) as Region];
@@ -51,25 +45,13 @@ pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
 }
 
 /// A named cell at a fraction, through a rigid map.
-pub fn lattice(
-    name: &str,
-    part: Part,
-    fraction: f64,
-    wavelength: Vec3,
-    rotate: Vec3,
-) -> Arc<dyn Field> {
+pub fn lattice(name: &str, part: Part, fraction: f64, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Field> {
     let level = Level::Fraction(Grade::Constant(fraction));
     lattice_at(name, part, level, wavelength, rotate)
 }
 
 /// The same at any level.
-pub fn lattice_at(
-    name: &str,
-    part: Part,
-    level: Level,
-    wavelength: Vec3,
-    rotate: Vec3,
-) -> Arc<dyn Field> {
+pub fn lattice_at(name: &str, part: Part, level: Level, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Field> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
     Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
@@ -87,13 +69,7 @@ pub struct Drawn {
 
 impl Drawn {
     pub fn lattice(&self) -> Arc<dyn Field> {
-        lattice(
-            self.name,
-            self.part,
-            self.fraction,
-            self.wavelength,
-            self.rotate,
-        )
+        lattice(self.name, self.part, self.fraction, self.wavelength, self.rotate)
     }
 }
 
@@ -117,10 +93,7 @@ pub fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
 /// The mesh as files in single precision hold it; −0 is 0.
 pub fn rounded(mesh: &Mesh) -> Mesh {
     let place = |v: &Vec3| v.map(|x| f64::from(x as f32) + 0.0);
-    Mesh {
-        vertices: mesh.vertices.iter().map(place).collect(),
-        triangles: mesh.triangles.clone(),
-    }
+    Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone() }
 }
 
 /// What keeps a mesh, as its file holds it, from bounding a solid.

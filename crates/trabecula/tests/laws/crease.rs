@@ -9,9 +9,7 @@ use trabecula::extract::{Silent, Surface, surface};
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
-use trabecula::math::{
-    Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit,
-};
+use trabecula::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use trabecula::mesh::Mesh;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;
@@ -35,10 +33,7 @@ pub fn moved(mut mesh: Mesh, degrees: Vec3, by: Vec3) -> Mesh {
 fn prism(polygon: &[[f64; 2]], fan: &[[usize; 3]], height: f64) -> Mesh {
     let n = polygon.len() as u32;
     let at = |z: f64| polygon.iter().map(move |p| [p[0], p[1], z]);
-    let mut mesh = Mesh {
-        vertices: at(0.0).chain(at(height)).collect(),
-        triangles: Vec::new(),
-    };
+    let mut mesh = Mesh { vertices: at(0.0).chain(at(height)).collect(), triangles: Vec::new() };
     for t in fan {
         let [a, b, c] = t.map(|v| v as u32);
         mesh.triangles.extend([[a, c, b], [a + n, b + n, c + n]]);
@@ -60,14 +55,7 @@ pub fn block(x: f64, y: f64, z: f64) -> Mesh {
 
 /// An L; its inner edge is concave, and so is one of the three edges at that edge's ends.
 pub fn angle() -> Mesh {
-    let polygon = [
-        [0.0, 0.0],
-        [2.0, 0.0],
-        [2.0, 0.8],
-        [0.7, 0.8],
-        [0.7, 1.9],
-        [0.0, 1.9],
-    ];
+    let polygon = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.8], [0.7, 0.8], [0.7, 1.9], [0.0, 1.9]];
     prism(&polygon, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 0.9)
 }
 
@@ -78,11 +66,7 @@ pub fn boxes(at: [&[f64]; 3], full: impl Fn([usize; 3]) -> bool) -> Mesh {
     let mut mesh = Mesh::default();
     let mut names = HashMap::new();
     for n in 0..cells.iter().product() {
-        let c = [
-            n % cells[0],
-            n / cells[0] % cells[1],
-            n / cells[0] / cells[1],
-        ];
+        let c = [n % cells[0], n / cells[0] % cells[1], n / cells[0] / cells[1]];
         for (axis, up) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let mut beside = c;
             beside[axis] = c[axis].wrapping_add(if up { 1 } else { usize::MAX });
@@ -144,9 +128,7 @@ pub fn creases(mesh: &Mesh, degrees: f64, apart: f64) -> Vec<Vec3> {
 /// How far the edges of a region are from a mesh, and points of the mesh from the region.
 fn apart(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> [f64; 2] {
     let found = region(mesh.clone());
-    let farthest = |r: &MeshRegion, points: &[Vec3]| {
-        points.iter().map(|p| r.value(*p).abs()).fold(0.0, f64::max)
-    };
+    let farthest = |r: &MeshRegion, points: &[Vec3]| points.iter().map(|p| r.value(*p).abs()).fold(0.0, f64::max);
     let middles: Vec<Vec3> = (0..mesh.triangles.len())
         .flat_map(|i| {
             let [a, b, c] = mesh.corners(i);
@@ -154,10 +136,7 @@ fn apart(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> [f64; 2] {
             [a, middle(a, b), middle(b, c), middle(c, a)]
         })
         .collect();
-    [
-        farthest(&found, &creases(truth.mesh(), 30.0, edge / 4.0)),
-        farthest(truth, &middles),
-    ]
+    [farthest(&found, &creases(truth.mesh(), 30.0, edge / 4.0)), farthest(truth, &middles)]
 }
 
 /// A mesh whose edges nobody knows of: what comes of it has them rounded off.
@@ -204,9 +183,7 @@ impl Shape for Rounded {
 pub fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     let found = region(mesh.clone());
     let points = creases(truth.mesh(), 30.0, edge / 4.0);
-    let far = points
-        .iter()
-        .filter(|p| found.value(**p).abs() > edge / 100.0);
+    let far = points.iter().filter(|p| found.value(**p).abs() > edge / 100.0);
     far.count() as f64 / points.len() as f64
 }
 
@@ -266,14 +243,8 @@ fn polyhedra_keep_their_edges() {
                     before.map(|x| x / edge)
                 );
                 // Points keep 1/4096 of a step away from nodes, and a corner sees three of them.
-                assert!(
-                    off.iter().all(|x| *x < edge * 3.0 / 4096.0),
-                    "{name}: {off:?}"
-                );
-                assert!(
-                    off[0] <= before[0] && off[1] <= before[1] + 1e-9 * edge,
-                    "{name}"
-                );
+                assert!(off.iter().all(|x| *x < edge * 3.0 / 4096.0), "{name}: {off:?}");
+                assert!(off[0] <= before[0] && off[1] <= before[1] + 1e-9 * edge, "{name}");
                 assert!(share < 0.01 && rounded > 0.7, "{name}: {share}, {rounded}");
             }
         }
@@ -308,11 +279,7 @@ fn in_lattice(truth: &MeshRegion, field: &dyn Field, mesh: &Mesh, edge: f64) -> 
 
 #[test]
 fn edges_are_kept_where_a_lattice_meets_them() {
-    for (name, mesh) in [
-        ("angle", angle()),
-        ("notched", notched()),
-        ("star", star(5)),
-    ] {
+    for (name, mesh) in [("angle", angle()), ("notched", notched()), ("star", star(5))] {
         for (cell, part) in [("gyroid", Part::Sheet), ("diamond", Part::Lower)] {
             let truth = region(moved(mesh.clone(), [17.0, 31.0, 47.0], [0.11, -0.07, 0.05]));
             let field = lattice(cell, part, 0.4, [0.6; 3], [0.0; 3]);
@@ -330,10 +297,7 @@ fn edges_are_kept_where_a_lattice_meets_them() {
             };
             let [kept, rounded] = [&s, &round].map(share);
             println!("{name}, {cell}: {kept:.3} of the edges are off, {rounded:.3} rounded");
-            assert!(
-                kept < 0.01 && rounded > 0.7,
-                "{name}, {cell}: {kept}, {rounded}"
-            );
+            assert!(kept < 0.01 && rounded > 0.7, "{name}, {cell}: {kept}, {rounded}");
         }
     }
 }
@@ -351,9 +315,7 @@ fn rims_with_a_lattice_come_to_second_order() {
         off.sort_by(f64::total_cmp);
         off[off.len() * 19 / 20]
     });
-    println!(
-        "19 of 20 points of the rims of a cylinder with a gyroid, at 15, 30, 60 steps: {errors:?}"
-    );
+    println!("19 of 20 points of the rims of a cylinder with a gyroid, at 15, 30, 60 steps: {errors:?}");
     assert!(errors[2] < errors[0] / 9.0, "{errors:?}");
 }
 
@@ -373,14 +335,8 @@ fn random_boxes_with_thin_walls_and_gaps_keep_every_guarantee() {
         let at = [planes(), planes(), planes()];
         let share = some.between(0.5, 0.9);
         let full: Vec<bool> = (0..27).map(|_| some.share() < share).collect();
-        let mesh = boxes(at.each_ref().map(|a| &a[..]), |[i, j, k]| {
-            full[i + 3 * j + 9 * k]
-        });
-        let turn = if done % 4 == 0 {
-            [0.0; 3]
-        } else {
-            some.point(180.0)
-        };
+        let mesh = boxes(at.each_ref().map(|a| &a[..]), |[i, j, k]| full[i + 3 * j + 9 * k]);
+        let turn = if done % 4 == 0 { [0.0; 3] } else { some.point(180.0) };
         let edge = some.between(0.03, 0.1);
         let Ok(truth) = MeshRegion::new(moved(mesh, turn, [0.1, 0.2, 0.3]), Repair::Refuse) else {
             continue;
@@ -406,10 +362,7 @@ fn both(what: &str, truth: Arc<MeshRegion>, edge: f64, some: &mut Random) -> f64
     println!("{what}: {off:.3} steps, {before:.3} rounded");
     // One lattice bare, the other with a skin; all four in a campaign.
     let all = cases(1) > 1;
-    for (cell, part, skinned) in [
-        ("gyroid", Part::Sheet, false),
-        ("diamond", Part::Lower, true),
-    ] {
+    for (cell, part, skinned) in [("gyroid", Part::Sheet, false), ("diamond", Part::Lower, true)] {
         let field = lattice(cell, part, 0.3, [0.5; 3], some.point(90.0));
         let filled = Solid::new(truth.clone(), Some(field), 0.5);
         if all || !skinned {
@@ -437,25 +390,18 @@ pub fn ball(n: usize) -> Mesh {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut mesh = Mesh::default();
     for (a, b) in [(1.0, g), (1.0, -g), (-1.0, g), (-1.0, -g)] {
-        mesh.vertices
-            .extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
+        mesh.vertices.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
     }
     // Corners are neighbours at the least distance, which is 2.
     let near = |v: &[Vec3], i: usize, j: usize| {
         let d = sub(v[i], v[j]);
         (d.iter().map(|x| x * x).sum::<f64>() - 4.0).abs() < 1e-9
     };
-    for (i, j, k) in
-        (0..12).flat_map(|i| (0..12).flat_map(move |j| (0..12).map(move |k| (i, j, k))))
-    {
+    for (i, j, k) in (0..12).flat_map(|i| (0..12).flat_map(move |j| (0..12).map(move |k| (i, j, k)))) {
         let v = &mesh.vertices;
         let right = {
             let (p, q, r) = (v[i], v[j], v[k]);
-            let n = [
-                q[1] * r[2] - q[2] * r[1],
-                q[2] * r[0] - q[0] * r[2],
-                q[0] * r[1] - q[1] * r[0],
-            ];
+            let n = [q[1] * r[2] - q[2] * r[1], q[2] * r[0] - q[0] * r[2], q[0] * r[1] - q[1] * r[0]];
             n.iter().zip(p).map(|(a, b)| a * b).sum::<f64>() > 0.0
         };
         if i < j && i < k && right && near(v, i, j) && near(v, j, k) && near(v, i, k) {
@@ -473,8 +419,7 @@ pub fn ball(n: usize) -> Mesh {
                     mesh.vertices.len() as u32 - 1
                 })
             });
-            mesh.triangles
-                .extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
+            mesh.triangles.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
         }
         for v in &mut mesh.vertices {
             let l = v.iter().map(|x| x * x).sum::<f64>().sqrt();

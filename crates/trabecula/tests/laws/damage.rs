@@ -31,17 +31,11 @@ fn block(n: i32) -> Mesh {
                             mesh.vertices.len() as u32 - 1
                         })
                     };
-                    let mut q = [
-                        name(i, j),
-                        name(i + 1, j),
-                        name(i + 1, j + 1),
-                        name(i, j + 1),
-                    ];
+                    let mut q = [name(i, j), name(i + 1, j), name(i + 1, j + 1), name(i, j + 1)];
                     if side == 0 {
                         q.reverse();
                     }
-                    mesh.triangles
-                        .extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+                    mesh.triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
                 }
             }
         }
@@ -59,11 +53,9 @@ fn ring(n: u32, m: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..n {
         for j in 0..m {
-            let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)]
-                .map(|t| t * std::f64::consts::TAU);
+            let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)].map(|t| t * std::f64::consts::TAU);
             let r = 0.8 + 0.35 * v.cos();
-            mesh.vertices
-                .push([r * u.cos(), r * u.sin(), 0.35 * v.sin()]);
+            mesh.vertices.push([r * u.cos(), r * u.sin(), 0.35 * v.sin()]);
             let at = |i: u32, j: u32| (i % n) * m + j % m;
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
@@ -186,11 +178,7 @@ impl Victim {
                 }
             }
             "patch lost" => {
-                let most = if some.share() < 0.2 {
-                    count / 5
-                } else {
-                    count / 40
-                };
+                let most = if some.share() < 0.2 { count / 5 } else { count / 40 };
                 let patch = 2 + some.below(most);
                 self.lose(some, patch);
             }
@@ -212,11 +200,7 @@ impl Victim {
             "duplicates" => {
                 for _ in 0..1 + some.below(40) {
                     let [a, b, c] = self.mesh.triangles[some.below(count)];
-                    let copy = if some.share() < 0.5 {
-                        [b, c, a]
-                    } else {
-                        [b, a, c]
-                    };
+                    let copy = if some.share() < 0.5 { [b, c, a] } else { [b, a, c] };
                     self.mesh.triangles.push(copy);
                 }
             }
@@ -254,9 +238,7 @@ impl Victim {
                 // Within the solid, facing out (it changes nothing) or in (a cavity).
                 let cavity = some.share() < 0.5;
                 let (at, clear) = self.inside;
-                let mut body = each(block(1 + some.below(3) as i32), |v| {
-                    add(scale(v, 0.3 * clear), at)
-                });
+                let mut body = each(block(1 + some.below(3) as i32), |v| add(scale(v, 0.3 * clear), at));
                 if cavity {
                     body.triangles.iter_mut().for_each(|t| t.swap(0, 1));
                     join(&mut self.truth, &body);
@@ -271,9 +253,7 @@ impl Victim {
                 let tip = self.mesh.vertices.len() as u32;
                 self.mesh.vertices.push(self.inside.0);
                 let own: Vec<[u32; 3]> = patch.iter().map(|i| self.mesh.triangles[*i]).collect();
-                let sides = own
-                    .iter()
-                    .flat_map(|t| [0, 1, 2].map(|k| (t[k], t[(k + 1) % 3])));
+                let sides = own.iter().flat_map(|t| [0, 1, 2].map(|k| (t[k], t[(k + 1) % 3])));
                 let sides: HashSet<(u32, u32)> = sides.collect();
                 let rim = sides.iter().filter(|(a, b)| !sides.contains(&(*b, *a)));
                 let mut walls: Vec<[u32; 3]> = rim.map(|(a, b)| [*b, *a, tip]).collect();
@@ -327,15 +307,8 @@ fn run(seed: u64) -> (Vec<&'static str>, Result<End, String>) {
         kinds.retain(|k| !["inner body", "flipped"].contains(k));
     }
     kinds.sort_by_key(|k| KINDS[..3].iter().position(|f| f == k).unwrap_or(3));
-    let mut victim = Victim {
-        truth: mesh.clone(),
-        mesh,
-        inside: (at, clear),
-        slack: 0.0,
-        margin: 0.0,
-        missing: 0.0,
-        broken: false,
-    };
+    let mut victim =
+        Victim { truth: mesh.clone(), mesh, inside: (at, clear), slack: 0.0, margin: 0.0, missing: 0.0, broken: false };
     for kind in &kinds {
         victim.damage(kind, &mut some);
     }
@@ -362,11 +335,7 @@ fn judge(victim: Victim) -> Result<End, String> {
     let rounding = 1e-9 * size * area;
     let share = (got - want).abs() / (victim.slack + rounding);
     if share > 1.0 {
-        return Err(format!(
-            "volume {got}, not {want} within {:e}: {:?}",
-            victim.slack,
-            region.repaired()
-        ));
+        return Err(format!("volume {got}, not {want} within {:e}: {:?}", victim.slack, region.repaired()));
     }
     // Inside and outside are where they were.
     let mut some = Random(7);
@@ -380,13 +349,7 @@ fn judge(victim: Victim) -> Result<End, String> {
     }
     let shared: Arc<dyn Shape> = Arc::new(region);
     let wavelength = size / some.between(3.0, 6.0);
-    let field = lattice(
-        "gyroid",
-        Part::Sheet,
-        0.4,
-        [wavelength; 3],
-        [11.0, 22.0, 33.0],
-    );
+    let field = lattice("gyroid", Part::Sheet, 0.4, [wavelength; 3], [11.0, 22.0, 33.0]);
     for (what, field) in [("full", None), ("gyroid", Some(field))] {
         let edge = wavelength / some.between(4.0, 9.0);
         let full = field.is_none();

@@ -10,10 +10,7 @@ struct Files(HashMap<String, Vec<u8>>);
 
 impl Loader for Files {
     fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-        self.0
-            .get(path)
-            .cloned()
-            .ok_or_else(|| format!("there is no file {path}"))
+        self.0.get(path).cloned().ok_or_else(|| format!("there is no file {path}"))
     }
 }
 
@@ -32,12 +29,7 @@ fn npy(shape: [usize; 3], value: impl Fn([usize; 3]) -> f64) -> Vec<u8> {
 }
 
 /// A box of hexahedra with arrays of points: `rho` a number, `S` a tensor, `v` a vector; and of cells: `c`.
-fn vtu(
-    size: Vec3,
-    n: usize,
-    rho: impl Fn(Vec3) -> f64,
-    tensor: impl Fn(Vec3) -> [f64; 6],
-) -> Vec<u8> {
+fn vtu(size: Vec3, n: usize, rho: impl Fn(Vec3) -> f64, tensor: impl Fn(Vec3) -> [f64; 6]) -> Vec<u8> {
     let m = n + 1;
     let points: Vec<Vec3> = (0..m * m * m)
         .map(|i| [i % m, i / m % m, i / m / m])
@@ -79,47 +71,22 @@ fn vtu(
 fn files() -> Files {
     let mut all = HashMap::new();
     let mut put = |name: &str, bytes: Vec<u8>| all.insert(name.to_string(), bytes);
-    put(
-        "good.npy",
-        npy([9, 9, 9], |[i, j, k]| {
-            0.2 + 0.03 * i as f64 + 0.01 * j as f64 - 0.005 * k as f64
-        }),
-    );
-    put(
-        "nan.npy",
-        npy([9, 9, 9], |at| if at == [3, 2, 1] { f64::NAN } else { 0.3 }),
-    );
-    put(
-        "flat.npy",
-        b"\x93NUMPY\x01\x00\x39\x00{'descr': '<f8', 'fortran_order': False, 'shape': (0,), }\n"
-            .to_vec(),
-    );
-    put(
-        "good.csv",
-        b"x,y,z,value\n0,0,0,0.2\n8,0,0,0.3\n0,8,0,0.4\n8,8,8,0.5\n".to_vec(),
-    );
+    put("good.npy", npy([9, 9, 9], |[i, j, k]| 0.2 + 0.03 * i as f64 + 0.01 * j as f64 - 0.005 * k as f64));
+    put("nan.npy", npy([9, 9, 9], |at| if at == [3, 2, 1] { f64::NAN } else { 0.3 }));
+    put("flat.npy", b"\x93NUMPY\x01\x00\x39\x00{'descr': '<f8', 'fortran_order': False, 'shape': (0,), }\n".to_vec());
+    put("good.csv", b"x,y,z,value\n0,0,0,0.2\n8,0,0,0.3\n0,8,0,0.4\n8,8,8,0.5\n".to_vec());
     put("bad.csv", b"0 0 0 0.2\n1 2 three 0.3\n".to_vec());
     let rho = |p: Vec3| 0.2 + 0.02 * p[0] + 0.01 * p[1];
     // Principal directions turn about z by 5 degrees for each mm along x; the greatest and the least stress change places.
     let tensor = |p: Vec3| {
         let (s, c) = (5.0 * p[0]).to_radians().sin_cos();
         let (a, b) = (10.0 - 2.6 * p[1], 1.0);
-        [
-            a * c * c + b * s * s,
-            a * s * s + b * c * c,
-            -6.0,
-            (a - b) * s * c,
-            0.0,
-            0.0,
-        ]
+        [a * c * c + b * s * s, a * s * s + b * c * c, -6.0, (a - b) * s * c, 0.0, 0.0]
     };
     put("result.vtu", vtu([8.0; 3], 8, rho, tensor));
     put("short.vtu", vtu([6.0, 8.0, 8.0], 8, rho, tensor));
     put("nan.vtu", vtu([8.0; 3], 4, |_| f64::NAN, tensor));
-    put(
-        "broken.vtu",
-        b"<VTKFile type=\"PolyData\"></VTKFile>".to_vec(),
-    );
+    put("broken.vtu", b"<VTKFile type=\"PolyData\"></VTKFile>".to_vec());
     Files(all)
 }
 
@@ -151,11 +118,7 @@ fn agrees(level: &str, within: f64, want: impl Fn(Vec3) -> f64) {
     let mut found = vec![0.0; points.len()];
     built.lattices[0].1.fractions(&points, &mut found);
     for (p, v) in points.iter().zip(found) {
-        assert!(
-            (v - want(*p)).abs() < within,
-            "{level}: {v} for {} at {p:?}",
-            want(*p)
-        );
+        assert!((v - want(*p)).abs() < within, "{level}: {v} for {} at {p:?}", want(*p));
     }
 }
 
@@ -164,26 +127,19 @@ fn numbers_from_files_are_where_they_belong() {
     let straight = |p: Vec3| 0.2 + 0.03 * p[0] + 0.01 * p[1] - 0.005 * p[2];
     let grid = "grid = { path = \"good.npy\", origin = [0, 0, 0], step = 1 }";
     agrees(&format!("fraction = {{ {grid} }}"), 1e-12, straight);
-    agrees(&format!("porosity = {{ {grid} }}"), 1e-12, |p| {
-        1.0 - straight(p)
-    });
-    let remap = "fraction = { grid = { path = \"good.npy\", origin = [0, 0, 0], step = 1, remap = [[0, 0.1], [1, 0.6]] } }";
+    agrees(&format!("porosity = {{ {grid} }}"), 1e-12, |p| 1.0 - straight(p));
+    let remap =
+        "fraction = { grid = { path = \"good.npy\", origin = [0, 0, 0], step = 1, remap = [[0, 0.1], [1, 0.6]] } }";
     agrees(remap, 1e-12, |p| 0.1 + 0.5 * straight(p));
-    agrees(
-        "fraction = { radial = { center = [1, 2, 3], stops = [[0, 0.2], [20, 0.6]] } }",
-        1e-12,
-        |[x, y, z]| 0.2 + 0.02 * ((x - 1.0).powi(2) + (y - 2.0).powi(2) + (z - 3.0).powi(2)).sqrt(),
-    );
-    agrees(
-        "fraction = { radial = { axis = [0, 0, 2], stops = [[0, 0.2], [20, 0.6]] } }",
-        1e-12,
-        |[x, y, _]| 0.2 + 0.02 * x.hypot(y),
-    );
-    agrees(
-        "fraction = { field = { path = \"result.vtu\", array = \"rho\" } }",
-        1e-9,
-        |p| 0.2 + 0.02 * p[0] + 0.01 * p[1],
-    );
+    agrees("fraction = { radial = { center = [1, 2, 3], stops = [[0, 0.2], [20, 0.6]] } }", 1e-12, |[x, y, z]| {
+        0.2 + 0.02 * ((x - 1.0).powi(2) + (y - 2.0).powi(2) + (z - 3.0).powi(2)).sqrt()
+    });
+    agrees("fraction = { radial = { axis = [0, 0, 2], stops = [[0, 0.2], [20, 0.6]] } }", 1e-12, |[x, y, _]| {
+        0.2 + 0.02 * x.hypot(y)
+    });
+    agrees("fraction = { field = { path = \"result.vtu\", array = \"rho\" } }", 1e-9, |p| {
+        0.2 + 0.02 * p[0] + 0.01 * p[1]
+    });
     // Cells' values at their corners and between: half a step off at the faces.
     agrees(
         "fraction = { field = { path = \"result.vtu\", array = \"c\", remap = [[0.2, 0.3], [0.8, 0.6]] } }",
@@ -199,15 +155,11 @@ fn numbers_from_files_are_where_they_belong() {
 /// The lattice follows the principal directions of a stress whose axes turn, also where they change places.
 #[test]
 fn principal_directions_are_followed() {
-    let map =
-        "phase = { wavelength = 2, stress = { field = { path = \"result.vtu\", array = \"S\" } } }";
+    let map = "phase = { wavelength = 2, stress = { field = { path = \"result.vtu\", array = \"S\" } } }";
     let built = design("fraction = 0.3", map).unwrap_or_else(|e| panic!("{e}"));
     let report = built.report();
     let d = &report["lattices"]["a"]["distortion"];
-    assert!(
-        d["turn"].as_f64().expect("turn") < 30.0 && d["outside"] == 0.0,
-        "{d}"
-    );
+    assert!(d["turn"].as_f64().expect("turn") < 30.0 && d["outside"] == 0.0, "{d}");
     let turned = "phase = { wavelength = 2, rotate_z = { formula = \"5*x\" } }";
     let same = design("fraction = 0.3", turned).expect("built");
     // The same gratings up to names and signs, which leave |det J| alone.
@@ -216,20 +168,12 @@ fn principal_directions_are_followed() {
     // nodes is rough.
     for p in places().filter(|p| (p[1] - 9.0 / 2.6).abs() > 1.5) {
         let det = |m: &trabecula::map::Map| trabecula::math::determinant(&m.jacobian(p));
-        assert!(
-            (det(a) / det(b) - 1.0).abs() < 0.05,
-            "{} {}",
-            det(a),
-            det(b)
-        );
+        assert!((det(a) / det(b) - 1.0).abs() < 0.05, "{} {}", det(a), det(b));
     }
     let map = "phase = { wavelength = 2, direction = { field = { path = \"result.vtu\", array = \"v\" } } }";
     let built = design("fraction = 0.3", map).unwrap_or_else(|e| panic!("{e}"));
     let j = built.lattices[0].1.map.jacobian([4.0; 3]);
-    assert!(
-        (j[2][0] - 0.3).abs() < 1e-9 && (j[2][2] - 0.4).abs() < 1e-9,
-        "{j:?}"
-    );
+    assert!((j[2][0] - 0.3).abs() < 1e-9 && (j[2][2] - 0.4).abs() < 1e-9, "{j:?}");
     assert!(built.solid.value([4.0; 3]).is_finite());
 }
 
@@ -242,118 +186,51 @@ fn bad_files_are_refused_with_what_is_wrong() {
             assert!(e.message.contains(w), "{w}: {e}");
         }
     };
-    let grid =
-        |file: &str, rest: &str| format!("fraction = {{ grid = {{ path = \"{file}\"{rest} }} }}");
+    let grid = |file: &str, rest: &str| format!("fraction = {{ grid = {{ path = \"{file}\"{rest} }} }}");
     let placed = ", origin = [0, 0, 0], step = 1";
     let at = "level.fraction.grid.path";
-    says(
-        &grid("nan.npy", placed),
-        PLAIN,
-        at,
-        &["nan.npy", "1 of 729 numbers is not finite", "(3, 2, 1)"],
-    );
+    says(&grid("nan.npy", placed), PLAIN, at, &["nan.npy", "1 of 729 numbers is not finite", "(3, 2, 1)"]);
     says(&grid("gone.npy", placed), PLAIN, at, &["there is no file"]);
-    says(
-        &grid("flat.npy", placed),
-        PLAIN,
-        at,
-        &["shape [0]", "three dimensions"],
-    );
+    says(&grid("flat.npy", placed), PLAIN, at, &["shape [0]", "three dimensions"]);
     says(&grid("good.csv", placed), PLAIN, at, &["must end in npy"]);
+    says(&grid("good.npy", ", origin = [0, 0, 0]"), PLAIN, "level.fraction.grid.step", &["step"]);
+    says(&grid("good.npy", ", origin = [0, 0, 0], step = 0.8"), PLAIN, at, &["does not cover", "% of the region"]);
     says(
-        &grid("good.npy", ", origin = [0, 0, 0]"),
-        PLAIN,
-        "level.fraction.grid.step",
-        &["step"],
-    );
-    says(
-        &grid("good.npy", ", origin = [0, 0, 0], step = 0.8"),
-        PLAIN,
-        at,
-        &["does not cover", "% of the region"],
-    );
-    says(
-        &grid(
-            "good.npy",
-            ", origin = [0, 0, 0], step = 1, remap = [[0, 0.1], [1, 7]]",
-        ),
+        &grid("good.npy", ", origin = [0, 0, 0], step = 1, remap = [[0, 0.1], [1, 7]]"),
         PLAIN,
         "level.fraction.grid",
         &["less than 1"],
     );
-    says(
-        "fraction = { points = { path = \"bad.csv\" } }",
-        PLAIN,
-        "level.fraction.points.path",
-        &["line 2", "three"],
-    );
-    let field = |file: &str, array: &str| {
-        format!("fraction = {{ field = {{ path = \"{file}\", array = \"{array}\" }} }}")
-    };
+    says("fraction = { points = { path = \"bad.csv\" } }", PLAIN, "level.fraction.points.path", &["line 2", "three"]);
+    let field =
+        |file: &str, array: &str| format!("fraction = {{ field = {{ path = \"{file}\", array = \"{array}\" }} }}");
     says(
         &field("result.vtu", "mises"),
         PLAIN,
         "level.fraction.field.array",
-        &[
-            "no array \"mises\"",
-            "\"rho\" (1 number each, of points)",
-            "\"S\" (6 numbers each",
-            "\"c\"",
-        ],
+        &["no array \"mises\"", "\"rho\" (1 number each, of points)", "\"S\" (6 numbers each", "\"c\""],
     );
-    says(
-        &field("result.vtu", "S"),
-        PLAIN,
-        "level.fraction.field.component",
-        &["6 components"],
-    );
+    says(&field("result.vtu", "S"), PLAIN, "level.fraction.field.component", &["6 components"]);
     says(
         &field("short.vtu", "rho"),
         PLAIN,
         "level.fraction.field.path",
         &["does not cover", "% of the region", "[6.0, 8.0, 8.0]"],
     );
-    says(
-        &field("nan.vtu", "rho"),
-        PLAIN,
-        "level.fraction.field.array",
-        &["125 of 125 numbers", "not finite"],
-    );
-    says(
-        &field("broken.vtu", "rho"),
-        PLAIN,
-        "level.fraction.field.path",
-        &["PolyData"],
-    );
+    says(&field("nan.vtu", "rho"), PLAIN, "level.fraction.field.array", &["125 of 125 numbers", "not finite"]);
+    says(&field("broken.vtu", "rho"), PLAIN, "level.fraction.field.path", &["PolyData"]);
     let stress = |array: &str| {
-        format!(
-            "phase = {{ wavelength = 2, stress = {{ field = {{ path = \"result.vtu\", array = \"{array}\" }} }} }}"
-        )
+        format!("phase = {{ wavelength = 2, stress = {{ field = {{ path = \"result.vtu\", array = \"{array}\" }} }} }}")
     };
-    says(
-        "fraction = 0.3",
-        &stress("sigma"),
-        "map.phase.stress.field.array",
-        &["no array \"sigma\"", "\"S\""],
-    );
-    says(
-        "fraction = 0.3",
-        &stress("v"),
-        "map.phase.stress.field.array",
-        &["3 components", "six or nine"],
-    );
+    says("fraction = 0.3", &stress("sigma"), "map.phase.stress.field.array", &["no array \"sigma\"", "\"S\""]);
+    says("fraction = 0.3", &stress("v"), "map.phase.stress.field.array", &["3 components", "six or nine"]);
     says(
         "fraction = 0.3",
         "phase = { wavelength = 2, rotate_z = 3, direction = [0, 0, 1] }",
         "map.phase.direction",
         &["at once"],
     );
-    says(
-        "fraction = 0.3",
-        "phase = { wavelength = 2, rotate = [1, 2] }",
-        "map.phase.rotate",
-        &["three angles"],
-    );
+    says("fraction = 0.3", "phase = { wavelength = 2, rotate = [1, 2] }", "map.phase.rotate", &["three angles"]);
     says(
         "fraction = 0.3",
         "phase = { wavelength = { formula = \"4 - x\" } }",
@@ -372,17 +249,9 @@ fn bad_files_are_refused_with_what_is_wrong() {
         "map.phase",
         &["folds at"],
     );
-    let warned = design(
-        "fraction = 0.3",
-        "phase = { wavelength = 4, rotate_z = { formula = \"17*x\" } }",
-    )
-    .expect("built");
-    assert!(
-        warned
-            .warnings
-            .iter()
-            .any(|w| w.path == "lattice.a.map.phase" && w.message.contains("within one cell"))
-    );
+    let warned =
+        design("fraction = 0.3", "phase = { wavelength = 4, rotate_z = { formula = \"17*x\" } }").expect("built");
+    assert!(warned.warnings.iter().any(|w| w.path == "lattice.a.map.phase" && w.message.contains("within one cell")));
 }
 
 /// A gyroid given as numbers is the gyroid; a rod given as a mesh fills as much of the cell as it did.
@@ -402,30 +271,14 @@ fn cells_come_from_files() {
         files.0.insert("gyroid.npy".into(), gyroid.clone());
         Design::from_toml(&text)?.build(&files)
     };
-    let file = lattice("{ file = { path = \"gyroid.npy\" } }", "iso = 0.3")
-        .unwrap_or_else(|e| panic!("{e}"));
+    let file = lattice("{ file = { path = \"gyroid.npy\" } }", "iso = 0.3").unwrap_or_else(|e| panic!("{e}"));
     let named = lattice("\"gyroid\"", "iso = 0.3").expect("named");
     for p in places() {
         assert!((file.lattices[0].1.value(p) - named.lattices[0].1.value(p)).abs() < 1e-9);
     }
-    assert!(
-        file.report()["lattices"]["a"]["truncation"]
-            .as_f64()
-            .expect("told")
-            < 1e-6
-    );
-    let e = lattice("{ file = { path = \"nan.npy\" } }", "iso = 0.3")
-        .err()
-        .expect("refused");
-    assert!(
-        e.path == "lattice.a.cell.file.path" && e.message.contains("[3, 2, 1]"),
-        "{e}"
-    );
-    let e = lattice(
-        "{ file = { path = \"gyroid.npy\", terms = 0 } }",
-        "iso = 0.3",
-    )
-    .err()
-    .expect("refused");
+    assert!(file.report()["lattices"]["a"]["truncation"].as_f64().expect("told") < 1e-6);
+    let e = lattice("{ file = { path = \"nan.npy\" } }", "iso = 0.3").err().expect("refused");
+    assert!(e.path == "lattice.a.cell.file.path" && e.message.contains("[3, 2, 1]"), "{e}");
+    let e = lattice("{ file = { path = \"gyroid.npy\", terms = 0 } }", "iso = 0.3").err().expect("refused");
     assert_eq!(e.path, "lattice.a.cell.file.terms");
 }

@@ -9,8 +9,7 @@ use trabecula::extract::{Silent, surface};
 use trabecula::math::{Mat3, Vec3, add, apply, rotation, scale};
 use trabecula::mesh::Mesh;
 use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere,
-    Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
 };
 use trabecula::solid::Solid;
 
@@ -105,9 +104,7 @@ fn count(region: &Region, frame: &Frame, n: usize) -> f64 {
     for i in 0..steps {
         for j in 0..steps {
             let at = |i: usize| lo + (i as f64 + 0.5) * side;
-            let row: Vec<Vec3> = (0..steps)
-                .map(|k| frame.place([at(k), at(j), at(i)]))
-                .collect();
+            let row: Vec<Vec3> = (0..steps).map(|k| frame.place([at(k), at(j), at(i)])).collect();
             region.values(&row, &mut out);
             inside += out.iter().filter(|v| **v < 0.0).count();
         }
@@ -132,16 +129,8 @@ fn run(seed: u64) -> Result<bool, String> {
     }
     let edge = frame.unit / some.between(2.2, 9.0);
     let wavelength = 1.7 * frame.unit;
-    let filling = [
-        None,
-        Some(lattice(
-            "gyroid",
-            Part::Sheet,
-            some.between(0.2, 0.6),
-            [wavelength; 3],
-            [11.0, 22.0, 33.0],
-        )),
-    ];
+    let filling =
+        [None, Some(lattice("gyroid", Part::Sheet, some.between(0.2, 0.6), [wavelength; 3], [11.0, 22.0, 33.0]))];
     for field in filling {
         let full = field.is_none();
         let solid = Solid::new(region.clone(), field, wavelength);
@@ -164,9 +153,7 @@ fn run(seed: u64) -> Result<bool, String> {
             _ => 0.06 * area * frame.unit + 6.0 * 0.2 * edge * edge * area.sqrt(),
         };
         if (volume - want).abs() > slack {
-            return Err(format!(
-                "edge {edge}: volume {volume}, not {want} within {slack}"
-            ));
+            return Err(format!("edge {edge}: volume {volume}, not {want} within {slack}"));
         }
     }
     Ok(true)
@@ -176,16 +163,9 @@ fn run(seed: u64) -> Result<bool, String> {
 fn random_bodies_that_touch_or_coincide() {
     let all: Vec<_> = (0..cases(48)).into_par_iter().map(run).collect();
     let solids = all.iter().filter(|r| matches!(r, Ok(true))).count();
-    let faults: Vec<String> = all
-        .iter()
-        .enumerate()
-        .filter_map(|(seed, r)| Some(format!("{seed}: {}", r.as_ref().err()?)))
-        .collect();
-    println!(
-        "{} regions, {solids} of them with volume, {} wrong",
-        all.len(),
-        faults.len()
-    );
+    let faults: Vec<String> =
+        all.iter().enumerate().filter_map(|(seed, r)| Some(format!("{seed}: {}", r.as_ref().err()?))).collect();
+    println!("{} regions, {solids} of them with volume, {} wrong", all.len(), faults.len());
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     assert!(solids > all.len() / 2);
 }

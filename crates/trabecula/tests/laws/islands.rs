@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{
-    Islands, Pieces, Progress, Silent, Stopped, stream_stl, surface, surface_of,
-};
+use trabecula::extract::{Islands, Pieces, Progress, Silent, Stopped, stream_stl, surface, surface_of};
 use trabecula::io::read_mesh;
 use trabecula::measure::size;
 use trabecula::mesh::Mesh;
@@ -35,11 +33,7 @@ fn winding(mesh: &Mesh, triangles: &[usize], p: [f64; 3]) -> f64 {
         .map(|&t| {
             let [a, b, c] = mesh.corners(t).map(|v| [0, 1, 2].map(|i| v[i] - p[i]));
             let [x, y, z] = [a, b, c].map(|v| dot(v, v).sqrt());
-            let cross = [
-                b[1] * c[2] - b[2] * c[1],
-                b[2] * c[0] - b[0] * c[2],
-                b[0] * c[1] - b[1] * c[0],
-            ];
+            let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
             let below = x * y * z + dot(a, b) * z + dot(b, c) * x + dot(c, a) * y;
             2.0 * dot(a, cross).atan2(below)
         })
@@ -67,25 +61,19 @@ fn largest(mesh: &Mesh) -> f64 {
     }
     let mut bodies: std::collections::BTreeMap<usize, Vec<usize>> = Default::default();
     for (i, t) in mesh.triangles.iter().enumerate() {
-        bodies
-            .entry(find(&mut root, t[0] as usize))
-            .or_default()
-            .push(i);
+        bodies.entry(find(&mut root, t[0] as usize)).or_default().push(i);
     }
     let bodies: Vec<Vec<usize>> = bodies.into_values().collect();
     let volume = |body: &Vec<usize>| {
-        let part = Mesh {
-            vertices: mesh.vertices.clone(),
-            triangles: body.iter().map(|t| mesh.triangles[*t]).collect(),
-        };
+        let part =
+            Mesh { vertices: mesh.vertices.clone(), triangles: body.iter().map(|t| mesh.triangles[*t]).collect() };
         part.volume()
     };
     let volumes: Vec<f64> = bodies.iter().map(volume).collect();
     let mut net = volumes.clone();
     for (i, body) in bodies.iter().enumerate().filter(|(i, _)| volumes[*i] < 0.0) {
         let p = mesh.corners(body[0])[0];
-        let holders = (0..bodies.len())
-            .filter(|o| *o != i && volumes[*o] > 0.0 && winding(mesh, &bodies[*o], p) > 0.5);
+        let holders = (0..bodies.len()).filter(|o| *o != i && volumes[*o] > 0.0 && winding(mesh, &bodies[*o], p) > 0.5);
         let owner = holders.min_by(|a, b| volumes[*a].total_cmp(&volumes[*b]));
         net[owner.expect("a cavity lies in a piece")] += volumes[i];
     }
@@ -99,22 +87,11 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
     let figures = |p: &Pieces| (p.pieces as usize, p.cavities as usize, p.euler);
     let of = |m: &trabecula::measure::Size| (m.pieces, m.cavities, m.euler);
     assert_eq!(figures(&found), of(&measured), "{what}");
-    assert_eq!(
-        (found.others + 1, found.dropped),
-        (found.pieces, 0),
-        "{what}"
-    );
+    assert_eq!((found.others + 1, found.dropped), (found.pieces, 0), "{what}");
     let best = largest(&all.mesh);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * measured.volume;
-    assert!(
-        near(found.largest, best),
-        "{what}: {} for {best}",
-        found.largest
-    );
-    assert!(
-        near(found.largest + found.volume, measured.volume),
-        "{what}"
-    );
+    assert!(near(found.largest, best), "{what}: {} for {best}", found.largest);
+    assert!(near(found.largest + found.volume, measured.volume), "{what}");
     let (_, told) = stream(solid, edge, Islands::Keep).expect("stl");
     assert_eq!(told.pieces, found, "{what}");
 
@@ -123,11 +100,7 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
     let left = size(&one.mesh);
     assert_eq!(figures(&kept), of(&left), "{what}");
     assert_eq!((left.pieces, kept.dropped), (1, found.others), "{what}");
-    assert!(
-        near(left.volume, best),
-        "{what}: {} for {best}",
-        left.volume
-    );
+    assert!(near(left.volume, best), "{what}: {} for {best}", left.volume);
     assert_eq!(one.cut.len(), one.mesh.triangles.len());
     let (bytes, summary) = stream(solid, edge, Islands::Drop).expect("stl");
     assert_eq!(summary.pieces, kept, "{what}");
@@ -151,30 +124,10 @@ fn a_cavity_stays_with_its_piece_and_a_ball_in_it_is_another() {
     let beside = ball([2.0, 0.1, 0.0], 0.6);
     let ball_volume = |r: f64| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3);
     for (what, parts, want, volume) in [
-        (
-            "hollow",
-            vec![big.clone()],
-            (1, 1),
-            ball_volume(1.0) - ball_volume(0.7),
-        ),
-        (
-            "nested",
-            vec![big.clone(), small.clone()],
-            (2, 2),
-            ball_volume(1.0) - ball_volume(0.7),
-        ),
-        (
-            "beside",
-            vec![beside.clone(), big, small],
-            (3, 2),
-            ball_volume(1.0) - ball_volume(0.7),
-        ),
-        (
-            "full is more",
-            vec![shell([-1.0, 0.0, 0.0], 0.61, 0.3), beside],
-            (2, 1),
-            ball_volume(0.6),
-        ),
+        ("hollow", vec![big.clone()], (1, 1), ball_volume(1.0) - ball_volume(0.7)),
+        ("nested", vec![big.clone(), small.clone()], (2, 2), ball_volume(1.0) - ball_volume(0.7)),
+        ("beside", vec![beside.clone(), big, small], (3, 2), ball_volume(1.0) - ball_volume(0.7)),
+        ("full is more", vec![shell([-1.0, 0.0, 0.0], 0.61, 0.3), beside], (2, 1), ball_volume(0.6)),
     ] {
         for edge in [0.1, 0.013] {
             if what != "nested" && edge < 0.1 {
@@ -183,11 +136,7 @@ fn a_cavity_stays_with_its_piece_and_a_ball_in_it_is_another() {
             let found = law(what, &solid(union(parts.clone()), None), edge);
             assert_eq!((found.pieces, found.cavities), want, "{what}");
             // A ball's volume at ten steps a radius.
-            assert!(
-                (found.largest / volume - 1.0).abs() < 0.02,
-                "{what}: {} for {volume}",
-                found.largest
-            );
+            assert!((found.largest / volume - 1.0).abs() < 0.02, "{what}: {} for {volume}", found.largest);
         }
     }
 }
@@ -205,10 +154,7 @@ fn many_tiles_and_any_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("pool").install(|| {
                 let streamed = stream(&solid, 0.025, Islands::Drop).expect("stl");
-                (
-                    streamed,
-                    surface_of(&solid, 0.025, Islands::Drop, &Silent).expect("surface"),
-                )
+                (streamed, surface_of(&solid, 0.025, Islands::Drop, &Silent).expect("surface"))
             })
         };
         assert!(run(1) == run(3));
@@ -286,13 +232,8 @@ fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
     match kind {
         0 => block(),
         1 => ball([s, 0.1, 0.0], r),
-        2 => {
-            Arc::new(Cylinder::new([s, -s, -t], [0.3, 0.2 + s, 1.0], r * 0.7, 1.0 + t).expect("it"))
-        }
-        3 => union(vec![
-            shell([s, 0.0, 0.0], r, 0.6 * r),
-            ball([s, 0.1, 0.0], 0.3 * r),
-        ]),
+        2 => Arc::new(Cylinder::new([s, -s, -t], [0.3, 0.2 + s, 1.0], r * 0.7, 1.0 + t).expect("it")),
+        3 => union(vec![shell([s, 0.0, 0.0], r, 0.6 * r), ball([s, 0.1, 0.0], 0.3 * r)]),
         _ => Arc::new(Intersection::new(vec![block(), shell([0.0; 3], 1.2 * r, 0.5)]).expect("it")),
     }
 }

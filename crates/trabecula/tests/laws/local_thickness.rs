@@ -14,16 +14,11 @@ use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
 
 fn bare(mesh: Mesh) -> Surface {
-    Surface {
-        cut: vec![false; mesh.triangles.len()],
-        mesh,
-    }
+    Surface { cut: vec![false; mesh.triangles.len()], mesh }
 }
 
 fn wall(mesh: Mesh, step: f64) -> Spread {
-    thickness(&bare(mesh), None, step, &Silent)
-        .expect("thickness")
-        .wall
+    thickness(&bare(mesh), None, step, &Silent).expect("thickness").wall
 }
 
 fn block(min: Vec3, size: Vec3) -> Mesh {
@@ -63,10 +58,7 @@ fn slabs_have_their_thickness_however_they_lie() {
             let s = wall(turned(block([0.1; 3], [20.0, 20.0, 1.03]), degrees), step);
             for found in [s.min, s.p05, s.max] {
                 // Planes are exact but for the rounding of single precision; balls touch to a fiftieth of a step.
-                assert!(
-                    (found - 1.03).abs() < 0.02 * step,
-                    "{degrees:?} {step}: {s:?}"
-                );
+                assert!((found - 1.03).abs() < 0.02 * step, "{degrees:?} {step}: {s:?}");
             }
             // Less than the whole only by what no ball reaches at the rim.
             assert!(s.mean > 0.98 * 1.03 && s.mean <= s.max, "{s:?}");
@@ -97,18 +89,12 @@ fn two_slabs_have_two_peaks() {
     let mut two = block([0.0; 3], [20.0, 20.0, 1.0]);
     let other = block([0.0, 0.0, 3.0], [20.0, 20.0, 2.0]);
     two.vertices.extend(other.vertices);
-    two.triangles
-        .extend(other.triangles.iter().map(|t| t.map(|v| v + 8)));
+    two.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + 8)));
     let s = wall(two, 0.2);
-    assert!(
-        (s.min - 1.0).abs() < 0.01 && (s.max - 2.0).abs() < 0.01,
-        "{s:?}"
-    );
+    assert!((s.min - 1.0).abs() < 0.01 && (s.max - 2.0).abs() < 0.01, "{s:?}");
     let within = |low: f64, high: f64| {
         let bars = s.edges.windows(2).zip(&s.share);
-        bars.filter(|(e, _)| e[0] >= low && e[1] <= high)
-            .map(|(_, share)| share)
-            .sum::<f64>()
+        bars.filter(|(e, _)| e[0] >= low && e[1] <= high).map(|(_, share)| share).sum::<f64>()
     };
     // A third of the volume and two thirds, less what lies at the rims.
     assert!((within(0.9, 1.1) - 1.0 / 3.0).abs() < 0.03, "{s:?}");
@@ -118,9 +104,7 @@ fn two_slabs_have_two_peaks() {
 #[test]
 fn a_shell_and_the_ball_in_it() {
     let region: Region = Arc::new(ball([0.0; 3], 3.0));
-    let shell: Region = Arc::new(
-        Difference::new(vec![region.clone(), Arc::new(ball([0.0; 3], 2.0))]).expect("shell"),
-    );
+    let shell: Region = Arc::new(Difference::new(vec![region.clone(), Arc::new(ball([0.0; 3], 2.0))]).expect("shell"));
     let made = full(shell, 0.08);
     let t = thickness(&made, Some(&region), 0.15, &Silent).expect("thickness");
     let pore = t.pore.expect("pore");
@@ -137,17 +121,9 @@ fn turning_and_moving_change_nothing() {
     let (made, _) = gyroid(Part::Sheet, 0.3, 0.1);
     let still = wall(made.mesh.clone(), 0.08);
     let mut moved = turned(made.mesh, [15.0, 40.0, 65.0]);
-    moved
-        .vertices
-        .iter_mut()
-        .flatten()
-        .for_each(|x| *x += 0.0317);
+    moved.vertices.iter_mut().flatten().for_each(|x| *x += 0.0317);
     let moved = wall(moved, 0.08);
-    for (a, b) in [
-        (still.mean, moved.mean),
-        (still.sd, moved.sd),
-        (still.max, moved.max),
-    ] {
+    for (a, b) in [(still.mean, moved.mean), (still.sd, moved.sd), (still.max, moved.max)] {
         assert!((a - b).abs() < 0.15 * 0.08, "{still:?} {moved:?}");
     }
 }
@@ -175,18 +151,11 @@ fn a_thin_sheet_is_as_thick_as_its_volume_over_half_its_area() {
     let cut = made.cut.iter().enumerate().filter(|c| *c.1);
     let area = made.mesh.area() - cut.map(|(i, _)| triangle(&made.mesh, i)).sum::<f64>();
     let expected = size(&made.mesh).volume / (area / 2.0);
-    assert!(
-        (t.wall.mean - expected).abs() < t.accuracy,
-        "{} {expected}",
-        t.wall.mean
-    );
+    assert!((t.wall.mean - expected).abs() < t.accuracy, "{} {expected}", t.wall.mean);
 }
 
 fn triangle(mesh: &Mesh, i: usize) -> f64 {
-    let one = Mesh {
-        vertices: mesh.corners(i).to_vec(),
-        triangles: vec![[0, 1, 2]],
-    };
+    let one = Mesh { vertices: mesh.corners(i).to_vec(), triangles: vec![[0, 1, 2]] };
     one.area()
 }
 
@@ -194,10 +163,7 @@ fn triangle(mesh: &Mesh, i: usize) -> f64 {
 fn the_same_for_any_number_of_threads() {
     let (made, region) = gyroid(Part::Upper, 0.3, 0.2);
     let on = |n| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(n)
-            .build()
-            .expect("pool");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("pool");
         pool.install(|| thickness(&made, Some(&region), 0.15, &Silent).expect("thickness"))
     };
     assert_eq!(on(1), on(3));
@@ -237,8 +203,5 @@ fn it_can_be_stopped() {
         }
     }
     let made = bare(block([0.0; 3], [1.0; 3]));
-    assert!(matches!(
-        thickness(&made, None, 0.05, &Stop),
-        Err(Stopped::Interrupted)
-    ));
+    assert!(matches!(thickness(&made, None, 0.05, &Stop), Err(Stopped::Interrupted)));
 }

@@ -18,9 +18,7 @@ fn formula(text: &str) -> Grade {
 }
 
 fn cell(name: &str) -> Arc<Cell> {
-    Arc::new(Cell::new(
-        Series::new(named(name).expect(name).terms()).expect(name),
-    ))
+    Arc::new(Cell::new(Series::new(named(name).expect(name).terms()).expect(name)))
 }
 
 fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
@@ -31,9 +29,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         angle_weight: 1.0,
         offset: [0.1, 0.2, 0.3],
     };
-    Map::Phase(Arc::new(
-        Phase::solve(b, &wanted, &Settings::default()).expect("solved"),
-    ))
+    Map::Phase(Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved")))
 }
 
 fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
@@ -45,19 +41,12 @@ fn inside(b: &Aabb, share: Vec3) -> Vec3 {
 }
 
 fn boxed(size: Vec3) -> Aabb {
-    Aabb {
-        min: [0.0; 3],
-        max: size,
-    }
+    Aabb { min: [0.0; 3], max: size }
 }
 
 /// All that bends, at once: three wavelengths that vary, three angles that vary.
 fn bent(b: &Aabb) -> Map {
-    map(
-        b,
-        ["3 + 0.1*x", "3.5 + 0.3*sin(z/2)", "4 - 0.05*y"],
-        ["3*z", "4*x", "5*y + 20"],
-    )
+    map(b, ["3 + 0.1*x", "3.5 + 0.3*sin(z/2)", "4 - 0.05*y"], ["3*z", "4*x", "5*y + 20"])
 }
 
 #[test]
@@ -81,9 +70,7 @@ fn blocks_equal_points_and_bounds_hold() {
             for l in fields {
                 // Reaching out of the box on all sides.
                 let axis: Vec<f64> = (0..23).map(|i| 0.61 * f64::from(i) - 1.3).collect();
-                let block = Block {
-                    axes: [&axis, &axis, &axis],
-                };
+                let block = Block { axes: [&axis, &axis, &axis] };
                 let mut out = vec![0f32; block.len()];
                 l.fill(&block, &mut out);
                 for (i, v) in out.iter().enumerate() {
@@ -110,21 +97,10 @@ fn blocks_equal_points_and_bounds_hold() {
 #[test]
 fn bounds_are_of_use() {
     let b = boxed([12.0, 10.0, 9.0]);
-    for level in [
-        Level::Fraction(Grade::Constant(0.2)),
-        Level::Thickness(Grade::Constant(0.3)),
-    ] {
+    for level in [Level::Fraction(Grade::Constant(0.2)), Level::Thickness(Grade::Constant(0.3))] {
         let l = Lattice::new(cell("gyroid"), bent(&b), Part::Sheet, level);
-        let skipped = numbers(400).filter(|s| {
-            l.bound(
-                &Aabb {
-                    min: inside(&b, *s),
-                    max: inside(&b, *s),
-                }
-                .grown(0.03),
-            )
-            .lo > 0.0
-        });
+        let skipped =
+            numbers(400).filter(|s| l.bound(&Aabb { min: inside(&b, *s), max: inside(&b, *s) }.grown(0.03)).lo > 0.0);
         let open = numbers(400).filter(|s| l.value(inside(&b, *s)) > 0.3);
         assert!(2 * skipped.count() > open.count());
     }
@@ -133,10 +109,7 @@ fn bounds_are_of_use() {
 #[test]
 fn gradients_agree_with_differences() {
     let b = boxed([12.0, 10.0, 9.0]);
-    for level in [
-        Level::Fraction(formula("0.2 + 0.02*x")),
-        Level::Thickness(formula("0.3 + 0.02*y")),
-    ] {
+    for level in [Level::Fraction(formula("0.2 + 0.02*x")), Level::Thickness(formula("0.3 + 0.02*y"))] {
         let l = Lattice::new(cell("diamond"), bent(&b), Part::Sheet, level);
         for l in l.parts() {
             for s in numbers(200) {
@@ -164,22 +137,12 @@ fn a_tube_closes_over_its_seam() {
     let tube = |r: f64, z: f64, h: f64| -> Region {
         Arc::new(Cylinder::new([0.0, 0.0, z], [0.0, 0.0, 1.0], r, h).expect("cylinder"))
     };
-    let region: Region =
-        Arc::new(Difference::new(vec![tube(8.0, 0.0, 8.0), tube(5.0, -1.0, 10.0)]).expect("tube"));
+    let region: Region = Arc::new(Difference::new(vec![tube(8.0, 0.0, 8.0), tube(5.0, -1.0, 10.0)]).expect("tube"));
     // Three cells across the wall and four along the axis, all of them whole.
-    let map =
-        Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [1.0, 2.0], 20.0, [5.0, 6.5, 8.0]).expect("map");
-    for level in [
-        Level::Fraction(Grade::Constant(0.35)),
-        Level::Thickness(Grade::Constant(0.25)),
-    ] {
+    let map = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [1.0, 2.0], 20.0, [5.0, 6.5, 8.0]).expect("map");
+    for level in [Level::Fraction(Grade::Constant(0.35)), Level::Thickness(Grade::Constant(0.25))] {
         let exact = matches!(level, Level::Fraction(_));
-        let l: Arc<dyn Field> = Arc::new(Lattice::new(
-            cell("gyroid"),
-            Map::Round(map),
-            Part::Sheet,
-            level,
-        ));
+        let l: Arc<dyn Field> = Arc::new(Lattice::new(cell("gyroid"), Map::Round(map), Part::Sheet, level));
         let solid = Solid::new(region.clone(), Some(l), 1.0);
         let m = size(&surface(&solid, 0.12, &Silent).expect("surface").mesh);
         let share = m.volume / (std::f64::consts::PI * 39.0 * 8.0);
@@ -197,43 +160,24 @@ fn a_tube_closes_over_its_seam() {
 fn graded_fractions_are_met_through_the_map() {
     let b = boxed([32.0, 24.0, 16.0]);
     let asked = formula("0.2 + 0.006*x + 0.1*sin(y/8)");
-    let map = map(
-        &b,
-        ["2.0 + 0.02*x", "2.0 + 0.02*x", "2.0 + 0.02*x"],
-        ["0*x", "1*y", "2.2*x"],
-    );
+    let map = map(&b, ["2.0 + 0.02*x", "2.0 + 0.02*x", "2.0 + 0.02*x"], ["0*x", "1*y", "2.2*x"]);
     let mut worst = (0.0f64, 0.0f64);
     for name in ["primitive", "gyroid", "iwp"] {
         for part in [Part::Lower, Part::Sheet] {
-            let l = Lattice::new(
-                cell(name),
-                map.clone(),
-                part,
-                Level::Fraction(asked.clone()),
-            );
+            let l = Lattice::new(cell(name), map.clone(), part, Level::Fraction(asked.clone()));
             for at in [[7.0, 6.0, 8.0], [16.0, 12.0, 8.0], [26.0, 17.0, 7.0]] {
                 // cos² windows: their transform is flat zero where the waves of the lattice are.
                 let (n, half) = (64usize, 4.0 * 1.25);
                 let axis: [Vec<f64>; 3] = core::array::from_fn(|a| {
-                    (0..n)
-                        .map(|i| at[a] + half * ((i as f64 + 0.5) / n as f64 * 2.0 - 1.0))
-                        .collect()
+                    (0..n).map(|i| at[a] + half * ((i as f64 + 0.5) / n as f64 * 2.0 - 1.0)).collect()
                 });
-                let weight: Vec<f64> = (0..n)
-                    .map(|i| {
-                        ((i as f64 + 0.5) / n as f64 * std::f64::consts::PI)
-                            .sin()
-                            .powi(4)
-                    })
-                    .collect();
-                let block = Block {
-                    axes: [&axis[0], &axis[1], &axis[2]],
-                };
+                let weight: Vec<f64> =
+                    (0..n).map(|i| ((i as f64 + 0.5) / n as f64 * std::f64::consts::PI).sin().powi(4)).collect();
+                let block = Block { axes: [&axis[0], &axis[1], &axis[2]] };
                 let mut out = vec![0f32; block.len()];
                 l.fill(&block, &mut out);
-                let points: Vec<Vec3> = (0..n * n * n)
-                    .map(|i| [axis[0][i % n], axis[1][i / n % n], axis[2][i / n / n]])
-                    .collect();
+                let points: Vec<Vec3> =
+                    (0..n * n * n).map(|i| [axis[0][i % n], axis[1][i / n % n], axis[2][i / n / n]]).collect();
                 let mut want = vec![0.0; points.len()];
                 asked.values(&points, &mut want);
                 let (mut sum, mut solid, mut mean) = (0.0, 0.0, 0.0);
@@ -245,24 +189,12 @@ fn graded_fractions_are_met_through_the_map() {
                     solid += w * f64::from(u8::from(out[i] <= 0.0));
                 }
                 let miss = (solid - mean).abs() / sum;
-                worst = if part == Part::Sheet {
-                    (worst.0, worst.1.max(miss))
-                } else {
-                    (worst.0.max(miss), worst.1)
-                };
-                assert!(
-                    miss < 0.005,
-                    "{name} {part:?} at {at:?}: {} for {}",
-                    solid / sum,
-                    mean / sum
-                );
+                worst = if part == Part::Sheet { (worst.0, worst.1.max(miss)) } else { (worst.0.max(miss), worst.1) };
+                assert!(miss < 0.005, "{name} {part:?} at {at:?}: {} for {}", solid / sum, mean / sum);
             }
         }
     }
-    println!(
-        "fraction missed by at most {:.4} (networks), {:.4} (sheets)",
-        worst.0, worst.1
-    );
+    println!("fraction missed by at most {:.4} (networks), {:.4} (sheets)", worst.0, worst.1);
 }
 
 /// Walls of a given thickness stay that thick where the map stretches cells: a point of the wall's face is followed along
@@ -270,25 +202,11 @@ fn graded_fractions_are_met_through_the_map() {
 #[test]
 fn thickness_is_true_through_the_jacobian() {
     let b = boxed([16.0, 12.0, 10.0]);
-    let map = map(
-        &b,
-        ["4 + 0.1*x", "4 + 0.1*x", "4 + 0.1*x"],
-        ["0*x", "0*y", "3*x"],
-    );
+    let map = map(&b, ["4 + 0.1*x", "4 + 0.1*x", "4 + 0.1*x"], ["0*x", "0*y", "3*x"]);
     let (mut errors, mut plain) = (Vec::new(), Vec::new());
     let w = 0.4;
-    let l = Lattice::new(
-        cell("gyroid"),
-        map.clone(),
-        Part::Sheet,
-        Level::Thickness(Grade::Constant(w)),
-    );
-    let mid = Lattice::new(
-        cell("gyroid"),
-        map.clone(),
-        Part::Lower,
-        Level::Iso(Grade::Constant(0.0)),
-    );
+    let l = Lattice::new(cell("gyroid"), map.clone(), Part::Sheet, Level::Thickness(Grade::Constant(w)));
+    let mid = Lattice::new(cell("gyroid"), map.clone(), Part::Lower, Level::Iso(Grade::Constant(0.0)));
     let gradient = |l: &Lattice, p: Vec3| {
         let (mut v, mut g) = ([0.0], [[0.0; 3]]);
         l.core_gradients(&[p], &mut v, &mut g);
@@ -340,15 +258,9 @@ fn surfaces_are_closed_and_hold_the_solid() {
         let m = size(&found.mesh);
         assert!(m.closed && is_embedded(&found.mesh));
         let n = 120_000;
-        let hits = numbers(n)
-            .filter(|s| l.value(inside(&b, *s)) <= 0.0)
-            .count();
+        let hits = numbers(n).filter(|s| l.value(inside(&b, *s)) <= 0.0).count();
         let sampled = hits as f64 / n as f64 * 480.0;
         // Quasi-random points: about n^(-2/3) of the box.
-        assert!(
-            (m.volume - sampled).abs() < 0.001 * 480.0,
-            "{} {sampled}",
-            m.volume
-        );
+        assert!((m.volume - sampled).abs() < 0.001 * 480.0, "{} {sampled}", m.volume);
     }
 }

@@ -48,12 +48,10 @@ fn farthest(from: &Mesh, to: &Mesh, reach: f64) -> f64 {
     let mut grid: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for t in 0..to.triangles.len() {
         let corners = to.corners(t);
-        let (lo, hi) = corners
-            .iter()
-            .fold((corners[0], corners[0]), |(lo, hi), p| {
-                let each = |f: fn(f64, f64) -> f64, q: Vec3| [0, 1, 2].map(|k| f(q[k], p[k]));
-                (each(f64::min, lo), each(f64::max, hi))
-            });
+        let (lo, hi) = corners.iter().fold((corners[0], corners[0]), |(lo, hi), p| {
+            let each = |f: fn(f64, f64) -> f64, q: Vec3| [0, 1, 2].map(|k| f(q[k], p[k]));
+            (each(f64::min, lo), each(f64::max, hi))
+        });
         let (lo, hi) = (cell(lo.map(|x| x - reach)), cell(hi.map(|x| x + reach)));
         for x in lo[0]..=hi[0] {
             for y in lo[1]..=hi[1] {
@@ -64,11 +62,7 @@ fn farthest(from: &Mesh, to: &Mesh, reach: f64) -> f64 {
         }
     }
     // Large triangles get more points.
-    let longest = |c: [Vec3; 3]| {
-        (0..3)
-            .map(|k| norm(sub(c[k], c[(k + 1) % 3])))
-            .fold(0.0, f64::max)
-    };
+    let longest = |c: [Vec3; 3]| (0..3).map(|k| norm(sub(c[k], c[(k + 1) % 3]))).fold(0.0, f64::max);
     let mut most = 0.0f64;
     for t in 0..from.triangles.len() {
         let c = from.corners(t);
@@ -76,14 +70,9 @@ fn farthest(from: &Mesh, to: &Mesh, reach: f64) -> f64 {
         for i in 0..=n {
             for j in 0..=n - i {
                 let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                let p = add(
-                    c[0],
-                    add(scale(sub(c[1], c[0]), s), scale(sub(c[2], c[0]), t)),
-                );
+                let p = add(c[0], add(scale(sub(c[1], c[0]), s), scale(sub(c[2], c[0]), t)));
                 let near = grid.get(&cell(p)).into_iter().flatten();
-                let d = near
-                    .map(|t| distance(p, to.corners(*t)))
-                    .fold(f64::INFINITY, f64::min);
+                let d = near.map(|t| distance(p, to.corners(*t))).fold(f64::INFINITY, f64::min);
                 most = most.max(d);
             }
         }
@@ -96,19 +85,9 @@ fn held(what: &str, s: &Surface, goal: Goal) -> (Surface, Report, f64) {
     let (made, report) = simplify(s, &goal, &Silent).expect(what);
     check(what, &made);
     let (a, b) = (size(&s.mesh), size(&made.mesh));
-    assert_eq!(
-        (a.euler, a.pieces, a.cavities),
-        (b.euler, b.pieces, b.cavities),
-        "{what}"
-    );
-    assert_eq!(
-        report.triangles,
-        [s.mesh.triangles.len(), made.mesh.triangles.len()]
-    );
-    assert!(
-        (report.volume[1] - b.volume).abs() <= 1e-9 * b.volume.abs(),
-        "{what}"
-    );
+    assert_eq!((a.euler, a.pieces, a.cavities), (b.euler, b.pieces, b.cavities), "{what}");
+    assert_eq!(report.triangles, [s.mesh.triangles.len(), made.mesh.triangles.len()]);
+    assert!((report.volume[1] - b.volume).abs() <= 1e-9 * b.volume.abs(), "{what}");
     // Rounding of the measurement itself.
     let limit = report.deviation + 1e-9;
     let reach = if limit < 1.0 { limit } else { 1.0 };
@@ -121,17 +100,11 @@ fn held(what: &str, s: &Surface, goal: Goal) -> (Surface, Report, f64) {
 }
 
 fn within(tolerance: f64) -> Goal {
-    Goal {
-        tolerance: Some(tolerance),
-        ..Goal::default()
-    }
+    Goal { tolerance: Some(tolerance), ..Goal::default() }
 }
 
 fn down_to(triangles: usize) -> Goal {
-    Goal {
-        triangles: Some(triangles),
-        ..Goal::default()
-    }
+    Goal { triangles: Some(triangles), ..Goal::default() }
 }
 
 fn of(region: Region, edge: f64) -> Surface {
@@ -144,10 +117,7 @@ fn a_cube_comes_down_to_twelve_triangles() {
         let max = add(min, [1.0, 1.0, 1.0]);
         let fine = of(Arc::new(Cuboid::new(min, max).expect("box")), edge);
         let (made, report, _) = held("cube", &fine, within(0.01));
-        assert_eq!(
-            (made.mesh.triangles.len(), made.mesh.vertices.len()),
-            (12, 8)
-        );
+        assert_eq!((made.mesh.triangles.len(), made.mesh.vertices.len()), (12, 8));
         // Corners are moved to single precision, at most 7.7 · 2⁻²⁴ each way.
         assert!(report.deviation < 2e-6 && (made.mesh.volume() - 1.0).abs() < 1e-5);
         assert!(made.cut.iter().all(|c| *c));
@@ -159,10 +129,7 @@ fn a_ball_needs_triangles_in_inverse_proportion_to_the_tolerance() {
     let fine = of(ball([0.0; 3], 1.0), 0.02);
     let counts = [0.02, 0.01, 0.005].map(|t| {
         let (made, report, found) = held("ball", &fine, within(t));
-        println!(
-            "ball {t}: {:?}, {:.5} promised, {found:.5} found",
-            report.triangles, report.deviation
-        );
+        println!("ball {t}: {:?}, {:.5} promised, {found:.5} found", report.triangles, report.deviation);
         assert!(found > t / 10.0, "far too careful");
         // The volume is kept by every collapse, but for rounding.
         assert!((report.volume[1] / report.volume[0] - 1.0).abs() < 1e-6);
@@ -196,23 +163,13 @@ fn a_cylinder_keeps_its_rims() {
     // The rims carry nearly all; a few vertices stay inside a cap, where triangles would be needles without them.
     let radii = made.mesh.vertices.iter().map(|v| v[0].hypot(v[1]));
     let inside = radii.clone().filter(|q| *q < r - 0.011).count();
-    assert!(
-        inside * 10 < made.mesh.vertices.len(),
-        "{inside} of {}",
-        made.mesh.vertices.len()
-    );
+    assert!(inside * 10 < made.mesh.vertices.len(), "{inside} of {}", made.mesh.vertices.len());
     assert!(radii.fold(0.0, f64::max) < r + 0.011);
 }
 
 #[test]
 fn a_number_of_triangles_is_met() {
-    let field = lattice_at(
-        "gyroid",
-        Part::Sheet,
-        Level::Fraction(Grade::Constant(0.3)),
-        [1.0; 3],
-        [0.0; 3],
-    );
+    let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.3)), [1.0; 3], [0.0; 3]);
     let fine = surface(&solid(cube(1.0), Some(field)), 1.0 / 24.0, &Silent).expect("surface");
     let n = fine.mesh.triangles.len();
     let mut last = 0.0;
@@ -227,10 +184,7 @@ fn a_number_of_triangles_is_met() {
     let (same, report) = simplify(&fine, &down_to(n), &Silent).expect("as it is");
     assert!(same == fine && report.deviation == 0.0 && report.triangles == [n, n]);
     // Both: the first that is reached.
-    let both = Goal {
-        tolerance: Some(1e-3),
-        triangles: Some(4),
-    };
+    let both = Goal { tolerance: Some(1e-3), triangles: Some(4) };
     assert_eq!(
         simplify(&fine, &both, &Silent).expect("both").0,
         simplify(&fine, &within(1e-3), &Silent).expect("one").0
@@ -239,13 +193,7 @@ fn a_number_of_triangles_is_met() {
 
 #[test]
 fn cuts_stay_what_they_are() {
-    let field = lattice_at(
-        "gyroid",
-        Part::Sheet,
-        Level::Fraction(Grade::Constant(0.35)),
-        [1.0; 3],
-        [0.0; 3],
-    );
+    let field = lattice_at("gyroid", Part::Sheet, Level::Fraction(Grade::Constant(0.35)), [1.0; 3], [0.0; 3]);
     let fine = surface(&solid(cube(1.5), Some(field)), 1.0 / 32.0, &Silent).expect("surface");
     let (made, report, _) = held("gyroid", &fine, within(0.005));
     println!("gyroid: {:?}", report.triangles);
@@ -264,30 +212,17 @@ fn cuts_stay_what_they_are() {
     // The faces of the box are flat and stay exactly where they are.
     for (i, cut) in made.cut.iter().enumerate() {
         let corners = made.mesh.corners(i);
-        let flat = (0..3).any(|k| {
-            [0.0, 1.5]
-                .iter()
-                .any(|x| corners.iter().all(|p| p[k] == *x))
-        });
+        let flat = (0..3).any(|k| [0.0, 1.5].iter().any(|x| corners.iter().all(|p| p[k] == *x)));
         assert_eq!(flat, *cut, "{corners:?}");
     }
 }
 
 #[test]
 fn same_bytes_for_any_number_of_threads() {
-    let field = lattice_at(
-        "diamond",
-        Part::Sheet,
-        Level::Fraction(Grade::Constant(0.3)),
-        [1.0; 3],
-        [5.0, 15.0, 25.0],
-    );
+    let field = lattice_at("diamond", Part::Sheet, Level::Fraction(Grade::Constant(0.3)), [1.0; 3], [5.0, 15.0, 25.0]);
     let fine = surface(&solid(ball([0.0; 3], 1.0), Some(field)), 0.05, &Silent).expect("surface");
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("pool");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| simplify(&fine, &within(0.01), &Silent).expect("simplified"))
     };
     assert!(run(1) == run(3));
@@ -305,26 +240,16 @@ fn what_cannot_be_done_is_refused_with_numbers() {
         assert!(refused(&fine, within(t)).starts_with("tolerance: is "));
     }
     assert!(refused(&fine, within(1e-9)).contains("single precision"));
-    assert_eq!(
-        refused(&fine, down_to(3)),
-        "triangles: is 3; a closed mesh has at least 4"
-    );
+    assert_eq!(refused(&fine, down_to(3)), "triangles: is 3; a closed mesh has at least 4");
     let mut open = fine.clone();
     open.mesh.triangles.pop();
     open.cut.pop();
     assert!(refused(&open, within(0.1)).contains("3 edges with one triangle"));
     let mut crossed = fine.clone();
     let n = crossed.mesh.vertices.len() as u32;
-    let shifted = fine
-        .mesh
-        .vertices
-        .iter()
-        .map(|p| add(*p, [0.53, 0.51, 0.57]));
+    let shifted = fine.mesh.vertices.iter().map(|p| add(*p, [0.53, 0.51, 0.57]));
     crossed.mesh.vertices.extend(shifted);
-    crossed
-        .mesh
-        .triangles
-        .extend(fine.mesh.triangles.iter().map(|t| t.map(|v| v + n)));
+    crossed.mesh.triangles.extend(fine.mesh.triangles.iter().map(|t| t.map(|v| v + n)));
     crossed.cut.extend(fine.cut.iter());
     assert!(refused(&crossed, within(0.1)).contains("pairs of triangles that meet"));
 
@@ -335,10 +260,7 @@ fn what_cannot_be_done_is_refused_with_numbers() {
         }
     }
     let many = of(ball([0.0; 3], 1.0), 0.05);
-    assert!(matches!(
-        simplify(&many, &within(0.05), &Never),
-        Err(Stopped::Interrupted)
-    ));
+    assert!(matches!(simplify(&many, &within(0.05), &Never), Err(Stopped::Interrupted)));
 }
 
 proptest! {

@@ -11,9 +11,7 @@ use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
 use trabecula::math::{Aabb, Interval, Vec3, norm, sub};
 use trabecula::mesh::Mesh;
-use trabecula::region::{
-    Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union,
-};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
@@ -86,13 +84,7 @@ const SINGLE: f64 = 2e-6;
 #[test]
 fn the_skin_of_a_box_is_the_box_less_the_inner_box() {
     let region = cuboid([0.0; 3], [10.0, 8.0, 6.0]);
-    for (w, edge) in [
-        (1.0, 0.25),
-        (0.7, 0.31),
-        (0.2, 0.5),
-        (0.05, 0.3),
-        (1.3, 0.4),
-    ] {
+    for (w, edge) in [(1.0, 0.25), (0.7, 0.31), (0.2, 0.5), (0.05, 0.3), (1.3, 0.4)] {
         let v = volume(&shell(&region, &Grade::Constant(w), &[]), edge, "box");
         let inner = (10.0 - 2.0 * w) * (8.0 - 2.0 * w) * (6.0 - 2.0 * w);
         close(v, 480.0 - inner, SINGLE * 480.0 / (480.0 - inner), "box");
@@ -108,18 +100,10 @@ fn an_open_face_has_no_skin_and_its_walls_are_full() {
         let solid = shell(&region, &Grade::Constant(1.0), &open);
         let s = surface(&solid, 0.3, &Silent).expect("surface");
         check("open box", &s);
-        close(
-            s.mesh.volume(),
-            480.0 - 8.0 * 6.0 * depth,
-            SINGLE,
-            "open box",
-        );
+        close(s.mesh.volume(), 480.0 - 8.0 * 6.0 * depth, SINGLE, "open box");
         // The rim is all there is of the open face: full thickness up to the end.
         let on_top = |i: &usize| s.mesh.corners(*i).iter().all(|p| p[2] == 6.0);
-        let rim: f64 = (0..s.mesh.triangles.len())
-            .filter(on_top)
-            .map(|i| area(&s.mesh, i))
-            .sum();
+        let rim: f64 = (0..s.mesh.triangles.len()).filter(on_top).map(|i| area(&s.mesh, i)).sum();
         close(rim, 80.0 - 48.0, SINGLE, "rim");
     }
 }
@@ -134,12 +118,7 @@ fn the_lattice_shows_on_the_open_face_alone() {
     let region = cuboid([0.0; 3], [8.0; 3]);
     let open = [half([0.0, 0.0, 8.0], [0.0, 0.0, 1.0])];
     let body = skin(&region, &Grade::Constant(0.5), &open).expect("skin");
-    let s = surface(
-        &filled(&region, gyroid(0.3, 4.0), vec![body]),
-        0.125,
-        &Silent,
-    )
-    .expect("surface");
+    let s = surface(&filled(&region, gyroid(0.3, 4.0), vec![body]), 0.125, &Silent).expect("surface");
     check("open lattice", &s);
     let on = |axis: usize, at: f64| -> f64 {
         let flat = |i: &usize| s.mesh.corners(*i).iter().all(|p| p[axis] == at);
@@ -162,11 +141,7 @@ fn the_lattice_shows_on_the_open_face_alone() {
 fn the_skin_of_a_ball_converges() {
     let want = 4.0 / 3.0 * PI * (1.0 - 0.8f64.powi(3));
     let errors = [8.0, 16.0, 32.0, 64.0].map(|n| {
-        let v = volume(
-            &shell(&ball([0.0; 3], 1.0), &Grade::Constant(0.2), &[]),
-            1.0 / n,
-            "ball",
-        );
+        let v = volume(&shell(&ball([0.0; 3], 1.0), &Grade::Constant(0.2), &[]), 1.0 / n, "ball");
         (v / want - 1.0).abs()
     });
     println!("ball: {errors:?}");
@@ -188,38 +163,22 @@ fn a_thickness_that_varies_is_met() {
     close(v, 480.0 - inner, 1e-4, "graded box");
     let open = [half([10.0, 0.0, 0.0], [1.0, 0.0, 0.0])];
     let v = volume(&shell(&region, &w, &open), 0.25, "graded open box");
-    close(
-        v,
-        480.0 - (whole(10.0) - whole(x0)),
-        1e-4,
-        "graded open box",
-    );
+    close(v, 480.0 - (whole(10.0) - whole(x0)), 1e-4, "graded open box");
     // (The faces are moved by hairs of 1e-6 of the size.) A constant, said as a formula.
     let constant = Grade::Formula(Formula::parse("0.2 + 0*x").expect("formula"));
     let ball = |w: &Grade| volume(&shell(&ball([0.0; 3], 1.0), w, &[]), 0.05, "ball");
-    close(
-        ball(&constant),
-        ball(&Grade::Constant(0.2)),
-        1e-4,
-        "formula",
-    );
+    close(ball(&constant), ball(&Grade::Constant(0.2)), 1e-4, "formula");
 }
 
 #[test]
 fn a_hole_gets_a_wall_of_its_own() {
-    let region = difference(
-        cuboid([0.0; 3], [12.0, 12.0, 6.0]),
-        cylinder([6.0, 6.0, -1.0], 2.0, 8.0),
-    );
+    let region = difference(cuboid([0.0; 3], [12.0, 12.0, 6.0]), cylinder([6.0, 6.0, -1.0], 2.0, 8.0));
     let hollow = |w: f64, depth: f64| {
         let side = 12.0 - 2.0 * w;
         (side * side - PI * (2.0 + w) * (2.0 + w)) * depth
     };
     let full = 144.0 * 6.0 - PI * 4.0 * 6.0;
-    for (open, depth) in [
-        (vec![], 4.0),
-        (vec![half([0.0, 0.0, 6.0], [0.0, 0.0, 1.0])], 5.0),
-    ] {
+    for (open, depth) in [(vec![], 4.0), (vec![half([0.0, 0.0, 6.0], [0.0, 0.0, 1.0])], 5.0)] {
         let v = volume(&shell(&region, &Grade::Constant(1.0), &open), 0.2, "hole");
         // Round faces: rims are polygons, short by (h/r)²/6 of their circle.
         close(v, full - hollow(1.0, depth), 2e-3, "hole");
@@ -231,8 +190,7 @@ fn slanted_faces_open_too() {
     // The lower half of a ball, its flat face slanted.
     let n = [0.3, -0.2, 1.0];
     let flat = Arc::new(half([0.0; 3], n));
-    let region: Region =
-        Arc::new(Intersection::new(vec![ball([0.0; 3], 3.0), flat]).expect("half ball"));
+    let region: Region = Arc::new(Intersection::new(vec![ball([0.0; 3], 3.0), flat]).expect("half ball"));
     let solid = shell(&region, &Grade::Constant(0.5), &[half([0.0; 3], n)]);
     let v = volume(&solid, 0.1, "half ball");
     let want = 2.0 / 3.0 * PI * (27.0 - 2.5f64.powi(3));
@@ -240,11 +198,7 @@ fn slanted_faces_open_too() {
     // A cylinder along a slanted axis, its end open.
     let axis = [1.0, 2.0, 2.0];
     let leaning: Region = Arc::new(Cylinder::new([0.0; 3], axis, 2.0, 6.0).expect("cylinder"));
-    let solid = shell(
-        &leaning,
-        &Grade::Constant(0.5),
-        &[half([2.0, 4.0, 4.0], axis)],
-    );
+    let solid = shell(&leaning, &Grade::Constant(0.5), &[half([2.0, 4.0, 4.0], axis)]);
     let want = PI * (4.0 * 6.0 - 1.5 * 1.5 * 5.5);
     close(volume(&solid, 0.1, "cup"), want, 2e-3, "cup");
 }
@@ -285,15 +239,9 @@ fn a_keep_zone_is_solid_and_nothing_else_is() {
     let both = filled(&region, Arc::new(Nothing), vec![skin, zone(&block)]);
     // The skin, and of the block what is above it.
     let want = 1000.0 - 512.0 + 16.0 * 3.0;
-    close(
-        volume(&both, 0.3, "skin and block"),
-        want,
-        SINGLE,
-        "skin and block",
-    );
+    close(volume(&both, 0.3, "skin and block"), want, SINGLE, "skin and block");
     // The sum is that of a union.
-    let union: Region =
-        Arc::new(Union::new(vec![block.clone(), cuboid([1.0; 3], [5.0; 3])]).expect("union"));
+    let union: Region = Arc::new(Union::new(vec![block.clone(), cuboid([1.0; 3], [5.0; 3])]).expect("union"));
     let alone = filled(&region, Arc::new(Nothing), vec![zone(&union)]);
     let want = 16.0 * 4.0 + 64.0 - 2.0 * 2.0 * 3.0;
     close(volume(&alone, 0.3, "union"), want, SINGLE, "union");
@@ -340,12 +288,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
         let want = 480.0 - 8.0 * 6.0 * depth;
         close(volume(&solid, 0.15, "mesh box"), want, 3e-3, "mesh box");
         // Nothing as thick as the skin is left at the open face, and its neighbours are whole.
-        let p = [
-            [5.0, 4.0, 5.99],
-            [0.5, 4.0, 5.99],
-            [1.05, 4.0, 5.99],
-            [5.0, 4.0, 0.5],
-        ];
+        let p = [[5.0, 4.0, 5.99], [0.5, 4.0, 5.99], [1.05, 4.0, 5.99], [5.0, 4.0, 0.5]];
         let solid = p.map(|p| solid.value(p) <= 0.0);
         assert_eq!(solid, [open.is_empty(), true, open.is_empty(), true]);
     }
@@ -355,8 +298,7 @@ fn a_mesh_region_has_the_skin_of_the_shape_it_is_of() {
     close(v, want, 5e-3, "mesh ball");
     // In combinations: the mesh's own face and the cut of another.
     let cut = Arc::new(half([5.0, 0.0, 0.0], [1.0, 0.0, 0.0]));
-    let region: Region =
-        Arc::new(Intersection::new(vec![block, cut.clone()]).expect("intersection"));
+    let region: Region = Arc::new(Intersection::new(vec![block, cut.clone()]).expect("intersection"));
     let solid = shell(&region, &w, &[top, *cut]);
     let want = 240.0 - 4.0 * 6.0 * 5.0;
     close(volume(&solid, 0.15, "cut mesh"), want, 3e-3, "cut mesh");
@@ -370,9 +312,7 @@ fn open_meshes_keep_their_bounds_and_blocks() {
     let cuts = [half([0.0, 0.0, 2.0], [0.0, 0.0, 1.0])];
     let open = region.opened(&cuts, &mut [false]).expect("a flat face");
     let axes: Vec<f64> = (0..40).map(|i| -1.0 + 0.153 * f64::from(i)).collect();
-    let block = trabecula::field::Block {
-        axes: [&axes, &axes[..30], &axes[3..35]],
-    };
+    let block = trabecula::field::Block { axes: [&axes, &axes[..30], &axes[3..35]] };
     let mut filled = vec![0f32; block.len()];
     open.fill_level(&block, -0.5, &mut filled);
     let mut i = 0;
@@ -382,10 +322,7 @@ fn open_meshes_keep_their_bounds_and_blocks() {
                 let v = open.value([x, y, z]) + 0.5;
                 let near = (f64::from(filled[i]) - v).abs() < 1e-6;
                 assert!(near || (v.abs() > 0.265 && f64::from(filled[i]) * v > 0.0));
-                let b = Aabb {
-                    min: [x, y, z],
-                    max: [x + 0.3, y + 0.2, z + 0.4],
-                };
+                let b = Aabb { min: [x, y, z], max: [x + 0.3, y + 0.2, z + 0.4] };
                 let r = open.bound(&b);
                 for q in [b.min, b.max, b.center(), [b.max[0], b.min[1], b.max[2]]] {
                     let v = open.value(q);
@@ -401,9 +338,8 @@ fn open_meshes_keep_their_bounds_and_blocks() {
 type Depth = Box<dyn Fn(Vec3) -> f64>;
 
 fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
-    let to_box = |a: Vec3, b: Vec3| {
-        move |p: Vec3| (0..3).fold(f64::INFINITY, |m, i| m.min(p[i] - a[i]).min(b[i] - p[i]))
-    };
+    let to_box =
+        |a: Vec3, b: Vec3| move |p: Vec3| (0..3).fold(f64::INFINITY, |m, i| m.min(p[i] - a[i]).min(b[i] - p[i]));
     let (a, b) = ([-r, -1.0, -t], [t, r, 1.0]);
     match kind {
         0 => (cuboid(a, b), Box::new(to_box(a, b))),
@@ -424,8 +360,7 @@ fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
         _ => {
             let h = half([s, 0.0, 0.1], [s, 1.0, 0.5]);
             let depth = move |p: Vec3| (r - norm(p)).min(-h.value(p));
-            let both =
-                Intersection::new(vec![ball([0.0; 3], r), Arc::new(h)]).expect("intersection");
+            let both = Intersection::new(vec![ball([0.0; 3], r), Arc::new(h)]).expect("intersection");
             (Arc::new(both), Box::new(depth))
         }
     }
@@ -435,9 +370,7 @@ fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
 fn the_field_is_membership_by_set_logic() {
     let mut seed = 7u64;
     let mut random = || {
-        seed = seed
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     };
     for n in 0..200 {
@@ -446,19 +379,13 @@ fn the_field_is_membership_by_set_logic() {
         let (w, slope) = (0.2 + 0.1 * random(), 0.05 * random());
         let grade = match n % 2 {
             0 => Grade::Constant(w),
-            _ => Grade::linear(
-                [0.0, 1.0, 0.0],
-                vec![[-9.0, w - 9.0 * slope], [9.0, w + 9.0 * slope]],
-            )
-            .expect("grade"),
+            _ => Grade::linear([0.0, 1.0, 0.0], vec![[-9.0, w - 9.0 * slope], [9.0, w + 9.0 * slope]]).expect("grade"),
         };
         let slope = if n % 2 == 0 { 0.0 } else { slope };
         if n % 2 == 1 && w - 2.0 * slope.abs() < 0.05 {
             continue;
         }
-        let Ok(skin) = skin(&region, &grade, &[]) else {
-            panic!("skin {n}")
-        };
+        let Ok(skin) = skin(&region, &grade, &[]) else { panic!("skin {n}") };
         let keep = cylinder([0.2, 0.1, -0.5], 0.3, 0.6);
         let field = gyroid(0.3, 0.9);
         let solid = filled(&region, field.clone(), vec![skin, zone(&keep)]);
@@ -484,10 +411,7 @@ fn the_field_is_membership_by_set_logic() {
             };
             let slope = [0, 1, 2].map(|a| (near(a, h) - near(a, -h)) / (2.0 * h));
             smooth += usize::from(norm(sub(slope, *g)) < 1e-2 * (1.0 + norm(*g)));
-            let b = Aabb {
-                min: *p,
-                max: p.map(|x| x + 0.1),
-            };
+            let b = Aabb { min: *p, max: p.map(|x| x + 0.1) };
             let range = solid.bound(&b);
             let q = [0; 3].map(|_| 0.05 + 0.05 * random());
             let inside = solid.value([0, 1, 2].map(|a| p[a] + q[a]));

@@ -27,16 +27,9 @@ fn mesh(region: &Region, size: &Grade) -> (TetMesh, Fit) {
 
 /// Conforming, positive, and bounded by one closed sheet that does not meet itself.
 fn sound(what: &str, mesh: &TetMesh) {
-    let (same, found) = mesh
-        .clone()
-        .checked()
-        .unwrap_or_else(|f| panic!("{what}: {f}"));
+    let (same, found) = mesh.clone().checked().unwrap_or_else(|f| panic!("{what}: {f}"));
     assert_eq!(&same, mesh, "{what}");
-    assert_eq!(
-        (found.turned, found.pinched, found.unused),
-        (false, 0, 0),
-        "{what}"
-    );
+    assert_eq!((found.turned, found.pinched, found.unused), (false, 0, 0), "{what}");
     if let Some(why) = fault(&mesh.boundary()) {
         panic!("{what}: {why}");
     }
@@ -45,12 +38,7 @@ fn sound(what: &str, mesh: &TetMesh) {
 fn angles(what: &str, mesh: &TetMesh) -> [f64; 2] {
     let d = mesh.quality().expect(what).dihedral;
     // Cosines of such angles, to rounding, give them to far better than this.
-    assert!(
-        d.min > ANGLES[0] - 1e-6 && d.max < ANGLES[1] + 1e-6,
-        "{what}: {} to {}",
-        d.min,
-        d.max
-    );
+    assert!(d.min > ANGLES[0] - 1e-6 && d.max < ANGLES[1] + 1e-6, "{what}: {} to {}", d.min, d.max);
     [d.min, d.max]
 }
 
@@ -70,11 +58,7 @@ fn random_regions_get_sound_meshes_of_bounded_angles_on_their_surface() {
         if fit.mended == 0.0 {
             let boundary = mesh.boundary();
             // Found to 1e-10 of an edge, or placed on an edge of the region, where signed distances of combinations bend.
-            let far = boundary
-                .vertices
-                .iter()
-                .map(|p| space.value(*p).abs())
-                .fold(0.0, f64::max);
+            let far = boundary.vertices.iter().map(|p| space.value(*p).abs()).fold(0.0, f64::max);
             assert!(far < 0.02 * size, "{what}: {far} off");
         }
         // A chord of length l is at most l²/8R off a curve of radius R; edges and corners are met to a tetrahedron.
@@ -90,11 +74,7 @@ struct Waves(Vec<(Vec3, f64)>);
 impl Field for Waves {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, p) in out.iter_mut().zip(points) {
-            *o = self
-                .0
-                .iter()
-                .map(|(k, phase)| (dot(*k, *p) + phase).sin())
-                .sum();
+            *o = self.0.iter().map(|(k, phase)| (dot(*k, *p) + phase).sin()).sum();
         }
     }
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
@@ -116,22 +96,11 @@ impl Field for Waves {
 #[test]
 fn the_bounds_of_angles_hold_for_any_surface() {
     let mut some = Random(5);
-    let bounds = Aabb {
-        min: [-2.0; 3],
-        max: [2.0; 3],
-    };
+    let bounds = Aabb { min: [-2.0; 3], max: [2.0; 3] };
     for i in 0..cases(12) {
-        let waves = (0..5)
-            .map(|_| (some.point(5.0), some.between(0.0, 6.3)))
-            .collect();
+        let waves = (0..5).map(|_| (some.point(5.0), some.between(0.0, 6.3))).collect();
         let field = Waves(waves);
-        let (mesh, _) = background(
-            &field,
-            &bounds,
-            &Grade::Constant(0.4),
-            &inside(&field, &bounds),
-        )
-        .expect("mesh");
+        let (mesh, _) = background(&field, &bounds, &Grade::Constant(0.4), &inside(&field, &bounds)).expect("mesh");
         sound(&format!("waves {i}"), &mesh);
         angles(&format!("waves {i}"), &mesh);
     }
@@ -211,10 +180,7 @@ fn graded_meshes_of_random_regions_keep_their_shapes() {
         // No bound is proven here; this is what campaigns have kept well away from.
         assert!(d.min > 5.0 && d.max < 172.0, "{what}: {d:?}");
     }
-    eprintln!(
-        "graded: dihedral angles from {:.2} to {:.2}",
-        worst[0], worst[1]
-    );
+    eprintln!("graded: dihedral angles from {:.2} to {:.2}", worst[0], worst[1]);
 }
 
 #[test]
@@ -226,19 +192,13 @@ fn a_box_is_met_exactly() {
     assert!((mesh.volume() - 6.0).abs() < 1e-9);
     assert!(fit.deviation < 1e-9 && fit.lost == 0.0, "{fit:?}");
     let q = mesh.quality().expect("quality");
-    assert!(
-        q.dihedral.min > 44.9 && q.dihedral.max < 90.1,
-        "{:?}",
-        q.dihedral
-    );
+    assert!(q.dihedral.min > 44.9 && q.dihedral.max < 90.1, "{:?}", q.dihedral);
 }
 
 #[test]
 fn a_grade_of_sizes_is_followed() {
     let mut spaces = vec![cuboid([0.0; 3], [2.0; 3]), ball([1.0; 3], 1.0)];
-    spaces.push(Arc::new(
-        Difference::new(vec![spaces[0].clone(), ball([1.0; 3], 0.5)]).expect("difference"),
-    ));
+    spaces.push(Arc::new(Difference::new(vec![spaces[0].clone(), ball([1.0; 3], 0.5)]).expect("difference")));
     for space in spaces {
         let size = Grade::linear([1.0, 0.0, 0.0], vec![[0.0, 0.06], [2.0, 0.3]]).expect("grade");
         let (mesh, fit) = mesh(&space, &size);
@@ -255,11 +215,7 @@ fn a_grade_of_sizes_is_followed() {
         assert!((0.6..1.05).contains(&at(0.5)), "{}", at(0.5));
         assert!(at(0.95) < 1.2 && at(1.0) < 1.9, "{} {}", at(0.95), at(1.0));
         let q = mesh.quality().expect("quality");
-        assert!(
-            q.dihedral.min > 5.0 && q.slivers < q.tets / 1000,
-            "{:?}",
-            q.dihedral
-        );
+        assert!(q.dihedral.min > 5.0 && q.slivers < q.tets / 1000, "{:?}", q.dihedral);
         assert!(q.size.max / q.size.min > 3.0);
     }
 }
@@ -271,12 +227,7 @@ fn thin_walls_are_told() {
         Arc::new(Difference::new(parts).expect("shell"))
     };
     let (thin, points) = (shell(0.08), |r: &Region| inside(&**r, &r.bounds()));
-    match background(
-        &*thin,
-        &thin.bounds(),
-        &Grade::Constant(0.2),
-        &points(&thin),
-    ) {
+    match background(&*thin, &thin.bounds(), &Grade::Constant(0.2), &points(&thin)) {
         Err(f) => assert!(f.message.contains("smaller"), "{f}"),
         Ok((mesh, fit)) => {
             sound("thin", &mesh);
@@ -293,10 +244,7 @@ fn any_number_of_threads_gives_the_same_mesh() {
     let space = region(5, 1.0, 0.9, 1.1);
     let size = Grade::linear([0.0, 1.0, 0.0], vec![[-1.0, 0.1], [1.0, 0.2]]).expect("grade");
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("pool");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| mesh(&space, &size))
     };
     assert_eq!(with(1), with(3));

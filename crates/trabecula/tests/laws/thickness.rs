@@ -38,11 +38,7 @@ struct Search {
 
 impl Search {
     fn new(series: &Series, map: &Affine) -> Search {
-        Search {
-            series: series.clone(),
-            map: *map,
-            back: transpose(&map.matrix),
-        }
+        Search { series: series.clone(), map: *map, back: transpose(&map.matrix) }
     }
 
     fn sample(&self, x: Vec3) -> (f64, Vec3) {
@@ -108,13 +104,8 @@ fn judged(series: &Series, map: Affine, thickness: Grade, edge: f64) -> [f64; 2]
             t.iter().for_each(|v| lattice_only[*v as usize] = false);
         }
     }
-    let faces: Vec<Vec3> = s
-        .mesh
-        .vertices
-        .iter()
-        .zip(lattice_only)
-        .filter_map(|(v, free)| free.then_some(*v))
-        .collect();
+    let faces: Vec<Vec3> =
+        s.mesh.vertices.iter().zip(lattice_only).filter_map(|(v, free)| free.then_some(*v)).collect();
     assert!(faces.len() > 1000);
     let search = Search::new(series, &map);
     let mut half = vec![0.0; faces.len()];
@@ -152,19 +143,14 @@ fn walls_are_as_thick_as_asked() {
 fn walls_of_stretched_and_turned_lattices_are_as_thick_as_asked() {
     for name in ["gyroid", "diamond", "primitive", "iwp"] {
         let s = series(name);
-        for (wavelength, rotate) in [
-            ([3.0, 4.0, 6.0], [0.0; 3]),
-            ([5.0; 3], [20.0, 35.0, 50.0]),
-            ([3.0, 4.0, 6.0], [20.0, 35.0, 50.0]),
-        ] {
+        for (wavelength, rotate) in
+            [([3.0, 4.0, 6.0], [0.0; 3]), ([5.0; 3], [20.0, 35.0, 50.0]), ([3.0, 4.0, 6.0], [20.0, 35.0, 50.0])]
+        {
             let map = rigid(wavelength, rotate);
             let limit = Distance::new(&s, &map.matrix).folding().expect("a surface");
             for w in [0.4, 0.95].map(|share| share * limit) {
                 let found = judged(&s, map, Grade::Constant(w), 3.0 / 48.0);
-                within(
-                    &format!("{name} {wavelength:?} {rotate:?} {w:.3} mm"),
-                    found,
-                );
+                within(&format!("{name} {wavelength:?} {rotate:?} {w:.3} mm"), found);
             }
         }
     }
@@ -183,20 +169,13 @@ fn graded_walls_are_as_thick_as_asked_where_they_stand() {
 fn off_centre_walls_stand_about_their_own_mid_surface() {
     let s = series("gyroid").about(0.6).expect("series");
     let map = rigid([5.0; 3], [0.0; 3]);
-    within(
-        "mid 0.6",
-        judged(&s, map, Grade::Constant(0.75), 5.0 / 48.0),
-    );
+    within("mid 0.6", judged(&s, map, Grade::Constant(0.75), 5.0 / 48.0));
 }
 
 /// Steiner: within w/2 of a minimal surface of area A and Euler number χ per cell lies A w + (π/6) χ w³.
 #[test]
 fn fractions_are_steiners() {
-    for (name, area, chi) in [
-        ("primitive", 2.345103, -4.0),
-        ("gyroid", 3.091444, -8.0),
-        ("diamond", 3.837785, -16.0),
-    ] {
+    for (name, area, chi) in [("primitive", 2.345103, -4.0), ("gyroid", 3.091444, -8.0), ("diamond", 3.837785, -16.0)] {
         let d = Distance::new(&series(name), &rigid([1.0; 3], [0.0; 3]).matrix);
         for w in [0.02, 0.06, 0.1, 0.15, 0.2, 0.3] {
             let law = area * w + PI / 6.0 * chi * w * w * w;
@@ -204,10 +183,7 @@ fn fractions_are_steiners() {
             println!("{name} {w}: {found:.5} {law:.5} {:.1e}", found / law - 1.0);
             // The surfaces f = 0 are nearly minimal: the primitive's area is 0.3 % more, and its mean curvature counts
             // as w² more.
-            assert!(
-                (found / law - 1.0).abs() < 0.01,
-                "{name} {w}: {found} {law}"
-            );
+            assert!((found / law - 1.0).abs() < 0.01, "{name} {w}: {found} {law}");
         }
     }
 }
@@ -215,20 +191,12 @@ fn fractions_are_steiners() {
 /// The law of any surface, minimal or not, as w goes to zero: A w with the area of f = 0 itself.
 #[test]
 fn thin_walls_weigh_their_area() {
-    for (name, area) in [
-        ("primitive", 2.3526),
-        ("gyroid", 3.0916),
-        ("diamond", 3.8380),
-        ("iwp", 3.5536),
-    ] {
+    for (name, area) in [("primitive", 2.3526), ("gyroid", 3.0916), ("diamond", 3.8380), ("iwp", 3.5536)] {
         let d = Distance::new(&series(name), &rigid([4.0; 3], [0.0; 3]).matrix);
         let found = d.fraction(Part::Sheet, 0.02) / 0.01;
         println!("{name}: {found:.5} {area}");
         // Areas by marching cubes are good to 1e-4; the cubic term of Steiner's law is below 1e-3 at w = 0.01.
-        assert!(
-            (found / area - 1.0).abs() < 1.5e-3,
-            "{name}: {found} {area}"
-        );
+        assert!((found / area - 1.0).abs() < 1.5e-3, "{name}: {found} {area}");
     }
 }
 
@@ -239,14 +207,9 @@ fn fractions_are_those_of_the_field() {
         let map = rigid([3.0, 4.0, 6.0], [0.0; 3]);
         let lattice = wall(series(name), Level::Thickness(Grade::Constant(0.5)), map);
         let n = 100;
-        let axes = map.wavelength.map(|w| {
-            (0..n)
-                .map(|i| w * (f64::from(i) + 0.37) / f64::from(n))
-                .collect::<Vec<f64>>()
-        });
-        let block = Block {
-            axes: [&axes[0], &axes[1], &axes[2]],
-        };
+        let axes =
+            map.wavelength.map(|w| (0..n).map(|i| w * (f64::from(i) + 0.37) / f64::from(n)).collect::<Vec<f64>>());
+        let block = Block { axes: [&axes[0], &axes[1], &axes[2]] };
         let mut out = vec![0f32; block.len()];
         lattice.fill(&block, &mut out);
         let counted = out.iter().filter(|v| **v <= 0.0).count() as f64 / 1e6;

@@ -23,28 +23,17 @@ use trabecula::tiling::{Amount, Level, Share, Tiling};
 pub fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
     let m = n + 1;
     let place = |i: usize| [i % m, i / m % m, i / m / m];
-    let nodes: Vec<[f64; 3]> = (0..m * m * m)
-        .map(|i| place(i).map(|v| edge * (v as f64 + some.between(-by, by))))
-        .collect();
+    let nodes: Vec<[f64; 3]> =
+        (0..m * m * m).map(|i| place(i).map(|v| edge * (v as f64 + some.between(-by, by)))).collect();
     let mut order: Vec<usize> = (0..nodes.len()).collect();
     for i in (1..order.len()).rev() {
         order.swap(i, some.below(i + 1));
     }
-    let mut out = TetMesh {
-        nodes: vec![[0.0; 3]; nodes.len()],
-        ..TetMesh::default()
-    };
+    let mut out = TetMesh { nodes: vec![[0.0; 3]; nodes.len()], ..TetMesh::default() };
     for (i, to) in order.iter().enumerate() {
         out.nodes[*to] = nodes[i];
     }
-    let paths = [
-        [0, 1, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [1, 0, 2],
-        [0, 2, 1],
-        [2, 1, 0],
-    ];
+    let paths = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
     for i in (0..m * m * m).filter(|i| place(*i).iter().all(|v| *v < n)) {
         for (k, path) in paths.iter().enumerate() {
             let mut at = place(i);
@@ -92,15 +81,8 @@ pub fn cell(name: &str) -> (Arc<Stencil>, Part, f64) {
 
 /// The cell of one real wave of a group.
 fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<Stencil> {
-    let waves = Group::named(group)
-        .expect(group)
-        .orbit(hkl, Side::Re)
-        .expect(group);
-    let terms = waves.into_iter().map(|(hkl, c, s)| Term {
-        hkl,
-        amplitude: c.hypot(s),
-        phase: (-s).atan2(c) / TAU,
-    });
+    let waves = Group::named(group).expect(group).orbit(hkl, Side::Re).expect(group);
+    let terms = waves.into_iter().map(|(hkl, c, s)| Term { hkl, amplitude: c.hypot(s), phase: (-s).atan2(c) / TAU });
     let series = Series::new(terms.collect()).expect(group);
     let stencil = Stencil::new(series, [site; 3], edge * 2f64.sqrt(), dual);
     Arc::new(stencil.expect(group))
@@ -118,12 +100,7 @@ fn ready_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
         assert!(found.closed, "{}", r.name);
         // By ports and union-find, and by the surface itself.
         let told = (told.pieces as usize, told.cavities as usize, told.euler);
-        assert_eq!(
-            told,
-            (found.pieces, found.cavities, found.euler),
-            "{}",
-            r.name
-        );
+        assert_eq!(told, (found.pieces, found.cavities, found.euler), "{}", r.name);
         assert_eq!(found.pieces, 1, "{}", r.name);
     }
 }
@@ -135,24 +112,9 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
     // Pieces counted elsewhere on 48 tetrahedra: of the P sheet too thin, of loose fragments, of nodes that reach no face, of a
     // cage whose bars have parted.
     for (s, part, t, pieces) in [
-        (
-            plain("221", [1, 0, 0], 0.5, 1.0, false),
-            Part::Sheet,
-            0.6,
-            27,
-        ),
-        (
-            plain("221", [1, 0, 0], 0.5, 1.0, false),
-            Part::Lower,
-            -1.8,
-            48,
-        ),
-        (
-            plain("227:2", [1, 1, 1], 0.125, 0.75, true),
-            Part::Lower,
-            -2.2,
-            75,
-        ),
+        (plain("221", [1, 0, 0], 0.5, 1.0, false), Part::Sheet, 0.6, 27),
+        (plain("221", [1, 0, 0], 0.5, 1.0, false), Part::Lower, -1.8, 48),
+        (plain("227:2", [1, 1, 1], 0.125, 0.75, true), Part::Lower, -2.2, 75),
     ] {
         assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
@@ -160,15 +122,10 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
         assert_eq!((foretold.pieces, foretold.joins.len()), (pieces, 0));
         let solid = solid(tiling, true);
         let edge = 0.75;
-        let (all, told) =
-            extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface");
+        let (all, told) = extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface");
         assert_eq!(size(&all.mesh).pieces, pieces);
-        assert_eq!(
-            (told.pieces as usize, told.others as usize),
-            (pieces, pieces - 1)
-        );
-        let (one, told) =
-            extract::surface_of(&solid, edge, Islands::Drop, &Silent).expect("surface");
+        assert_eq!((told.pieces as usize, told.others as usize), (pieces, pieces - 1));
+        let (one, told) = extract::surface_of(&solid, edge, Islands::Drop, &Silent).expect("surface");
         assert_eq!((size(&one.mesh).pieces, told.pieces), (1, 1));
         let refused = extract::surface_of(&solid, edge, Islands::Error, &Silent);
         assert!(matches!(refused, Err(Stopped::Refused(_))));
@@ -178,16 +135,8 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
 #[test]
 fn surfaces_are_embedded_after_rounding_whatever_varies() {
     let mut some = Random(3);
-    for (i, name) in [
-        "diamond",
-        "iwp",
-        "primitive_sheet",
-        "pn3m_sheet",
-        "fm3m_sheet",
-        "diamond_cage",
-    ]
-    .into_iter()
-    .enumerate()
+    for (i, name) in
+        ["diamond", "iwp", "primitive_sheet", "pn3m_sheet", "fm3m_sheet", "diamond_cage"].into_iter().enumerate()
     {
         let mesh = shaken(1 + i % 2, 0.2, 7.0, &mut some);
         let (s, part, t) = cell(name);
@@ -267,10 +216,7 @@ fn both_roads_lead_to_one_surface() {
         assert!(b.0.0 < 0.32 * a.0.0, "{name}: explicit {a:?} {b:?}");
         assert!(b.1.0 < 0.45 * a.1.0, "{name}: implicit {a:?} {b:?}");
         let apart = |x: ((f64, f64), (f64, f64))| (x.0.1 - x.1.1).abs() / x.1.1;
-        assert!(
-            apart(b) < 0.4 * apart(a) || apart(b) < 2e-3,
-            "{name}: {a:?} {b:?}"
-        );
+        assert!(apart(b) < 0.4 * apart(a) || apart(b) < 2e-3, "{name}: {a:?} {b:?}");
     }
 }
 
@@ -287,8 +233,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
     let (mesh, _) = background(&*region, &region.bounds(), &size_mm, &inside).expect("mesh");
     let (s, part, t) = cell("diamond");
     let solid = solid(Tiling::new(map(&mesh), s, part, Level::Same(t)), true);
-    let (surface, pieces) =
-        extract::surface_of(&solid, 0.5, Islands::Keep, &Silent).expect("surface");
+    let (surface, pieces) = extract::surface_of(&solid, 0.5, Islands::Keep, &Silent).expect("surface");
     assert_eq!(fault(&surface.mesh), None);
     assert_eq!(pieces.pieces, 1);
     let streams = [1, 3].map(|threads| {
@@ -364,11 +309,7 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
     let of = |zone: u32| {
         let s = cell(names[zone as usize]).0;
         let range = s.range();
-        Share {
-            stencil: s,
-            scale: 0.5 * (range.hi - range.lo),
-            weights: Some(Arc::new(map.shares(|z| z == zone))),
-        }
+        Share { stencil: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
     };
     let cells = vec![of(0), of(1)];
     let level = Level::mixed(&map, &cells, part, &[fraction]);
@@ -379,34 +320,20 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
 fn pieces_and_joins_are_foretold_without_a_surface() {
     let mut some = Random(13);
     let mesh = shaken(3, 0.1, 6.0, &mut some);
-    let lower: Vec<&str> = ready_cells()
-        .iter()
-        .filter(|r| r.part == Part::Lower)
-        .map(|r| r.name)
-        .collect();
+    let lower: Vec<&str> = ready_cells().iter().filter(|r| r.part == Part::Lower).map(|r| r.name).collect();
     let drawn = (0..cases(2)).map(|_| {
         let mut any = || lower[some.below(lower.len())];
         ([any(), any()], some.between(0.15, 0.5), None)
     });
-    let known = [
-        (["p43m", "f43m"], 0.3, Some(true)),
-        (["pn3m", "diamond"], 0.3, Some(false)),
-    ];
+    let known = [(["p43m", "f43m"], 0.3, Some(true)), (["pn3m", "diamond"], 0.3, Some(false))];
     for (names, fraction, joined) in known.into_iter().chain(drawn.collect::<Vec<_>>()) {
         let tiling = zoned(&mesh, names, Part::Lower, fraction);
         let told = extract::foretold(&tiling).expect("few tetrahedra");
-        let [join] = &told.joins[..] else {
-            panic!("{names:?}: {told:?}")
-        };
+        let [join] = &told.joins[..] else { panic!("{names:?}: {told:?}") };
         let map = &tiling.map;
         let others = |t: usize| {
-            let across = map
-                .across(t)
-                .into_iter()
-                .filter(|o| (*o as usize) < map.len());
-            across
-                .filter(|o| map.zone(*o as usize) != map.zone(t))
-                .count()
+            let across = map.across(t).into_iter().filter(|o| (*o as usize) < map.len());
+            across.filter(|o| map.zone(*o as usize) != map.zone(t)).count()
         };
         let faces = (0..map.len()).map(others).sum::<usize>() / 2;
         assert_eq!((join.zones, join.faces), ([0, 1], faces), "{names:?}");
@@ -414,11 +341,7 @@ fn pieces_and_joins_are_foretold_without_a_surface() {
         let (surface, found) = made(tiling.clone(), 16.0, true);
         let pieces = size(&surface.mesh).pieces;
         println!("{names:?} {fraction:.2}: {pieces} pieces, {join:?}");
-        assert_eq!(
-            (told.pieces, found.pieces as usize),
-            (pieces, pieces),
-            "{names:?} {fraction}"
-        );
+        assert_eq!((told.pieces, found.pieces as usize), (pieces, pieces), "{names:?} {fraction}");
         assert!(pieces > 1 || join.joined, "{names:?}");
         if let Some(joined) = joined {
             assert_eq!(join.joined, joined, "{names:?}");
@@ -432,26 +355,16 @@ fn zones_hold_their_fraction_and_fit() {
     let mut some = Random(8);
     let mut mesh = shaken(3, 0.1, 6.0, &mut some);
     let middle = |t: &[u32; 4]| t.iter().map(|n| mesh.nodes[*n as usize][0]).sum::<f64>() / 4.0;
-    mesh.zones = mesh
-        .tets
-        .iter()
-        .map(|t| u32::from(middle(t) > 9.0))
-        .collect();
+    mesh.zones = mesh.tets.iter().map(|t| u32::from(middle(t) > 9.0)).collect();
     let map = map(&mesh);
     let of = |name: &str, zone: u32| {
         let s = cell(name).0;
         let range = s.range();
-        Share {
-            stencil: s,
-            scale: 0.5 * (range.hi - range.lo),
-            weights: Some(Arc::new(map.shares(|z| z == zone))),
-        }
+        Share { stencil: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
     };
-    for (a, b, part) in [
-        ("diamond", "primitive", Part::Lower),
-        ("iwp", "diamond", Part::Upper),
-        ("frd", "iwp", Part::Sheet),
-    ] {
+    for (a, b, part) in
+        [("diamond", "primitive", Part::Lower), ("iwp", "diamond", Part::Upper), ("frd", "iwp", Part::Sheet)]
+    {
         let asked = 0.3;
         let cells = vec![of(a, 0), of(b, 1)];
         let level = Level::mixed(&map, &cells, part, &[asked]);
@@ -469,9 +382,7 @@ fn zones_hold_their_fraction_and_fit() {
             }
         }
         let settled = about.iter().filter(|a| a.1 > 0.0);
-        let worst = settled
-            .map(|(s, v)| (s / v - asked).abs())
-            .fold(0.0f64, f64::max);
+        let worst = settled.map(|(s, v)| (s / v - asked).abs()).fold(0.0f64, f64::max);
         let (all, exact) = tiling.volumes();
         let mean = (exact / all - asked).abs();
         println!("{a} and {b}: fractions about nodes within {worst:.4}, of all {mean:.5}");
@@ -485,10 +396,7 @@ fn zones_hold_their_fraction_and_fit() {
             found.volume
         });
         let off = (fine + (fine - coarse) / 3.0) / exact - 1.0;
-        println!(
-            "  volume off by {:.1e}, and by {off:.1e} extrapolated",
-            fine / exact - 1.0
-        );
+        println!("  volume off by {:.1e}, and by {off:.1e} extrapolated", fine / exact - 1.0);
         assert!(off.abs() < 2e-3, "{a} {b}: {off}");
     }
 }

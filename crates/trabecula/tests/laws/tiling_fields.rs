@@ -25,14 +25,10 @@ fn fields_are_continuous_for_any_numbering() {
                 // A point of the face by its nodes, seen from both sides.
                 let w = [some.share() + 0.1, some.share() + 0.1, some.share() + 0.1];
                 let sum: f64 = w.iter().sum();
-                let on: Vec<u32> = (0..4)
-                    .filter(|i| *i != face)
-                    .map(|i| map.tet(t)[i])
-                    .collect();
+                let on: Vec<u32> = (0..4).filter(|i| *i != face).map(|i| map.tet(t)[i]).collect();
                 let seen = |t: usize| {
                     let of = map.tet(t);
-                    let weight =
-                        |n: u32| on.iter().position(|o| *o == n).map_or(0.0, |k| w[k] / sum);
+                    let weight = |n: u32| on.iter().position(|o| *o == n).map_or(0.0, |k| w[k] / sum);
                     s.values(&[of.map(weight)])[0]
                 };
                 let (a, b) = (seen(t), seen(other as usize));
@@ -54,11 +50,7 @@ fn fields_are_continuous_for_any_numbering() {
 fn bounds_hold_and_gradients_are_those_of_the_values() {
     let mut some = Random(7);
     let mesh = shaken(2, 0.15, 4.0, &mut some);
-    for (overlap, name) in [
-        (0.0, "diamond_sheet"),
-        (0.1, "primitive_sheet"),
-        (0.1, "iwp"),
-    ] {
+    for (overlap, name) in [(0.0, "diamond_sheet"), (0.1, "primitive_sheet"), (0.1, "iwp")] {
         let map = Arc::new(Tets::new(&mesh, overlap).expect("mesh"));
         let (s, part, t) = cell(name);
         let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.8, 1.2));
@@ -67,10 +59,7 @@ fn bounds_hold_and_gradients_are_those_of_the_values() {
         fields.push(Arc::new(tiling.clone()));
         for _ in 0..600 {
             let (low, h) = (some.point(5.0).map(|v| v + 4.0), some.share().powi(3));
-            let b = Aabb {
-                min: low,
-                max: low.map(|v| v + h),
-            };
+            let b = Aabb { min: low, max: low.map(|v| v + h) };
             for f in &fields {
                 let r = f.bound(&b);
                 for _ in 0..8 {
@@ -129,10 +118,7 @@ fn overlap_smooths_the_creases() {
     };
     let (sharp, tiling) = turn(0.0);
     let told = tiling.creases().expect("creases");
-    assert!(
-        sharp > 20.0 && told.max > 20.0 && told.mean > 5.0,
-        "{sharp} {told:?}"
-    );
+    assert!(sharp > 20.0 && told.max > 20.0 && told.mean > 5.0, "{sharp} {told:?}");
     let (smooth, tiling) = turn(0.1);
     assert!(smooth < 0.01, "{smooth}");
     // What moves is of the order of the overlap; what is closed stays closed.

@@ -14,10 +14,7 @@ use trabecula::math::{Aabb, Vec3};
 
 use crate::common::check;
 
-const BOUNDS: Aabb = Aabb {
-    min: [-16.0, -8.0, -8.0],
-    max: [16.0, 8.0, 8.0],
-};
+const BOUNDS: Aabb = Aabb { min: [-16.0, -8.0, -8.0], max: [16.0, 8.0, 8.0] };
 
 fn sheet(name: &str, fraction: &str, wavelength: f64) -> Arc<Lattice> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
@@ -54,9 +51,7 @@ fn even(count: usize) -> impl Iterator<Item = Vec3> {
 }
 
 fn points() -> Vec<Vec3> {
-    even(6000)
-        .map(|u| [32.0 * u[0], 16.0 * u[1], 16.0 * u[2]])
-        .collect()
+    even(6000).map(|u| [32.0 * u[0], 16.0 * u[1], 16.0 * u[2]]).collect()
 }
 
 /// Known by its sides a sheet is the same sheet: by value everywhere, by fraction as far as looking tells its quantiles.
@@ -64,20 +59,14 @@ fn points() -> Vec<Vec3> {
 fn a_sheet_by_its_sides_is_itself() {
     let points = points();
     for fraction in ["0.25", "0.25 + 0.004*z"] {
-        let (gyroid, other) = (
-            sheet("gyroid", fraction, 4.0),
-            sheet("primitive", "0.3", 4.3),
-        );
+        let (gyroid, other) = (sheet("gyroid", fraction, 4.0), sheet("primitive", "0.3", 4.3));
         for by in [By::Value, By::Fraction] {
             let whole = blended(Constituent::Lattice(gyroid.clone()), &other, by);
             let sides = blended(wall(&gyroid), &other, by);
             let (mut a, mut b) = (vec![0.0; points.len()], vec![0.0; points.len()]);
             whole.values(&points, &mut a);
             sides.values(&points, &mut b);
-            let far = a
-                .iter()
-                .zip(&b)
-                .fold(0f64, |m, (a, b)| m.max((a - b).abs()));
+            let far = a.iter().zip(&b).fold(0f64, |m, (a, b)| m.max((a - b).abs()));
             match by {
                 By::Value => assert!(far < 1e-12, "{fraction}: {far:e}"),
                 By::Fraction => {
@@ -94,19 +83,14 @@ fn a_sheet_by_its_sides_is_itself() {
 #[test]
 fn gradients_blocks_and_bounds_agree_with_values() {
     for fraction in ["0.25", "0.25 + 0.004*z"] {
-        let (gyroid, other) = (
-            sheet("gyroid", fraction, 4.0),
-            sheet("primitive", "0.3", 4.3),
-        );
+        let (gyroid, other) = (sheet("gyroid", fraction, 4.0), sheet("primitive", "0.3", 4.3));
         let whole = blended(wall(&gyroid), &other, By::Fraction);
         let mut fields = whole.parts();
         assert_eq!(fields.len(), 2);
         fields.push(Arc::new(whole));
         let axis: Vec<f64> = (0..21).map(|i| 0.37 * f64::from(i) - 4.1).collect();
         for field in fields {
-            let block = Block {
-                axes: [&axis, &axis[..9], &axis[3..12]],
-            };
+            let block = Block { axes: [&axis, &axis[..9], &axis[3..12]] };
             let mut out = vec![0f32; block.len()];
             field.fill(&block, &mut out);
             for (i, v) in out.iter().enumerate() {
@@ -116,10 +100,7 @@ fn gradients_blocks_and_bounds_agree_with_values() {
             }
             for (i, p) in points().into_iter().take(200).enumerate() {
                 let size = 0.01 * (i % 90) as f64;
-                let b = Aabb {
-                    min: p,
-                    max: p.map(|x| x + size),
-                };
+                let b = Aabb { min: p, max: p.map(|x| x + size) };
                 let (r, v) = (field.bound(&b), field.value(p.map(|x| x + 0.6 * size)));
                 assert!(r.lo <= v && v <= r.hi, "{r:?} {v}");
                 let (mut v, mut g) = ([0.0], [[0.0; 3]]);
@@ -156,9 +137,7 @@ fn thin_walls_over_tetrahedra_are_kept() {
         [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[0, 0], [4, 1]] }";
     let design = Design::from_toml(text).expect("text");
     let built = design.build(&Nothing).expect("built");
-    let points: Vec<Vec3> = even(300_000)
-        .map(|u| [9.0 * u[0], 4.0 * u[1], 4.0 * u[2]])
-        .collect();
+    let points: Vec<Vec3> = even(300_000).map(|u| [9.0 * u[0], 4.0 * u[1], 4.0 * u[2]]).collect();
     let mut v = vec![0.0; points.len()];
     // In the tetrahedra, which leave out a little of the box.
     built.solid.values(&points, &mut v);
@@ -171,8 +150,5 @@ fn thin_walls_over_tetrahedra_are_kept() {
         (made.mesh.volume() / (9.0 * 4.0 * 4.0) - share).abs()
     });
     println!("{off:?} of {share:.4}");
-    assert!(
-        off[0] < 0.1 * share && off[1] < 0.4 * off[0],
-        "{off:?} of {share:.4}"
-    );
+    assert!(off[0] < 0.1 * share && off[1] < 0.4 * off[0], "{off:?} of {share:.4}");
 }

@@ -119,11 +119,7 @@ impl Forest {
         if ra == rb {
             let grew = self.loops[ra as usize].insert(gap);
             let piece = self.elder[ra as usize];
-            return if grew {
-                Joined::Loop { piece, shift: gap }
-            } else {
-                Joined::Same
-            };
+            return if grew { Joined::Loop { piece, shift: gap } } else { Joined::Same };
         }
         let (ea, eb) = (self.elder[ra as usize], self.elder[rb as usize]);
         let shift = minus(plus(gap, self.find(eb).1), self.find(ea).1);
@@ -151,19 +147,10 @@ mod tests {
         let mut f = Forest::new(4);
         (0..4).for_each(|i| f.insert(i));
         for i in 0..3 {
-            assert!(matches!(
-                f.join(i, i + 1, [0; 3]),
-                Joined::Merged { pieces: [0, _], .. }
-            ));
+            assert!(matches!(f.join(i, i + 1, [0; 3]), Joined::Merged { pieces: [0, _], .. }));
         }
         assert!(f.together(0, 3, [0; 3]) && !f.together(0, 3, [1, 0, 0]));
-        assert!(matches!(
-            f.join(3, 0, [1, 0, 0]),
-            Joined::Loop {
-                piece: 0,
-                shift: [1, 0, 0]
-            }
-        ));
+        assert!(matches!(f.join(3, 0, [1, 0, 0]), Joined::Loop { piece: 0, shift: [1, 0, 0] }));
         assert!(f.together(0, 3, [-5, 0, 0]) && !f.together(0, 3, [0, 1, 0]));
         assert!(matches!(f.join(2, 1, [2, 0, 0]), Joined::Same));
     }

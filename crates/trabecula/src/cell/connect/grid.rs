@@ -7,15 +7,7 @@ use super::sublattice::Int3;
 use crate::math::{Vec3, norm, sub};
 
 /// The directions of edges from a node: direction k has the bits of k + 1 along x, y, z (Freudenthal).
-pub(super) const DIRECTIONS: [Int3; 7] = [
-    [1, 0, 0],
-    [0, 1, 0],
-    [1, 1, 0],
-    [0, 0, 1],
-    [1, 0, 1],
-    [0, 1, 1],
-    [1, 1, 1],
-];
+pub(super) const DIRECTIONS: [Int3; 7] = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
 
 /// The neighbours of a node: ahead along each direction, then behind.
 pub(super) const AROUND: [Int3; 14] = {
@@ -82,41 +74,24 @@ impl Grid {
         let coarse = Grid::of(f, 48);
         // A hundredth of the range keeps apart what an engineer would call apart.
         let wanted = (48.0 * (coarse.error / (0.02 * coarse.range())).sqrt() / 8.0).ceil() * 8.0;
-        if wanted > 48.0 {
-            Grid::of(f, wanted.min(96.0) as usize)
-        } else {
-            coarse
-        }
+        if wanted > 48.0 { Grid::of(f, wanted.min(96.0) as usize) } else { coarse }
     }
 
     fn of(f: Function, n: usize) -> Grid {
         let h = 1.0 / n as f64;
         let mut values = vec![0.0; n * n * n];
         let mut slopes = vec![[0.0; 3]; n * n * n];
-        values
-            .par_chunks_mut(n * n)
-            .zip(slopes.par_chunks_mut(n * n))
-            .enumerate()
-            .for_each(|(z, (v, g))| {
-                let points: Vec<Vec3> = (0..n * n)
-                    .map(|i| [(i % n) as f64 * h, (i / n) as f64 * h, z as f64 * h])
-                    .collect();
-                f(&points, v, g);
-            });
+        values.par_chunks_mut(n * n).zip(slopes.par_chunks_mut(n * n)).enumerate().for_each(|(z, (v, g))| {
+            let points: Vec<Vec3> =
+                (0..n * n).map(|i| [(i % n) as f64 * h, (i / n) as f64 * h, z as f64 * h]).collect();
+            f(&points, v, g);
+        });
         let steepness = slopes.iter().map(|g| norm(*g)).collect();
-        let mut grid = Grid {
-            n,
-            values,
-            slopes: steepness,
-            error: 0.0,
-            bend: 0.0,
-        };
+        let mut grid = Grid { n, values, slopes: steepness, error: 0.0, bend: 0.0 };
         let bend = (0..slopes.len() as u32).into_par_iter().map(|i| {
             let step = grid.steps(i);
             let change = |d: Int3| norm(sub(slopes[step(d).0 as usize], slopes[i as usize])) / h;
-            change(DIRECTIONS[0])
-                .max(change(DIRECTIONS[1]))
-                .max(change(DIRECTIONS[3]))
+            change(DIRECTIONS[0]).max(change(DIRECTIONS[1])).max(change(DIRECTIONS[3]))
         });
         grid.bend = bend.reduce(|| 0.0, f64::max);
         grid.error = 0.375 * h * h * grid.bend;
@@ -125,12 +100,7 @@ impl Grid {
 
     /// Greatest less least value.
     pub(super) fn range(&self) -> f64 {
-        let ends = self
-            .values
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                (a.min(*v), b.max(*v))
-            });
+        let ends = self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         ends.1 - ends.0
     }
 
@@ -159,10 +129,7 @@ impl Grid {
         core::array::from_fn(|k| {
             let at = [0, 1, 2].map(|a| low[a] + (k as i32 >> a & 1));
             let on = at.map(|c| c.rem_euclid(n));
-            (
-                ((on[2] * n + on[1]) * n + on[0]) as u32,
-                at.map(|c| c.div_euclid(n)),
-            )
+            (((on[2] * n + on[1]) * n + on[0]) as u32, at.map(|c| c.div_euclid(n)))
         })
     }
 

@@ -78,10 +78,7 @@ mod tests {
         };
         assert!(!of(&[]).is_full());
         assert!(of(&[[1, 0, 0], [0, 1, 0], [0, 0, 1]]).is_full());
-        assert!(
-            !of(&[[1, 1, 0], [0, 1, 1], [1, 0, 1]]).is_full(),
-            "fcc has index 2"
-        );
+        assert!(!of(&[[1, 1, 0], [0, 1, 1], [1, 0, 1]]).is_full(), "fcc has index 2");
         assert!(of(&[[1, 1, 0], [0, 1, 1], [1, 0, 1], [1, 1, 1]]).is_full());
         assert!(of(&[[2, 0, 0], [3, 0, 0], [5, 1, 0], [7, 9, -1]]).is_full());
         assert!(!of(&[[2, 0, 0], [0, 1, 0], [0, 0, 1]]).is_full());

@@ -17,9 +17,7 @@ fn with_gradients(g: Plain) -> impl Fn(&[Vec3], &mut [f64], &mut [Vec3]) + Sync 
                     w[a] += k * h;
                     g(w)
                 };
-                d[a] = (45.0 * (at(1.0) - at(-1.0)) - 9.0 * (at(2.0) - at(-2.0)) + at(3.0)
-                    - at(-3.0))
-                    / (60.0 * h);
+                d[a] = (45.0 * (at(1.0) - at(-1.0)) - 9.0 * (at(2.0) - at(-2.0)) + at(3.0) - at(-3.0)) / (60.0 * h);
             }
         }
     }
@@ -70,82 +68,27 @@ fn split_p([x, y, z]: Vec3) -> f64 {
 fn thresholds_of_the_named_surfaces() {
     // Intervals of the lower and the upper part, and the number of necks of each in a period. The first level of each
     // is that of the literature's critical values; those with two digits more were checked by Newton on ∇f = 0.
-    type Row = (
-        &'static str,
-        Plain,
-        Vec<[f64; 2]>,
-        Vec<[f64; 2]>,
-        [usize; 2],
-    );
+    type Row = (&'static str, Plain, Vec<[f64; 2]>, Vec<[f64; 2]>, [usize; 2]);
     let r = 2f64.sqrt();
     let all: [Row; 9] = [
-        (
-            "primitive",
-            primitive,
-            vec![[-1.0, 3.0]],
-            vec![[1.0, -3.0]],
-            [3, 3],
-        ),
+        ("primitive", primitive, vec![[-1.0, 3.0]], vec![[1.0, -3.0]], [3, 3]),
         ("gyroid", gyroid, vec![[-r, 1.5]], vec![[r, -1.5]], [12, 12]),
-        (
-            "diamond",
-            diamond,
-            vec![[-1.0, r]],
-            vec![[1.0, -r]],
-            [16, 16],
-        ),
+        ("diamond", diamond, vec![[-1.0, r]], vec![[1.0, -r]], [16, 16]),
         ("iwp", iwp, vec![[-3.0, 3.0]], vec![[3.0, -5.0]], [12, 0]),
-        (
-            "neovius",
-            neovius,
-            vec![[-0.75, 13.0]],
-            vec![[0.75, -13.0]],
-            [12, 12],
-        ),
+        ("neovius", neovius, vec![[-0.75, 13.0]], vec![[0.75, -13.0]], [12, 12]),
         // Above 1 loose balls appear about the nodes of the network, which they join at 1.8638.
-        (
-            "frd",
-            frd,
-            vec![[-1.0982, 1.0], [1.86383, 2.0]],
-            vec![[1.0, -7.0]],
-            [0, 0],
-        ),
-        (
-            "fks",
-            fks,
-            vec![[-0.749168, r]],
-            vec![[0.749168, -r]],
-            [48, 48],
-        ),
+        ("frd", frd, vec![[-1.0982, 1.0], [1.86383, 2.0]], vec![[1.0, -7.0]], [0, 0]),
+        ("fks", fks, vec![[-0.749168, r]], vec![[0.749168, -r]], [48, 48]),
         // Two networks that interpenetrate until 0.15 and 0.6.
-        (
-            "lidinoid",
-            lidinoid,
-            vec![[-0.173937, 1.15]],
-            vec![[0.15, -1.35]],
-            [0, 0],
-        ),
-        (
-            "split_p",
-            split_p,
-            vec![[-0.97047, 1.81]],
-            vec![[0.6, -1.8]],
-            [0, 0],
-        ),
+        ("lidinoid", lidinoid, vec![[-0.173937, 1.15]], vec![[0.15, -1.35]], [0, 0]),
+        ("split_p", split_p, vec![[-0.97047, 1.81]], vec![[0.6, -1.8]], [0, 0]),
     ];
     for (name, f, lower, upper, necks) in all {
-        for (part, want, necks) in [
-            (Part::Lower, lower, necks[0]),
-            (Part::Upper, upper, necks[1]),
-        ] {
+        for (part, want, necks) in [(Part::Lower, lower, necks[0]), (Part::Upper, upper, necks[1])] {
             let r = connected(&with_gradients(f), part);
             assert_eq!(r.len(), want.len(), "{name} {part:?}: {:?}", r);
             for (i, w) in r.iter().flatten().zip(want.iter().flatten()) {
-                assert!(
-                    (i - w).abs() < 1e-4,
-                    "{name} {part:?}: {:?} not {want:?}",
-                    r
-                );
+                assert!((i - w).abs() < 1e-4, "{name} {part:?}: {:?} not {want:?}", r);
             }
             let found = super::necks(&with_gradients(f), part);
             if necks > 0 {
@@ -160,14 +103,8 @@ fn thresholds_of_the_named_surfaces() {
 
 #[test]
 fn sheets_are_one_piece_however_thin() {
-    let all: [(Plain, f64); 6] = [
-        (primitive, 3.0),
-        (gyroid, 1.5),
-        (diamond, 2f64.sqrt()),
-        (iwp, 5.0),
-        (neovius, 13.0),
-        (lidinoid, 1.35),
-    ];
+    let all: [(Plain, f64); 6] =
+        [(primitive, 3.0), (gyroid, 1.5), (diamond, 2f64.sqrt()), (iwp, 5.0), (neovius, 13.0), (lidinoid, 1.35)];
     for (f, top) in all {
         let r = connected(&with_gradients(f), Part::Sheet);
         assert_eq!(r.len(), 1);
@@ -186,9 +123,5 @@ fn a_sublattice_of_translations_is_not_one_piece() {
     let r = connected(&with_gradients(tubes), Part::Lower);
     assert!(r.len() == 1 && r[0][0].abs() < 1e-6, "{:?}", r);
     let slabs: Plain = |[x, _, _]| c(2.0 * x);
-    assert!(
-        connected(&with_gradients(slabs), Part::Lower)
-            .iter()
-            .all(|i| i[1] - i[0] < 1e-6)
-    );
+    assert!(connected(&with_gradients(slabs), Part::Lower).iter().all(|i| i[1] - i[0] < 1e-6));
 }

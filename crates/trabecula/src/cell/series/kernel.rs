@@ -19,11 +19,7 @@ pub(super) struct Wave {
 impl Wave {
     pub fn new(t: &Term) -> Wave {
         let (s, c) = sin_cos_turns(t.phase);
-        Wave {
-            hkl: t.hkl,
-            re: t.amplitude * c,
-            im: t.amplitude * s,
-        }
+        Wave { hkl: t.hkl, re: t.amplitude * c, im: t.amplitude * s }
     }
 }
 
@@ -43,19 +39,9 @@ fn times(a: &mut (Lanes, Lanes), b: &(Lanes, Lanes), sign: f64) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(super) fn evaluate(
-    waves: &[Wave],
-    top: usize,
-    u: &[Vec3],
-    values: &mut [f64],
-    gradients: &mut [Vec3],
-) {
-    let mut powers: [Powers; 3] =
-        core::array::from_fn(|_| vec![([1.0; LANES], [0.0; LANES]); top + 1]);
-    let blocks = u
-        .chunks(LANES)
-        .zip(values.chunks_mut(LANES))
-        .zip(gradients.chunks_mut(LANES));
+pub(super) fn evaluate(waves: &[Wave], top: usize, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    let mut powers: [Powers; 3] = core::array::from_fn(|_| vec![([1.0; LANES], [0.0; LANES]); top + 1]);
+    let blocks = u.chunks(LANES).zip(values.chunks_mut(LANES)).zip(gradients.chunks_mut(LANES));
     for ((u, values), gradients) in blocks {
         for a in 0..3 {
             let mut w = [0.0; LANES];
@@ -79,11 +65,7 @@ pub(super) fn evaluate(
             for a in 0..3 {
                 let n = w.hkl[a];
                 if n != 0 {
-                    times(
-                        &mut z,
-                        &powers[a][n.unsigned_abs() as usize],
-                        f64::from(n.signum()),
-                    );
+                    times(&mut z, &powers[a][n.unsigned_abs() as usize], f64::from(n.signum()));
                 }
             }
             for l in 0..LANES {
@@ -133,8 +115,7 @@ fn sin_cos_wide(u: &Wide) -> (Wide, Wide) {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn fill(waves: &[([i32; 3], f32, f32)], top: usize, u: &[Vec<f64>; 3], out: &mut [f32]) {
     const ROUND: f64 = 6755399441055744.0;
-    let mut powers: [Vec<(Wide, Wide)>; 3] =
-        core::array::from_fn(|_| vec![([1.0; WIDE], [0.0; WIDE]); top + 1]);
+    let mut powers: [Vec<(Wide, Wide)>; 3] = core::array::from_fn(|_| vec![([1.0; WIDE], [0.0; WIDE]); top + 1]);
     for (block, out) in out.chunks_mut(WIDE).enumerate() {
         let from = block * WIDE;
         for a in 0..3 {

@@ -22,11 +22,7 @@ pub(super) struct Pieces {
 
 /// The least depth on a simplex.
 fn least(part: Part, values: &[f64]) -> f64 {
-    let (lo, hi) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
+    let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     match part {
         Part::Lower => lo,
         Part::Upper => -hi,
@@ -136,12 +132,7 @@ impl Pieces {
                 whole.push([level(from), level(to)]);
             }
         }
-        Pieces {
-            upper,
-            solid,
-            trace,
-            whole,
-        }
+        Pieces { upper, solid, trace, whole }
     }
 
     pub fn whole(&self) -> &[[f64; 2]] {
@@ -150,9 +141,6 @@ impl Pieces {
 
     pub fn count(&self, iso: f64) -> Count {
         let depth = if self.upper { -iso } else { iso };
-        Count {
-            pieces: at(&self.solid, depth),
-            ports: at(&self.trace, depth),
-        }
+        Count { pieces: at(&self.solid, depth), ports: at(&self.trace, depth) }
     }
 }

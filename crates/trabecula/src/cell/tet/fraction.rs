@@ -29,11 +29,7 @@ fn below_in_tet([a, b, c, d]: [f64; 4], t: f64) -> f64 {
         // The corner cut off at a less the one cut off at b, without the poles at b = a and c = d.
         let (ca, da, cb, db) = (c - a, d - a, c - b, d - b);
         let s = t - b;
-        let cubic = if cb > 0.0 {
-            (ca + db) / (cb * db) * s.powi(3)
-        } else {
-            0.0
-        };
+        let cubic = if cb > 0.0 { (ca + db) / (cb * db) * s.powi(3) } else { 0.0 };
         ((b - a).powi(2) + 3.0 * (b - a) * s + 3.0 * s * s - cubic) / (ca * da)
     } else {
         1.0 - (d - t).powi(3) / ((d - a) * (d - b) * (d - c))
@@ -90,11 +86,7 @@ impl Table {
     pub fn new(stencil: &Stencil) -> Table {
         let nodes = STEPS.map(|n| Nodes::new(stencil, Grid { n }));
         let fine = &nodes[1].values;
-        let (lo, hi) = fine
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| {
-                (r.0.min(*v), r.1.max(*v))
-            });
+        let (lo, hi) = fine.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
         let range = Interval::new(lo, hi);
         let [coarse, fine] = [0, 1].map(|i| shares(&nodes[i], range));
         let mut most = 0.0f64;
@@ -165,9 +157,7 @@ pub(super) fn of_face(stencil: &Stencil, part: Part, iso: f64) -> f64 {
                 let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
                 [k[0], k[1], k[2], 0.0]
             };
-            let at: Vec<_> = (0..=n)
-                .flat_map(|a| (0..=a).map(move |b| place(a, b)))
-                .collect();
+            let at: Vec<_> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
             let v = stencil.values(&at);
             let mut sum = 0.0;
             Grid { n }.each_triangle(|t3, _| {

@@ -121,11 +121,7 @@ impl Nodes {
             .map(|k| {
                 let mut k = *k;
                 k.sort_unstable_by(|a, b| b.cmp(a));
-                Grid::index(
-                    grid.n - usize::from(k[0]),
-                    usize::from(k[2] + k[3]),
-                    usize::from(k[3]),
-                ) as u32
+                Grid::index(grid.n - usize::from(k[0]), usize::from(k[2] + k[3]), usize::from(k[3])) as u32
             })
             .collect();
         let (mut values, mut gradients) = (vec![0.0; whole.len()], vec![[0.0; 4]; whole.len()]);
@@ -135,13 +131,7 @@ impl Nodes {
         for i in 0..whole.len() {
             values[i] = values[sorted[i] as usize];
         }
-        Nodes {
-            grid,
-            whole,
-            values,
-            gradients,
-            sorted,
-        }
+        Nodes { grid, whole, values, gradients, sorted }
     }
 
     /// The change of f over the small edge from node a to node b by its slope at a: ∂f/∂λ · (λ_b − λ_a).

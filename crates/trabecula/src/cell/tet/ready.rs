@@ -302,16 +302,10 @@ impl Ready {
             };
             json!({ "hkl": hkl, "component": part, "amplitude": amplitude })
         });
-        let parts = [
-            ("sheet", Part::Sheet),
-            ("lower", Part::Lower),
-            ("upper", Part::Upper),
-        ];
+        let parts = [("sheet", Part::Sheet), ("lower", Part::Lower), ("upper", Part::Upper)];
         let word = parts.iter().find(|p| p.1 == self.part).map_or("", |p| p.0);
-        let whole: Map<String, Json> = parts
-            .iter()
-            .map(|(word, part)| (word.to_string(), json!(stencil.connected_fraction(*part))))
-            .collect();
+        let whole: Map<String, Json> =
+            parts.iter().map(|(word, part)| (word.to_string(), json!(stencil.connected_fraction(*part)))).collect();
         let iso = stencil.iso(self.part, self.fraction);
         let range = stencil.range();
         Ok(json!({
@@ -362,11 +356,7 @@ mod tests {
             let holds = |i: &[f64; 2]| i[0] + 0.02 < r.fraction && r.fraction < i[1] - 0.02;
             assert!(whole.iter().any(holds), "{}: {whole:?}", r.name);
             let count = s.count(r.part, s.iso(r.part, r.fraction));
-            assert!(
-                count.pieces == 1 && count.ports > 0,
-                "{}: {count:?}",
-                r.name
-            );
+            assert!(count.pieces == 1 && count.ports > 0, "{}: {count:?}", r.name);
             groups.insert(Group::named(r.group).expect(r.name).number);
             kinds[usize::from(r.part == Part::Sheet)] += 1;
             assert_eq!(ready_cells().iter().filter(|o| o.name == r.name).count(), 1);

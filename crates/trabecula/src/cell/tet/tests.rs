@@ -148,46 +148,10 @@ pub(crate) const KNOWN: [Known; 17] = [
         (1, 1, 0.52089, 0.32979),
         Some([0.05, 3.35]),
     ),
-    (
-        "X1",
-        "221",
-        &[([1, 0, 0], Re, 1.0)],
-        (0.5, 1.0, false),
-        Sheet,
-        0.6,
-        (4, 3, 0.18401, 0.26837),
-        None,
-    ),
-    (
-        "X2",
-        "224:2",
-        &[([1, 1, 0], Re, 1.0)],
-        (0.25, 0.75, false),
-        Lower,
-        -2.5,
-        (5, 4, 0.37753, 0.05899),
-        None,
-    ),
-    (
-        "X3",
-        "221",
-        &[([1, 0, 0], Re, 1.0)],
-        (0.5, 1.0, false),
-        Lower,
-        -1.8,
-        (1, 0, 0.23371, 0.0),
-        None,
-    ),
-    (
-        "X4",
-        "227:2",
-        &[([1, 1, 1], Re, 1.0)],
-        (0.125, 0.75, true),
-        Lower,
-        -2.2,
-        (5, 3, 0.16016, 0.11780),
-        None,
-    ),
+    ("X1", "221", &[([1, 0, 0], Re, 1.0)], (0.5, 1.0, false), Sheet, 0.6, (4, 3, 0.18401, 0.26837), None),
+    ("X2", "224:2", &[([1, 1, 0], Re, 1.0)], (0.25, 0.75, false), Lower, -2.5, (5, 4, 0.37753, 0.05899), None),
+    ("X3", "221", &[([1, 0, 0], Re, 1.0)], (0.5, 1.0, false), Lower, -1.8, (1, 0, 0.23371, 0.0), None),
+    ("X4", "227:2", &[([1, 1, 1], Re, 1.0)], (0.125, 0.75, true), Lower, -2.2, (5, 3, 0.16016, 0.11780), None),
 ];
 
 pub(crate) fn known(k: &Known) -> Stencil {
@@ -204,11 +168,7 @@ fn worked_cells_are_met() {
         let (id, part, t) = (k.0, k.4, k.5);
         let (pieces, ports, volume, face) = k.6;
         let (v, f) = (s.fraction(part, t), s.face_fraction(part, t));
-        println!(
-            "{id} {v:.5} {volume} {f:.5} {face} {:?} {:?}",
-            s.count(part, t),
-            s.connected(part)
-        );
+        println!("{id} {v:.5} {volume} {f:.5} {face} {:?} {:?}", s.count(part, t), s.connected(part));
         // What is promised of a fraction, and what is known of the figures.
         assert!((v - volume).abs() < 1e-4 + 2e-5, "{id}: volume {v}");
         assert!((f - face).abs() < 1e-4 + 2e-5, "{id}: face {f}");
@@ -219,11 +179,7 @@ fn worked_cells_are_met() {
             Some([lo, hi]) => {
                 let found = holds.expect(id);
                 // The known ends are of steps of 0.05 on a coarser subdivision, where thin walls break up.
-                let low = if part == Sheet {
-                    f64::NEG_INFINITY
-                } else {
-                    lo - 0.1
-                };
+                let low = if part == Sheet { f64::NEG_INFINITY } else { lo - 0.1 };
                 assert!(found[0] > low && found[0] < lo + 0.05, "{id}: {found:?}");
                 // The scan went up by 3 at most, or to a level that f has all along the edges, where rounding stopped it.
                 let end = hi.min(s.range().abs().hi);
@@ -240,11 +196,7 @@ fn levels_invert_fractions() {
         for part in [Part::Sheet, Part::Lower, Part::Upper] {
             for p in [0.05, 0.2, 0.5, 0.8, 0.95] {
                 let t = s.iso(part, p);
-                assert!(
-                    (s.fraction(part, t) - p).abs() < 1e-9,
-                    "{} {part:?} {p}",
-                    k.0
-                );
+                assert!((s.fraction(part, t) - p).abs() < 1e-9, "{} {part:?} {p}", k.0);
             }
         }
     }
@@ -269,10 +221,7 @@ fn values_are_the_same_in_all_bits_for_any_order_of_corners() {
                     core::array::from_fn(|i| x[i] + e * (y[i] - x[i]))
                 };
                 let v = s.values(&[mix(1e-4), mix(-1e-4)]);
-                assert!(
-                    (found - (v[0] - v[1]) / 2e-4).abs() < 1e-4 * scale,
-                    "{a} {b}"
-                );
+                assert!((found - (v[0] - v[1]) / 2e-4).abs() < 1e-4 * scale, "{a} {b}");
             }
         }
     }
@@ -280,15 +229,8 @@ fn values_are_the_same_in_all_bits_for_any_order_of_corners() {
 
 #[test]
 fn what_has_not_the_symmetry_is_refused() {
-    let p = ready("primitive")
-        .expect("listed")
-        .stencil()
-        .expect("valid");
-    let wrong = |site, edge| {
-        Stencil::new(p.series().clone(), site, edge, false)
-            .err()
-            .map(|f| f.at)
-    };
+    let p = ready("primitive").expect("listed").stencil().expect("valid");
+    let wrong = |site, edge| Stencil::new(p.series().clone(), site, edge, false).err().map(|f| f.at);
     // 221 (100) about (1/4, 1/4, 1/4): the known counterexample.
     assert_eq!(wrong([0.25; 3], 1.0).as_deref(), Some("site"));
     assert_eq!(wrong([0.5; 3], 1.3), None, "any edge will do");

@@ -19,11 +19,7 @@ pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>)
     let told: Vec<String> = [
         (c.merged, "node", "merged into another at the same place"),
         (c.short, "strut", "of no length left out"),
-        (
-            c.duplicates,
-            "strut",
-            "left out because another joins the same nodes",
-        ),
+        (c.duplicates, "strut", "left out because another joins the same nodes"),
         (c.isolated, "node", "left out because no strut ends there"),
     ]
     .into_iter()
@@ -31,10 +27,7 @@ pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>)
     .map(|(n, what, done)| format!("{} {done}", counted(n, what)))
     .collect();
     if !told.is_empty() {
-        warnings.push(Warning {
-            path: path.into(),
-            message: told.join(", "),
-        });
+        warnings.push(Warning { path: path.into(), message: told.join(", ") });
     }
 }
 
@@ -46,10 +39,7 @@ pub(super) fn warn(
     warnings: &mut Vec<Warning>,
 ) {
     let mut say = |message: String| {
-        warnings.push(Warning {
-            path: place.path.clone(),
-            message,
-        });
+        warnings.push(Warning { path: place.path.clone(), message });
     };
     let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
     if truss.dangling > 0 && truss.cleaned.dangling == 0 {
@@ -64,10 +54,7 @@ pub(super) fn warn(
             let less = |f: &&(usize, f64)| f.1 < r * (1.0 - 1e-9);
             fillets.iter().filter(less).copied().collect()
         }
-        _ => (truss.quadors.shortfalls().iter())
-            .filter(|s| inside(s.hub))
-            .map(|s| (s.hub, s.radius))
-            .collect(),
+        _ => (truss.quadors.shortfalls().iter()).filter(|s| inside(s.hub)).map(|s| (s.hub, s.radius)).collect(),
     };
     if let Some((hub, radius)) = short.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
         let asked = match spec.fillet {
@@ -80,9 +67,7 @@ pub(super) fn warn(
             at(truss.quadors.center(*hub))
         ));
     }
-    let over: Vec<_> = (truss.quadors.overlaps().iter())
-        .filter(|o| inside(o.hub))
-        .collect();
+    let over: Vec<_> = (truss.quadors.overlaps().iter()).filter(|o| inside(o.hub)).collect();
     if let (false, Some(o)) = (spec.fillet == FilletSpec::None, over.first()) {
         say(format!(
             "{} of beams still overlap halfway along, the first at {}: no fillet is made between them; make them thinner",
@@ -99,11 +84,7 @@ pub(super) fn warn(
         ));
     }
     if let Some((n, p)) = truss.graph.swallowed() {
-        say(format!(
-            "{} lie within another one of the same hub, the first about {}",
-            counted(n, "beam"),
-            at(p)
-        ));
+        say(format!("{} lie within another one of the same hub, the first about {}", counted(n, "beam"), at(p)));
     } else if let Some((angle, p)) = truss.facts.angle.filter(|a| a.0 < NARROW) {
         say(format!(
             "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
@@ -114,10 +95,7 @@ pub(super) fn warn(
 
 /// Whether a design is one graph of beams and nothing else.
 pub(in crate::design) fn lone(built: &Built) -> bool {
-    built.beams.len() == 1
-        && built.lattices.is_empty()
-        && built.tilings.is_empty()
-        && built.solid.filled.is_empty()
+    built.beams.len() == 1 && built.lattices.is_empty() && built.tilings.is_empty() && built.solid.filled.is_empty()
 }
 
 /// Most beams of a pattern that are looked at one by one.
@@ -152,26 +130,17 @@ pub(in crate::design) fn share(
 }
 
 /// The figures of beams; `sampled` is the solid share of the region, by looks at points.
-pub(in crate::design) fn report(
-    beams: &Beams,
-    built: &Built,
-    sampled: &dyn core::ops::Deref<Target = f64>,
-) -> Json {
+pub(in crate::design) fn report(beams: &Beams, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
     let truss = match beams {
         Beams::Truss(truss) => truss,
         Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
     };
     let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
-    let [least, most] = (graph.hubs.iter().map(|h| h.radius))
-        .fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
-            [a.min(v), b.max(v)]
-        });
-    let valence: serde_json::Map<String, Json> = (facts.valence.iter())
-        .map(|(v, n)| (v.to_string(), json!(n)))
-        .collect();
-    let thin = (0..graph.beams.len())
-        .map(|b| quadors.pencil(b).waist())
-        .fold(f64::INFINITY, f64::min);
+    let [least, most] =
+        (graph.hubs.iter().map(|h| h.radius)).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)]);
+    let valence: serde_json::Map<String, Json> =
+        (facts.valence.iter()).map(|(v, n)| (v.to_string(), json!(n))).collect();
+    let thin = (0..graph.beams.len()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
     // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();

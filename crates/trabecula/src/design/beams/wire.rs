@@ -29,9 +29,7 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
     let Some((first, fault)) = wrong.first() else {
         return Ok(());
     };
-    let [from, to] = graph.beams[*first]
-        .ends
-        .map(|n| graph::place(graph.hubs[n as usize].center));
+    let [from, to] = graph.beams[*first].ends.map(|n| graph::place(graph.hubs[n as usize].center));
     let more = match wrong.len() {
         1 => String::new(),
         n => format!(" ({} in all)", counted(n, "such beam")),
@@ -69,11 +67,7 @@ pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignErro
         Some(ProfileSpec::Waist(v)) => Some(Profile::Waist(positive(v, "waist")?)),
         Some(ProfileSpec::Lambda(v)) => Some(Profile::Lambda(positive(v, "lambda")?)),
     };
-    Ok(Radii {
-        radius: varied(&spec.radius, "radius")?,
-        hub: varied(&spec.hub, "hub")?,
-        profile,
-    })
+    Ok(Radii { radius: varied(&spec.radius, "radius")?, hub: varied(&spec.hub, "hub")?, profile })
 }
 
 /// The greatest value at points in the region.
@@ -103,10 +97,7 @@ pub(super) fn merging(spec: &BeamsSpec, mean: f64, place: &Place) -> Result<f64,
         None => Ok(ONE * mean),
         Some(v) if v >= 0.0 && v.is_finite() => Ok(v),
         Some(v) => {
-            let message = format!(
-                "merge is {} mm; it must be a finite number, 0 or more",
-                number(v)
-            );
+            let message = format!("merge is {} mm; it must be a finite number, 0 or more", number(v));
             Err(DesignError::new(format!("{}.merge", place.path), message).found(number(v)))
         }
     }
@@ -118,16 +109,14 @@ pub(super) fn check_left(wire: &Wire, key: &str, place: &Place) -> Result<(), De
         return Ok(());
     }
     let message = match key {
-        "dangling" => "no beam is left once those with a free end are dropped: none of them lies on a closed way".into(),
+        "dangling" => {
+            "no beam is left once those with a free end are dropped: none of them lies on a closed way".into()
+        }
         "struts" => "no beam has two different ends".to_string(),
         _ => {
             let b = place.region.bounds();
             let corner = |v: Vec3| v.map(number).join(", ");
-            format!(
-                "no beam lies in the region, which reaches from ({}) to ({}) mm",
-                corner(b.min),
-                corner(b.max)
-            )
+            format!("no beam lies in the region, which reaches from ({}) to ({}) mm", corner(b.min), corner(b.max))
         }
     };
     Err(DesignError::new(format!("{}.{key}", place.path), message))
@@ -137,9 +126,8 @@ pub(super) fn check_left(wire: &Wire, key: &str, place: &Place) -> Result<(), De
 pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>), DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let read = |path: &str, key: &str| samples::bytes(path, &below(key), place);
-    let wrong = |path: &str, key: &str, f: Fault| {
-        DesignError::new(below(key), format!("{path}: {}", f.message)).found(path)
-    };
+    let wrong =
+        |path: &str, key: &str, f: Fault| DesignError::new(below(key), format!("{path}: {}", f.message)).found(path);
     let nodes = match &spec.nodes {
         Some(NodesSpec::Path(path)) => {
             let text = read(path, "nodes")?;
@@ -155,11 +143,7 @@ pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>)
             graph::struts(&text, &nodes).map_err(|f| wrong(path, "struts", f))?
         }
         Some(StrutsSpec::Rows(rows)) => {
-            for (i, n) in rows
-                .iter()
-                .enumerate()
-                .flat_map(|(i, r)| r.iter().map(move |n| (i, n)))
-            {
+            for (i, n) in rows.iter().enumerate().flat_map(|(i, r)| r.iter().map(move |n| (i, n))) {
                 if *n as usize >= nodes.places.len() {
                     let message = format!(
                         "there is no node {n}; there are {}, counted from 0",
@@ -169,10 +153,7 @@ pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>)
                     return Err(DesignError::new(at, message).found(n.to_string()));
                 }
             }
-            Wire {
-                nodes: nodes.places.clone(),
-                struts: rows.clone(),
-            }
+            Wire { nodes: nodes.places.clone(), struts: rows.clone() }
         }
         None => Wire::default(),
     };

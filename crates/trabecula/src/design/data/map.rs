@@ -171,14 +171,7 @@ impl SkewSpec {
     /// The six shears by name.
     pub fn named(&self) -> [(&'static str, f64); 6] {
         let s = self;
-        [
-            ("xy", s.xy),
-            ("xz", s.xz),
-            ("yx", s.yx),
-            ("yz", s.yz),
-            ("zx", s.zx),
-            ("zy", s.zy),
-        ]
+        [("xy", s.xy), ("xz", s.xz), ("yx", s.yx), ("yz", s.yz), ("zx", s.zx), ("zy", s.zy)]
     }
 }
 
@@ -258,10 +251,7 @@ pub struct CylinderMapSpec {
     #[serde(default, skip_serializing_if = "is_default")]
     pub center: [f64; 3],
     /// Direction of the axis.
-    #[serde(
-        default = "super::build_axis",
-        skip_serializing_if = "super::is_build_axis"
-    )]
+    #[serde(default = "super::build_axis", skip_serializing_if = "super::is_build_axis")]
     pub axis: [f64; 3],
 }
 
@@ -277,10 +267,7 @@ pub struct SphereMapSpec {
     #[serde(default, skip_serializing_if = "is_default")]
     pub center: [f64; 3],
     /// Direction from pole to pole.
-    #[serde(
-        default = "super::build_axis",
-        skip_serializing_if = "super::is_build_axis"
-    )]
+    #[serde(default = "super::build_axis", skip_serializing_if = "super::is_build_axis")]
     pub axis: [f64; 3],
 }
 

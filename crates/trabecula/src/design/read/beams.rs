@@ -6,10 +6,8 @@ use crate::design::node::At;
 use crate::fault::{counted, number};
 use crate::graph::catalogue;
 
-const KEYS: [&str; 12] = [
-    "cell", "map", "nodes", "struts", "pattern", "radius", "hub", "profile", "fillet", "trim",
-    "dangling", "merge",
-];
+const KEYS: [&str; 12] =
+    ["cell", "map", "nodes", "struts", "pattern", "radius", "hub", "profile", "fillet", "trim", "dangling", "merge"];
 
 /// What others call the cells.
 const CELLS: [(&str, &str); 16] = [
@@ -37,22 +35,17 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
     let own = f.get("nodes").or(f.get("struts"));
     let pattern = f.get("pattern").map(pattern).transpose()?;
     if pattern.is_some() {
-        for key in [
-            "cell", "map", "nodes", "struts", "trim", "dangling", "merge",
-        ] {
+        for key in ["cell", "map", "nodes", "struts", "trim", "dangling", "merge"] {
             if let Some(other) = f.get(key) {
-                let message = format!(
-                    "a pattern has its own nodes and struts, and is cut by the region; leave {key} out"
-                );
+                let message =
+                    format!("a pattern has its own nodes and struts, and is cut by the region; leave {key} out");
                 return Err(other.error(message));
             }
         }
     }
     match (&cell, own) {
         (Some(_), Some(own)) => {
-            return Err(
-                own.error("beams are either a cell on a map, or nodes and struts; found both")
-            );
+            return Err(own.error("beams are either a cell on a map, or nodes and struts; found both"));
         }
         (None, None) if pattern.is_some() => {}
         (None, None) => {
@@ -60,14 +53,8 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
             return Err(f.at.error(message));
         }
         (None, Some(_)) => {
-            f.need(
-                "nodes",
-                "a table (csv) of id, x, y, z, or rows of x, y, z in mm",
-            )?;
-            f.need(
-                "struts",
-                "a table (csv) of pairs of ids, or rows of two numbers of nodes",
-            )?;
+            f.need("nodes", "a table (csv) of id, x, y, z, or rows of x, y, z in mm")?;
+            f.need("struts", "a table (csv) of pairs of ids, or rows of two numbers of nodes")?;
             if let Some(map) = f.get("map") {
                 let message = "nodes are given by their places in mm; a map belongs to a cell";
                 return Err(map.error(message));
@@ -81,11 +68,7 @@ pub(super) fn beams(at: &At) -> Read<BeamsSpec> {
         }
     }
     let maybe = |key: &str| f.read(key, None, |at| grade(at).map(Some));
-    let trims = [
-        ("cut", TrimSpec::Cut),
-        ("drop", TrimSpec::Drop),
-        ("snap", TrimSpec::Snap),
-    ];
+    let trims = [("cut", TrimSpec::Cut), ("drop", TrimSpec::Drop), ("snap", TrimSpec::Snap)];
     let loose = [("keep", DanglingSpec::Keep), ("drop", DanglingSpec::Drop)];
     Ok(BeamsSpec {
         cell,
@@ -108,8 +91,7 @@ fn cell(at: &At) -> Read<String> {
     if at.is_text() {
         let word = at.text("a name")?;
         if crate::cell::named(word).is_some() && crate::graph::named(word).is_none() {
-            let message =
-                format!("{word} is a surface, not a cell of beams; write it as a lattice");
+            let message = format!("{word} is a surface, not a cell of beams; write it as a lattice");
             return Err(at.error(message));
         }
     }
@@ -120,19 +102,14 @@ fn nodes(at: &At) -> Read<NodesSpec> {
     if at.is_text() {
         return Ok(NodesSpec::Path(at.text("a path")?.to_string()));
     }
-    Ok(NodesSpec::Rows(places(
-        at,
-        "the path of a table, or rows of x, y, z in mm",
-    )?))
+    Ok(NodesSpec::Rows(places(at, "the path of a table, or rows of x, y, z in mm")?))
 }
 
 fn places(at: &At, what: &str) -> Read<Vec<RowSpec>> {
     let rows = at.list(what)?;
     let row = |at: &At| match at.list("x, y, z and perhaps a radius, mm")?.len() {
         4 => Ok(RowSpec::Ball(at.numbers("x, y, z, radius")?)),
-        _ => Ok(RowSpec::Place(
-            at.numbers("x, y, z and perhaps a radius, mm")?,
-        )),
+        _ => Ok(RowSpec::Place(at.numbers("x, y, z and perhaps a radius, mm")?)),
     };
     let rows = rows.iter().map(row).collect::<Read<Vec<_>>>()?;
     if rows.is_empty() {
@@ -147,18 +124,12 @@ fn pattern(at: &At) -> Read<PatternSpec> {
         f.need("nodes", "rows of x, y, z and perhaps a radius, mm")?,
         "rows of x, y, z and perhaps a radius, mm",
     )?;
-    let struts = f.need(
-        "struts",
-        "rows of two ids and the repeats between them, such as [0, 0, 1, 0, 0]",
-    )?;
+    let struts = f.need("struts", "rows of two ids and the repeats between them, such as [0, 0, 1, 0, 0]")?;
     let row = |at: &At| {
         let what = "two ids and up to three repeats, such as [0, 0, 1, 0, 0]";
         let items = at.list(what)?;
         if !(2..=5).contains(&items.len()) {
-            return Err(at.error(format!(
-                "expected {what}, found {}",
-                counted(items.len(), "value")
-            )));
+            return Err(at.error(format!("expected {what}, found {}", counted(items.len(), "value"))));
         }
         let mut row = [0; 5];
         for (i, (r, item)) in row.iter_mut().zip(&items).enumerate() {
@@ -175,30 +146,18 @@ fn pattern(at: &At) -> Read<PatternSpec> {
     if made.is_empty() {
         return Err(struts.error("no struts given"));
     }
-    let steps = f.need(
-        "repeat",
-        "one to three steps, such as { count = 12, rotate = [0, 0, 30] }",
-    )?;
+    let steps = f.need("repeat", "one to three steps, such as { count = 12, rotate = [0, 0, 30] }")?;
     let items = steps.list("one to three steps, such as [{ count = 12, rotate = [0, 0, 30] }]")?;
     if !(1..=3).contains(&items.len()) {
-        return Err(steps.error(format!(
-            "expected one to three steps, found {}",
-            items.len()
-        )));
+        return Err(steps.error(format!("expected one to three steps, found {}", items.len())));
     }
-    Ok(PatternSpec {
-        nodes,
-        struts: made,
-        repeat: items.iter().map(repeat).collect::<Read<Vec<_>>>()?,
-    })
+    Ok(PatternSpec { nodes, struts: made, repeat: items.iter().map(repeat).collect::<Read<Vec<_>>>()? })
 }
 
 fn repeat(at: &At) -> Read<RepeatSpec> {
     let f = at.fields("a step", &["count", "by", "rotate", "scale", "about"])?;
     Ok(RepeatSpec {
-        count: f
-            .need("count", "how often, the original counted")?
-            .number()?,
+        count: f.need("count", "how often, the original counted")?.number()?,
         by: f.read("by", [0.0; 3], three)?,
         rotate: f.read("rotate", [0.0; 3], three)?,
         scale: f.read("scale", 1.0, At::number)?,
@@ -213,14 +172,8 @@ fn struts(at: &At) -> Read<StrutsSpec> {
     let rows = at.list("the path of a table, or pairs of numbers of nodes")?;
     let row = |at: &At| {
         let pair: [f64; 2] = at.numbers("two numbers of nodes")?;
-        match pair
-            .iter()
-            .find(|v| !(v.fract() == 0.0 && **v >= 0.0 && **v < f64::from(u32::MAX)))
-        {
-            Some(v) => Err(at.error(format!(
-                "nodes are counted by whole numbers from 0, found {}",
-                number(*v)
-            ))),
+        match pair.iter().find(|v| !(v.fract() == 0.0 && **v >= 0.0 && **v < f64::from(u32::MAX))) {
+            Some(v) => Err(at.error(format!("nodes are counted by whole numbers from 0, found {}", number(*v)))),
             None => Ok(pair.map(|v| v as u32)),
         }
     };
@@ -233,19 +186,12 @@ fn struts(at: &At) -> Read<StrutsSpec> {
 
 fn profile(at: &At) -> Read<ProfileSpec> {
     if at.is_text() {
-        let words = [
-            ("cone", ProfileSpec::Cone),
-            ("cylinder", ProfileSpec::Cylinder),
-        ];
+        let words = [("cone", ProfileSpec::Cone), ("cylinder", ProfileSpec::Cylinder)];
         return at.word("profile", &words);
     }
     let (kind, at) = at.kind("profile", &["waist", "lambda"])?;
     let v = at.number()?;
-    Ok(if kind == "waist" {
-        ProfileSpec::Waist(v)
-    } else {
-        ProfileSpec::Lambda(v)
-    })
+    Ok(if kind == "waist" { ProfileSpec::Waist(v) } else { ProfileSpec::Lambda(v) })
 }
 
 fn fillet(at: &At) -> Read<FilletSpec> {
@@ -254,9 +200,7 @@ fn fillet(at: &At) -> Read<FilletSpec> {
         return at.word("fillet", &words);
     }
     if at.is_number() {
-        return Err(at.error(
-            "a bare number says not what it is; for a radius in mm write fillet = { radius = 0.5 }",
-        ));
+        return Err(at.error("a bare number says not what it is; for a radius in mm write fillet = { radius = 0.5 }"));
     }
     let (kind, at) = at.kind("fillet", &["radius", "tau", "alpha", "beta"])?;
     let v = at.number()?;

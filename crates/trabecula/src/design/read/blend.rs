@@ -13,14 +13,13 @@ use crate::fault::counted;
 pub(super) fn blend(at: &At, names: &[&str]) -> Read<BlendSpec> {
     let f = at.fields("a blend", &["between", "weight", "of", "by"])?;
     let by = f.read("by", BySpec::Fraction, |at| {
-        at.word(
-            "word",
-            &[("fraction", BySpec::Fraction), ("value", BySpec::Value)],
-        )
+        at.word("word", &[("fraction", BySpec::Fraction), ("value", BySpec::Value)])
     })?;
     let lattices = match (f.get("between"), f.get("of")) {
         (Some(_), Some(of)) => {
-            return Err(of.error("a blend is between two lattices with one weight, or of any number with a weight each; found both"));
+            return Err(of.error(
+                "a blend is between two lattices with one weight, or of any number with a weight each; found both",
+            ));
         }
         (Some(between), None) => BlendKind::Between(BetweenSpec {
             between: pair(between, names)?,
@@ -28,9 +27,7 @@ pub(super) fn blend(at: &At, names: &[&str]) -> Read<BlendSpec> {
         }),
         (None, Some(of)) => {
             if let Some(weight) = f.get("weight") {
-                return Err(
-                    weight.error("weight goes with between; under of each lattice has its own")
-                );
+                return Err(weight.error("weight goes with between; under of each lattice has its own"));
             }
             let mut each = BTreeMap::new();
             for (name, at) in of.entries("weights by the names of lattices")? {
@@ -64,10 +61,7 @@ fn pair(at: &At, names: &[&str]) -> Read<[String; 2]> {
         *own = name.to_string();
     }
     if both[0] == both[1] {
-        return Err(b.error(format!(
-            "\"{}\" is named twice; a blend is between two lattices",
-            both[0]
-        )));
+        return Err(b.error(format!("\"{}\" is named twice; a blend is between two lattices", both[0])));
     }
     Ok(both)
 }
@@ -78,8 +72,5 @@ fn known(at: &At, name: &str, names: &[&str]) -> Read<()> {
         return Ok(());
     }
     let at = at.error("");
-    Err(DesignError {
-        line: at.line,
-        ..DesignError::unknown(&at.path, "lattice", name, names)
-    })
+    Err(DesignError { line: at.line, ..DesignError::unknown(&at.path, "lattice", name, names) })
 }

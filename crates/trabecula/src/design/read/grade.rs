@@ -34,11 +34,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
                 array: f.read("array", None, |at| Ok(Some(at.text("a name")?.to_string())))?,
                 origin: f.read("origin", None, |at| three(at).map(Some))?,
                 step: f.read("step", None, |at| {
-                    Ok(Some(if at.is_list() {
-                        OneOrThree::Three(three(at)?)
-                    } else {
-                        OneOrThree::One(at.number()?)
-                    }))
+                    Ok(Some(if at.is_list() { OneOrThree::Three(three(at)?) } else { OneOrThree::One(at.number()?) }))
                 })?,
                 remap: remap(&f)?,
             })
@@ -57,20 +53,14 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
             GradeKind::Sigmoid(SigmoidSpec {
                 of: Box::new(grade(f.need("of", "the number that it is a step of")?)?),
                 at: f.read("at", 0.0, At::number)?,
-                width: f
-                    .need("width", "from where it is 0 to where it is 1")?
-                    .number()?,
+                width: f.need("width", "from where it is 0 to where it is 1")?.number()?,
             })
         }
         "region" => {
             let f = at.fields("a region as a number", &["of", "width"])?;
             GradeKind::Region(WithinSpec {
-                of: Box::new(region(
-                    f.need("of", "a region, such as { sphere = { radius = 5 } }")?,
-                )?),
-                width: f
-                    .need("width", "of the step at its surface, mm")?
-                    .number()?,
+                of: Box::new(region(f.need("of", "a region, such as { sphere = { radius = 5 } }")?)?),
+                width: f.need("width", "of the step at its surface, mm")?.number()?,
             })
         }
         "distance" => {
@@ -90,11 +80,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
                 points: control(&f)?,
                 values: f.read("values", None, |at| {
                     let values = at.list("a list of numbers")?;
-                    values
-                        .iter()
-                        .map(At::number)
-                        .collect::<Read<Vec<f64>>>()
-                        .map(Some)
+                    values.iter().map(At::number).collect::<Read<Vec<f64>>>().map(Some)
                 })?,
                 delta: f.read("delta", None, |at| at.number().map(Some))?,
                 axis: f.read("axis", None, |at| three(at).map(Some))?,
@@ -103,10 +89,7 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
         _ => {
             let f = at.fields("a linear grade", &["along", "stops"])?;
             let along = three(f.need("along", "the direction [x, y, z]")?)?;
-            GradeKind::Linear(LinearSpec {
-                along,
-                stops: stops(&f)?,
-            })
+            GradeKind::Linear(LinearSpec { along, stops: stops(&f)? })
         }
     }))
 }
@@ -114,19 +97,15 @@ pub(super) fn grade(at: &At) -> Read<GradeSpec> {
 /// Control points: here, or in a file.
 pub(super) fn control(f: &Fields) -> Read<ControlSpec> {
     match (f.get("points"), f.get("path")) {
-        (Some(_), Some(path)) => {
-            Err(path.error("points and path at once; give the points here or in a file"))
-        }
+        (Some(_), Some(path)) => Err(path.error("points and path at once; give the points here or in a file")),
         (Some(points), None) => {
             let points = points.list("a list of points [x, y, z]")?;
-            Ok(ControlSpec::Points(
-                points.iter().map(three).collect::<Read<_>>()?,
-            ))
+            Ok(ControlSpec::Points(points.iter().map(three).collect::<Read<_>>()?))
         }
         (None, Some(path)) => Ok(ControlSpec::Path(path.text("a path")?.to_string())),
-        (None, None) => Err(f.at.error(
-            "the points are missing; give points = [[x, y, z], ...] or path, a table (csv)",
-        )),
+        (None, None) => {
+            Err(f.at.error("the points are missing; give points = [[x, y, z], ...] or path, a table (csv)"))
+        }
     }
 }
 
@@ -134,10 +113,7 @@ pub(super) fn control(f: &Fields) -> Read<ControlSpec> {
 pub(super) fn field(at: &At) -> Read<FieldSpec> {
     let keys = ["path", "array", "component", "remap"];
     let f = at.fields("a field of a result", &keys)?;
-    let array = f.need(
-        "array",
-        "the name of an array of points or cells in the file",
-    )?;
+    let array = f.need("array", "the name of an array of points or cells in the file")?;
     Ok(FieldSpec {
         path: file(&f)?,
         array: array.text("a name")?.to_string(),
@@ -160,9 +136,5 @@ fn remap(f: &Fields) -> Read<Vec<[f64; 2]>> {
 
 fn stops(f: &Fields) -> Read<Vec<[f64; 2]>> {
     let stops = f.need("stops", "a list of [position, value]")?;
-    stops
-        .list("a list of [position, value]")?
-        .iter()
-        .map(|s| s.numbers("[position, value]"))
-        .collect()
+    stops.list("a list of [position, value]")?.iter().map(|s| s.numbers("[position, value]")).collect()
 }

@@ -9,23 +9,10 @@ use crate::design::node::{At, Fields};
 use crate::fault::counted;
 
 /// Ways to say how cells are turned, of which one is given.
-const TURNS: [&str; 7] = [
-    "rotate",
-    "rotate_x",
-    "rotate_y",
-    "rotate_z",
-    "direction",
-    "frame",
-    "stress",
-];
+const TURNS: [&str; 7] = ["rotate", "rotate_x", "rotate_y", "rotate_z", "direction", "frame", "stress"];
 
 pub(super) fn map(at: &At) -> Read<MapSpec> {
-    let (kind, at) = at.kind(
-        "map",
-        &[
-            "affine", "spartan", "phase", "cylinder", "sphere", "sweep", "tets",
-        ],
-    )?;
+    let (kind, at) = at.kind("map", &["affine", "spartan", "phase", "cylinder", "sphere", "sweep", "tets"])?;
     if kind == "tets" {
         return Ok(MapSpec::Tets(tets(&at)?));
     }
@@ -33,23 +20,16 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         return Ok(MapSpec::Phase(Box::new(phase(&at)?)));
     }
     if kind == "cylinder" {
-        let f = at.fields(
-            "a map round an axis",
-            &["wavelength", "around", "center", "axis"],
-        )?;
-        let wavelength = f.need(
-            "wavelength",
-            "the cell's edge in mm along the radius and the axis, one number or two",
-        )?;
+        let f = at.fields("a map round an axis", &["wavelength", "around", "center", "axis"])?;
+        let wavelength =
+            f.need("wavelength", "the cell's edge in mm along the radius and the axis, one number or two")?;
         return Ok(MapSpec::Cylinder(CylinderMapSpec {
             wavelength: if wavelength.is_list() {
                 OneOrTwo::Two(wavelength.numbers("one number or two, mm")?)
             } else {
                 OneOrTwo::One(wavelength.number()?)
             },
-            around: f
-                .need("around", "the whole number of cells around")?
-                .number()?,
+            around: f.need("around", "the whole number of cells around")?.number()?,
             center: f.read("center", [0.0; 3], three)?,
             axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
         }));
@@ -57,10 +37,8 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
     if kind == "sweep" {
         let keys = ["wavelength", "points", "path", "closed", "normal"];
         let f = at.fields("a map along a line", &keys)?;
-        let wavelength = f.need(
-            "wavelength",
-            "the cell's edge in mm, one number or three: two across the line and one along it",
-        )?;
+        let wavelength =
+            f.need("wavelength", "the cell's edge in mm, one number or three: two across the line and one along it")?;
         return Ok(MapSpec::Sweep(SweepSpec {
             wavelength: if wavelength.is_list() {
                 OneOrThree::Three(wavelength.numbers("one number or three, mm")?)
@@ -73,17 +51,10 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
         }));
     }
     if kind == "sphere" {
-        let f = at.fields(
-            "a map about a centre",
-            &["wavelength", "around", "center", "axis"],
-        )?;
+        let f = at.fields("a map about a centre", &["wavelength", "around", "center", "axis"])?;
         return Ok(MapSpec::Sphere(SphereMapSpec {
-            wavelength: f
-                .need("wavelength", "the cell's edge in mm along the radius")?
-                .number()?,
-            around: f
-                .need("around", "the even number of cells round the equator")?
-                .number()?,
+            wavelength: f.need("wavelength", "the cell's edge in mm along the radius")?.number()?,
+            around: f.need("around", "the even number of cells round the equator")?.number()?,
             center: f.read("center", [0.0; 3], three)?,
             axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
         }));
@@ -91,33 +62,18 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
     if kind == "spartan" {
         let f = at.fields("a spartan map", &["wavelength", "rotate", "offset"])?;
         let (wavelength, rotate, offset) = common(&f)?;
-        return Ok(MapSpec::Spartan(SpartanSpec {
-            wavelength,
-            rotate,
-            offset,
-        }));
+        return Ok(MapSpec::Spartan(SpartanSpec { wavelength, rotate, offset }));
     }
     let f = at.fields("an affine map", &["wavelength", "rotate", "offset", "skew"])?;
     let (wavelength, rotate, offset) = common(&f)?;
-    Ok(MapSpec::Affine(AffineSpec {
-        wavelength,
-        rotate,
-        offset,
-        skew: f.read("skew", SkewSpec::default(), skew)?,
-    }))
+    Ok(MapSpec::Affine(AffineSpec { wavelength, rotate, offset, skew: f.read("skew", SkewSpec::default(), skew)? }))
 }
 
 /// What others call the meshers.
-const MESHERS: [(&str, &str); 3] = [
-    ("wildmeshing", "ftetwild"),
-    ("tetwild", "ftetwild"),
-    ("stuffing", "background"),
-];
+const MESHERS: [(&str, &str); 3] = [("wildmeshing", "ftetwild"), ("tetwild", "ftetwild"), ("stuffing", "background")];
 
 pub(super) fn tets(at: &At) -> Read<TetsSpec> {
-    let keys = [
-        "size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road",
-    ];
+    let keys = ["size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road"];
     let f = at.fields("a map over tetrahedra", &keys)?;
     let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
     let joined = Joined {
@@ -127,9 +83,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     let found = |keys: &[&str]| keys.iter().find_map(|k| f.get(k));
     let made = found(&["size", "mesher", "limit", "zones"]);
     if let (Some(_), Some(path)) = (made, f.get("path")) {
-        return Err(path.error(
-            "a tetrahedral mesh is either made, with size, or read, from path; found both",
-        ));
+        return Err(path.error("a tetrahedral mesh is either made, with size, or read, from path; found both"));
     }
     if let Some(path) = f.get("path") {
         return Ok(TetsSpec::File(TetFileSpec {
@@ -142,18 +96,12 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     if let Some(of_file) = found(&["unit", "split"]) {
         return Err(of_file.error("this belongs to a mesh from a file, and there is no path"));
     }
-    let meaning =
-        "the tetrahedra's edge in mm, a number or a grade (or give path, to a mesh of your own)";
+    let meaning = "the tetrahedra's edge in mm, a number or a grade (or give path, to a mesh of your own)";
     let size = grade(f.need("size", meaning)?)?;
-    let meshers = [
-        ("background", MesherSpec::Background),
-        ("ftetwild", MesherSpec::FTetWild),
-    ];
+    let meshers = [("background", MesherSpec::Background), ("ftetwild", MesherSpec::FTetWild)];
     Ok(TetsSpec::Made(MadeTetsSpec {
         size,
-        mesher: f.read("mesher", MesherSpec::Background, |at| {
-            at.word_or("mesher", &meshers, &MESHERS)
-        })?,
+        mesher: f.read("mesher", MesherSpec::Background, |at| at.word_or("mesher", &meshers, &MESHERS))?,
         limit: f.read("limit", 600.0, At::number)?,
         zones: f.read("zones", BTreeMap::new(), zones)?,
         joined,
@@ -161,8 +109,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
 }
 
 fn zones(at: &At) -> Read<BTreeMap<String, RegionSpec>> {
-    let of =
-        at.entries("regions by the zone's number, such as { 1 = { sphere = { radius = 5 } } }")?;
+    let of = at.entries("regions by the zone's number, such as { 1 = { sphere = { radius = 5 } } }")?;
     of.into_iter()
         .map(|(zone, at)| match zone.parse::<u32>() {
             Ok(n) if n.to_string() == zone => Ok((zone.to_string(), region(&at)?)),
@@ -178,11 +125,7 @@ fn common(f: &Fields) -> Read<(OneOrThree, [f64; 3], [f64; 3])> {
     } else {
         OneOrThree::One(wavelength.number()?)
     };
-    Ok((
-        wavelength,
-        f.read("rotate", [0.0; 3], three)?,
-        f.read("offset", [0.0; 3], three)?,
-    ))
+    Ok((wavelength, f.read("rotate", [0.0; 3], three)?, f.read("offset", [0.0; 3], three)?))
 }
 
 fn skew(at: &At) -> Read<SkewSpec> {
@@ -201,14 +144,7 @@ fn skew(at: &At) -> Read<SkewSpec> {
 fn phase(at: &At) -> Read<PhaseSpec> {
     let mut keys = vec!["wavelength"];
     keys.extend(TURNS);
-    keys.extend([
-        "weight",
-        "angle_weight",
-        "offset",
-        "step",
-        "domain",
-        "folds",
-    ]);
+    keys.extend(["weight", "angle_weight", "offset", "step", "domain", "folds"]);
     let f = at.fields("a phase map", &keys)?;
     let given: Vec<&str> = TURNS.into_iter().filter(|k| f.get(k).is_some()).collect();
     if let [first, rest @ ..] = given.as_slice() {
@@ -221,10 +157,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         }
     }
     let maybe = |key: &str| f.read(key, None, |at| grade(at).map(Some));
-    let wavelength = f.need(
-        "wavelength",
-        "the cell's edge in mm, one number or three; each may vary",
-    )?;
+    let wavelength = f.need("wavelength", "the cell's edge in mm, one number or three; each may vary")?;
     let domains = [("region", Domain::Region), ("box", Domain::Box)];
     Ok(PhaseSpec {
         wavelength: if wavelength.is_list() {
@@ -232,9 +165,7 @@ fn phase(at: &At) -> Read<PhaseSpec> {
         } else {
             GradeOrThree::One(grade(wavelength)?)
         },
-        rotate: f.read("rotate", None, |at| {
-            grades(at, "three angles [x, y, z] in degrees").map(Some)
-        })?,
+        rotate: f.read("rotate", None, |at| grades(at, "three angles [x, y, z] in degrees").map(Some))?,
         rotate_x: maybe("rotate_x")?,
         rotate_y: maybe("rotate_y")?,
         rotate_z: maybe("rotate_z")?,
@@ -260,12 +191,9 @@ fn vector(at: &At) -> Read<VectorSpec> {
     if !at.is_list() {
         let f = at.fields("a vector", &["field"])?;
         let field = f.need("field", "an array of three numbers of a result")?;
-        return Ok(VectorSpec::Field(VectorField {
-            field: super::grade::field(field)?,
-        }));
+        return Ok(VectorSpec::Field(VectorField { field: super::grade::field(field)? }));
     }
-    grades(at, "three numbers [x, y, z], each of which may vary")
-        .map(|g| VectorSpec::Components(Box::new(g)))
+    grades(at, "three numbers [x, y, z], each of which may vary").map(|g| VectorSpec::Components(Box::new(g)))
 }
 
 fn tensor(at: &At) -> Read<TensorSpec> {
@@ -278,11 +206,8 @@ fn tensor(at: &At) -> Read<TensorSpec> {
             order: f.read("order", TensorOrder::Vtk, |at| at.word("order", &orders))?,
         }));
     }
-    grades(
-        at,
-        "six numbers [11, 22, 33, 23, 13, 12], each of which may vary",
-    )
-    .map(|g| TensorSpec::Components(Box::new(g)))
+    grades(at, "six numbers [11, 22, 33, 23, 13, 12], each of which may vary")
+        .map(|g| TensorSpec::Components(Box::new(g)))
 }
 
 /// So many numbers, each of which may vary.
@@ -290,10 +215,5 @@ fn grades<const N: usize>(at: &At, what: &str) -> Read<[GradeSpec; N]> {
     let items = at.list(what)?;
     let found = items.len();
     let read = items.iter().map(grade).collect::<Read<Vec<GradeSpec>>>()?;
-    read.try_into().map_err(|_| {
-        at.error(format!(
-            "expected {what}, found {}",
-            counted(found, "value")
-        ))
-    })
+    read.try_into().map_err(|_| at.error(format!("expected {what}, found {}", counted(found, "value"))))
 }

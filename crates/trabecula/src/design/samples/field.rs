@@ -14,34 +14,19 @@ use crate::math::Aabb;
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
 
-pub(in crate::design) fn field(
-    spec: &FieldSpec,
-    path: &str,
-    place: &Place,
-) -> Result<Samples, DesignError> {
+pub(in crate::design) fn field(spec: &FieldSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.component");
-    let made = components(spec, path, place, |array| {
-        match (spec.component, array.components) {
-            (None, 1) => Ok(vec![0]),
-            (None, n) => Err(DesignError::new(
-                &at,
-                format!(
-                    "the array \"{}\" has {n} components; give component, from 0 to {}",
-                    array.name,
-                    n - 1
-                ),
-            )),
-            (Some(c), n) if c >= 0.0 && c < n as f64 && c.fract() == 0.0 => Ok(vec![c as usize]),
-            (Some(c), n) => Err(DesignError::new(
-                &at,
-                format!(
-                    "component is {}; the array \"{}\" has components 0 to {}",
-                    number(c),
-                    array.name,
-                    n - 1
-                ),
-            )),
-        }
+    let made = components(spec, path, place, |array| match (spec.component, array.components) {
+        (None, 1) => Ok(vec![0]),
+        (None, n) => Err(DesignError::new(
+            &at,
+            format!("the array \"{}\" has {n} components; give component, from 0 to {}", array.name, n - 1),
+        )),
+        (Some(c), n) if c >= 0.0 && c < n as f64 && c.fract() == 0.0 => Ok(vec![c as usize]),
+        (Some(c), n) => Err(DesignError::new(
+            &at,
+            format!("component is {}; the array \"{}\" has components 0 to {}", number(c), array.name, n - 1),
+        )),
     })?;
     let one = made.into_iter().next();
     one.ok_or_else(|| DesignError::new(path, "the array has no numbers"))
@@ -56,27 +41,15 @@ pub(in crate::design) fn several<const N: usize>(
 ) -> Result<[Grade; N], DesignError> {
     let made = components(spec, path, place, |array| {
         order(array.components).map(|o| o.to_vec()).ok_or_else(|| {
-            let needed = if N == 3 {
-                "a vector has three"
-            } else {
-                "a tensor has six or nine"
-            };
+            let needed = if N == 3 { "a vector has three" } else { "a tensor has six or nine" };
             DesignError::new(
                 format!("{path}.array"),
-                format!(
-                    "the array \"{}\" has {} components; {needed}",
-                    array.name, array.components
-                ),
+                format!("the array \"{}\" has {} components; {needed}", array.name, array.components),
             )
         })
     })?;
-    let mut made = made.into_iter().map(|s| Grade::Samples {
-        of: Arc::new(s),
-        remap: Vec::new(),
-    });
-    Ok(core::array::from_fn(|_| {
-        made.next().unwrap_or(Grade::Constant(0.0))
-    }))
+    let mut made = made.into_iter().map(|s| Grade::Samples { of: Arc::new(s), remap: Vec::new() });
+    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
 }
 
 /// The chosen components of an array, on grids over the region.
@@ -88,13 +61,9 @@ fn components(
 ) -> Result<Vec<Samples>, DesignError> {
     let at = format!("{path}.path");
     let file = bytes(&spec.path, &at, place)?;
-    let wrong =
-        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     if !["vtu", "vtk", "vti"].contains(&extension(&spec.path).as_str()) {
-        let message = format!(
-            "the name must end in vtu, vtk or vti; found \"{}\"",
-            spec.path
-        );
+        let message = format!("the name must end in vtu, vtk or vti; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     }
     let data = io::read_vtk(&file).map_err(wrong)?;
@@ -113,33 +82,19 @@ fn components(
         return Err(DesignError::new(format!("{path}.array"), message));
     }
     let chosen = choose(array)?;
-    let column = |c: usize| {
-        array
-            .values
-            .chunks_exact(array.components)
-            .map(move |t| t[c])
-    };
+    let column = |c: usize| array.values.chunks_exact(array.components).map(move |t| t[c]);
     let (points, tets, of) = match data.shape {
         Shape::Mesh(elements) => {
             let (tets, of) = elements.tets();
             (elements.points, tets, of)
         }
-        Shape::Image {
-            origin,
-            step,
-            nodes,
-        } => {
+        Shape::Image { origin, step, nodes } => {
             let (origin, shape) = if array.of_cells {
-                (
-                    core::array::from_fn(|a| origin[a] + 0.5 * step[a]),
-                    nodes.map(|n| n.saturating_sub(1).max(1)),
-                )
+                (core::array::from_fn(|a| origin[a] + 0.5 * step[a]), nodes.map(|n| n.saturating_sub(1).max(1)))
             } else {
                 (origin, nodes)
             };
-            let made = chosen
-                .iter()
-                .map(|&c| Samples::new(origin, step, shape, column(c).collect()));
+            let made = chosen.iter().map(|&c| Samples::new(origin, step, shape, column(c).collect()));
             return made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong);
         }
     };
@@ -161,20 +116,11 @@ fn components(
                     weight[i] += volume;
                 }
             }
-            sum.iter()
-                .zip(&weight)
-                .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
-                .collect()
+            sum.iter().zip(&weight).map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 }).collect()
         })
         .collect();
-    let (made, share) = Samples::meshed(
-        &points,
-        &tets,
-        &values,
-        &place.region.bounds(),
-        place.points,
-    )
-    .map_err(wrong)?;
+    let (made, share) =
+        Samples::meshed(&points, &tets, &values, &place.region.bounds(), place.points).map_err(wrong)?;
     if share > UNCOVERED {
         let b = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
         let message = format!(

@@ -8,29 +8,17 @@ use crate::fault::Fault;
 use crate::grade::Samples;
 use crate::io::{self, Shape};
 
-pub(in crate::design) fn grid(
-    spec: &GridSpec,
-    path: &str,
-    place: &Place,
-) -> Result<Samples, DesignError> {
+pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let kind = extension(&spec.path);
     let pictures = ["png", "tif", "tiff"].contains(&kind.as_str());
-    let file = if pictures {
-        Vec::new()
-    } else {
-        bytes(&spec.path, &at, place)?
-    };
-    let wrong =
-        |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
+    let file = if pictures { Vec::new() } else { bytes(&spec.path, &at, place)? };
+    let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let (origin, step, shape, values) = match extension(&spec.path).as_str() {
         "npy" => {
             let (shape, values) = io::read_npy(&file).map_err(wrong)?;
             let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
-                wrong(Fault::new(
-                    "",
-                    format!("the array has shape {shape:?}; a grid has three dimensions [x, y, z]"),
-                ))
+                wrong(Fault::new("", format!("the array has shape {shape:?}; a grid has three dimensions [x, y, z]")))
             })?;
             let need = |key: &str, what: &str| {
                 DesignError::new(
@@ -38,29 +26,17 @@ pub(in crate::design) fn grid(
                     format!("an NPY file does not say where it lies; give {key}, {what}"),
                 )
             };
-            let origin = spec
-                .origin
-                .ok_or_else(|| need("origin", "the place of the first number, [x, y, z] in mm"))?;
-            let step = spec
-                .step
-                .ok_or_else(|| need("step", "the distance between numbers in mm, one or three"))?;
+            let origin = spec.origin.ok_or_else(|| need("origin", "the place of the first number, [x, y, z] in mm"))?;
+            let step = spec.step.ok_or_else(|| need("step", "the distance between numbers in mm, one or three"))?;
             (origin, step.three(), shape, values)
         }
         "vti" | "vtk" => {
             let data = io::read_vtk(&file).map_err(wrong)?;
-            let Shape::Image {
-                origin,
-                step,
-                nodes,
-            } = data.shape
-            else {
-                return Err(wrong(Fault::new(
-                    "",
-                    "the file holds a mesh; use the grade field for it",
-                )));
+            let Shape::Image { origin, step, nodes } = data.shape else {
+                return Err(wrong(Fault::new("", "the file holds a mesh; use the grade field for it")));
             };
-            let array = pick(&data.arrays, spec.array.as_deref())
-                .map_err(|m| DesignError::new(format!("{path}.array"), m))?;
+            let array =
+                pick(&data.arrays, spec.array.as_deref()).map_err(|m| DesignError::new(format!("{path}.array"), m))?;
             if array.components != 1 {
                 let message = format!(
                     "the array \"{}\" has {} components; a number needs an array with one",
@@ -69,19 +45,12 @@ pub(in crate::design) fn grid(
                 return Err(DesignError::new(format!("{path}.array"), message));
             }
             let (origin, shape) = if array.of_cells {
-                let at = core::array::from_fn(|a| {
-                    origin[a] + if nodes[a] > 1 { 0.5 * step[a] } else { 0.0 }
-                });
+                let at = core::array::from_fn(|a| origin[a] + if nodes[a] > 1 { 0.5 * step[a] } else { 0.0 });
                 (at, nodes.map(|n| n.saturating_sub(1).max(1)))
             } else {
                 (origin, nodes)
             };
-            (
-                spec.origin.unwrap_or(origin),
-                spec.step.map_or(step, OneOrThree::three),
-                shape,
-                array.values.clone(),
-            )
+            (spec.origin.unwrap_or(origin), spec.step.map_or(step, OneOrThree::three), shape, array.values.clone())
         }
         "png" | "tif" | "tiff" => {
             let need = |key: &str, what: &str| {
@@ -90,23 +59,16 @@ pub(in crate::design) fn grid(
                     format!("pictures do not say where they lie; give {key}, {what}"),
                 )
             };
-            let origin = spec
-                .origin
-                .ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
-            let step = spec.step.ok_or_else(|| {
-                need(
-                    "step",
-                    "the distance between pixels and pictures in mm, one or three",
-                )
-            })?;
+            let origin = spec.origin.ok_or_else(|| need("origin", "the middle of the first pixel, [x, y, z] in mm"))?;
+            let step = spec
+                .step
+                .ok_or_else(|| need("step", "the distance between pixels and pictures in mm, one or three"))?;
             let (shape, values) = stack(spec, &at, place)?;
             (origin, step.three(), shape, values)
         }
         _ => {
-            let message = format!(
-                "the name must end in npy, vti or vtk, or in png or tif for pictures; found \"{}\"",
-                spec.path
-            );
+            let message =
+                format!("the name must end in npy, vti or vtk, or in png or tif for pictures; found \"{}\"", spec.path);
             return Err(DesignError::new(at, message).found(&spec.path));
         }
     };
@@ -117,11 +79,7 @@ pub(in crate::design) fn grid(
     // A number stands for half a step about it as well.
     let reach = samples.step().into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
     let covered = samples.bounds().grown(reach);
-    let missing = place
-        .points
-        .iter()
-        .filter(|p| covered.distance(**p) > 0.0)
-        .count();
+    let missing = place.points.iter().filter(|p| covered.distance(**p) > 0.0).count();
     if missing > 0 {
         let (b, share) = (samples.bounds(), missing as f64 / place.points.len() as f64);
         let message = format!(
@@ -140,35 +98,26 @@ pub(in crate::design) fn grid(
 /// each with one picture or more.
 fn stack(spec: &GridSpec, at: &str, place: &Place) -> Result<([usize; 3], Vec<f64>), DesignError> {
     let mut names = match spec.path.contains('*') {
-        true => place
-            .loader
-            .list(&spec.path)
-            .map_err(|m| DesignError::new(at, m).found(&spec.path))?,
+        true => place.loader.list(&spec.path).map_err(|m| DesignError::new(at, m).found(&spec.path))?,
         false => vec![spec.path.clone()],
     };
     names.sort_by_cached_key(|n| counted_name(n));
     let (mut size, mut values, mut count) = (None, Vec::new(), 0);
     for name in &names {
-        let wrong =
-            |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
+        let wrong = |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
         let file = bytes(name, at, place)?;
         for picture in io::read_pictures(&file).map_err(|f| wrong(f.message))? {
             let [w, h] = picture.size;
             let first = *size.get_or_insert(picture.size);
             if first != picture.size {
-                let message = format!(
-                    "a picture of {w} × {h} pixels among those of {} × {}",
-                    first[0], first[1]
-                );
+                let message = format!("a picture of {w} × {h} pixels among those of {} × {}", first[0], first[1]);
                 return Err(wrong(message));
             }
             values.extend(picture.values);
             count += 1;
         }
     }
-    let [w, h] = size.ok_or_else(|| {
-        DesignError::new(at, format!("{}: no pictures", spec.path)).found(&spec.path)
-    })?;
+    let [w, h] = size.ok_or_else(|| DesignError::new(at, format!("{}: no pictures", spec.path)).found(&spec.path))?;
     Ok(([w, h, count], values))
 }
 

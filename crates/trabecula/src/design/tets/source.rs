@@ -13,15 +13,7 @@ use crate::solid::Solid;
 use crate::tets::{Checked, TetMesh};
 
 /// Names under which programs write the zones of cells.
-const ZONES: [&str; 7] = [
-    "zone",
-    "gmsh:physical",
-    "medit:ref",
-    "cell_tags",
-    "MaterialIds",
-    "material",
-    "zones",
-];
+const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "material", "zones"];
 
 /// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
 /// the region's.
@@ -33,19 +25,14 @@ pub(super) fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Me
     match extract::surface(&solid, size / 4.0, &Silent) {
         Ok(made) => Ok(made.mesh),
         Err(Stopped::Refused(f)) => Err(DesignError::fault(&place.path, f)),
-        Err(_) => Err(DesignError::new(
-            &place.path,
-            "the region's surface could not be made",
-        )),
+        Err(_) => Err(DesignError::new(&place.path, "the region's surface could not be made")),
     }
 }
 
 /// The triangles of a file as they are, mm.
 pub(super) fn triangles(file: &MeshSpec, loader: &dyn Loader) -> Result<Mesh, DesignError> {
     let path = "region.mesh.path";
-    let bytes = loader
-        .load(&file.path)
-        .map_err(|e| DesignError::new(path, e).found(&file.path))?;
+    let bytes = loader.load(&file.path).map_err(|e| DesignError::new(path, e).found(&file.path))?;
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e);
     let loaded = io::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
     let unit = file.unit.map_or(1.0, Unit::in_mm) * file.scale;
@@ -63,10 +50,7 @@ pub(super) fn wild(
     loader: &dyn Loader,
 ) -> Result<(TetMesh, Checked), DesignError> {
     if !(made.limit > 0.0 && made.limit.is_finite()) {
-        let message = format!(
-            "limit is {} s; it must be a finite number greater than 0",
-            number(made.limit)
-        );
+        let message = format!("limit is {} s; it must be a finite number greater than 0", number(made.limit));
         return Err(DesignError::new(format!("{path}.limit"), message));
     }
     loader
@@ -82,45 +66,26 @@ pub(super) fn from_file(
     path: &str,
     loader: &dyn Loader,
 ) -> Result<(TetMesh, Checked), DesignError> {
-    let at = if path.is_empty() {
-        String::new()
-    } else {
-        format!("{path}.path")
-    };
+    let at = if path.is_empty() { String::new() } else { format!("{path}.path") };
     let wrong = |f: Fault| {
         if f.at == "split" {
             return DesignError::fault(path, f);
         }
         DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
     };
-    let kind = file
-        .path
-        .rsplit_once('.')
-        .map_or("", |(_, e)| e)
-        .to_lowercase();
+    let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
     let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
-        let bytes = loader
-            .load(&file.path)
-            .map_err(|m| DesignError::new(&at, m).found(&file.path))?;
+        let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
         let data = io::read_vtk(&bytes).map_err(wrong)?;
         let Shape::Mesh(elements) = data.shape else {
             let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
             return Err(DesignError::new(at, message).found(&file.path));
         };
-        let named = |name: &&str| {
-            data.arrays
-                .iter()
-                .find(|a| a.of_cells && a.components == 1 && a.name == **name)
-        };
-        let zones = ZONES
-            .iter()
-            .find_map(named)
-            .map(|a| a.values.iter().map(|v| *v as u32).collect());
+        let named = |name: &&str| data.arrays.iter().find(|a| a.of_cells && a.components == 1 && a.name == **name);
+        let zones = ZONES.iter().find_map(named).map(|a| a.values.iter().map(|v| *v as u32).collect());
         (elements, zones.unwrap_or_default())
     } else {
-        loader
-            .elements(&file.path)
-            .map_err(|m| DesignError::new(&at, m).found(&file.path))?
+        loader.elements(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?
     };
     elements.check().map_err(wrong)?;
     let (mut mesh, of) = elements.tet_mesh(file.split).map_err(wrong)?;

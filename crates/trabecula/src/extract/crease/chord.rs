@@ -124,12 +124,7 @@ impl Edges {
         }
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let (du, dv) = (nodes.stride[u], nodes.stride[v]);
-        let edges = [
-            (low, u, true),
-            (low + du, v, true),
-            (low + dv, u, false),
-            (low, v, false),
-        ];
+        let edges = [(low, u, true), (low + du, v, true), (low + dv, u, false), (low, v, false)];
         let mut points: Vec<Point> = Vec::with_capacity(8);
         let mut solid = signs.is_negative(seen.face, low);
         for (edge, (node, along, forward)) in edges.into_iter().enumerate() {
@@ -137,22 +132,14 @@ impl Edges {
             let ends = ends.map(|n| signs.is_negative(seen.face, n));
             let mut add = |key: Key, place: Vec3| {
                 solid = !solid;
-                points.push(Point {
-                    key,
-                    place,
-                    edge,
-                    enters: solid,
-                });
+                points.push(Point { key, place, edge, enters: solid });
             };
             if let Some(twice) = self.twice.get(&(seen.face, node, along)) {
                 for i in if forward { [0, 1] } else { [1, 0] } {
                     add(Key::crossing(node, along, seen.face, i), twice[i]);
                 }
             } else if ends[0] != ends[1] {
-                add(
-                    Key::new(node, &[1 << along], &[seen.face]),
-                    (seen.place)(node, along)?,
-                );
+                add(Key::new(node, &[1 << along], &[seen.face]), (seen.place)(node, along)?);
             }
         }
         (!points.is_empty()).then_some(points)
@@ -178,11 +165,7 @@ impl Edges {
                         at = *p;
                     }
                     counts.push(via.len() + 1);
-                    ways.push(Way {
-                        ends: [i, j],
-                        via,
-                        off: 0.0,
-                    });
+                    ways.push(Way { ends: [i, j], via, off: 0.0 });
                 };
                 orders(corners, &mut Vec::new(), &mut add);
                 if from.edge == to.edge {
@@ -255,11 +238,7 @@ fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
             return;
         };
         for (n, &other) in others.iter().enumerate().step_by(2) {
-            pairs.push(if points[first].enters {
-                [first, other]
-            } else {
-                [other, first]
-            });
+            pairs.push(if points[first].enters { [first, other] } else { [other, first] });
             later.push(others[n + 1..].to_vec());
             rest(points, &others[..n], pairs, found, later);
             later.pop();
@@ -326,15 +305,10 @@ impl<'a> Choice<'a> {
             let cross = side(a, b[0]) * side(a, b[1]) <= 0 && side(b, a[0]) * side(b, a[1]) <= 0;
             cross || a.iter().any(|p| near(*p, b)) || b.iter().any(|p| near(*p, a))
         };
-        let paths: Vec<Vec<[f64; 2]>> = ways
-            .iter()
-            .map(|w| self.path(w).into_iter().map(flat).collect())
-            .collect();
+        let paths: Vec<Vec<[f64; 2]>> = ways.iter().map(|w| self.path(w).into_iter().map(flat).collect()).collect();
         // A path may cross itself, or turn back.
         let bent = |p: &Vec<[f64; 2]>| {
-            let turns = p
-                .windows(3)
-                .any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]));
+            let turns = p.windows(3).any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]));
             let of = |i: usize| &p[i..i + 2];
             turns || (3..p.len()).any(|j| (0..j - 2).any(|i| meet(of(i), of(j - 1))))
         };

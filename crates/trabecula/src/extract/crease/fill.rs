@@ -40,10 +40,7 @@ impl<'b> Tet<'b> {
     /// From a point to a triangle of a side.
     pub fn over(b: &'b Base, apex: usize) -> Tet<'b> {
         Tet {
-            simplex: Simplex {
-                nodes: [b.ids[0], b.ids[1], b.ids[2], apex],
-                count: 4,
-            },
+            simplex: Simplex { nodes: [b.ids[0], b.ids[1], b.ids[2], apex], count: 4 },
             right: !b.left,
             inside: b.inside,
             walls: [false; 4],
@@ -54,10 +51,7 @@ impl<'b> Tet<'b> {
     /// The same, where the patch is the cone from the point.
     fn of_cone(b: &'b Base, apex: usize) -> Tet<'b> {
         let [p, q, r] = b.walls;
-        Tet {
-            walls: [p, q, r, false].map(|w| w && b.inside),
-            ..Tet::over(b, apex)
-        }
+        Tet { walls: [p, q, r, false].map(|w| w && b.inside), ..Tet::over(b, apex) }
     }
 
     /// From a point to a triangle inside the cell, counter-clockwise seen from beyond it; `wall`: whether it lies on the face.
@@ -68,10 +62,7 @@ impl<'b> Tet<'b> {
         let [a, b, c] = sorted;
         let left = [[a, b, c], [b, c, a], [c, a, b]].contains(&ids);
         Tet {
-            simplex: Simplex {
-                nodes: [a, b, c, apex],
-                count: 4,
-            },
+            simplex: Simplex { nodes: [a, b, c, apex], count: 4 },
             right: !left,
             inside,
             walls: [false, false, false, wall],
@@ -89,8 +80,7 @@ impl Knots<'_> {
         let bases = self.bases(cell, face);
         let steps = self.steps(cell, face);
         let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let rims: Vec<(Rim, Vec<usize>)> =
-            rims.iter().map(|keys| self.bare_rim(cell, keys)).collect();
+        let rims: Vec<(Rim, Vec<usize>)> = rims.iter().map(|keys| self.bare_rim(cell, keys)).collect();
         let (edges, of) = (self.edges, self.cell_of(cell, face));
         let patches: Vec<Patches> = match &rims[..] {
             [(rim, _)] => vec![edges.patches(of, rim, None)],
@@ -228,11 +218,8 @@ impl Knots<'_> {
                     if self.holds(cell, piece.negative & !(1 << f)) {
                         continue;
                     }
-                    let ring: Vec<u32> = side
-                        .ring
-                        .iter()
-                        .map(|s| self.spot_name(node, bases, tet, *s, &mut names))
-                        .collect();
+                    let ring: Vec<u32> =
+                        side.ring.iter().map(|s| self.spot_name(node, bases, tet, *s, &mut names)).collect();
                     let cut = self.grid.faces[self.local.live[f]].cut;
                     self.fan(&ring, cut);
                 }
@@ -241,14 +228,7 @@ impl Knots<'_> {
     }
 
     /// Adds the sides of a tetrahedron that lie on the face, where no other crosses it.
-    fn fill_walls(
-        &mut self,
-        node: usize,
-        face: usize,
-        bases: &[Base],
-        tet: &Tet,
-        names: &mut Vec<(Inner, u32)>,
-    ) {
+    fn fill_walls(&mut self, node: usize, face: usize, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
         let cut = self.grid.faces[self.local.live[face]].cut;
         let sides = Simplex::sides(tet.right);
         for (ring, _) in sides.iter().zip(tet.walls).filter(|s| s.1) {
@@ -258,21 +238,10 @@ impl Knots<'_> {
     }
 
     /// The vertex at a spot of a tetrahedron; `inner` are those inside the cell.
-    fn spot_name(
-        &mut self,
-        node: usize,
-        bases: &[Base],
-        tet: &Tet,
-        spot: Spot,
-        inner: &mut Vec<(Inner, u32)>,
-    ) -> u32 {
+    fn spot_name(&mut self, node: usize, bases: &[Base], tet: &Tet, spot: Spot, inner: &mut Vec<(Inner, u32)>) -> u32 {
         let corners = (0..4).filter(|c| spot.corners >> c & 1 == 1);
         if spot.corners & 8 == 0 {
-            let holds = |b: &&Base| {
-                corners
-                    .clone()
-                    .all(|c| b.ids.contains(&tet.simplex.nodes[c]))
-            };
+            let holds = |b: &&Base| corners.clone().all(|c| b.ids.contains(&tet.simplex.nodes[c]));
             if let Some(base) = tet.base.or_else(|| bases.iter().find(holds)) {
                 let key = self.base_key(base, &tet.simplex, spot);
                 return self.vertex(key);
@@ -303,10 +272,7 @@ impl Knots<'_> {
             of.any(|i| simplex.nodes[i] == base.ids[*c])
         };
         let corners_of = (0..3).filter(is_of).fold(0, |w, c| w | 1 << c);
-        let spot = Spot {
-            corners: corners_of,
-            ..spot
-        };
+        let spot = Spot { corners: corners_of, ..spot };
         self.side_key(base.side, side, corners, spot)
     }
 }

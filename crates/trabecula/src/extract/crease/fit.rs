@@ -42,10 +42,7 @@ pub(in crate::extract) struct Fits {
 impl Fits {
     /// None yet, where there are so many faces.
     pub fn none(live: usize) -> Fits {
-        Fits {
-            live,
-            ..Fits::default()
-        }
+        Fits { live, ..Fits::default() }
     }
 
     pub fn place(&self, point: usize) -> Vec3 {
@@ -65,19 +62,13 @@ impl Edges {
     /// Takes the cells in which a face with edges meets others out of those to be cut as knots.
     pub fn fit(&mut self, local: &Local, signs: &mut Signs, nodes: &Nodes, face: usize) {
         self.fitted_to = Some(face);
-        let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| {
-            !matches!(signs.corners(face, i, j, k), 0 | 0xff)
-        };
+        let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| !matches!(signs.corners(face, i, j, k), 0 | 0xff);
         let mut found: Vec<[usize; 3]> = signs.knotted_cells().collect();
         found.retain(|c| mixed(signs, *c));
         for &(_, node) in self.pieces.keys().filter(|p| p.0 == face) {
             let cell = nodes.at(node);
             let others = Others::of(local, signs, face, cell);
-            if !mixed(signs, cell)
-                && others.varies != 0
-                && !others.leave_all()
-                && !others.leave_none()
-            {
+            if !mixed(signs, cell) && others.varies != 0 && !others.leave_all() && !others.leave_none() {
                 found.push(cell);
             }
         }
@@ -124,11 +115,7 @@ impl Edges {
     }
 
     /// Whether a cell can follow whatever a side or a grid edge of it gets.
-    pub(super) fn joins<P: Fn(usize, usize) -> Option<Vec3>>(
-        &self,
-        seen: &Seen<P>,
-        cell: [usize; 3],
-    ) -> bool {
+    pub(super) fn joins<P: Fn(usize, usize) -> Option<Vec3>>(&self, seen: &Seen<P>, cell: [usize; 3]) -> bool {
         if seen.alone(cell) {
             return true;
         }
@@ -142,11 +129,7 @@ impl Knots<'_> {
     pub(super) fn kept(&self, face: usize, v: f64) -> f64 {
         let id = self.local.live[face];
         let least = self.grid.margin * self.grid.faces[id].slope * self.grid.step;
-        if v <= 0.0 {
-            v.min(-least)
-        } else {
-            v.max(least)
-        }
+        if v <= 0.0 { v.min(-least) } else { v.max(least) }
     }
 
     /// The value of a face at a share of a grid edge: between those at its nodes.
@@ -164,9 +147,7 @@ impl Knots<'_> {
     /// The points in which the face with edges crosses a grid edge, the lower one first.
     pub(super) fn points_of(&self, node: usize, axis: usize, face: usize) -> Vec<(Key, Vec3)> {
         if let Some(points) = self.edges.twice.get(&(face, node, axis)) {
-            return (0..2)
-                .map(|i| (Key::crossing(node, axis, face, i), points[i]))
-                .collect();
+            return (0..2).map(|i| (Key::crossing(node, axis, face, i), points[i])).collect();
         }
         let ends = [node, node + self.offset(1 << axis)];
         let [p, q] = ends.map(|n| self.signs.is_negative(face, n));
@@ -218,21 +199,11 @@ impl Knots<'_> {
 
     /// The points in which the fitted face crosses a grid edge, as shares of it; and the other faces that cross it, in
     /// order: after how many of these points each does, the share by its values at the nodes, and its number.
-    fn order_along(
-        &self,
-        node: usize,
-        axis: usize,
-        fitted: usize,
-    ) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
+    fn order_along(&self, node: usize, axis: usize, fitted: usize) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
         let points = self.points_of(node, axis, fitted);
-        let at: Vec<f64> = points
-            .iter()
-            .map(|p| self.share_of(node, axis, p.1))
-            .collect();
+        let at: Vec<f64> = points.iter().map(|p| self.share_of(node, axis, p.1)).collect();
         let stretch = |f: usize| {
-            let same = |s: &&f64| {
-                (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0)
-            };
+            let same = |s: &&f64| (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0);
             at.iter().take_while(same).count()
         };
         let others = self.crossings(&self.simplex(node, &[1 << axis]));
@@ -269,12 +240,7 @@ impl Knots<'_> {
     }
 
     /// Adds a point that is no node; gives its number.
-    pub(super) fn add_point(
-        &mut self,
-        place: Vec3,
-        line: Option<(usize, usize)>,
-        values: Vec<f64>,
-    ) -> usize {
+    pub(super) fn add_point(&mut self, place: Vec3, line: Option<(usize, usize)>, values: Vec<f64>) -> usize {
         self.fits.places.push(place);
         self.fits.lines.push(line);
         self.fits.values.extend(values);
@@ -285,8 +251,7 @@ impl Knots<'_> {
 
     /// The number that stands for a node or a point and those that are the same.
     pub(super) fn first_of(&self, id: usize) -> usize {
-        id.checked_sub(self.nodes.count())
-            .map_or(id, |p| self.fits.first[p])
+        id.checked_sub(self.nodes.count()).map_or(id, |p| self.fits.first[p])
     }
 
     /// The same point with other values of the same signs, by chance.
@@ -297,10 +262,7 @@ impl Knots<'_> {
         let faces = 0..self.local.live.len();
         let shaken = faces.map(|f| {
             let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
-            self.kept(
-                f,
-                self.fits.value(point, f) * (1.0 + 0.7 * self.chance(seed, low)),
-            )
+            self.kept(f, self.fits.value(point, f) * (1.0 + 0.7 * self.chance(seed, low)))
         });
         let values = shaken.collect();
         let id = self.add_point(self.fits.places[point], self.fits.lines[point], values);
@@ -313,9 +275,7 @@ impl Knots<'_> {
     pub(super) fn values_between(&self, place: Vec3, around: &[usize]) -> Vec<f64> {
         let value = |f: usize| {
             let at = around.iter().map(|n| self.value(f, *n));
-            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                (l.min(v), h.max(v))
-            });
+            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
             if (low <= 0.0) == (high <= 0.0) || self.is_fitted(f) {
                 return low;
             }

@@ -22,14 +22,7 @@ pub(in crate::extract) struct Wide<'a> {
 
 impl Edges {
     /// Follows the edges of a live face through the cells of the block.
-    pub fn follow(
-        &mut self,
-        nodes: &Nodes,
-        wide: &Wide,
-        of: &Creases,
-        face: usize,
-        segments: &[u32],
-    ) {
+    pub fn follow(&mut self, nodes: &Nodes, wide: &Wide, of: &Creases, face: usize, segments: &[u32]) {
         for &i in segments {
             self.walk(nodes, wide, face, of.segments[i as usize].ends);
         }

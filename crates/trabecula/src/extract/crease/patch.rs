@@ -56,11 +56,7 @@ impl Patches {
 impl Patch {
     fn cone(rim: &Rim, apex: Vec3) -> Patch {
         let n = rim.places.len();
-        Patch {
-            inner: vec![apex],
-            triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(),
-            ways: Vec::new(),
-        }
+        Patch { inner: vec![apex], triangles: (0..n).map(|i| [n, i, (i + 1) % n]).collect(), ways: Vec::new() }
     }
 }
 
@@ -113,10 +109,7 @@ impl Edges {
         let is_exact = off < (cell.grid.margin * cell.grid.step).powi(2);
         let web = (!is_exact).then(|| Web::new(cell, rim, self.pieces_in(cell)));
         let divided = web.and_then(|w| w.patch(cell)).filter(|d| d.1 < off);
-        Patches {
-            divided: divided.map(|d| d.0),
-            cone: Patch::cone(rim, apex),
-        }
+        Patches { divided: divided.map(|d| d.0), cone: Patch::cone(rim, apex) }
     }
 
     /// The same over one of several rims.
@@ -125,10 +118,7 @@ impl Edges {
         let own: Vec<[Vec3; 2]> = web.pieces().collect();
         let (apex, off) = self.best(cell, rim, &own, None);
         let divided = web.patch(cell).filter(|d| d.1 < off);
-        Patches {
-            divided: divided.map(|d| d.0),
-            cone: Patch::cone(rim, apex),
-        }
+        Patches { divided: divided.map(|d| d.0), cone: Patch::cone(rim, apex) }
     }
 
     /// Where a corner in a cell beside this one is nearer to the face than any point of this.
@@ -149,21 +139,11 @@ impl Edges {
     }
 
     /// The apex where only some pieces of edges belong to the patch.
-    fn best(
-        &self,
-        cell: Cell,
-        rim: &Rim,
-        pieces: &[[Vec3; 2]],
-        beyond: Option<Vec3>,
-    ) -> (Vec3, f64) {
+    fn best(&self, cell: Cell, rim: &Rim, pieces: &[[Vec3; 2]], beyond: Option<Vec3>) -> (Vec3, f64) {
         let in_sides = rim.places.iter().zip(&rim.sides);
         let corners = in_sides.filter(|(_, s)| s.count_ones() == 1);
         let corners: Vec<Vec3> = corners.map(|(p, _)| *p).collect();
-        let of = if corners.is_empty() {
-            &rim.places
-        } else {
-            &corners
-        };
+        let of = if corners.is_empty() { &rim.places } else { &corners };
         let center = middle(of);
         let far = |p: &Vec3| norm(sub(*p, center));
         let mut tried = Vec::with_capacity(4);
@@ -182,10 +162,7 @@ impl Edges {
             *p = cell.within(*p);
         }
         tried.extend(beyond);
-        let samples: Vec<Vec3> = pieces
-            .iter()
-            .flat_map(|s| [s[0], scale(add(s[0], s[1]), 0.5), s[1]])
-            .collect();
+        let samples: Vec<Vec3> = pieces.iter().flat_map(|s| [s[0], scale(add(s[0], s[1]), 0.5), s[1]]).collect();
         let off = |apex: &Vec3| {
             let away = |p: &Vec3| {
                 let spokes = rim.places.iter();
@@ -193,8 +170,7 @@ impl Edges {
                 all.fold(f64::INFINITY, f64::min).powi(2)
             };
             let missed: f64 = samples.iter().map(away).sum();
-            cell.off(*apex, &rim.places) / rim.places.len() as f64
-                + missed / samples.len().max(1) as f64
+            cell.off(*apex, &rim.places) / rim.places.len() as f64 + missed / samples.len().max(1) as f64
         };
         let all = tried.iter().map(|p| (*p, off(p)));
         let best = all.min_by(|a, b| a.1.total_cmp(&b.1));

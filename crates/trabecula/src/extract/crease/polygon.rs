@@ -25,11 +25,7 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
             let over = |k: usize| {
                 let corners = [i, k, j].map(|c| ring[c]);
                 let turns = orient2d(corners[0], corners[1], corners[2]) * way > 0;
-                let own = if turns {
-                    height(corners) * weight([i, k, j], other)
-                } else {
-                    f64::NEG_INFINITY
-                };
+                let own = if turns { height(corners) * weight([i, k, j], other) } else { f64::NEG_INFINITY };
                 (own.min(best[i * n + k].0).min(best[k * n + j].0), k)
             };
             let all = (i + 1..j).map(over);
@@ -58,11 +54,8 @@ fn height([a, b, c]: [[f64; 2]; 3]) -> f64 {
 
 /// One, or by `other` something from a quarter to one.
 fn weight([i, j, k]: [usize; 3], other: usize) -> f64 {
-    let mix = [i, j, k].iter().fold(other as u64, |h, x| {
-        (h ^ *x as u64)
-            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-            .rotate_left(29)
-    });
+    let mix =
+        [i, j, k].iter().fold(other as u64, |h, x| (h ^ *x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
     match other {
         0 => 1.0,
         _ => 0.25 + 0.75 * (mix % 1024) as f64 / 1023.0,
@@ -109,18 +102,9 @@ mod tests {
     #[test]
     fn points_of_one_line_are_not_joined() {
         // Four corners of a square, and two points of a side of it but for 1e-9: cut off by themselves they are nothing.
-        let ring = [
-            [0.0, 0.0],
-            [0.3, 1e-9],
-            [0.6, -1e-9],
-            [1.0, 0.0],
-            [1.0, 1.0],
-            [0.0, 1.0],
-        ];
+        let ring = [[0.0, 0.0], [0.3, 1e-9], [0.6, -1e-9], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         for other in 0..8 {
-            let flattest = triangles(&ring, other)
-                .into_iter()
-                .map(|t| height(t.map(|i| ring[i])));
+            let flattest = triangles(&ring, other).into_iter().map(|t| height(t.map(|i| ring[i])));
             assert!(flattest.fold(f64::INFINITY, f64::min) > 0.1);
         }
     }

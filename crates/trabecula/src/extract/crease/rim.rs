@@ -24,10 +24,7 @@ pub(super) struct Step {
 impl Step {
     pub fn path(&self) -> Vec<Key> {
         let ends = (std::iter::once(self.from), std::iter::once(self.to));
-        ends.0
-            .chain(self.via.iter().copied())
-            .chain(ends.1)
-            .collect()
+        ends.0.chain(self.via.iter().copied()).chain(ends.1).collect()
     }
 }
 
@@ -36,10 +33,7 @@ impl Knots<'_> {
     pub fn edged(&mut self, cell: [usize; 3], face: usize) {
         let steps = self.steps(cell, face);
         let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let (node, cut) = (
-            self.nodes.index(cell),
-            self.grid.faces[self.local.live[face]].cut,
-        );
+        let (node, cut) = (self.nodes.index(cell), self.grid.faces[self.local.live[face]].cut);
         let (edges, of) = (self.edges, self.cell_of(cell, face));
         let patches: Vec<Patches> = rims
             .iter()
@@ -83,12 +77,7 @@ impl Knots<'_> {
                         path.reverse();
                     }
                     let last = path.len() - 1;
-                    Step {
-                        from: path[0],
-                        via: path[1..last].to_vec(),
-                        to: path[last],
-                        side: (axis, upper),
-                    }
+                    Step { from: path[0], via: path[1..last].to_vec(), to: path[last], side: (axis, upper) }
                 }));
                 continue;
             }
@@ -121,8 +110,7 @@ impl Knots<'_> {
             }
             let mut across = cell;
             across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
-            let knotted =
-                across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across);
+            let knotted = across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across);
             for from in enters {
                 let (via, to) = if knotted {
                     self.trace(cell, axis, upper, face, from)
@@ -130,12 +118,7 @@ impl Knots<'_> {
                     (Vec::new(), leaves.first().copied())
                 };
                 let Some(to) = to else { continue };
-                steps.push(Step {
-                    from,
-                    via,
-                    to,
-                    side: (axis, upper),
-                });
+                steps.push(Step { from, via, to, side: (axis, upper) });
             }
         }
         steps
@@ -192,22 +175,15 @@ impl Knots<'_> {
 
     /// Adds a simple polygon across an axis, not convex perhaps, by its vertices.
     pub(super) fn flat(&mut self, names: &[u32], axis: usize, cut: bool) {
-        let flat: Vec<[f64; 2]> = names
-            .iter()
-            .map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis))
-            .collect();
+        let flat: Vec<[f64; 2]> =
+            names.iter().map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis)).collect();
         for t in triangles(&flat, 0) {
             self.extra.triangles.push((t.map(|i| names[i]), cut));
         }
     }
 
     /// What is solid of the sides of a cell: polygons, counter-clockwise about the side's axis.
-    fn solid_polygons(
-        &self,
-        cell: [usize; 3],
-        face: usize,
-        steps: &[Step],
-    ) -> Vec<((usize, bool), Vec<Key>)> {
+    fn solid_polygons(&self, cell: [usize; 3], face: usize, steps: &[Step]) -> Vec<((usize, bool), Vec<Key>)> {
         let node = self.nodes.index(cell);
         let mut all = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {

@@ -113,20 +113,9 @@ impl Knots<'_> {
         let mut solid = self.signs.is_negative(face, low);
         for i in 0..4 {
             boundary.push((corners.len(), None));
-            corners.push(Corner {
-                id: ring[i],
-                code: i,
-                key: Key::new(ring[i], &[], &[]),
-            });
-            let (node, along) = (
-                ring[i].min(ring[(i + 1) % 4]),
-                if i % 2 == 0 { u } else { v },
-            );
-            let mut points: Vec<_> = self
-                .points_of(node, along, face)
-                .into_iter()
-                .enumerate()
-                .collect();
+            corners.push(Corner { id: ring[i], code: i, key: Key::new(ring[i], &[], &[]) });
+            let (node, along) = (ring[i].min(ring[(i + 1) % 4]), if i % 2 == 0 { u } else { v });
+            let mut points: Vec<_> = self.points_of(node, along, face).into_iter().enumerate().collect();
             if i > 1 {
                 points.reverse();
             }
@@ -136,9 +125,7 @@ impl Knots<'_> {
                 let id = self.point(key, place, |k| {
                     let share = k.share_of(node, along, place);
                     let faces = 0..k.local.live.len();
-                    faces
-                        .map(|f| k.value_along(f, node, along, share))
-                        .collect()
+                    faces.map(|f| k.value_along(f, node, along, share)).collect()
                 });
                 let code = 4 + 2 * i + n;
                 corners.push(Corner { id, code, key });
@@ -213,11 +200,7 @@ impl Knots<'_> {
                 for &(key, place) in &c.via {
                     let id = self.point(key, place, |k| k.values_between(place, ring));
                     path.push(corners.len());
-                    corners.push(Corner {
-                        id,
-                        code: 12 + via,
-                        key,
-                    });
+                    corners.push(Corner { id, code: 12 + via, key });
                     via += 1;
                 }
                 path.extend(end(corners, c.to));
@@ -240,15 +223,9 @@ impl Knots<'_> {
         chords: &[Vec<usize>],
         (solid, tries): (bool, usize),
     ) -> Vec<Part> {
-        let flat: Vec<[f64; 2]> = corners
-            .iter()
-            .map(|c| drop_axis(self.place_of(c.id), axis))
-            .collect();
+        let flat: Vec<[f64; 2]> = corners.iter().map(|c| drop_axis(self.place_of(c.id), axis)).collect();
         let is_wall = |a: usize, b: usize| {
-            chords.iter().any(|c| {
-                c.windows(2)
-                    .any(|w| (w[0], w[1]) == (a, b) || (w[1], w[0]) == (a, b))
-            })
+            chords.iter().any(|c| c.windows(2).any(|w| (w[0], w[1]) == (a, b) || (w[1], w[0]) == (a, b)))
         };
         let mut parts = Vec::new();
         let mut add = |polygon: &[usize], inside: bool| {
@@ -285,9 +262,7 @@ impl Knots<'_> {
                     polygon.push(boundary[i].0);
                     let chord = loop {
                         i = (i + 1) % boundary.len();
-                        let ends = |c: &&Vec<usize>| {
-                            (if inside { c[c.len() - 1] } else { c[0] }) == boundary[i].0
-                        };
+                        let ends = |c: &&Vec<usize>| (if inside { c[c.len() - 1] } else { c[0] }) == boundary[i].0;
                         if let Some(c) = chords.iter().find(ends) {
                             break c;
                         }
@@ -319,10 +294,7 @@ impl Knots<'_> {
         let mut pieces = Vec::with_capacity(side.parts.len());
         for part in &side.parts {
             let [a, b, c] = part.corners.map(|c| side.corners[c].id);
-            let simplex = Simplex {
-                nodes: [a, b, c, a],
-                count: 3,
-            };
+            let simplex = Simplex { nodes: [a, b, c, a], count: 3 };
             let (negative, mixed) = self.others_of(&simplex, face, part.inside);
             let mut ring = [1, 2, 4].map(|corners| Spot { corners, faces: 0 });
             if !part.left {
@@ -357,13 +329,7 @@ impl Knots<'_> {
     }
 
     /// The name of a spot of a triangle in a side, or of a line in it.
-    pub(super) fn side_key(
-        &self,
-        (low, axis): (usize, usize),
-        side: &Side,
-        corners: &[usize],
-        spot: Spot,
-    ) -> Key {
+    pub(super) fn side_key(&self, (low, axis): (usize, usize), side: &Side, corners: &[usize], spot: Spot) -> Key {
         let (mut all, mut count) = ([side.corners[0]; 3], 0);
         for c in bits(u64::from(spot.corners)) {
             all[count] = side.corners[corners[c]];
@@ -391,31 +357,19 @@ impl Knots<'_> {
     }
 
     /// A chord with the points where faces cross it.
-    fn crossed(
-        &mut self,
-        at: (usize, usize),
-        face: usize,
-        side: &Side,
-        chord: &[usize],
-    ) -> Vec<Key> {
+    fn crossed(&mut self, at: (usize, usize), face: usize, side: &Side, chord: &[usize]) -> Vec<Key> {
         let mut path = vec![side.corners[chord[0]].key];
         for w in chord.windows(2) {
             let mut ends = [w[0], w[1]];
             ends.sort_by_key(|c| side.corners[*c].code);
-            let simplex = Simplex {
-                nodes: [ends[0], ends[1], ends[0], ends[0]].map(|c| side.corners[c].id),
-                count: 2,
-            };
+            let simplex = Simplex { nodes: [ends[0], ends[1], ends[0], ends[0]].map(|c| side.corners[c].id), count: 2 };
             let mut found = self.crossings(&simplex);
             found.retain(|c| c.1 != face);
             if ends[0] != w[0] {
                 found.reverse();
             }
             path.extend(found.into_iter().map(|(_, f)| {
-                let spot = Spot {
-                    corners: 3,
-                    faces: 1 << f,
-                };
+                let spot = Spot { corners: 3, faces: 1 << f };
                 self.side_key(at, side, &ends, spot)
             }));
             path.push(side.corners[w[1]].key);
@@ -427,11 +381,7 @@ impl Knots<'_> {
 /// Whether all polygons of a side are what they are meant to be in single precision: then they do not overlap either, for
 /// together they fill the side.
 fn is_sound(pieces: &[Polygon], axis: usize) -> bool {
-    let way = orient2d(
-        [0.0, 0.0],
-        drop_axis(AXES[(axis + 1) % 3], axis),
-        drop_axis(AXES[(axis + 2) % 3], axis),
-    );
+    let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
     pieces.iter().all(|(_, ring)| {
         let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
         (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)

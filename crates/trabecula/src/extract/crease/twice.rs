@@ -11,11 +11,7 @@ const ROUNDS: usize = 40;
 
 impl Edges {
     /// Finds the grid edges that the face crosses twice, of some cells by their lowest nodes.
-    pub(super) fn find_twice<P: Fn(usize, usize) -> Option<Vec3>>(
-        &mut self,
-        seen: &Seen<P>,
-        cells: Vec<usize>,
-    ) {
+    pub(super) fn find_twice<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>, cells: Vec<usize>) {
         let stride = seen.nodes.stride;
         let mut edges: Vec<(usize, usize)> = Vec::with_capacity(12 * cells.len());
         for cell in cells {
@@ -33,8 +29,7 @@ impl Edges {
         }
         for ((face, node, axis), points) in &self.twice {
             for (i, p) in points.iter().enumerate() {
-                self.points
-                    .insert(super::Key::crossing(*node, *axis, *face, i), *p);
+                self.points.insert(super::Key::crossing(*node, *axis, *face, i), *p);
             }
         }
     }
@@ -45,17 +40,11 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     fn twice(&self, edges: &Edges, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
-        if at[axis] + 2 > nodes.shape[axis]
-            || around
-                .clone()
-                .any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a])
-        {
+        if at[axis] + 2 > nodes.shape[axis] || around.clone().any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a]) {
             return None;
         }
         let [a, b] = self.open(node, axis)?;
-        let on_plane = around
-            .clone()
-            .any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
+        let on_plane = around.clone().any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
         let mut beside = around;
         let (u, v) = (beside.next()?, beside.next()?);
         let all_join = || {
@@ -119,11 +108,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
     /// How far a point of a grid edge is on the side of the face on which its lower end is, in shares of the edge.
     fn height(&self, node: usize, axis: usize, t: f64) -> f64 {
         let d = self.field.value(self.along(node, axis, t)) / self.length(node, axis);
-        if self.signs.is_negative(self.face, node) {
-            -d
-        } else {
-            d
-        }
+        if self.signs.is_negative(self.face, node) { -d } else { d }
     }
 }
 
@@ -158,11 +143,7 @@ fn root(height: &impl Fn(f64) -> f64, positive: (f64, f64), other: (f64, f64)) -
         if (p.0 - q.0).abs() < 1e-12 || q.1 == 0.0 {
             break;
         }
-        let t = if round % 3 == 2 {
-            (p.0 + q.0) / 2.0
-        } else {
-            p.0 + (q.0 - p.0) * p.1 / (p.1 - q.1)
-        };
+        let t = if round % 3 == 2 { (p.0 + q.0) / 2.0 } else { p.0 + (q.0 - p.0) * p.1 / (p.1 - q.1) };
         let h = height(t);
         if h > 0.0 {
             p = (t, h);

@@ -72,10 +72,7 @@ impl Knots<'_> {
         if bases.iter().any(is_shaken) {
             return None;
         }
-        let side = |b: &'b Base| Facet {
-            ids: turned(b.ids, b.left),
-            of: Of::Side(b),
-        };
+        let side = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: Of::Side(b) };
         let sides: Vec<Facet> = bases.iter().map(side).collect();
         let rims: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
         let mut volumes: Vec<Volume> = Vec::with_capacity(patches.len() + 1);
@@ -97,10 +94,7 @@ impl Knots<'_> {
             let meets = |v: &&mut Volume| v.facets.iter().any(|f| lines_of(f.ids).contains(&start));
             for volume in volumes.iter_mut().filter(meets) {
                 let stays = volume.inside;
-                let facet = |t: &[usize; 3]| Facet {
-                    ids: turned(t.map(|i| ids[i]), stays),
-                    of: Of::Patch,
-                };
+                let facet = |t: &[usize; 3]| Facet { ids: turned(t.map(|i| ids[i]), stays), of: Of::Patch };
                 volume.facets.extend(patch.triangles.iter().map(facet));
             }
         }
@@ -139,12 +133,7 @@ impl Knots<'_> {
     }
 
     /// Adds the tetrahedra of a volume, if it is seen whole from a point.
-    fn is_seen<'b>(
-        &mut self,
-        cell: [usize; 3],
-        volume: &Volume<'b>,
-        tets: &mut Vec<Tet<'b>>,
-    ) -> bool {
+    fn is_seen<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<Tet<'b>>) -> bool {
         let facets = volume.facets.iter();
         let places: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.place_of(i))).collect();
         let step = self.grid.step;
@@ -161,12 +150,7 @@ impl Knots<'_> {
     }
 
     /// The halves of a volume that is divided by a wall between a way along its patches and one along its sides.
-    fn walled_off<'b>(
-        &mut self,
-        cell: [usize; 3],
-        volume: &Volume<'b>,
-        way: &[usize],
-    ) -> Option<[Volume<'b>; 2]> {
+    fn walled_off<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, way: &[usize]) -> Option<[Volume<'b>; 2]> {
         let mut ring = way.to_vec();
         ring.extend(back(&volume.facets, way)?);
         let lines = around(&ring);
@@ -181,10 +165,7 @@ impl Knots<'_> {
                 sides.map(|(a, b)| [apex, *a, *b]).collect()
             }
         };
-        Some([one, other].map(|half| Volume {
-            facets: closed(half, &wall, [ring[0], ring[1]]),
-            inside: volume.inside,
-        }))
+        Some([one, other].map(|half| Volume { facets: closed(half, &wall, [ring[0], ring[1]]), inside: volume.inside }))
     }
 }
 
@@ -192,10 +173,7 @@ impl Knots<'_> {
 fn closed<'b>(mut half: Vec<Facet<'b>>, wall: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
     let runs = |ids: [usize; 3]| (0..3).any(|k| [ids[k], ids[(k + 1) % 3]] == line);
     let stays = !half.iter().any(|f| runs(f.ids));
-    half.extend(wall.iter().map(|t| Facet {
-        ids: turned(*t, stays),
-        of: Of::Wall,
-    }));
+    half.extend(wall.iter().map(|t| Facet { ids: turned(*t, stays), of: Of::Wall }));
     half
 }
 
@@ -216,9 +194,7 @@ fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
                 continue;
             }
             part.push(facets[i]);
-            let inner = lines_of(facets[i].ids)
-                .into_iter()
-                .filter(|l| !lines.contains(l));
+            let inner = lines_of(facets[i].ids).into_iter().filter(|l| !lines.contains(l));
             open.extend(inner.flat_map(|l| beside[&l].iter().copied()));
         }
         if !part.is_empty() {
@@ -235,9 +211,7 @@ fn back(facets: &[Facet], way: &[usize]) -> Option<Vec<usize>> {
     let is_side = |f: &&Facet| matches!(f.of, Of::Side(_));
     let others = facets.iter().filter(|f| !is_side(f));
     let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
-    let lines: Vec<Line> = (facets.iter().filter(is_side))
-        .flat_map(|f| lines_of(f.ids))
-        .collect();
+    let lines: Vec<Line> = (facets.iter().filter(is_side)).flat_map(|f| lines_of(f.ids)).collect();
     let mut from: By<usize, usize> = By::default();
     let mut open = VecDeque::from([start]);
     while let Some(at) = open.pop_front() {
@@ -299,10 +273,7 @@ mod tests {
             ids.push([i, next, next + n]);
             ids.push([i, next + n, i + n]);
         }
-        let facets = ids.iter().map(|ids| Facet {
-            ids: *ids,
-            of: Of::Patch,
-        });
+        let facets = ids.iter().map(|ids| Facet { ids: *ids, of: Of::Patch });
         let at = |z: f64| polygon.iter().map(move |p| [p[0], p[1], z]);
         (facets.collect(), at(0.0).chain(at(1.0)).collect())
     }
@@ -313,24 +284,9 @@ mod tests {
 
     const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     /// A square with a slot that ends before its far side.
-    const SLOT: [[f64; 2]; 8] = [
-        [0.0, 0.0],
-        [0.4, 0.0],
-        [0.4, 0.8],
-        [0.6, 0.8],
-        [0.6, 0.0],
-        [1.0, 0.0],
-        [1.0, 1.0],
-        [0.0, 1.0],
-    ];
-    const SLOT_ENDS: [[usize; 3]; 6] = [
-        [0, 1, 2],
-        [0, 2, 7],
-        [2, 3, 7],
-        [3, 6, 7],
-        [3, 5, 6],
-        [3, 4, 5],
-    ];
+    const SLOT: [[f64; 2]; 8] =
+        [[0.0, 0.0], [0.4, 0.0], [0.4, 0.8], [0.6, 0.8], [0.6, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    const SLOT_ENDS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 7], [2, 3, 7], [3, 6, 7], [3, 5, 6], [3, 4, 5]];
 
     #[test]
     fn a_point_behind_all_sides_is_found_where_there_is_one() {

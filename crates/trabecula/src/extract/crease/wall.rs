@@ -85,17 +85,12 @@ impl Knots<'_> {
             })
         };
         let around = |ring: &[Key]| -> Vec<(Key, Key)> {
-            (0..ring.len())
-                .map(|i| (ring[i], ring[(i + 1) % ring.len()]))
-                .collect()
+            (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()])).collect()
         };
         let of_solid = polygons.iter().filter(|p| p.solid);
         let lines: Vec<(Key, Key)> = of_solid.flat_map(|p| around(&p.ring)).collect();
         let known: HashSet<(Key, Key)> = lines.iter().copied().collect();
-        for (p, q) in lines
-            .into_iter()
-            .filter(|(p, q)| !known.contains(&(*q, *p)))
-        {
+        for (p, q) in lines.into_iter().filter(|(p, q)| !known.contains(&(*q, *p))) {
             let cut = self.is_cut(p, q);
             let [a, b] = [p, q].map(|k| self.vertex(k));
             let [c, d] = [p, q].map(|k| within(self, k));

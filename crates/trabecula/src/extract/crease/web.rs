@@ -31,11 +31,7 @@ impl Web {
     pub fn new(cell: Cell, rim: &Rim, pieces: &[[Vec3; 2]]) -> Web {
         let n = rim.places.len();
         let close = SAME * cell.grid.margin * cell.grid.step;
-        let mut web = Web {
-            places: rim.places.clone(),
-            rim: n,
-            trees: Vec::new(),
-        };
+        let mut web = Web { places: rim.places.clone(), rim: n, trees: Vec::new() };
         let mut links: Vec<Link> = Vec::with_capacity(pieces.len());
         for piece in pieces {
             let [a, b] = piece.map(|p| web.number(p, close));
@@ -59,8 +55,7 @@ impl Web {
             let meets = |t: &Vec<Link>| t.iter().flatten().any(|i| *i >= n && link.contains(i));
             let (joined, apart): (Vec<_>, Vec<_>) = web.trees.into_iter().partition(meets);
             web.trees = apart;
-            web.trees
-                .push(joined.into_iter().flatten().chain([link]).collect());
+            web.trees.push(joined.into_iter().flatten().chain([link]).collect());
         }
         web
     }
@@ -110,11 +105,7 @@ impl Web {
         let mut edges: Vec<Link> = triangles.iter().flat_map(ways).collect();
         edges.sort_unstable();
         let once = edges.windows(2).all(|w| w[0] != w[1]);
-        let patch = || Patch {
-            inner,
-            triangles,
-            ways: self.ways(),
-        };
+        let patch = || Patch { inner, triangles, ways: self.ways() };
         once.then(|| (patch(), sum / f64::from(count as u32)))
     }
 
@@ -123,10 +114,7 @@ impl Web {
         let of = |tree: &Vec<Link>| {
             let ends = self.ends(tree);
             let next = ends.iter().cycle().skip(1);
-            let pairs = ends
-                .iter()
-                .zip(next)
-                .take(if ends.len() == 2 { 1 } else { ends.len() });
+            let pairs = ends.iter().zip(next).take(if ends.len() == 2 { 1 } else { ends.len() });
             let ways = pairs.filter_map(|(a, b)| path(tree, *a, *b));
             ways.collect::<Vec<_>>()
         };
@@ -143,20 +131,13 @@ impl Web {
     }
 
     /// Divides a polygon by trees whose ends are among its points; none if they are no trees, or cross.
-    fn divide(
-        &self,
-        ring: Vec<usize>,
-        mut trees: Vec<Vec<Link>>,
-        parts: &mut Vec<Vec<usize>>,
-    ) -> Option<()> {
+    fn divide(&self, ring: Vec<usize>, mut trees: Vec<Vec<Link>>, parts: &mut Vec<Vec<usize>>) -> Option<()> {
         let Some(tree) = trees.pop() else {
             parts.push(ring);
             return Some(());
         };
         let ends = self.ends(&tree);
-        let at: Vec<usize> = (0..ring.len())
-            .filter(|i| ends.contains(&ring[*i]))
-            .collect();
+        let at: Vec<usize> = (0..ring.len()).filter(|i| ends.contains(&ring[*i])).collect();
         if at.len() < 2 || at.len() < ends.len() {
             return None;
         }
@@ -231,11 +212,7 @@ mod tests {
 
     /// The parts of a rim of so many points that some trees divide.
     fn parts(rim: usize, trees: &[&[Link]]) -> Option<Vec<Vec<usize>>> {
-        let web = Web {
-            places: Vec::new(),
-            rim,
-            trees: trees.iter().map(|t| t.to_vec()).collect(),
-        };
+        let web = Web { places: Vec::new(), rim, trees: trees.iter().map(|t| t.to_vec()).collect() };
         let mut parts = Vec::new();
         let whole = (0..rim).collect();
         web.divide(whole, web.trees.clone(), &mut parts)?;

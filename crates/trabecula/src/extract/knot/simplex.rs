@@ -64,20 +64,14 @@ impl Simplex {
             if !right {
                 c.swap(1, 2);
             }
-            c.map(|c| Spot {
-                corners: 1 << c,
-                faces: 0,
-            })
+            c.map(|c| Spot { corners: 1 << c, faces: 0 })
         })
     }
 }
 
 impl Knots<'_> {
     pub(in crate::extract) fn offset(&self, step: usize) -> usize {
-        (0..3)
-            .filter(|a| step >> a & 1 == 1)
-            .map(|a| self.nodes.stride[a])
-            .sum()
+        (0..3).filter(|a| step >> a & 1 == 1).map(|a| self.nodes.stride[a]).sum()
     }
 
     /// The value of a face at a node, kept away from zero: a plane that passed through a node would leave needles.
@@ -87,20 +81,9 @@ impl Knots<'_> {
         }
         let id = self.local.live[face];
         let scale = self.grid.faces[id].slope * self.grid.step;
-        let (v, least) = (
-            f64::from(self.samples[face][node]),
-            self.grid.margin * scale,
-        );
-        let v = if self.moved.contains(&node) {
-            v + SHIFT * scale * self.chance(id, node)
-        } else {
-            v
-        };
-        if self.signs.is_negative(face, node) {
-            v.min(-least)
-        } else {
-            v.max(least)
-        }
+        let (v, least) = (f64::from(self.samples[face][node]), self.grid.margin * scale);
+        let v = if self.moved.contains(&node) { v + SHIFT * scale * self.chance(id, node) } else { v };
+        if self.signs.is_negative(face, node) { v.min(-least) } else { v.max(least) }
     }
 
     /// A number between −1 and 1 that depends on the face and the node alone.
@@ -116,10 +99,7 @@ impl Knots<'_> {
         for (n, s) in nodes[1..].iter_mut().zip(steps) {
             *n = node + self.offset(*s);
         }
-        Simplex {
-            nodes,
-            count: 1 + steps.len(),
-        }
+        Simplex { nodes, count: 1 + steps.len() }
     }
 
     pub(super) fn key_simplex(&self, key: Key) -> Simplex {
@@ -130,9 +110,7 @@ impl Knots<'_> {
 
     /// The name of a spot of a simplex.
     pub(in crate::extract) fn key(&self, simplex: &Simplex, spot: Spot) -> Key {
-        let mut nodes = (0..4)
-            .filter(|c| spot.corners >> c & 1 == 1)
-            .map(|c| simplex.nodes[c]);
+        let mut nodes = (0..4).filter(|c| spot.corners >> c & 1 == 1).map(|c| simplex.nodes[c]);
         let Some(first) = nodes.next() else {
             return Key::new(0, &[], &[]);
         };
@@ -154,13 +132,7 @@ impl Knots<'_> {
     /// The shares of its corners in the point of a simplex where as many faces vanish as it has dimensions.
     pub(super) fn shares(&self, simplex: &Simplex, faces: &[usize]) -> [f64; 4] {
         let v = |f: usize| {
-            [0, 1, 2, 3].map(|c| {
-                if c < simplex.count {
-                    self.value(faces[f], simplex.nodes[c])
-                } else {
-                    0.0
-                }
-            })
+            [0, 1, 2, 3].map(|c| if c < simplex.count { self.value(faces[f], simplex.nodes[c]) } else { 0.0 })
         };
         let w = match faces.len() {
             0 => [1.0, 0.0, 0.0, 0.0],
@@ -189,10 +161,7 @@ impl Knots<'_> {
 
     /// The side of a simplex that a spot lies in, and the faces that meet in it.
     fn part(&self, simplex: &Simplex, spot: Spot) -> (Simplex, [usize; 3], usize) {
-        let mut part = Simplex {
-            nodes: [simplex.nodes[0]; 4],
-            count: 0,
-        };
+        let mut part = Simplex { nodes: [simplex.nodes[0]; 4], count: 0 };
         for c in (0..4).filter(|c| spot.corners >> c & 1 == 1) {
             part.nodes[part.count] = simplex.nodes[c];
             part.count += 1;
@@ -241,16 +210,11 @@ impl Knots<'_> {
             places[c] = self.place_of(part.nodes[c]);
         }
         if part.count == 2 {
-            let length = sub(places[1], places[0])
-                .map(f64::abs)
-                .into_iter()
-                .fold(0.0, f64::max);
+            let length = sub(places[1], places[0]).map(f64::abs).into_iter().fold(0.0, f64::max);
             let least = (apart * self.grid.margin * self.grid.step / length).min(1.0 / 3.0);
             shares[1] = shares[1].clamp(least, 1.0 - least);
         }
-        (1..part.count).fold(places[0], |p, c| {
-            add(p, scale(sub(places[c], places[0]), shares[c]))
-        })
+        (1..part.count).fold(places[0], |p, c| add(p, scale(sub(places[c], places[0]), shares[c])))
     }
 
     /// The place of a vertex: a function of its name and the samples at its nodes alone.
@@ -267,12 +231,7 @@ impl Knots<'_> {
         let shares = self.shares(&simplex, &faces[..met]);
         // Steps from the first corner: coordinates that all corners share come out exactly.
         let first = self.nodes.place(simplex.nodes[0]);
-        (1..simplex.count).fold(first, |p, c| {
-            add(
-                p,
-                scale(sub(self.nodes.place(simplex.nodes[c]), first), shares[c]),
-            )
-        })
+        (1..simplex.count).fold(first, |p, c| add(p, scale(sub(self.nodes.place(simplex.nodes[c]), first), shares[c])))
     }
 
     /// Where faces cross the edge between two nodes, in order, as shares of it.
@@ -306,10 +265,7 @@ impl Knots<'_> {
     pub(in crate::extract) fn faces_of(&self, simplex: &Simplex) -> (u64, u64) {
         let (mut all, mut some) = (0, 0);
         for f in 0..self.local.live.len() {
-            let count = simplex.nodes[..simplex.count]
-                .iter()
-                .filter(|n| self.is_negative(f, **n))
-                .count();
+            let count = simplex.nodes[..simplex.count].iter().filter(|n| self.is_negative(f, **n)).count();
             all |= u64::from(count == simplex.count) << f;
             some |= u64::from(count > 0) << f;
         }
@@ -326,20 +282,13 @@ impl Knots<'_> {
         walls: [Option<usize>; 4],
     ) -> Vec<Piece> {
         let sides = Simplex::sides(right).into_iter().zip(walls);
-        let sides = sides.map(|(ring, face)| Side {
-            face,
-            ring: ring.to_vec(),
-        });
-        let mut pieces = vec![Piece {
-            negative,
-            sides: sides.collect(),
-        }];
+        let sides = sides.map(|(ring, face)| Side { face, ring: ring.to_vec() });
+        let mut pieces = vec![Piece { negative, sides: sides.collect() }];
         for f in bits(mixed) {
             let mut next = Vec::with_capacity(2 * pieces.len());
             for piece in pieces {
                 let room = piece.sides.len() + 1;
-                let (mut inside, mut outside) =
-                    (Vec::with_capacity(room), Vec::with_capacity(room));
+                let (mut inside, mut outside) = (Vec::with_capacity(room), Vec::with_capacity(room));
                 // The new edges, from end to end as the inside's new side has them.
                 let mut edges: Vec<(Spot, Spot)> = Vec::new();
                 for side in piece.sides {
@@ -354,13 +303,9 @@ impl Knots<'_> {
                         }
                         Parted::Both(halves) => halves,
                     };
-                    for (part, to) in [(halves.inside, &mut inside), (halves.outside, &mut outside)]
-                    {
+                    for (part, to) in [(halves.inside, &mut inside), (halves.outside, &mut outside)] {
                         if part.len() > 2 {
-                            to.push(Side {
-                                face: side.face,
-                                ring: part,
-                            });
+                            to.push(Side { face: side.face, ring: part });
                         }
                     }
                     edges.extend(halves.edge);
@@ -375,28 +320,16 @@ impl Knots<'_> {
                 }
                 if !inside.is_empty() {
                     if ring.len() > 2 {
-                        inside.push(Side {
-                            face: Some(f),
-                            ring: ring.clone(),
-                        });
+                        inside.push(Side { face: Some(f), ring: ring.clone() });
                     }
-                    next.push(Piece {
-                        negative: piece.negative | 1 << f,
-                        sides: inside,
-                    });
+                    next.push(Piece { negative: piece.negative | 1 << f, sides: inside });
                 }
                 if !outside.is_empty() {
                     if ring.len() > 2 {
                         ring.reverse();
-                        outside.push(Side {
-                            face: Some(f),
-                            ring,
-                        });
+                        outside.push(Side { face: Some(f), ring });
                     }
-                    next.push(Piece {
-                        negative: piece.negative,
-                        sides: outside,
-                    });
+                    next.push(Piece { negative: piece.negative, sides: outside });
                 }
             }
             pieces = next;
@@ -438,9 +371,7 @@ impl Knots<'_> {
     /// the negative part runs along it.
     pub(super) fn split(&self, simplex: &Simplex, ring: Vec<Spot>, f: usize) -> Parted {
         // A side has three corners, and one more for each of at most 64 faces.
-        let signs = (0..).zip(&ring).fold(0u128, |w, (i, s)| {
-            w | u128::from(self.is_negative_at(simplex, *s, f)) << i
-        });
+        let signs = (0..).zip(&ring).fold(0u128, |w, (i, s)| w | u128::from(self.is_negative_at(simplex, *s, f)) << i);
         if signs == 0 {
             return Parted::Outside(ring);
         }
@@ -453,12 +384,7 @@ impl Knots<'_> {
         let (mut leave, mut enter) = (None, None);
         for i in 0..ring.len() {
             let next = (i + 1) % ring.len();
-            (if is_inside(i) {
-                &mut inside
-            } else {
-                &mut outside
-            })
-            .push(ring[i]);
+            (if is_inside(i) { &mut inside } else { &mut outside }).push(ring[i]);
             if is_inside(i) != is_inside(next) {
                 let new = Spot {
                     corners: ring[i].corners | ring[next].corners,
@@ -469,10 +395,6 @@ impl Knots<'_> {
                 *(if is_inside(i) { &mut leave } else { &mut enter }) = Some(new);
             }
         }
-        Parted::Both(Halves {
-            inside,
-            outside,
-            edge: enter.zip(leave),
-        })
+        Parted::Both(Halves { inside, outside, edge: enter.zip(leave) })
     }
 }

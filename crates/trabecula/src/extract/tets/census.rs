@@ -30,14 +30,7 @@ pub(super) struct Links {
 
 impl Links {
     /// Adds the next tetrahedron, with what its bodies add up to.
-    pub fn add(
-        &mut self,
-        map: &Tets,
-        t: usize,
-        mask: u8,
-        piece: &Piece,
-        sums: &[Sum],
-    ) -> Result<(), Fault> {
+    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &Piece, sums: &[Sum]) -> Result<(), Fault> {
         let base = self.sums.len();
         let bodies = piece.bounds.len();
         let end = base + bodies + piece.solids as usize;
@@ -55,11 +48,7 @@ impl Links {
             unite(&mut self.solid, (base + b) as u32, inner(*solid));
         }
         let named = |runs: &[Run]| -> Vec<Run> {
-            let one = |r: &Run| Run {
-                surface: surface(r.surface),
-                solid: inner(r.solid),
-                ..*r
-            };
+            let one = |r: &Run| Run { surface: surface(r.surface), solid: inner(r.solid), ..*r };
             runs.iter().map(one).collect()
         };
         let across = map.across(t);
@@ -71,10 +60,7 @@ impl Links {
             match self.faces.remove(&(t as u32, face as u8)) {
                 Some(theirs) => self.join(&runs, &theirs),
                 None => {
-                    let back = map
-                        .across(other as usize)
-                        .iter()
-                        .position(|b| *b as usize == t);
+                    let back = map.across(other as usize).iter().position(|b| *b as usize == t);
                     self.faces.insert((other, back.unwrap_or(0) as u8), runs);
                 }
             }
@@ -116,8 +102,7 @@ impl Links {
                     let mut of = (0..4).filter(on);
                     let (a, b) = (of.next().unwrap_or(0), of.next().unwrap_or(0));
                     if corner {
-                        *counts[usize::from(*zero)]
-                            .get_or_insert_with(|| self.edges.insert([ids[a], ids[b]]))
+                        *counts[usize::from(*zero)].get_or_insert_with(|| self.edges.insert([ids[a], ids[b]]))
                     } else {
                         caps[super::template::pair(a, b)]
                     }

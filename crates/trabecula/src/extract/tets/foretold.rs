@@ -50,12 +50,10 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
     // The first tetrahedron of each kind, and the kind of each.
     let (mut firsts, mut kinds, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for t in 0..map.len() {
-        let kind = *known
-            .entry((numbers(tiling, t), work.mask(t)))
-            .or_insert_with(|| {
-                firsts.push(t);
-                firsts.len() - 1
-            });
+        let kind = *known.entry((numbers(tiling, t), work.mask(t))).or_insert_with(|| {
+            firsts.push(t);
+            firsts.len() - 1
+        });
         kinds.push(kind);
         if firsts.len() > MOST {
             return None;
@@ -67,16 +65,9 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
             Of::Same(piece) => piece.clone(),
         };
         // All but what is placed.
-        Piece {
-            places: Vec::new(),
-            triangles: Vec::new(),
-            ..made
-        }
+        Piece { places: Vec::new(), triangles: Vec::new(), ..made }
     };
-    let pieces: Vec<Piece> = firsts
-        .par_iter()
-        .map_init(Scratch::default, piece)
-        .collect();
+    let pieces: Vec<Piece> = firsts.par_iter().map_init(Scratch::default, piece).collect();
     let mut links = Links::default();
     // For each piece of solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
@@ -97,17 +88,11 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
     // For each zone, in how many of its tetrahedra each piece is.
     let mut about: BTreeMap<u32, HashMap<u32, usize>> = BTreeMap::new();
     for (t, whole) in of.iter().zip(&wholes) {
-        *about
-            .entry(map.zone(*t))
-            .or_default()
-            .entry(*whole)
-            .or_default() += 1;
+        *about.entry(map.zone(*t)).or_default().entry(*whole).or_default() += 1;
     }
     let main = |zone: u32| {
         let of = about.get(&zone)?;
-        of.iter()
-            .max_by_key(|(name, count)| (**count, u32::MAX - **name))
-            .map(|(name, _)| *name)
+        of.iter().max_by_key(|(name, count)| (**count, u32::MAX - **name)).map(|(name, _)| *name)
     };
     let mut joins: BTreeMap<[u32; 2], Join> = BTreeMap::new();
     for t in 0..map.len() {
@@ -130,10 +115,7 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
             join.open += usize::from(!pieces[kinds[t]].faces[face].is_empty());
         }
     }
-    Some(Foretold {
-        pieces: names.len(),
-        joins: joins.into_values().collect(),
-    })
+    Some(Foretold { pieces: names.len(), joins: joins.into_values().collect() })
 }
 
 /// All that a tetrahedron's piece follows from: levels and weights at its nodes.

@@ -33,11 +33,7 @@ pub(super) struct Run {
 fn push(runs: &mut Vec<Run>, surface: u32, solid: u32) {
     match runs.last_mut() {
         Some(r) if (r.surface, r.solid) == (surface, solid) => r.count += 1,
-        _ => runs.push(Run {
-            count: 1,
-            surface,
-            solid,
-        }),
+        _ => runs.push(Run { count: 1, surface, solid }),
     }
 }
 
@@ -98,18 +94,9 @@ struct Side {
 }
 
 fn sides(part: Part) -> &'static [Side] {
-    const BELOW: Side = Side {
-        sign: 1.0,
-        below: true,
-    };
-    const ABOVE: Side = Side {
-        sign: 1.0,
-        below: false,
-    };
-    const BACK: Side = Side {
-        sign: -1.0,
-        below: false,
-    };
+    const BELOW: Side = Side { sign: 1.0, below: true };
+    const ABOVE: Side = Side { sign: 1.0, below: false };
+    const BACK: Side = Side { sign: -1.0, below: false };
     match part {
         Part::Lower => &[BELOW],
         Part::Upper => &[ABOVE],
@@ -133,14 +120,7 @@ pub(super) struct Scratch {
 
 impl Piece {
     /// Cuts the tetrahedron; `mask` has a bit for each face that is to be capped.
-    pub fn new(
-        nodes: &Nodes,
-        template: &Template,
-        core: &Core,
-        part: Part,
-        mask: u8,
-        scratch: &mut Scratch,
-    ) -> Piece {
+    pub fn new(nodes: &Nodes, template: &Template, core: &Core, part: Part, mask: u8, scratch: &mut Scratch) -> Piece {
         let sides = sides(part);
         let mut out = Piece::default();
         let count = template.zero.len();
@@ -189,14 +169,7 @@ impl Piece {
     }
 
     /// The corners on the edges.
-    fn corners(
-        &mut self,
-        nodes: &Nodes,
-        template: &Template,
-        core: &Core,
-        sides: &[Side],
-        scratch: &mut Scratch,
-    ) {
+    fn corners(&mut self, nodes: &Nodes, template: &Template, core: &Core, sides: &[Side], scratch: &mut Scratch) {
         let n = nodes.grid.n as f64;
         for (e, [a, b]) in template.edges.iter().enumerate() {
             let crossed = |s: usize| scratch.below[s][*a as usize] != scratch.below[s][*b as usize];
@@ -205,17 +178,10 @@ impl Piece {
             // The lower level first along the edge from its lower end.
             for s in (0..sides.len()).rev().filter(|s| crossed(*s)) {
                 let (fa, fb) = (core.values[*a as usize], core.values[*b as usize]);
-                let (ta, tb) = (
-                    sides[s].sign * core.levels.at(*a),
-                    sides[s].sign * core.levels.at(*b),
-                );
+                let (ta, tb) = (sides[s].sign * core.levels.at(*a), sides[s].sign * core.levels.at(*b));
                 let [ga, gb] = core.slopes[e].map(|g| g - (tb - ta));
                 let up = scratch.below[s][*a as usize];
-                let at = if up {
-                    first_root(fa - ta, fb - tb, ga, gb)
-                } else {
-                    first_root(fb - tb, fa - ta, -gb, -ga)
-                };
+                let at = if up { first_root(fa - ta, fb - tb, ga, gb) } else { first_root(fb - tb, fa - ta, -gb, -ga) };
                 let at = match last {
                     None if both => at.clamp(MARGIN, 1.0 - 2.0 * MARGIN),
                     None => at.clamp(MARGIN, 1.0 - MARGIN),
@@ -231,8 +197,7 @@ impl Piece {
                 let n = self.places.len();
                 self.places.swap(n - 1, n - 2);
             }
-            let first =
-                self.places.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
+            let first = self.places.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
             let (ka, kb) = (nodes.whole[*a as usize], nodes.whole[*b as usize]);
             let zero = template.zero[*a as usize] & template.zero[*b as usize];
             let named = scratch.corner[e].iter_mut().filter(|c| **c != NONE);
@@ -265,8 +230,7 @@ impl Piece {
                 if inside == 0 || inside == 15 {
                     continue;
                 }
-                let corner =
-                    |a: usize, b: usize| scratch.corner[small.edges[pair(a, b)] as usize][s];
+                let corner = |a: usize, b: usize| scratch.corner[small.edges[pair(a, b)] as usize][s];
                 let (triangles, quad) = crossing(inside, small.even);
                 let number = if quad { 2 } else { 1 };
                 for t in &triangles[..number] {
@@ -275,11 +239,7 @@ impl Piece {
                     unite(&mut scratch.surface, t[0], t[1]);
                     unite(&mut scratch.surface, t[0], t[2]);
                 }
-                for v in triangles[..number]
-                    .iter()
-                    .flatten()
-                    .map(|[a, b]| corner(*a, *b))
-                {
+                for v in triangles[..number].iter().flatten().map(|[a, b]| corner(*a, *b)) {
                     if first == NONE {
                         first = v;
                     }
@@ -394,11 +354,7 @@ impl Piece {
             }
             for v in 0..count {
                 if self.zero[v] & off == off {
-                    push(
-                        &mut self.rims[e],
-                        self.body[v],
-                        self.bounds[self.body[v] as usize],
-                    );
+                    push(&mut self.rims[e], self.body[v], self.bounds[self.body[v] as usize]);
                 }
             }
         }
@@ -428,9 +384,5 @@ fn crossing(inside: u8, even: bool) -> ([[[usize; 2]; 3]; 2], bool) {
             ([t, t], false, n == 1)
         }
     };
-    if out == even {
-        (triangles, quad)
-    } else {
-        (triangles.map(turned), quad)
-    }
+    if out == even { (triangles, quad) } else { (triangles.map(turned), quad) }
 }

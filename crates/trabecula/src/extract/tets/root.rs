@@ -28,14 +28,8 @@ pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
         }
         let (l, h) = (value(lo), value(hi));
         // The chord's guess.
-        let start = if h > l {
-            lo - l * (hi - lo) / (h - l)
-        } else {
-            lo
-        };
-        return root([lo, hi], start, true, [1e-13, 0.0], |s| {
-            [value(s), slope(s)]
-        });
+        let start = if h > l { lo - l * (hi - lo) / (h - l) } else { lo };
+        return root([lo, hi], start, true, [1e-13, 0.0], |s| [value(s), slope(s)]);
     }
     1.0
 }
@@ -48,8 +42,7 @@ mod tests {
     fn the_first_root_is_found() {
         // (s − ¼)(s − ½)(s − ¾) rises through ¼, falls through ½, rises through ¾.
         let value = |s: f64| (s - 0.25) * (s - 0.5) * (s - 0.75);
-        let slope =
-            |s: f64| (s - 0.5) * (s - 0.75) + (s - 0.25) * (s - 0.75) + (s - 0.25) * (s - 0.5);
+        let slope = |s: f64| (s - 0.5) * (s - 0.75) + (s - 0.25) * (s - 0.75) + (s - 0.25) * (s - 0.5);
         let found = first_root(value(0.0), value(1.0), slope(0.0), slope(1.0));
         assert!((found - 0.25).abs() < 1e-12, "{found}");
         // Lines, and ends that are zero.

@@ -45,19 +45,12 @@ pub(super) fn pair(a: usize, b: usize) -> usize {
 
 impl Template {
     pub fn new(grid: Grid) -> Template {
-        let zero: Vec<u8> = grid
-            .whole()
-            .iter()
-            .map(|k| (0..4).fold(0, |m, i| m | u8::from(k[i] == 0) << i))
-            .collect();
+        let zero: Vec<u8> = grid.whole().iter().map(|k| (0..4).fold(0, |m, i| m | u8::from(k[i] == 0) << i)).collect();
         let mut raw = Vec::new();
         grid.each_tet(|at, even| {
             raw.push((at.map(|[i, j, k]| Grid::index(i, j, k) as u32), even));
         });
-        let mut edges: Vec<[u32; 2]> = raw
-            .iter()
-            .flat_map(|(n, _)| PAIRS.map(|[a, b]| [n[a], n[b]]))
-            .collect();
+        let mut edges: Vec<[u32; 2]> = raw.iter().flat_map(|(n, _)| PAIRS.map(|[a, b]| [n[a], n[b]])).collect();
         edges.sort_unstable();
         edges.dedup();
         let edge = |a: u32, b: u32| edges.partition_point(|e| *e < [a.min(b), a.max(b)]) as u32;
@@ -73,23 +66,12 @@ impl Template {
                 if !even {
                     of.swap(1, 2);
                 }
-                faces[on.trailing_zeros() as usize].push(Tile {
-                    nodes: of,
-                    edges: [0, 1, 2].map(|i| edge(of[i], of[(i + 1) % 3])),
-                });
+                faces[on.trailing_zeros() as usize]
+                    .push(Tile { nodes: of, edges: [0, 1, 2].map(|i| edge(of[i], of[(i + 1) % 3])) });
             }
-            tets.push(Small {
-                nodes,
-                edges: PAIRS.map(|[a, b]| edge(nodes[a], nodes[b])),
-                even,
-            });
+            tets.push(Small { nodes, edges: PAIRS.map(|[a, b]| edge(nodes[a], nodes[b])), even });
         }
-        Template {
-            zero,
-            edges,
-            tets,
-            faces,
-        }
+        Template { zero, edges, tets, faces }
     }
 }
 

@@ -20,13 +20,7 @@ const CREASE: f32 = 0.906;
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
 /// edge: what faces its edge can move without running far along it.
-pub(super) fn balance(
-    s: &mut Scratch,
-    grid: &Grid,
-    local: &Local,
-    nodes: &Nodes,
-    own: &[Range<usize>; 3],
-) {
+pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];
@@ -43,14 +37,7 @@ pub(super) fn balance(
         } else {
             f32::NEG_INFINITY
         };
-        share_out(
-            triangles,
-            starts,
-            least,
-            &s.places,
-            &s.normals,
-            &mut s.moments,
-        );
+        share_out(triangles, starts, least, &s.places, &s.normals, &mut s.moments);
     }
     // Chords over corners were laid between points where these are.
     for key in s.edges.chord_ends() {
@@ -63,9 +50,8 @@ pub(super) fn balance(
     if creased.contains(&true) {
         for (v, m) in s.vertices.iter().zip(&mut s.moments) {
             let node = v.node.map(usize::from);
-            let on_border = (0..3)
-                .filter(|a| *a != usize::from(v.axis))
-                .any(|a| node[a] == own[a].start || node[a] == own[a].end);
+            let on_border =
+                (0..3).filter(|a| *a != usize::from(v.axis)).any(|a| node[a] == own[a].start || node[a] == own[a].end);
             if on_border && creased[usize::from(v.face)] && s.edges.are_near(nodes, node) {
                 *m = (0.0, 0.0);
             }
@@ -109,11 +95,7 @@ fn share_out(
             continue;
         }
         let above = (dot(sub(nb, na), ab) + dot(sub(nc, nb), bc) + dot(sub(na, nc), ca)) / 24.0;
-        let n = [
-            ca[1] * ab[2] - ca[2] * ab[1],
-            ca[2] * ab[0] - ca[0] * ab[2],
-            ca[0] * ab[1] - ca[1] * ab[0],
-        ];
+        let n = [ca[1] * ab[2] - ca[2] * ab[1], ca[2] * ab[0] - ca[0] * ab[2], ca[0] * ab[1] - ca[1] * ab[0]];
         let volume = above * 0.5 * dot(n, n).sqrt();
         let facing = t.map(|v| match v {
             v if v < starts[0] => n[0],

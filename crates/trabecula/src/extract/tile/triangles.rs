@@ -12,23 +12,13 @@ use crate::extract::table::{CASES, EDGES, MOST};
 /// Lists the triangles of all plain cells of the block, halo included; and the plain cells beside knotted ones, which
 /// `knot` fills in its own way.
 pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &[Range<usize>; 3]) {
-    let Scratch {
-        signs,
-        numbers,
-        plain,
-        edges,
-        ..
-    } = s;
+    let Scratch { signs, numbers, plain, edges, .. } = s;
     plain.triangles.clear();
     plain.counts.clear();
     plain.kinds.clear();
     plain.seams.clear();
     for (face, numbers) in numbers.iter().enumerate().take(local.live.len()) {
-        let kind = if grid.faces[local.live[face]].cut {
-            Kind::Cut
-        } else {
-            Kind::Lattice
-        };
+        let kind = if grid.faces[local.live[face]].cut { Kind::Cut } else { Kind::Lattice };
         let before = plain.triangles.len();
         list_patches(signs, &edges.cells, numbers, face, own, kind, plain);
         plain.counts.push(plain.triangles.len() - before);
@@ -45,12 +35,7 @@ fn list_patches(
     kind: Kind,
     out: &mut Plain,
 ) {
-    let Plain {
-        triangles,
-        kinds,
-        seams,
-        ..
-    } = out;
+    let Plain { triangles, kinds, seams, .. } = out;
     let [_, ny, nz] = signs.shape;
     let cases = &*CASES;
     let mine_x = within(&own[0]);
@@ -61,22 +46,15 @@ fn list_patches(
             if bits == 0 {
                 continue;
             }
-            let mine = if own[1].contains(&j) && own[2].contains(&k) {
-                mine_x
-            } else {
-                0
-            };
+            let mine = if own[1].contains(&j) && own[2].contains(&k) { mine_x } else { 0 };
             let mut seam = 0;
             if mine != 0 {
                 let kn = &signs.knotted;
                 let here = kn[row];
                 // The block's last row of words holds no cells, so the upper neighbours exist; the lower ones do for
                 // cells of the tile itself, except at the grid's padding.
-                let below =
-                    if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
-                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below)
-                    & mine
-                    & !edged[row];
+                let below = if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine & !edged[row];
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
@@ -87,10 +65,7 @@ fn list_patches(
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let pair = |w: u64| (w >> i & 3) as usize;
-                let corners = pair(signs[0])
-                    | pair(signs[1]) << 2
-                    | pair(signs[2]) << 4
-                    | pair(signs[3]) << 6;
+                let corners = pair(signs[0]) | pair(signs[1]) << 2 | pair(signs[2]) << 4 | pair(signs[3]) << 6;
                 let case = &cases[corners];
                 // All edges, crossed or not, and room for the most triangles: to count them takes longer. Sixteen
                 // names, so that four bits never lead outside.
@@ -99,11 +74,7 @@ fn list_patches(
                 for (e, &(corner, _)) in EDGES.iter().enumerate() {
                     names[e] = first[e] + (crossed[e] & below[corner & 1]).count_ones();
                 }
-                let mut kind = if mine >> i & 1 == 1 {
-                    kind
-                } else {
-                    Kind::Neighbour
-                };
+                let mut kind = if mine >> i & 1 == 1 { kind } else { Kind::Neighbour };
                 if edged[row] >> i & 1 == 1 {
                     kind = Kind::Neighbour;
                 } else if seam >> i & 1 == 1 {
@@ -111,8 +82,7 @@ fn list_patches(
                     kind = Kind::Neighbour;
                 }
                 let count = triangles.len() + case.count;
-                triangles
-                    .extend_from_slice(&case.triangles.map(|t| t.map(|e| names[e as usize & 15])));
+                triangles.extend_from_slice(&case.triangles.map(|t| t.map(|e| names[e as usize & 15])));
                 triangles.truncate(count);
                 kinds.extend_from_slice(&[kind; MOST]);
                 kinds.truncate(count);

@@ -11,22 +11,12 @@ use crate::math::unit;
 
 /// Lists the vertices of plain cells, face by face.
 pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
-    let Scratch {
-        signs,
-        numbers,
-        vertices,
-        edges,
-        ..
-    } = s;
+    let Scratch { signs, numbers, vertices, edges, .. } = s;
     vertices.clear();
     numbers.resize_with(signs.negative.len(), Numbers::default);
     let any_knot = signs.is_any_knotted();
     for (face, numbers) in numbers.iter_mut().enumerate() {
-        let knots = if any_knot {
-            Some(edges.knots(signs, face))
-        } else {
-            None
-        };
+        let knots = if any_knot { Some(edges.knots(signs, face)) } else { None };
         list_face(signs, numbers, vertices, nodes, face, knots.as_deref());
     }
 }
@@ -96,11 +86,7 @@ impl Root {
         if value == 0.0 {
             return 0.0;
         }
-        *(if value <= 0.0 {
-            &mut self.solid
-        } else {
-            &mut self.void
-        }) = (self.t, value);
+        *(if value <= 0.0 { &mut self.solid } else { &mut self.void }) = (self.t, value);
         let ((lo, a), (hi, b)) = (self.solid, self.void);
         let newton = self.t - value / slope;
         let next = if halve {
@@ -125,41 +111,19 @@ const SMOOTH: usize = 6;
 const ROUNDS: usize = SMOOTH + 20;
 
 /// Finds where a face crosses the edges of its vertices, and its normals there.
-pub(super) fn solve(
-    s: &mut Scratch,
-    nodes: &Nodes,
-    f: &dyn Field,
-    face: usize,
-    which: Range<usize>,
-) {
-    let Scratch {
-        samples,
-        points,
-        values,
-        gradients,
-        vertices,
-        normals,
-        ..
-    } = s;
+pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, which: Range<usize>) {
+    let Scratch { samples, points, values, gradients, vertices, normals, .. } = s;
     normals.resize(vertices.len(), [0.0; 3]);
     let samples = &samples[face];
     let mut roots = Vec::with_capacity(BATCH);
     for from in which.clone().step_by(BATCH) {
         roots.clear();
-        for (i, v) in (from..which.end)
-            .zip(&vertices[from..which.end])
-            .take(BATCH)
-        {
+        for (i, v) in (from..which.end).zip(&vertices[from..which.end]).take(BATCH) {
             let low = v.low(nodes);
             let high = low + nodes.stride[usize::from(v.axis)];
             let (a, b) = if v.up { (low, high) } else { (high, low) };
             let (a, b) = (f64::from(samples[a]), f64::from(samples[b]));
-            roots.push(Root {
-                vertex: i as u32,
-                solid: (0.0, a),
-                void: (1.0, b),
-                t: -a / (b - a),
-            });
+            roots.push(Root { vertex: i as u32, solid: (0.0, a), void: (1.0, b), t: -a / (b - a) });
         }
         for round in 0..ROUNDS {
             points.clear();

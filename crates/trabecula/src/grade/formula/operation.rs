@@ -5,10 +5,7 @@ use core::f64::consts::{LN_10, PI, TAU};
 use crate::math::Interval;
 
 /// Everything: the range of a result that may be anything, or undefined.
-pub(super) const ALL: Interval = Interval {
-    lo: f64::NEG_INFINITY,
-    hi: f64::INFINITY,
-};
+pub(super) const ALL: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
 /// An operation on one to three numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,9 +78,7 @@ impl Operation {
     /// How many numbers it takes.
     pub(super) fn arity(self) -> usize {
         match self {
-            Add | Subtract | Multiply | Divide | Power | Atan2 | Min | Max | Mod | Hypot | Step => {
-                2
-            }
+            Add | Subtract | Multiply | Divide | Power | Atan2 | Min | Max | Mod | Hypot | Step => 2,
             Clamp | Smoothstep => 3,
             _ => 1,
         }
@@ -114,9 +109,7 @@ impl Operation {
             Log10 => a.log10(),
             Sqrt => a.sqrt(),
             Abs => a.abs(),
-            Min | Max | Clamp | Step | Smoothstep if a.is_nan() || b.is_nan() || c.is_nan() => {
-                f64::NAN
-            }
+            Min | Max | Clamp | Step | Smoothstep if a.is_nan() || b.is_nan() || c.is_nan() => f64::NAN,
             Min => a.min(b),
             Max => a.max(b),
             Clamp => a.max(b).min(c),
@@ -124,11 +117,7 @@ impl Operation {
             Ceil => a.ceil(),
             Mod => {
                 let r = a % b;
-                if r != 0.0 && (r < 0.0) != (b < 0.0) {
-                    r + b
-                } else {
-                    r
-                }
+                if r != 0.0 && (r < 0.0) != (b < 0.0) { r + b } else { r }
             }
             Hypot => a.hypot(b),
             Sign if a == 0.0 => 0.0,
@@ -197,11 +186,7 @@ impl Operation {
             Floor | Ceil | Sign | Step => [0.0; 3],
             Smoothstep => {
                 let t = ramp(a, b, c);
-                let d = if t > 0.0 && t < 1.0 {
-                    6.0 * t * (1.0 - t) / (b - a)
-                } else {
-                    0.0
-                };
+                let d = if t > 0.0 && t < 1.0 { 6.0 * t * (1.0 - t) / (b - a) } else { 0.0 };
                 [d * (t - 1.0), -d * t, d]
             }
         }
@@ -211,12 +196,8 @@ impl Operation {
     pub(super) fn range(self, [a, b, c]: [Interval; 3]) -> Interval {
         let call = |p: f64| self.value([p, 0.0, 0.0]);
         let rising = || outward(Interval::new(call(a.lo), call(a.hi)));
-        let corners = || {
-            hull(
-                [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)]
-                    .map(|(p, q)| self.value([p, q, 0.0])),
-            )
-        };
+        let corners =
+            || hull([(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)].map(|(p, q)| self.value([p, q, 0.0])));
         match self {
             Negate => -a,
             Add => tidy(Interval::new(a.lo + b.lo, a.hi + b.hi)),
@@ -224,12 +205,7 @@ impl Operation {
             Multiply => {
                 // The arguments themselves are finite, so nothing times an infinite end is nothing.
                 let times = |p: f64, q: f64| if p == 0.0 || q == 0.0 { 0.0 } else { p * q };
-                hull([
-                    times(a.lo, b.lo),
-                    times(a.lo, b.hi),
-                    times(a.hi, b.lo),
-                    times(a.hi, b.hi),
-                ])
+                hull([times(a.lo, b.lo), times(a.lo, b.hi), times(a.hi, b.lo), times(a.hi, b.hi)])
             }
             Divide if has(b, 0.0) => ALL,
             Divide => corners(),
@@ -238,11 +214,7 @@ impl Operation {
             Cos => wave(a, 0.0),
             Tan => {
                 let turn = |v: f64, slack: f64| (v / PI + 0.5 + slack).floor();
-                if a.lo.abs().max(a.hi.abs()) < 1e8 && turn(a.lo, -1e-6) == turn(a.hi, 1e-6) {
-                    rising()
-                } else {
-                    ALL
-                }
+                if a.lo.abs().max(a.hi.abs()) < 1e8 && turn(a.lo, -1e-6) == turn(a.hi, 1e-6) { rising() } else { ALL }
             }
             Asin | Acos if a.lo < -1.0 || a.hi > 1.0 => ALL,
             Acos => outward(Interval::new(a.hi.acos(), a.lo.acos())),
@@ -259,8 +231,7 @@ impl Operation {
             Mod if has(b, 0.0) => ALL,
             Mod => {
                 let whole = |v: f64| (v / b.lo).floor();
-                let one_piece =
-                    b.lo == b.hi && whole(a.lo) == whole(a.hi) && a.hi < (whole(a.lo) + 1.0) * b.lo;
+                let one_piece = b.lo == b.hi && whole(a.lo) == whole(a.hi) && a.hi < (whole(a.lo) + 1.0) * b.lo;
                 if b.lo > 0.0 && one_piece && a.lo >= whole(a.lo) * b.lo {
                     corners()
                 } else {
@@ -272,10 +243,9 @@ impl Operation {
                 outward(Interval::new(p.lo.hypot(q.lo), p.hi.hypot(q.hi)))
             }
             Step => Interval::new(f64::from(b.lo >= a.hi), f64::from(b.hi >= a.lo)),
-            Smoothstep if a.lo == a.hi && b.lo == b.hi && a.lo <= b.lo => outward(Interval::new(
-                self.value([a.lo, b.lo, c.lo]),
-                self.value([a.lo, b.lo, c.hi]),
-            )),
+            Smoothstep if a.lo == a.hi && b.lo == b.hi && a.lo <= b.lo => {
+                outward(Interval::new(self.value([a.lo, b.lo, c.lo]), self.value([a.lo, b.lo, c.hi])))
+            }
             Smoothstep => outward(Interval::new(0.0, 1.0)),
         }
     }
@@ -283,31 +253,18 @@ impl Operation {
 
 /// (c − a)/(b − a) held within 0 and 1; a step at c = a where a = b.
 fn ramp(a: f64, b: f64, c: f64) -> f64 {
-    if a == b {
-        f64::from(c >= a)
-    } else {
-        ((c - a) / (b - a)).clamp(0.0, 1.0)
-    }
+    if a == b { f64::from(c >= a) } else { ((c - a) / (b - a)).clamp(0.0, 1.0) }
 }
 
 /// aᵇ; small whole powers by multiplication, which is what a reader of x^2 expects.
 fn power(a: f64, b: f64) -> f64 {
-    if b == b.trunc() && b.abs() <= 64.0 {
-        a.powi(b as i32)
-    } else {
-        a.powf(b)
-    }
+    if b == b.trunc() && b.abs() <= 64.0 { a.powi(b as i32) } else { a.powf(b) }
 }
 
 fn power_range(a: Interval, b: Interval) -> Interval {
     let whole = b.lo == b.hi && b.lo == b.lo.trunc() && b.lo.abs() <= 64.0;
     let ends = |a: Interval, b: Interval| {
-        outward(hull([
-            power(a.lo, b.lo),
-            power(a.lo, b.hi),
-            power(a.hi, b.lo),
-            power(a.hi, b.hi),
-        ]))
+        outward(hull([power(a.lo, b.lo), power(a.lo, b.hi), power(a.hi, b.lo), power(a.hi, b.hi)]))
     };
     if a.lo > 0.0 || (a.lo == 0.0 && b.lo > 0.0) {
         ends(a, b)
@@ -333,16 +290,8 @@ fn wave(v: Interval, shift: f64) -> Interval {
     // The slack of 1e-7 turns aside, the reduction above is good to 1e-8·2π at the largest argument.
     let slack = 1e-14 + 1e-15 * far;
     Interval::new(
-        if holds(0.5) {
-            -1.0
-        } else {
-            (ends[0].min(ends[1]) - slack).max(-1.0)
-        },
-        if holds(0.0) {
-            1.0
-        } else {
-            (ends[0].max(ends[1]) + slack).min(1.0)
-        },
+        if holds(0.5) { -1.0 } else { (ends[0].min(ends[1]) - slack).max(-1.0) },
+        if holds(0.0) { 1.0 } else { (ends[0].max(ends[1]) + slack).min(1.0) },
     )
 }
 
@@ -356,28 +305,18 @@ fn hull(v: [f64; 4]) -> Interval {
     if v.iter().any(|v| v.is_nan()) {
         return ALL;
     }
-    v.iter()
-        .fold(Interval::new(f64::INFINITY, f64::NEG_INFINITY), |i, v| {
-            i.union(Interval::new(*v, *v))
-        })
+    v.iter().fold(Interval::new(f64::INFINITY, f64::NEG_INFINITY), |i, v| i.union(Interval::new(*v, *v)))
 }
 
 /// The interval, or everything where an end is undefined.
 fn tidy(i: Interval) -> Interval {
-    Interval::new(
-        if i.lo.is_nan() { ALL.lo } else { i.lo },
-        if i.hi.is_nan() { ALL.hi } else { i.hi },
-    )
+    Interval::new(if i.lo.is_nan() { ALL.lo } else { i.lo }, if i.hi.is_nan() { ALL.hi } else { i.hi })
 }
 
 /// The interval widened by the error of library functions (a few units in the last place).
 fn outward(i: Interval) -> Interval {
     let wide = |v: f64| {
-        if v.is_finite() {
-            v.abs() * 4.0 * f64::EPSILON + f64::MIN_POSITIVE
-        } else {
-            0.0
-        }
+        if v.is_finite() { v.abs() * 4.0 * f64::EPSILON + f64::MIN_POSITIVE } else { 0.0 }
     };
     tidy(Interval::new(i.lo - wide(i.lo), i.hi + wide(i.hi)))
 }
@@ -396,9 +335,7 @@ mod tests {
     }
 
     fn random(state: &mut u64) -> f64 {
-        *state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*state >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -410,10 +347,7 @@ mod tests {
             let (lo, hi) = domain(op);
             for _ in 0..300 {
                 let mut part = || {
-                    let (p, q) = (
-                        lo + (hi - lo) * random(s),
-                        lo + (hi - lo) * random(s) * random(s),
-                    );
+                    let (p, q) = (lo + (hi - lo) * random(s), lo + (hi - lo) * random(s) * random(s));
                     Interval::new(p.min(q), p.max(q))
                 };
                 let box_ = [part(), part(), part()];
@@ -421,10 +355,7 @@ mod tests {
                 for _ in 0..10 {
                     let args = box_.map(|i| i.lo + (i.hi - i.lo) * random(s));
                     let v = op.value(args);
-                    assert!(
-                        v.is_nan() || (range.lo <= v && v <= range.hi),
-                        "{op:?}{args:?} = {v} not in {range:?}"
-                    );
+                    assert!(v.is_nan() || (range.lo <= v && v <= range.hi), "{op:?}{args:?} = {v} not in {range:?}");
                     let partials = op.partials(args);
                     for k in 0..op.arity() {
                         let h = 1e-6;
@@ -432,8 +363,7 @@ mod tests {
                         l[k] -= h;
                         r[k] += h;
                         let d = (op.value(r) - op.value(l)) / (2.0 * h);
-                        let smooth =
-                            (op.partials(l)[k] - op.partials(r)[k]).abs() < 1e-3 && d.abs() < 1e3;
+                        let smooth = (op.partials(l)[k] - op.partials(r)[k]).abs() < 1e-3 && d.abs() < 1e3;
                         if smooth {
                             assert!(
                                 (d - partials[k]).abs() < 1e-4 * (1.0 + d.abs()),
@@ -450,31 +380,15 @@ mod tests {
     fn ranges_are_tight_where_they_can_be() {
         let i = Interval::new;
         let none = i(0.0, 0.0);
-        let near =
-            |a: Interval, b: Interval| (a.lo - b.lo).abs() < 1e-12 && (a.hi - b.hi).abs() < 1e-12;
-        assert!(near(
-            Sin.range([i(0.0, core::f64::consts::FRAC_PI_2), none, none]),
-            i(0.0, 1.0)
-        ));
-        assert!(near(
-            Cos.range([i(0.5, 0.6), none, none]),
-            i(0.6f64.cos(), 0.5f64.cos())
-        ));
-        assert!(near(
-            Power.range([i(-2.0, 1.0), i(2.0, 2.0), none]),
-            i(0.0, 4.0)
-        ));
-        assert!(near(
-            Power.range([i(-2.0, 1.0), i(3.0, 3.0), none]),
-            i(-8.0, 1.0)
-        ));
+        let near = |a: Interval, b: Interval| (a.lo - b.lo).abs() < 1e-12 && (a.hi - b.hi).abs() < 1e-12;
+        assert!(near(Sin.range([i(0.0, core::f64::consts::FRAC_PI_2), none, none]), i(0.0, 1.0)));
+        assert!(near(Cos.range([i(0.5, 0.6), none, none]), i(0.6f64.cos(), 0.5f64.cos())));
+        assert!(near(Power.range([i(-2.0, 1.0), i(2.0, 2.0), none]), i(0.0, 4.0)));
+        assert!(near(Power.range([i(-2.0, 1.0), i(3.0, 3.0), none]), i(-8.0, 1.0)));
         assert_eq!(Divide.range([i(1.0, 2.0), i(-1.0, 1.0), none]), ALL);
         assert_eq!(Multiply.range([none, ALL, none]), none);
         assert_eq!(Power.range([i(-1.0, 1.0), i(0.5, 0.5), none]), ALL);
         assert_eq!(Log.range([i(0.0, 1.0), none, none]), ALL);
-        assert!(near(
-            Mod.range([i(2.25, 2.5), i(1.0, 1.0), none]),
-            i(0.25, 0.5)
-        ));
+        assert!(near(Mod.range([i(2.25, 2.5), i(1.0, 1.0), none]), i(0.25, 0.5)));
     }
 }

@@ -21,17 +21,9 @@ const DEEPEST: usize = 64;
 pub(super) fn parse(text: &str) -> Result<Vec<Instruction>, Fault> {
     if text.len() > LONGEST {
         let n = text.len();
-        return Err(Fault::new(
-            "",
-            format!("the formula has {n} characters; at most {LONGEST} are read"),
-        ));
+        return Err(Fault::new("", format!("the formula has {n} characters; at most {LONGEST} are read")));
     }
-    let mut p = Parser {
-        text,
-        at: 0,
-        depth: 0,
-        program: Vec::new(),
-    };
+    let mut p = Parser { text, at: 0, depth: 0, program: Vec::new() };
     p.sum()?;
     match p.peek() {
         None => Ok(p.program),
@@ -54,11 +46,7 @@ impl<'a> Parser<'a> {
         while let Some(sign @ ('+' | '-')) = self.peek() {
             self.at += 1;
             self.product()?;
-            self.apply(if sign == '+' {
-                Operation::Add
-            } else {
-                Operation::Subtract
-            });
+            self.apply(if sign == '+' { Operation::Add } else { Operation::Subtract });
         }
         Ok(())
     }
@@ -71,11 +59,7 @@ impl<'a> Parser<'a> {
             }
             self.at += 1;
             self.signed()?;
-            self.apply(if sign == '*' {
-                Operation::Multiply
-            } else {
-                Operation::Divide
-            });
+            self.apply(if sign == '*' { Operation::Multiply } else { Operation::Divide });
         }
         Ok(())
     }
@@ -153,9 +137,7 @@ impl<'a> Parser<'a> {
 
     fn word(&mut self) -> Result<(), Fault> {
         let rest = &self.text[self.at..];
-        let end = rest
-            .find(|c: char| !c.is_alphanumeric() && c != '_')
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
         let word = &rest[..end];
         let instruction = match word {
             "x" => Instruction::Variable(0),
@@ -187,27 +169,19 @@ impl<'a> Parser<'a> {
         };
         self.at += word.len();
         if self.peek() != Some('(') {
-            return Err(self.fault(&format!(
-                "{word} takes its argument in brackets: expected ("
-            )));
+            return Err(self.fault(&format!("{word} takes its argument in brackets: expected (")));
         }
         self.at += 1;
         self.sum()?;
         for k in 1..op.arity() {
             if self.peek() != Some(',') {
-                return Err(self.fault(&format!(
-                    "{word} takes {} arguments, not {k}: expected a comma",
-                    op.arity()
-                )));
+                return Err(self.fault(&format!("{word} takes {} arguments, not {k}: expected a comma", op.arity())));
             }
             self.at += 1;
             self.sum()?;
         }
         if self.peek() == Some(',') {
-            return Err(self.fault(&format!(
-                "{word} takes no more than {}",
-                counted(op.arity(), "argument")
-            )));
+            return Err(self.fault(&format!("{word} takes no more than {}", counted(op.arity(), "argument"))));
         }
         self.expect(')')?;
         self.apply(op);
@@ -242,10 +216,7 @@ impl<'a> Parser<'a> {
         let found = match next {
             None => "the formula ends".to_string(),
             Some(c) if c.is_alphabetic() || c == '_' => {
-                let word = rest
-                    .chars()
-                    .take_while(|c| c.is_alphanumeric() || *c == '_')
-                    .take(32);
+                let word = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').take(32);
                 format!("found '{}'", word.collect::<String>())
             }
             Some(c) => format!("found '{}'", c.escape_debug()),

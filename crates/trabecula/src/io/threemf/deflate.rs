@@ -96,10 +96,7 @@ impl Tokens {
         // Two symbols of each kind at least make a complete code.
         (tokens.literals[0], tokens.literals[END]) = (1, 1);
         (tokens.distances[0], tokens.distances[1]) = (1, 1);
-        let mut at = text
-            .iter()
-            .position(|b| *b == b'\n')
-            .map_or(text.len(), |n| n + 1);
+        let mut at = text.iter().position(|b| *b == b'\n').map_or(text.len(), |n| n + 1);
         let mut up = 0;
         tokens.plain(&text[..at]);
         while at < text.len() {
@@ -151,22 +148,14 @@ impl Tokens {
     #[inline]
     fn end(&mut self, length: u16, back: u16) {
         let plain = std::mem::take(&mut self.plain);
-        self.runs.push(Run {
-            plain,
-            length,
-            back,
-        });
+        self.runs.push(Run { plain, length, back });
     }
 }
 
 /// Number of equal bytes from `a` and from `b` > `a` on.
 #[inline]
 fn common(text: &[u8], a: usize, b: usize) -> usize {
-    let word = |i: usize| {
-        text.get(i..i + 8)
-            .and_then(|w| w.try_into().ok())
-            .map(u64::from_le_bytes)
-    };
+    let word = |i: usize| text.get(i..i + 8).and_then(|w| w.try_into().ok()).map(u64::from_le_bytes);
     let mut n = 0;
     while let (Some(x), Some(y)) = (word(a + n), word(b + n)) {
         if x != y {
@@ -192,11 +181,7 @@ fn length_code(length: u32) -> (usize, u32, u32) {
     }
     let log = l.ilog2();
     let n = log - 2;
-    (
-        257 + 4 * (log as usize - 1) + (l >> n & 3) as usize,
-        l & ((1 << n) - 1),
-        n,
-    )
+    (257 + 4 * (log as usize - 1) + (l >> n & 3) as usize, l & ((1 << n) - 1), n)
 }
 
 /// Symbol, extra bits and their number for a distance less one.
@@ -207,23 +192,15 @@ fn distance_code(d: u32) -> (usize, u32, u32) {
     }
     let log = d.ilog2();
     let n = log - 1;
-    (
-        2 * log as usize + (d >> n & 1) as usize,
-        d & ((1 << n) - 1),
-        n,
-    )
+    (2 * log as usize + (d >> n & 1) as usize, d & ((1 << n) - 1), n)
 }
 
 /// Huffman code lengths of at most 15 bits; zero for what never occurs.
 fn lengths(counts: &[u32]) -> Vec<u32> {
     let mut weights: Vec<u64> = counts.iter().map(|c| u64::from(*c)).collect();
     loop {
-        let mut heap: BinaryHeap<Reverse<(u64, usize)>> = weights
-            .iter()
-            .enumerate()
-            .filter(|(_, w)| **w > 0)
-            .map(|(i, w)| Reverse((*w, i)))
-            .collect();
+        let mut heap: BinaryHeap<Reverse<(u64, usize)>> =
+            weights.iter().enumerate().filter(|(_, w)| **w > 0).map(|(i, w)| Reverse((*w, i))).collect();
         let mut parent = vec![usize::MAX; weights.len()];
         while let (Some(Reverse((a, i))), Some(Reverse((b, j)))) = (heap.pop(), heap.pop()) {
             (parent[i], parent[j]) = (parent.len(), parent.len());
@@ -242,20 +219,13 @@ fn lengths(counts: &[u32]) -> Vec<u32> {
             return depth;
         }
         // Flatter weights make a flatter tree.
-        weights
-            .iter_mut()
-            .filter(|w| **w > 0)
-            .for_each(|w| *w = *w / 2 + 1);
+        weights.iter_mut().filter(|w| **w > 0).for_each(|w| *w = *w / 2 + 1);
     }
 }
 
 /// The low `n` bits in reverse order: codes go out from their highest bit.
 fn reversed(v: u32, n: u32) -> u32 {
-    if n == 0 {
-        0
-    } else {
-        v.reverse_bits() >> (32 - n)
-    }
+    if n == 0 { 0 } else { v.reverse_bits() >> (32 - n) }
 }
 
 /// Canonical codes, as they go out, with their lengths.
@@ -285,12 +255,7 @@ struct Bits {
 
 impl Bits {
     fn new(room: usize) -> Bits {
-        Bits {
-            out: vec![0; room],
-            at: 0,
-            held: 0,
-            count: 0,
-        }
+        Bits { out: vec![0; room], at: 0, held: 0, count: 0 }
     }
 
     /// Makes room for `bytes` more.
@@ -332,14 +297,8 @@ mod tests {
         let mut out = Vec::with_capacity(text.len() + 1);
         let mut state = Decompress::new(false);
         let whole = [&packed[..], &[3, 0]].concat();
-        state
-            .decompress_vec(&whole, &mut out, FlushDecompress::Finish)
-            .unwrap();
-        assert!(
-            out == text,
-            "{:?}",
-            String::from_utf8_lossy(&text[..text.len().min(200)])
-        );
+        state.decompress_vec(&whole, &mut out, FlushDecompress::Finish).unwrap();
+        assert!(out == text, "{:?}", String::from_utf8_lossy(&text[..text.len().min(200)]));
         packed.len()
     }
 
@@ -348,15 +307,8 @@ mod tests {
         let mut text = String::new();
         let mut seed = 1u64;
         for i in 0..5000u64 {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            text += &format!(
-                "<triangle v1=\"{}\" v2=\"{}\" v3=\"{}\"/>\n",
-                i / 2,
-                i / 2 + (seed >> 61),
-                seed >> 50
-            );
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            text += &format!("<triangle v1=\"{}\" v2=\"{}\" v3=\"{}\"/>\n", i / 2, i / 2 + (seed >> 61), seed >> 50);
         }
         let packed = check(text.as_bytes());
         assert!(packed < text.len() / 5, "{packed} of {}", text.len());
@@ -374,9 +326,7 @@ mod tests {
         for n in 0..300 {
             let text: Vec<u8> = (0..n * 7)
                 .map(|_| {
-                    seed = seed
-                        .wrapping_mul(6364136223846793005)
-                        .wrapping_add(1442695040888963407);
+                    seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                     b"\"\n01<\xff"[(seed >> 40) as usize % 6]
                 })
                 .collect();
@@ -393,31 +343,17 @@ mod tests {
         }
         let lengths = lengths(&counts);
         assert!(lengths.iter().all(|l| (1..=15).contains(l)));
-        assert_eq!(
-            lengths.iter().map(|l| 1u32 << (15 - l)).sum::<u32>(),
-            1 << 15
-        );
+        assert_eq!(lengths.iter().map(|l| 1u32 << (15 - l)).sum::<u32>(), 1 << 15);
     }
 
     #[test]
     fn lengths_and_distances_are_coded_as_the_standard_tells() {
-        let cases = [
-            (3, 257, 0, 0),
-            (10, 264, 0, 0),
-            (11, 265, 0, 1),
-            (22, 269, 3, 2),
-            (257, 284, 30, 5),
-            (258, 285, 0, 0),
-        ];
+        let cases =
+            [(3, 257, 0, 0), (10, 264, 0, 0), (11, 265, 0, 1), (22, 269, 3, 2), (257, 284, 30, 5), (258, 285, 0, 0)];
         for (length, symbol, extra, n) in cases {
             assert_eq!(length_code(length), (symbol, extra, n));
         }
-        for (distance, symbol, extra, n) in [
-            (1, 0, 0, 0),
-            (5, 4, 0, 1),
-            (48, 10, 15, 4),
-            (32768, 29, 8191, 13),
-        ] {
+        for (distance, symbol, extra, n) in [(1, 0, 0, 0), (5, 4, 0, 1), (48, 10, 15, 4), (32768, 29, 8191, 13)] {
             assert_eq!(distance_code(distance - 1), (symbol, extra, n));
         }
     }

@@ -23,10 +23,7 @@ struct Placement {
 }
 
 impl Placement {
-    const NONE: Placement = Placement {
-        m: crate::math::IDENTITY,
-        shift: [0.0; 3],
-    };
+    const NONE: Placement = Placement { m: crate::math::IDENTITY, shift: [0.0; 3] };
 
     fn of(&self, x: Vec3) -> Vec3 {
         add(apply(&self.m, x), self.shift)
@@ -34,10 +31,7 @@ impl Placement {
 
     /// This one after `inner`.
     fn after(&self, inner: &Placement) -> Placement {
-        Placement {
-            m: crate::math::product(&self.m, &inner.m),
-            shift: self.of(inner.shift),
-        }
+        Placement { m: crate::math::product(&self.m, &inner.m), shift: self.of(inner.shift) }
     }
 }
 
@@ -67,21 +61,13 @@ struct Model {
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let archive = Archive::new(bytes)?;
     let root = archive.file("_rels/.rels").ok().and_then(|r| target(&r));
-    let root = root.or_else(|| {
-        archive
-            .names()
-            .find(|n| n.to_ascii_lowercase().ends_with(".model"))
-            .map(String::from)
-    });
+    let root = root.or_else(|| archive.names().find(|n| n.to_ascii_lowercase().ends_with(".model")).map(String::from));
     let root = root.unwrap_or_else(|| MODEL.to_string());
     let main = model(&archive.file(&root)?)?;
     if main.items.is_empty() {
         return Err(Fault::new(
             "",
-            format!(
-                "{}, but the build places none of them",
-                counted(main.objects.len(), "object")
-            ),
+            format!("{}, but the build places none of them", counted(main.objects.len(), "object")),
         ));
     }
     let mut files = HashMap::new();
@@ -96,18 +82,8 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
         }
     }
     // Instances multiply what the file holds; a small file that asks for billions is refused.
-    let held: usize = files
-        .values()
-        .flat_map(|f| f.objects.values())
-        .map(|o| o.triangles.len())
-        .sum();
-    let mut placing = Placing {
-        files: &files,
-        unit,
-        joiner: Joiner::default(),
-        left: 10_000_000 + 64 * held,
-        uses: 0,
-    };
+    let held: usize = files.values().flat_map(|f| f.objects.values()).map(|o| o.triangles.len()).sum();
+    let mut placing = Placing { files: &files, unit, joiner: Joiner::default(), left: 10_000_000 + 64 * held, uses: 0 };
     for i in 0..items {
         placing.place("", &files[""].items[i], &Placement::NONE, 0)?;
     }
@@ -129,11 +105,7 @@ fn target(relations: &[u8]) -> Option<String> {
 
 /// Other files that a model's components and items name.
 fn outside(model: &Model) -> impl Iterator<Item = String> {
-    let uses = model
-        .objects
-        .values()
-        .flat_map(|o| &o.components)
-        .chain(&model.items);
+    let uses = model.objects.values().flat_map(|o| &o.components).chain(&model.items);
     uses.filter(|u| !u.path.is_empty()).map(|u| u.path.clone())
 }
 
@@ -146,65 +118,34 @@ struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    fn place(
-        &mut self,
-        path: &str,
-        of: &Use,
-        outer: &Placement,
-        depth: usize,
-    ) -> Result<(), Fault> {
+    fn place(&mut self, path: &str, of: &Use, outer: &Placement, depth: usize) -> Result<(), Fault> {
         let path = if of.path.is_empty() { path } else { &of.path };
         let files = self.files;
         let Some(object) = files.get(path).and_then(|f| f.objects.get(&of.id)) else {
-            return Err(Fault::new(
-                "",
-                format!("object {} is placed but does not exist", of.id),
-            ));
+            return Err(Fault::new("", format!("object {} is placed but does not exist", of.id)));
         };
         if depth > DEPTH {
-            return Err(Fault::new(
-                "",
-                format!(
-                    "object {} holds itself, or nests deeper than {DEPTH}",
-                    of.id
-                ),
-            ));
+            return Err(Fault::new("", format!("object {} holds itself, or nests deeper than {DEPTH}", of.id)));
         }
         self.uses += 1;
         if object.triangles.len() > self.left || self.uses > 1_000_000 {
-            return Err(Fault::new(
-                "",
-                "the components multiply to more triangles than the file can mean",
-            ));
+            return Err(Fault::new("", "the components multiply to more triangles than the file can mean"));
         }
         self.left -= object.triangles.len();
         if object.support {
             return Ok(());
         }
         let placement = outer.after(&of.placement);
-        let vertices: Vec<Vec3> = object
-            .vertices
-            .iter()
-            .map(|v| scale(placement.of(*v), self.unit))
-            .collect();
+        let vertices: Vec<Vec3> = object.vertices.iter().map(|v| scale(placement.of(*v), self.unit)).collect();
         if vertices.iter().flatten().any(|x| !x.is_finite()) {
-            return Err(Fault::new(
-                "",
-                format!(
-                    "object {} is placed at coordinates that are not finite",
-                    of.id
-                ),
-            ));
+            return Err(Fault::new("", format!("object {} is placed at coordinates that are not finite", of.id)));
         }
         let mirrored = determinant(&placement.m) < 0.0;
         for &[a, b, c] in &object.triangles {
             let t = if mirrored { [a, c, b] } else { [a, b, c] };
             self.joiner.triangle(t.map(|v| vertices[v as usize]))?;
         }
-        object
-            .components
-            .iter()
-            .try_for_each(|c| self.place(path, c, &placement, depth + 1))
+        object.components.iter().try_for_each(|c| self.place(path, c, &placement, depth + 1))
     }
 }
 
@@ -217,11 +158,7 @@ fn model(bytes: &[u8]) -> Result<Model, Fault> {
     let mut object: Option<(u32, Object)> = None;
     while let Some(event) = s.next()? {
         let (name, attributes, empty) = match event {
-            Event::Start {
-                name,
-                attributes,
-                empty,
-            } => (name, attributes, empty),
+            Event::Start { name, attributes, empty } => (name, attributes, empty),
             Event::End { name } => (name, &[][..], true),
         };
         if !started {
@@ -248,15 +185,9 @@ fn model(bytes: &[u8]) -> Result<Model, Fault> {
         }
         match (local, &mut object) {
             (b"object", None) => {
-                let support = attribute(attributes, "type")
-                    .is_some_and(|t| matches!(&*t, b"support" | b"solidsupport"));
-                object = Some((
-                    required(&s, attributes, "id")?,
-                    Object {
-                        support,
-                        ..Object::default()
-                    },
-                ));
+                let support =
+                    attribute(attributes, "type").is_some_and(|t| matches!(&*t, b"support" | b"solidsupport"));
+                object = Some((required(&s, attributes, "id")?, Object { support, ..Object::default() }));
             }
             (b"vertex", Some((_, o))) => o.vertices.push(vertex(&s, attributes)?),
             (b"triangle", Some((_, o))) => {
@@ -308,12 +239,7 @@ fn using(s: &Scanner, attributes: &[u8]) -> Result<Use, Fault> {
     if let Some(text) = attribute(attributes, "transform") {
         let v: Option<Vec<f64>> = super::super::text::words(&text).map(parse::<f64>).collect();
         let v = v.filter(|v| v.len() == 12 && v.iter().all(|x| x.is_finite()));
-        let v = v.ok_or_else(|| {
-            s.fault(format!(
-                "the transform {} is not twelve numbers",
-                shown(&text)
-            ))
-        })?;
+        let v = v.ok_or_else(|| s.fault(format!("the transform {} is not twelve numbers", shown(&text))))?;
         // Rows of the file multiply row vectors: its columns are ours.
         for i in 0..3 {
             placement.m[i] = [v[i], v[3 + i], v[6 + i]];
@@ -322,28 +248,16 @@ fn using(s: &Scanner, attributes: &[u8]) -> Result<Use, Fault> {
     }
     // The production extension's path, under whatever prefix.
     let path = super::xml::attributes(attributes).find(|(n, _)| n.ends_with(b":path"));
-    let path = path
-        .map(|(_, v)| String::from_utf8_lossy(v).into_owned())
-        .unwrap_or_default();
-    Ok(Use {
-        path,
-        id: required(s, attributes, "objectid")?,
-        placement,
-    })
+    let path = path.map(|(_, v)| String::from_utf8_lossy(v).into_owned()).unwrap_or_default();
+    Ok(Use { path, id: required(s, attributes, "objectid")?, placement })
 }
 
 fn check(s: &Scanner, id: u32, o: &Object) -> Result<(), Fault> {
     let count = o.vertices.len();
-    match o
-        .triangles
-        .iter()
-        .position(|t| t.iter().any(|v| *v as usize >= count))
-    {
+    match o.triangles.iter().position(|t| t.iter().any(|v| *v as usize >= count)) {
         Some(i) => {
             let t = o.triangles[i];
-            Err(s.fault(format!(
-                "triangle {i} of object {id} is {t:?}, but there are {count} vertices (from 0)"
-            )))
+            Err(s.fault(format!("triangle {i} of object {id} is {t:?}, but there are {count} vertices (from 0)")))
         }
         None => Ok(()),
     }
@@ -373,11 +287,7 @@ mod tests {
     fn comes_back_as_rounded_to_single_precision() {
         let mut mesh = tetrahedron();
         mesh.vertices[3][2] = 1.0 / 3.0;
-        let meta = Metadata {
-            title: "a & <b>".into(),
-            design: "x = 1 < 2\n".into(),
-            application: "t".into(),
-        };
+        let meta = Metadata { title: "a & <b>".into(), design: "x = 1 < 2\n".into(), application: "t".into() };
         let mut bytes = Vec::new();
         write(&mesh, &meta, &mut bytes).unwrap();
         let back = read(&bytes).unwrap();
@@ -394,27 +304,15 @@ mod tests {
              <c:component objectid=\"3\" transform=\"1 0 0 0 1 0 0 0 1 5 0 0\"/></c:components></c:object>\
              <c:object id=\"5\" type=\"support\">{0}</c:object><x:object/></c:resources><c:build>\
              <c:item objectid=\"4\" transform=\"0 2 0 -2 0 0 0 0 2 0 0 10\"/><c:item objectid=\"5\"/></c:build></c:model>",
-            SHAPE
-                .replace("</", "</c:")
-                .replace('<', "<c:")
-                .replace("<c:/c:", "</c:")
+            SHAPE.replace("</", "</c:").replace('<', "<c:").replace("<c:/c:", "</c:")
         );
         let mesh = read(&pack(&text)).unwrap();
         assert_eq!(mesh.triangles.len(), 8);
         let inch = 25.4f64;
-        assert!(
-            (mesh.volume() - 2.0 * 8.0 / 6.0 * inch.powi(3)).abs() < 1e-8,
-            "{}",
-            mesh.volume()
-        );
+        assert!((mesh.volume() - 2.0 * 8.0 / 6.0 * inch.powi(3)).abs() < 1e-8, "{}", mesh.volume());
         let b = mesh.bounds();
         // x' = −2y, y' = 2x: x from −2 to 0, y from −2 to 12, z from 10 to 12 inches.
-        for (got, want) in b
-            .min
-            .iter()
-            .chain(&b.max)
-            .zip([-2.0, -2.0, 10.0, 0.0, 12.0, 12.0])
-        {
+        for (got, want) in b.min.iter().chain(&b.max).zip([-2.0, -2.0, 10.0, 0.0, 12.0, 12.0]) {
             assert!((got - want * inch).abs() < 1e-10, "{b:?}");
         }
     }
@@ -422,31 +320,21 @@ mod tests {
     #[test]
     fn models_that_cannot_be_are_refused() {
         let wrap = |unit: &str, items: &str, objects: &str| {
-            format!(
-                "<model unit=\"{unit}\"><resources>{objects}</resources><build>{items}</build></model>"
-            )
+            format!("<model unit=\"{unit}\"><resources>{objects}</resources><build>{items}</build></model>")
         };
         let object = format!("<object id=\"1\">{SHAPE}</object>");
         let item = "<item objectid=\"1\"/>";
         assert!(read(&pack(&wrap("millimeter", item, &object))).is_ok());
-        let looping = "<object id=\"1\"><components><component objectid=\"1\"/><component objectid=\"1\"/></components></object>";
+        let looping =
+            "<object id=\"1\"><components><component objectid=\"1\"/><component objectid=\"1\"/></components></object>";
         let cases = [
             (wrap("furlong", item, &object), "furlong"),
             (wrap("meter", "", &object), "places none"),
             (wrap("meter", "<item objectid=\"2\"/>", &object), "object 2"),
             (wrap("meter", item, looping), "holds itself"),
-            (
-                wrap("meter", item, &object.replace("v3=\"1\"", "v3=\"4\"")),
-                "[0, 2, 4]",
-            ),
-            (
-                wrap("meter", item, &object.replace("x='0'", "x='nan'")),
-                "not finite",
-            ),
-            (
-                wrap("meter", "<item objectid=\"1\" transform=\"1 0\"/>", &object),
-                "twelve numbers",
-            ),
+            (wrap("meter", item, &object.replace("v3=\"1\"", "v3=\"4\"")), "[0, 2, 4]"),
+            (wrap("meter", item, &object.replace("x='0'", "x='nan'")), "not finite"),
+            (wrap("meter", "<item objectid=\"1\" transform=\"1 0\"/>", &object), "twelve numbers"),
             ("<html></html>".to_string(), "html"),
             ("no".to_string(), "no XML"),
         ];

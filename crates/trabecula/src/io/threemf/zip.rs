@@ -31,11 +31,7 @@ pub struct Piece {
 pub fn deflate_rows(text: &[u8]) -> Piece {
     let mut crc = Crc::new();
     crc.update(text);
-    Piece {
-        bytes: super::deflate::rows(text),
-        crc,
-        size: text.len() as u64,
-    }
+    Piece { bytes: super::deflate::rows(text), crc, size: text.len() as u64 }
 }
 
 /// Deflates text on its own, up to a byte boundary.
@@ -50,11 +46,7 @@ pub fn deflate(text: &[u8]) -> Piece {
         let status = state.compress_vec(&text[from..], &mut bytes, FlushCompress::Sync);
         let done = state.total_in() as usize == text.len() && bytes.len() < bytes.capacity();
         if done || status.is_err() {
-            return Piece {
-                bytes,
-                crc,
-                size: text.len() as u64,
-            };
+            return Piece { bytes, crc, size: text.len() as u64 };
         }
         bytes.reserve(bytes.capacity().max(1024));
     }
@@ -71,12 +63,7 @@ pub struct Entry {
 impl Entry {
     /// An empty file.
     pub fn new(name: &'static str) -> Self {
-        Entry {
-            name,
-            pieces: Vec::new(),
-            crc: Crc::new(),
-            size: 0,
-        }
+        Entry { name, pieces: Vec::new(), crc: Crc::new(), size: 0 }
     }
 
     /// Adds a piece at the end.
@@ -100,14 +87,12 @@ struct Record(Vec<u8>);
 
 impl Record {
     fn two(&mut self, v: impl TryInto<u16>) -> &mut Self {
-        self.0
-            .extend(v.try_into().unwrap_or(u16::MAX).to_le_bytes());
+        self.0.extend(v.try_into().unwrap_or(u16::MAX).to_le_bytes());
         self
     }
     /// A number of four bytes, all ones where it does not fit.
     fn four(&mut self, v: u64, limit: u64) -> &mut Self {
-        self.0
-            .extend((if v >= limit { u32::MAX } else { v as u32 }).to_le_bytes());
+        self.0.extend((if v >= limit { u32::MAX } else { v as u32 }).to_le_bytes());
         self
     }
     fn eight(&mut self, v: u64) -> &mut Self {
@@ -128,12 +113,7 @@ pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result
         let wide = e.size >= limit || packed >= limit || at >= limit;
         let version = if wide { 45 } else { 20 };
         let fields = |r: &mut Record| {
-            r.two(version)
-                .two(0)
-                .two(8)
-                .two(0)
-                .two(DATE)
-                .raw(e.crc.sum());
+            r.two(version).two(0).two(8).two(0).two(DATE).raw(e.crc.sum());
             let cap = if wide { 0 } else { u64::MAX };
             r.four(packed, cap).four(e.size, cap).two(name.len());
         };
@@ -147,21 +127,11 @@ pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result
         }
         directory.raw(CENTRAL).two(version);
         fields(&mut directory);
-        directory
-            .two(if wide { 28 } else { 0 })
-            .two(0)
-            .two(0)
-            .two(0)
-            .raw(0);
+        directory.two(if wide { 28 } else { 0 }).two(0).two(0).two(0).raw(0);
         directory.four(at, if wide { 0 } else { u64::MAX });
         directory.0.extend(name);
         if wide {
-            directory
-                .two(1)
-                .two(24)
-                .eight(e.size)
-                .eight(packed)
-                .eight(at);
+            directory.two(1).two(24).eight(e.size).eight(packed).eight(at);
         }
         out.write_all(&local.0)?;
         e.pieces.iter().try_for_each(|p| out.write_all(p))?;
@@ -171,22 +141,10 @@ pub fn write<W: Write>(entries: &[Entry], limit: u64, out: &mut W) -> io::Result
     let (count, size) = (entries.len(), directory.0.len() as u64);
     if at >= limit {
         directory.raw(END64).eight(44).two(45).two(45).raw(0).raw(0);
-        directory
-            .eight(count as u64)
-            .eight(count as u64)
-            .eight(size)
-            .eight(at);
+        directory.eight(count as u64).eight(count as u64).eight(size).eight(at);
         directory.raw(LOCATOR64).raw(0).eight(at + size).raw(1);
     }
-    directory
-        .raw(END)
-        .two(0)
-        .two(0)
-        .two(count)
-        .two(count)
-        .four(size, limit)
-        .four(at, limit)
-        .two(0);
+    directory.raw(END).two(0).two(0).two(count).two(count).four(size, limit).four(at, limit).two(0);
     out.write_all(&directory.0)
 }
 
@@ -217,45 +175,27 @@ fn fault(message: impl Into<String>) -> Fault {
 /// The little-endian number of `n` bytes at `at`.
 fn number(bytes: &[u8], at: u64, n: u64) -> Result<u64, Fault> {
     let end = at.checked_add(n).filter(|e| *e <= bytes.len() as u64);
-    let end = end.ok_or_else(|| {
-        fault(format!(
-            "the ZIP directory points to byte {at} of {}",
-            bytes.len()
-        ))
-    })?;
-    Ok(bytes[at as usize..end as usize]
-        .iter()
-        .rev()
-        .fold(0, |v, b| v << 8 | u64::from(*b)))
+    let end = end.ok_or_else(|| fault(format!("the ZIP directory points to byte {at} of {}", bytes.len())))?;
+    Ok(bytes[at as usize..end as usize].iter().rev().fold(0, |v, b| v << 8 | u64::from(*b)))
 }
 
 impl<'a> Archive<'a> {
     /// Reads the directory.
     pub fn new(bytes: &'a [u8]) -> Result<Self, Fault> {
         let tail = bytes.len().saturating_sub(22 + 65535);
-        let end = bytes[tail..]
-            .windows(22)
-            .rposition(|w| w.starts_with(&END.to_le_bytes()));
-        let end = (end.ok_or_else(|| {
-            fault(format!(
-                "no ZIP directory in {} bytes: truncated or not 3MF",
-                bytes.len()
-            ))
-        })? + tail) as u64;
+        let end = bytes[tail..].windows(22).rposition(|w| w.starts_with(&END.to_le_bytes()));
+        let end = (end
+            .ok_or_else(|| fault(format!("no ZIP directory in {} bytes: truncated or not 3MF", bytes.len())))?
+            + tail) as u64;
         let (mut count, mut at) = (number(bytes, end + 10, 2)?, number(bytes, end + 16, 4)?);
         if end >= 20 && number(bytes, end - 20, 4)? == u64::from(LOCATOR64) {
             let wide = number(bytes, end - 12, 8)?;
-            (count, at) = (
-                number(bytes, wide.saturating_add(32), 8)?,
-                number(bytes, wide.saturating_add(48), 8)?,
-            );
+            (count, at) = (number(bytes, wide.saturating_add(32), 8)?, number(bytes, wide.saturating_add(48), 8)?);
         }
         let mut entries = Vec::new();
         for i in 0..count {
             if number(bytes, at, 4)? != u64::from(CENTRAL) {
-                return Err(fault(format!(
-                    "entry {i} of {count} of the ZIP directory (byte {at}) is damaged"
-                )));
+                return Err(fault(format!("entry {i} of {count} of the ZIP directory (byte {at}) is damaged")));
             }
             let get = |offset, n| number(bytes, at + offset, n);
             let (name, extra, comment) = (get(28, 2)?, get(30, 2)?, get(32, 2)?);
@@ -270,21 +210,14 @@ impl<'a> Archive<'a> {
                 at: get(42, 4)?,
             };
             if get(8, 2)? & 1 == 1 {
-                return Err(fault(format!(
-                    "\"{}\" is encrypted: save the file without a password",
-                    e.name
-                )));
+                return Err(fault(format!("\"{}\" is encrypted: save the file without a password", e.name)));
             }
             widen(slice(at + 46 + name, extra), &mut e)?;
             entries.push(e);
             at += 46 + name + extra + comment;
         }
         let left = Cell::new(MOST.0 * bytes.len() as u64 + MOST.1);
-        Ok(Archive {
-            bytes,
-            entries,
-            left,
-        })
+        Ok(Archive { bytes, entries, left })
     }
 
     /// Names of the files.
@@ -297,28 +230,18 @@ impl<'a> Archive<'a> {
         let plain = |s: &str| s.trim_start_matches('/').to_ascii_lowercase();
         let e = self.entries.iter().find(|e| plain(&e.name) == plain(name));
         let e = e.ok_or_else(|| fault(format!("the archive holds no \"{name}\": not 3MF")))?;
-        let skip = number(self.bytes, e.at.saturating_add(26), 2)?
-            + number(self.bytes, e.at.saturating_add(28), 2)?;
+        let skip = number(self.bytes, e.at.saturating_add(26), 2)? + number(self.bytes, e.at.saturating_add(28), 2)?;
         if number(self.bytes, e.at, 4)? != u64::from(LOCAL) {
-            return Err(fault(format!(
-                "\"{name}\" does not begin at byte {}: damaged",
-                e.at
-            )));
+            return Err(fault(format!("\"{name}\" does not begin at byte {}: damaged", e.at)));
         }
         let from = e.at + 30 + skip;
         let end = from.saturating_add(e.packed);
         let Some(data) = self.bytes.get(from as usize..end as usize) else {
-            return Err(fault(format!(
-                "\"{name}\" ends at byte {end}, the file at {}: truncated",
-                self.bytes.len()
-            )));
+            return Err(fault(format!("\"{name}\" ends at byte {end}, the file at {}: truncated", self.bytes.len())));
         };
         // Deflate gives at most 1032 bytes for one.
         if e.size > e.packed.saturating_mul(1032).saturating_add(1032) {
-            return Err(fault(format!(
-                "\"{name}\" claims {} bytes from {}: damaged",
-                e.size, e.packed
-            )));
+            return Err(fault(format!("\"{name}\" claims {} bytes from {}: damaged", e.size, e.packed)));
         }
         let Some(left) = self.left.get().checked_sub(e.size) else {
             return Err(fault(format!(
@@ -331,25 +254,17 @@ impl<'a> Archive<'a> {
         self.left.set(left);
         let content = match e.method {
             0 => data.to_vec(),
-            8 => inflate(data, e.size as usize).ok_or_else(|| {
-                fault(format!(
-                    "\"{name}\" is not {} deflated bytes: damaged",
-                    e.size
-                ))
-            })?,
+            8 => inflate(data, e.size as usize)
+                .ok_or_else(|| fault(format!("\"{name}\" is not {} deflated bytes: damaged", e.size)))?,
             m => {
-                return Err(fault(format!(
-                    "\"{name}\" is packed by method {m}: only 0 and 8 (deflate) are read"
-                )));
+                return Err(fault(format!("\"{name}\" is packed by method {m}: only 0 and 8 (deflate) are read")));
             }
         };
         let mut crc = Crc::new();
         crc.update(&content);
         if content.len() as u64 != e.size || u64::from(crc.sum()) != e.crc {
             let (want, got) = (e.crc, crc.sum());
-            return Err(fault(format!(
-                "\"{name}\" has the checksum {got:08x}, not {want:08x}: damaged"
-            )));
+            return Err(fault(format!("\"{name}\" has the checksum {got:08x}, not {want:08x}: damaged")));
         }
         Ok(content)
     }
@@ -382,10 +297,7 @@ fn inflate(data: &[u8], size: usize) -> Option<Vec<u8>> {
     loop {
         let from = state.total_in() as usize;
         let before = out.len();
-        match state
-            .decompress_vec(&data[from..], &mut out, FlushDecompress::Finish)
-            .ok()?
-        {
+        match state.decompress_vec(&data[from..], &mut out, FlushDecompress::Finish).ok()? {
             Status::StreamEnd => return (out.len() == size).then_some(out),
             _ if out.len() > size || (out.len() == before && state.total_in() as usize == from) => {
                 return None;
@@ -401,9 +313,7 @@ mod tests {
 
     #[test]
     fn pieces_join_with_narrow_and_wide_sizes() {
-        let text: Vec<u8> = (0..200_000u32)
-            .flat_map(|i| format!("{} ", i % 9973 * (i % 977)).into_bytes())
-            .collect();
+        let text: Vec<u8> = (0..200_000u32).flat_map(|i| format!("{} ", i % 9973 * (i % 977)).into_bytes()).collect();
         for limit in [LIMIT, 0, 1000] {
             let mut long = Entry::new("a/long.txt");
             text.chunks(7001).for_each(|c| long.push(deflate(c)));
@@ -412,10 +322,7 @@ mod tests {
             let mut bytes = Vec::new();
             write(&[long, short, Entry::new("empty")], limit, &mut bytes).unwrap();
             let archive = Archive::new(&bytes).unwrap();
-            assert_eq!(
-                archive.names().collect::<Vec<_>>(),
-                ["a/long.txt", "short", "empty"]
-            );
+            assert_eq!(archive.names().collect::<Vec<_>>(), ["a/long.txt", "short", "empty"]);
             assert_eq!(archive.file("/A/long.txt").unwrap(), text);
             assert_eq!(archive.file("short").unwrap(), b"x");
             assert_eq!(archive.file("empty").unwrap(), b"");
@@ -431,14 +338,8 @@ mod tests {
             let (mut crc, mut bytes) = (Crc::new(), Vec::with_capacity(1 << 16));
             crc.update(&text);
             let mut state = Compress::new(Compression::best(), false);
-            state
-                .compress_vec(&text, &mut bytes, FlushCompress::Sync)
-                .unwrap();
-            Piece {
-                bytes,
-                crc,
-                size: 1 << 20,
-            }
+            state.compress_vec(&text, &mut bytes, FlushCompress::Sync).unwrap();
+            Piece { bytes, crc, size: 1 << 20 }
         };
         (0..300).for_each(|_| long.push(piece()));
         let mut short = Entry::new("some");
@@ -462,9 +363,6 @@ mod tests {
         .take(100_000)
         .collect();
         let piece = deflate(&noise);
-        assert_eq!(
-            inflate(&[&piece.bytes[..], &FINAL].concat(), noise.len()),
-            Some(noise)
-        );
+        assert_eq!(inflate(&[&piece.bytes[..], &FINAL].concat(), noise.len()), Some(noise));
     }
 }

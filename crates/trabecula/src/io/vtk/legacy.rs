@@ -21,10 +21,7 @@ impl<'a> Reader<'a> {
     fn word(&mut self) -> Option<&'a [u8]> {
         let rest = self.bytes.get(self.at..)?;
         let from = rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        let end = rest[from..]
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .map_or(rest.len(), |e| from + e);
+        let end = rest[from..].iter().position(u8::is_ascii_whitespace).map_or(rest.len(), |e| from + e);
         self.at += end;
         Some(&rest[from..end])
     }
@@ -35,27 +32,14 @@ impl<'a> Reader<'a> {
 
     fn count(&mut self, what: &str) -> Result<usize, Fault> {
         let word = self.word().unwrap_or_default();
-        parse(word).ok_or_else(|| {
-            fault(format!(
-                "{what} should be a whole number, found {}",
-                shown(word)
-            ))
-        })
+        parse(word).ok_or_else(|| fault(format!("{what} should be a whole number, found {}", shown(word))))
     }
 
-    fn three<T: core::str::FromStr + Copy + Default>(
-        &mut self,
-        what: &str,
-    ) -> Result<[T; 3], Fault> {
+    fn three<T: core::str::FromStr + Copy + Default>(&mut self, what: &str) -> Result<[T; 3], Fault> {
         let mut out = [T::default(); 3];
         for o in &mut out {
             let word = self.word().unwrap_or_default();
-            *o = parse(word).ok_or_else(|| {
-                fault(format!(
-                    "{what} should be three numbers, found {}",
-                    shown(word)
-                ))
-            })?;
+            *o = parse(word).ok_or_else(|| fault(format!("{what} should be three numbers, found {}", shown(word))))?;
         }
         Ok(out)
     }
@@ -67,9 +51,7 @@ impl<'a> Reader<'a> {
             let mut out = Vec::new();
             for _ in 0..count {
                 let word = self.word().ok_or_else(cut)?;
-                out.push(
-                    parse(word).ok_or_else(|| fault(format!("{} is not a number", shown(word))))?,
-                );
+                out.push(parse(word).ok_or_else(|| fault(format!("{} is not a number", shown(word))))?);
             }
             return Ok(out);
         }
@@ -87,18 +69,11 @@ impl<'a> Reader<'a> {
             other => return Err(fault(format!("the type \"{other}\" is not a number"))),
         };
         // One line end, then the bytes.
-        while self
-            .bytes
-            .get(self.at)
-            .is_some_and(|b| *b == b' ' || *b == b'\r')
-        {
+        while self.bytes.get(self.at).is_some_and(|b| *b == b' ' || *b == b'\r') {
             self.at += 1;
         }
         self.at += 1;
-        let end = count
-            .checked_mul(width)
-            .and_then(|n| n.checked_add(self.at))
-            .ok_or_else(cut)?;
+        let end = count.checked_mul(width).and_then(|n| n.checked_add(self.at)).ok_or_else(cut)?;
         let out = numbers(self.bytes.get(self.at..end).ok_or_else(cut)?, kind, true);
         self.at = end;
         out
@@ -106,11 +81,7 @@ impl<'a> Reader<'a> {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
-    let mut r = Reader {
-        bytes,
-        at: 0,
-        binary: false,
-    };
+    let mut r = Reader { bytes, at: 0, binary: false };
     r.line();
     r.line();
     let form = r.line().unwrap_or_default();
@@ -118,15 +89,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
         "ASCII" => false,
         "BINARY" => true,
         _ => {
-            return Err(fault(format!(
-                "the third line should say ASCII or BINARY, found \"{form}\""
-            )));
+            return Err(fault(format!("the third line should say ASCII or BINARY, found \"{form}\"")));
         }
     };
-    let (mut kind, mut nodes, mut origin, mut step) =
-        (String::new(), [1usize; 3], [0.0; 3], [1.0; 3]);
-    let (mut place, mut connectivity, mut offsets, mut types) =
-        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut kind, mut nodes, mut origin, mut step) = (String::new(), [1usize; 3], [0.0; 3], [1.0; 3]);
+    let (mut place, mut connectivity, mut offsets, mut types) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut arrays: Vec<Array> = Vec::new();
     let (mut of_cells, mut count) = (false, 0);
     while let Some(word) = r.text() {
@@ -148,10 +115,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
                 place = r.numbers(n.saturating_mul(3), &of)?;
             }
             "CELLS" => {
-                let (n, size) = (
-                    r.count("the number of cells")?,
-                    r.count("the size of the cells")?,
-                );
+                let (n, size) = (r.count("the number of cells")?, r.count("the size of the cells")?);
                 let at = r.at;
                 if r.text().as_deref() == Some("OFFSETS") {
                     let of = r.text().unwrap_or_default();
@@ -168,10 +132,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
                     for _ in 0..n {
                         let m = all.get(from).copied().unwrap_or(0.0) as usize;
                         let corners = all.get(from + 1..(from + 1).saturating_add(m));
-                        connectivity.extend(
-                            corners
-                                .ok_or_else(|| fault("a cell reaches beyond the list of cells"))?,
-                        );
+                        connectivity.extend(corners.ok_or_else(|| fault("a cell reaches beyond the list of cells"))?);
                         offsets.push(connectivity.len() as f64);
                         from += m + 1;
                     }
@@ -196,12 +157,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
                     r.at = at;
                 }
                 let values = r.numbers(count.saturating_mul(components), &of)?;
-                arrays.push(Array {
-                    name,
-                    of_cells,
-                    components,
-                    values,
-                });
+                arrays.push(Array { name, of_cells, components, values });
             }
             "VECTORS" | "NORMALS" | "TENSORS" | "TENSORS6" => {
                 let components = match word.to_ascii_uppercase().as_str() {
@@ -211,30 +167,17 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
                 };
                 let (name, of) = (r.text().unwrap_or_default(), r.text().unwrap_or_default());
                 let values = r.numbers(count.saturating_mul(components), &of)?;
-                arrays.push(Array {
-                    name,
-                    of_cells,
-                    components,
-                    values,
-                });
+                arrays.push(Array { name, of_cells, components, values });
             }
             "FIELD" => {
                 r.text();
                 let n = r.count("the number of arrays")?;
                 for _ in 0..n {
                     let name = r.text().unwrap_or_default();
-                    let (components, tuples) = (
-                        r.count("the number of components")?,
-                        r.count("the number of tuples")?,
-                    );
+                    let (components, tuples) = (r.count("the number of components")?, r.count("the number of tuples")?);
                     let of = r.text().unwrap_or_default();
                     let values = r.numbers(components.saturating_mul(tuples), &of)?;
-                    arrays.push(Array {
-                        name,
-                        of_cells,
-                        components,
-                        values,
-                    });
+                    arrays.push(Array { name, of_cells, components, values });
                 }
             }
             "LOOKUP_TABLE" => {
@@ -248,45 +191,18 @@ pub(super) fn read(bytes: &[u8]) -> Result<Data, Fault> {
     }
     let (shape, points, cells) = match kind.as_str() {
         "STRUCTURED_POINTS" => {
-            let points = nodes
-                .iter()
-                .try_fold(1usize, |n, m| n.checked_mul(*m))
-                .unwrap_or(usize::MAX);
-            let cells = nodes
-                .iter()
-                .map(|n| n.saturating_sub(1).max(1))
-                .fold(1usize, usize::saturating_mul);
-            (
-                Shape::Image {
-                    origin,
-                    step,
-                    nodes,
-                },
-                points,
-                cells,
-            )
+            let points = nodes.iter().try_fold(1usize, |n, m| n.checked_mul(*m)).unwrap_or(usize::MAX);
+            let cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).fold(1usize, usize::saturating_mul);
+            (Shape::Image { origin, step, nodes }, points, cells)
         }
         "UNSTRUCTURED_GRID" => {
             if offsets.len() + 1 == types.len() {
                 offsets.push(connectivity.len() as f64);
             }
             if offsets.len() != types.len() {
-                return Err(fault(format!(
-                    "{} cells and {} cell types",
-                    offsets.len(),
-                    types.len()
-                )));
+                return Err(fault(format!("{} cells and {} cell types", offsets.len(), types.len())));
             }
-            (
-                Shape::Mesh(Elements::of_numbers(
-                    &place,
-                    &connectivity,
-                    &offsets,
-                    &types,
-                )?),
-                place.len() / 3,
-                types.len(),
-            )
+            (Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?), place.len() / 3, types.len())
         }
         _ => return Err(fault("the file names no data set")),
     };
@@ -302,13 +218,9 @@ mod tests {
     #[test]
     fn text_and_bytes_give_the_same() {
         let head = |form: &str| {
-            format!(
-                "# vtk DataFile Version 3.0\na tet\n{form}\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
-            )
+            format!("# vtk DataFile Version 3.0\na tet\n{form}\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n")
         };
-        let place = [
-            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f32,
-        ];
+        let place = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f32];
         let text = format!(
             "{}{}\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS T double 1\nLOOKUP_TABLE default\n1 2 3 4\nCELL_DATA 1\nFIELD f 1\nS 6 1 float\n1 2 3 4 5 6\n",
             head("ASCII"),
@@ -323,17 +235,10 @@ mod tests {
         bytes.extend(b"\nPOINT_DATA 4\nSCALARS T double 1\nLOOKUP_TABLE default\n");
         bytes.extend([1.0, 2.0, 3.0, 4.0f64].iter().flat_map(|v| v.to_be_bytes()));
         bytes.extend(b"\nCELL_DATA 1\nFIELD f 1\nS 6 1 float\n");
-        bytes.extend(
-            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0f32]
-                .iter()
-                .flat_map(|v| v.to_be_bytes()),
-        );
+        bytes.extend([1.0, 2.0, 3.0, 4.0, 5.0, 6.0f32].iter().flat_map(|v| v.to_be_bytes()));
         let (a, b) = (read(text.as_bytes()).unwrap(), read(&bytes).unwrap());
         assert_eq!(a, b);
-        assert_eq!(
-            (a.arrays[0].values.as_slice(), a.arrays[1].components),
-            (&[1.0, 2.0, 3.0, 4.0][..], 6)
-        );
+        assert_eq!((a.arrays[0].values.as_slice(), a.arrays[1].components), (&[1.0, 2.0, 3.0, 4.0][..], 6));
         for n in 0..bytes.len() {
             // Whole up to an array: the ones before are all there.
             if let Ok(d) = read(&bytes[..n]) {

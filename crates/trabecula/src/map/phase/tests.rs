@@ -47,13 +47,8 @@ fn what_does_not_vary_is_the_affine_map() {
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
     let affine = Map::Affine(Affine::rigid(wavelength, angles, offset, &[]).expect("map"));
     for region in [None, Some(&ball as &dyn Field)] {
-        let settings = Settings {
-            region,
-            ..Settings::default()
-        };
-        let map = Map::Phase(Arc::new(
-            Phase::solve(&b, &wanted, &settings).expect("solved"),
-        ));
+        let settings = Settings { region, ..Settings::default() };
+        let map = Map::Phase(Arc::new(Phase::solve(&b, &wanted, &settings).expect("solved")));
         for i in 0..200 {
             let s = [0.371, 0.713, 0.193].map(|s| (s * f64::from(i)).fract());
             let p = core::array::from_fn(|a| b.min[a] - 1.0 + s[a] * (b.size()[a] + 2.0));
@@ -115,11 +110,7 @@ fn the_ramp_meets_its_closed_form_at_second_order() {
     let l = 4.0;
     let center = ramp(l / 2.0, l / 2.0, l);
     let exact = |x, y| sub(ramp(x, y, l), center);
-    for ((x, y), want) in [
-        ((0.0, 0.0), -15.6615213),
-        ((1.0, 2.0), -5.1907736),
-        ((4.0, 4.0), 15.5318259),
-    ] {
+    for ((x, y), want) in [((0.0, 0.0), -15.6615213), ((1.0, 2.0), -5.1907736), ((4.0, 4.0), 15.5318259)] {
         // Figures in radians with seven decimals; the series is cut at 120 terms.
         assert!((TAU * exact(x, y)[0] - want).abs() < 2e-4);
     }
@@ -127,19 +118,13 @@ fn the_ramp_meets_its_closed_form_at_second_order() {
     let wanted = about_z("22.5*x", Grade::Constant(1.0));
     let mut errors = Vec::new();
     for n in [16.0, 32.0, 64.0] {
-        let settings = Settings {
-            step: Some(l / n),
-            ..Settings::default()
-        };
+        let settings = Settings { step: Some(l / n), ..Settings::default() };
         let phase = Phase::solve(&b, &wanted, &settings).expect("solved");
         let center = at(&phase, [l / 2.0; 3]);
         let mut worst = 0.0f64;
         for i in 0..25 {
             // On the nodes of the coarsest grid and off them.
-            let (x, y) = (
-                f64::from(i % 5) * l / 4.0 * 0.999,
-                f64::from(i / 5) * l / 4.0 * 0.999,
-            );
+            let (x, y) = (f64::from(i % 5) * l / 4.0 * 0.999, f64::from(i / 5) * l / 4.0 * 0.999);
             let d = sub(sub(at(&phase, [x, y, 1.3]), center), exact(x, y));
             worst = worst.max(d[0].abs()).max(d[1].abs());
         }
@@ -158,18 +143,12 @@ fn the_ramp_meets_its_closed_form_at_second_order() {
 fn a_conformal_map_is_found_at_second_order() {
     let b = bounds([1.0, 1.0, 0.0], [5.0, 4.0, 2.0]);
     // |K| = a / r, turned by the polar angle.
-    let mut wanted = about_z(
-        "atan2(y, x) * 57.29577951308232",
-        formula("sqrt(x^2 + y^2) / 2.5"),
-    );
+    let mut wanted = about_z("atan2(y, x) * 57.29577951308232", formula("sqrt(x^2 + y^2) / 2.5"));
     wanted.wavelength[2] = Grade::Constant(2.0);
     let exact = |p: Vec3| [2.5 * p[0].hypot(p[1]).ln(), 2.5 * p[1].atan2(p[0])];
     let mut errors = Vec::new();
     for step in [0.25, 0.125, 0.0625] {
-        let settings = Settings {
-            step: Some(step),
-            ..Settings::default()
-        };
+        let settings = Settings { step: Some(step), ..Settings::default() };
         let phase = Phase::solve(&b, &wanted, &settings).expect("solved");
         let c = b.center();
         let mut worst = 0.0f64;
@@ -177,18 +156,13 @@ fn a_conformal_map_is_found_at_second_order() {
             let s = [0.371, 0.713, 0.193].map(|s| (s * f64::from(i)).fract());
             let p = core::array::from_fn(|a| b.min[a] + s[a] * b.size()[a]);
             let (u, v) = (sub(at(&phase, p), at(&phase, c)), exact(p));
-            worst = worst
-                .max((u[0] - v[0] + exact(c)[0]).abs())
-                .max((u[1] - v[1] + exact(c)[1]).abs());
+            worst = worst.max((u[0] - v[0] + exact(c)[0]).abs()).max((u[1] - v[1] + exact(c)[1]).abs());
         }
         errors.push(worst);
         let d = phase.distortion();
         // Second order again: the coarsest step is a sixth of the distance to the pole.
         let most = 1.0 + 0.01 * (step / 0.25_f64).powi(2);
-        assert!(
-            d.outside == 0.0 && d.spacing.iter().all(|s| s.max < most),
-            "{d:?}"
-        );
+        assert!(d.outside == 0.0 && d.spacing.iter().all(|s| s.max < most), "{d:?}");
     }
     println!("conformal: {errors:?} turns");
     for pair in errors.windows(2) {
@@ -203,28 +177,16 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
     let grid = Grid::over(&b, [17, 21, 13]);
     let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
     let angles = [formula("30*y"), formula("10*x*z"), formula("40*x")];
-    let frames = Orientation::Angles(angles)
-        .frames(&grid, &nodes)
-        .expect("frames");
-    let k: [Vec<Vec3>; 3] =
-        core::array::from_fn(|i| frames.iter().map(|f| [f[0][i], f[1][i], f[2][i]]).collect());
-    let depth: Vec<f64> = nodes
-        .iter()
-        .map(|p| norm(sub(*p, b.center())) - 1.5)
-        .collect();
+    let frames = Orientation::Angles(angles).frames(&grid, &nodes).expect("frames");
+    let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| frames.iter().map(|f| [f[0][i], f[1][i], f[2][i]]).collect());
+    let depth: Vec<f64> = nodes.iter().map(|p| norm(sub(*p, b.center())) - 1.5).collect();
     for depth in [vec![-1.0; grid.len()], depth] {
         let roots = closeness(&grid, &depth, None, &nodes).expect("weights");
         let (three, ..) = integrate(&grid, &k, roots.as_deref(), 1.0);
         let hkl = [2.0, -1.0, 3.0];
-        let sum: Vec<Vec3> = (0..grid.len())
-            .map(|n| (0..3).fold([0.0; 3], |s, i| add(s, scale(k[i][n], hkl[i]))))
-            .collect();
-        let (own, ..) = integrate(
-            &grid,
-            &[sum.clone(), sum.clone(), sum],
-            roots.as_deref(),
-            1.0,
-        );
+        let sum: Vec<Vec3> =
+            (0..grid.len()).map(|n| (0..3).fold([0.0; 3], |s, i| add(s, scale(k[i][n], hkl[i])))).collect();
+        let (own, ..) = integrate(&grid, &[sum.clone(), sum.clone(), sum], roots.as_deref(), 1.0);
         let exact = depth[0] == -1.0;
         for n in (0..grid.len()).filter(|&n| depth[n] < 0.0) {
             let joined: f64 = (0..3).map(|i| hkl[i] * three[i][n]).sum();
@@ -239,8 +201,7 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
 fn the_region_counts_and_its_surroundings_hardly() {
     use crate::region::{Cuboid, Cylinder, Difference, Intersection};
     let ring = Difference::new(vec![
-        Arc::new(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 12.0, 4.0).expect("outer"))
-            as crate::region::Region,
+        Arc::new(Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 12.0, 4.0).expect("outer")) as crate::region::Region,
         Arc::new(Cylinder::new([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], 9.0, 6.0).expect("inner")),
     ]);
     let quarter = Intersection::new(vec![
@@ -250,18 +211,7 @@ fn the_region_counts_and_its_surroundings_hardly() {
     .expect("quarter");
     let b = bounds([0.0; 3], [12.0, 12.0, 4.0]);
     let wanted = about_z("atan2(y, x) * 57.29577951308232", Grade::Constant(2.0));
-    let solve = |region| {
-        Phase::solve(
-            &b,
-            &wanted,
-            &Settings {
-                region,
-                folds: true,
-                step: None,
-            },
-        )
-        .expect("solved")
-    };
+    let solve = |region| Phase::solve(&b, &wanted, &Settings { region, folds: true, step: None }).expect("solved");
     let (near, all) = (solve(Some(&quarter)), solve(None));
     let judge = |phase: &Phase| {
         let mut sum = (0.0, 0);
@@ -271,20 +221,12 @@ fn the_region_counts_and_its_surroundings_hardly() {
             if quarter.value(p) < 0.0 {
                 let t = p[1].atan2(p[0]);
                 let want = [-0.5 * t.sin(), 0.5 * t.cos(), 0.0];
-                sum = (
-                    sum.0 + norm(sub(phase.jacobian(p)[1], want)).powi(2),
-                    sum.1 + 1,
-                );
+                sum = (sum.0 + norm(sub(phase.jacobian(p)[1], want)).powi(2), sum.1 + 1);
             }
         }
         (sum.0 / f64::from(sum.1)).sqrt() / 0.5
     };
-    println!(
-        "misfit {:.4} with weights in {} steps, {:.4} without",
-        judge(&near),
-        near.effort().1,
-        judge(&all)
-    );
+    println!("misfit {:.4} with weights in {} steps, {:.4} without", judge(&near), near.effort().1, judge(&all));
     assert!(judge(&near) < 0.5 * judge(&all));
     assert!(near.effort().1 < 60);
 }
@@ -292,38 +234,16 @@ fn the_region_counts_and_its_surroundings_hardly() {
 #[test]
 fn what_cannot_be_solved_is_refused_with_its_place() {
     let b = bounds([0.0; 3], [10.0, 10.0, 10.0]);
-    let solve = |w: &Wanted, step| {
-        Phase::solve(
-            &b,
-            w,
-            &Settings {
-                step,
-                ..Settings::default()
-            },
-        )
-        .err()
-    };
+    let solve = |w: &Wanted, step| Phase::solve(&b, w, &Settings { step, ..Settings::default() }).err();
     let refused = |w: &Wanted, key: &str, words: &str| {
         let f = solve(w, None).expect("refused");
         assert!(f.at == key && f.message.contains(words), "{f}");
     };
-    refused(
-        &about_z("x", formula("5 - x")),
-        "wavelength",
-        "(5.0000, 0.0000, 0.0000)",
-    );
-    refused(
-        &about_z("1/(x-5)", Grade::Constant(2.0)),
-        "rotate",
-        "(5.0000, 0.0000, 0.0000)",
-    );
+    refused(&about_z("x", formula("5 - x")), "wavelength", "(5.0000, 0.0000, 0.0000)");
+    refused(&about_z("1/(x-5)", Grade::Constant(2.0)), "rotate", "(5.0000, 0.0000, 0.0000)");
     let jump = Grade::linear([1.0, 0.0, 0.0], vec![[5.0, 2.0], [5.001, 4.0]]).expect("grade");
     refused(&about_z("0*x", jump), "wavelength", "faster than the grid");
-    refused(
-        &about_z("0*x", formula("4 + 3*sin(40*x*y*z)")),
-        "wavelength",
-        "faster than the grid",
-    );
+    refused(&about_z("0*x", formula("4 + 3*sin(40*x*y*z)")), "wavelength", "faster than the grid");
     let fine = solve(&about_z("x", Grade::Constant(2.0)), Some(1e-4)).expect("refused");
     assert!(fine.at == "step" && fine.message.contains("use a step above"));
     // Half a turn within half a cell.
@@ -346,17 +266,10 @@ fn solving_three_phases_at_128_cubed() {
         let poisson = Poisson::new(grid);
         let start = std::time::Instant::now();
         let solved: Vec<Vec<f64>> = k.iter().map(|k| poisson.integrate(k)).collect();
-        println!(
-            "{n}: {:.3} s for three phases, {:.6}",
-            start.elapsed().as_secs_f64(),
-            solved[0][77]
-        );
+        println!("{n}: {:.3} s for three phases, {:.6}", start.elapsed().as_secs_f64(), solved[0][77]);
         let start = std::time::Instant::now();
         let (values, ..) = integrate(&grid, &k, None, 1.0);
-        println!(
-            "{n}: {:.3} s with means and gauge",
-            start.elapsed().as_secs_f64()
-        );
+        println!("{n}: {:.3} s with means and gauge", start.elapsed().as_secs_f64());
         let start = std::time::Instant::now();
         let spline = Spline::through(grid, values);
         println!(
@@ -368,11 +281,7 @@ fn solving_three_phases_at_128_cubed() {
         let start = std::time::Instant::now();
         let mut f = solved;
         f.iter_mut().for_each(|f| *f = poisson.apply(f));
-        println!(
-            "{n}: {:.4} s for one sweep of three phases, {:.3}",
-            start.elapsed().as_secs_f64(),
-            f[0][5]
-        );
+        println!("{n}: {:.4} s for one sweep of three phases, {:.3}", start.elapsed().as_secs_f64(), f[0][5]);
     }
 }
 
@@ -384,10 +293,7 @@ fn errors_go_where_they_weigh_least() {
     let one = |_: Vec3| 1.0;
     let left = |p: Vec3| (-p[0] / 4.0).exp();
     let solve = |weight| {
-        let wanted = Wanted {
-            weight,
-            ..turned.clone()
-        };
+        let wanted = Wanted { weight, ..turned.clone() };
         Phase::solve(&b, &wanted, &Settings::default()).expect("solved")
     };
     let miss = |map: &Phase, weight: &dyn Fn(Vec3) -> f64| -> f64 {
@@ -409,10 +315,7 @@ fn errors_go_where_they_weigh_least() {
     assert!(miss(&even, &one) < 0.97 * miss(&heavy, &one));
     assert!(miss(&heavy, &left) < 0.97 * miss(&even, &left));
     for bad in ["x - 1", "0*x"] {
-        let wanted = Wanted {
-            weight: Some(formula(bad)),
-            ..turned.clone()
-        };
+        let wanted = Wanted { weight: Some(formula(bad)), ..turned.clone() };
         let fault = Phase::solve(&b, &wanted, &Settings::default()).err();
         assert_eq!(fault.expect("refused").at, "weight", "{bad}");
     }
@@ -426,38 +329,18 @@ fn angles_are_bought_with_spacings() {
     let ball = crate::region::Sphere::new([8.0, 8.0, 2.0], 7.0).expect("ball");
     for region in [None, Some(&ball as &dyn Field)] {
         let solve = |angle_weight, angle: &str| {
-            let wanted = Wanted {
-                angle_weight,
-                ..about_z(angle, Grade::Constant(2.0))
-            };
-            let settings = Settings {
-                region,
-                ..Settings::default()
-            };
+            let wanted = Wanted { angle_weight, ..about_z(angle, Grade::Constant(2.0)) };
+            let settings = Settings { region, ..Settings::default() };
             Phase::solve(&b, &wanted, &settings)
         };
         let off = |angle_weight| {
-            let d = solve(angle_weight, "70*x/16")
-                .expect("solved")
-                .distortion()
-                .clone();
-            let spacing = d
-                .spacing
-                .iter()
-                .take(2)
-                .map(|s| (s.max - 1.0).abs())
-                .fold(0.0, f64::max);
+            let d = solve(angle_weight, "70*x/16").expect("solved").distortion().clone();
+            let spacing = d.spacing.iter().take(2).map(|s| (s.max - 1.0).abs()).fold(0.0, f64::max);
             (d.angle[0].mean + d.angle[1].mean, spacing)
         };
         let [little, even, much] = [0.1, 1.0, 10.0].map(off);
-        assert!(
-            much.0 < 0.8 * even.0 && even.0 < 0.95 * little.0,
-            "{little:?} {even:?} {much:?}"
-        );
-        assert!(
-            much.1 > even.1 && even.1 > little.1,
-            "{little:?} {even:?} {much:?}"
-        );
+        assert!(much.0 < 0.8 * even.0 && even.0 < 0.95 * little.0, "{little:?} {even:?} {much:?}");
+        assert!(much.1 > even.1 && even.1 > little.1, "{little:?} {even:?} {much:?}");
         let still = solve(30.0, "25").expect("solved");
         let (p, q) = ([3.1, 9.2, 1.3], [11.0, 4.4, 2.0]);
         let (c, s) = (25f64.to_radians().cos(), 25f64.to_radians().sin());
@@ -477,10 +360,7 @@ fn misfits_at_nodes_are_those_of_the_report() {
     // A tensor whose first direction is turned as the angles are: s cos 2a etc., with a third value apart.
     let stress = ["cos(0.1*x)", "-cos(0.1*x)", "3", "0", "0", "sin(0.1*x)"].map(formula);
     let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
-    let laid = Wanted {
-        orientation: Orientation::Stress(stress),
-        ..turned.clone()
-    };
+    let laid = Wanted { orientation: Orientation::Stress(stress), ..turned.clone() };
     for wanted in [turned, laid] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.spline.grid();
@@ -491,11 +371,7 @@ fn misfits_at_nodes_are_those_of_the_report() {
         // The report looks at every node of a grid as small as this; angles are good to √ε.
         assert!(grid.len() < LOOKS);
         let shear = most(&|m| m.shear);
-        assert!(
-            (shear - d.shear.max).abs() < 1e-5,
-            "{shear} {}",
-            d.shear.max
-        );
+        assert!((shear - d.shear.max).abs() < 1e-5, "{shear} {}", d.shear.max);
         for i in 0..3 {
             let angle = most(&|m| m.angle[i]);
             let any = (0..3).any(|k| (angle - d.angle[k].max).abs() < 1e-5);

@@ -20,11 +20,7 @@ pub(super) struct Knot {
 pub(super) fn carried(knot: &Knot, place: Vec3, tangent: Vec3) -> Vec3 {
     let mirrored = |v: Vec3, n: Vec3| {
         let long = dot(n, n);
-        if long > 0.0 {
-            sub(v, scale(n, 2.0 * dot(n, v) / long))
-        } else {
-            v
-        }
+        if long > 0.0 { sub(v, scale(n, 2.0 * dot(n, v) / long)) } else { v }
     };
     let way = sub(place, knot.place);
     let (normal, along) = (mirrored(knot.normal, way), mirrored(knot.tangent, way));
@@ -59,17 +55,8 @@ pub(super) fn spline(points: &[Vec3], closed: bool) -> Result<(Spans, f64), Faul
             };
             let right = scale(sub(slope(after), slope(before)), 6.0);
             let (hb, ha) = (chord[before], chord[after]);
-            let near = add(
-                scale(bend[before], hb),
-                scale(
-                    bend[if closed {
-                        (after + 1) % count
-                    } else {
-                        after + 1
-                    }],
-                    ha,
-                ),
-            );
+            let near =
+                add(scale(bend[before], hb), scale(bend[if closed { (after + 1) % count } else { after + 1 }], ha));
             bend[i] = scale(sub(right, near), 1.0 / (2.0 * (hb + ha)));
             if closed && i == 0 {
                 bend[count] = bend[0];
@@ -82,15 +69,7 @@ pub(super) fn spline(points: &[Vec3], closed: bool) -> Result<(Spans, f64), Faul
         let h = chord[i];
         let (m0, m1) = (bend[i], bend[if closed { (i + 1) % count } else { i + 1 }]);
         let b = sub(slope(i), scale(add(scale(m0, 2.0), m1), h / 6.0));
-        spans.push((
-            from,
-            [
-                at(i),
-                b,
-                scale(m0, 0.5),
-                scale(sub(m1, m0), 1.0 / (6.0 * h)),
-            ],
-        ));
+        spans.push((from, [at(i), b, scale(m0, 0.5), scale(sub(m1, m0), 1.0 / (6.0 * h))]));
         from += h;
     }
     Ok((spans, from))

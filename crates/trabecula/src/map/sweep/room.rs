@@ -16,10 +16,7 @@ impl Sweep {
         for (end, sign) in ends.into_iter().filter(|_| !self.closed) {
             let k = self.knots[end];
             let way = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
-            all.extend((1..=8 * FINE).map(|i| Knot {
-                place: add(k.place, scale(k.tangent, way(i))),
-                ..k
-            }));
+            all.extend((1..=8 * FINE).map(|i| Knot { place: add(k.place, scale(k.tangent, way(i))), ..k }));
         }
         for k in &self.knots {
             let (_, slope, second) = self.curve(k.t);
@@ -53,10 +50,7 @@ impl Sweep {
         for k in &self.knots {
             let (c, first, second) = self.curve(k.t);
             let speed = norm(first);
-            let bend = scale(
-                sub(second, scale(k.tangent, dot(second, k.tangent))),
-                1.0 / (speed * speed),
-            );
+            let bend = scale(sub(second, scale(k.tangent, dot(second, k.tangent))), 1.0 / (speed * speed));
             let bent = norm(bend);
             let center = add(c, scale(bend, 1.0 / (bent * bent)));
             if bent > 1e-9 / self.length && region.value(center) <= 0.0 {
@@ -67,12 +61,7 @@ impl Sweep {
             }
         }
         let mut range: [Option<(f64, Vec3)>; 2] = [None; 2];
-        let h = 0.125
-            * self
-                .wavelength
-                .iter()
-                .copied()
-                .fold(f64::INFINITY, f64::min);
+        let h = 0.125 * self.wavelength.iter().copied().fold(f64::INFINITY, f64::min);
         for p in looks {
             let own = self.local(*p);
             if own.room <= 0.0 {

@@ -5,25 +5,15 @@ use crate::region::Sphere;
 
 fn ring(n: usize, radius: f64) -> Vec<Vec3> {
     let turn = |i: usize| core::f64::consts::TAU * i as f64 / n as f64;
-    (0..n)
-        .map(|i| [radius * turn(i).cos(), radius * turn(i).sin(), 0.0])
-        .collect()
+    (0..n).map(|i| [radius * turn(i).cos(), radius * turn(i).sin(), 0.0]).collect()
 }
 
 fn wave() -> Vec<Vec3> {
-    (0..9)
-        .map(|i| f64::from(i) * 5.0)
-        .map(|x| [x, 4.0 * (x / 7.0).sin(), 3.0 * (x / 9.0).cos()])
-        .collect()
+    (0..9).map(|i| f64::from(i) * 5.0).map(|x| [x, 4.0 * (x / 7.0).sin(), 3.0 * (x / 9.0).cos()]).collect()
 }
 
 fn path(points: Vec<Vec3>, closed: bool) -> Path {
-    Path {
-        points,
-        closed,
-        wavelength: [2.0, 2.5, 3.0],
-        normal: None,
-    }
+    Path { points, closed, wavelength: [2.0, 2.5, 3.0], normal: None }
 }
 
 /// Places about the line, none farther than `far`.
@@ -41,10 +31,7 @@ fn tube(line: Vec<Vec3>, closed: bool) -> (Sweep, Vec<Vec3>) {
     let looks = about(&line, 1.6);
     // All that is looked at, and nothing that is not.
     let region = Sphere::new([0.0; 3], 1e-3).expect("ball");
-    (
-        Sweep::new(&path(line, closed), &region, &looks).expect("map"),
-        looks,
-    )
+    (Sweep::new(&path(line, closed), &region, &looks).expect("map"), looks)
 }
 
 #[test]
@@ -78,18 +65,12 @@ fn slopes_places_and_bounds_agree() {
                 d[2] -= (d[2] / 1e-1).round() * 1e-1;
                 for i in 0..3 {
                     // Frames between knots are of fourth order in their distance.
-                    assert!(
-                        (d[i] / 2e-5 - j[i][a]).abs() < 2e-4,
-                        "{closed} {p:?} {i}{a}"
-                    );
+                    assert!((d[i] / 2e-5 - j[i][a]).abs() < 2e-4, "{closed} {p:?} {i}{a}");
                 }
             }
             let back = map.position(map.phase(*p)).expect("place");
             assert!(norm(sub(back, *p)) < 1e-7, "{closed} {p:?} {back:?}");
-            let b = Aabb {
-                min: *p,
-                max: p.map(|x| x + 0.2),
-            };
+            let b = Aabb { min: *p, max: p.map(|x| x + 0.2) };
             let steep = crate::math::spectral_norm(&map.jacobian(p.map(|x| x + 0.13)));
             assert!(steep <= map.stretch(&b) * (1.0 + 1e-9), "{closed} {p:?}");
         }
@@ -121,28 +102,14 @@ fn folds_tears_and_slips_are_refused() {
     let fault = |line: Vec<Vec3>, closed: bool, radius: f64, center: Vec3| {
         let ball = Sphere::new(center, radius).expect("ball");
         let looks = about(&[center], 3f64.sqrt() * radius);
-        let looks: Vec<Vec3> = looks
-            .into_iter()
-            .filter(|p| ball.value(*p) <= 0.0)
-            .collect();
-        Sweep::new(&path(line, closed), &ball, &looks)
-            .err()
-            .map(|f| (f.at, f.message))
+        let looks: Vec<Vec3> = looks.into_iter().filter(|p| ball.value(*p) <= 0.0).collect();
+        Sweep::new(&path(line, closed), &ball, &looks).err().map(|f| (f.at, f.message))
     };
     // The centre of a ring.
     let (at, words) = fault(ring(12, 6.0), true, 8.0, [0.0; 3]).expect("refused");
-    assert!(
-        at == "points" && (words.contains("folds") || words.contains("tears")),
-        "{words}"
-    );
+    assert!(at == "points" && (words.contains("folds") || words.contains("tears")), "{words}");
     // Half-way between two legs.
-    let legs = vec![
-        [0.0, 0.0, 0.0],
-        [0.0, 0.0, 20.0],
-        [6.0, 0.0, 26.0],
-        [12.0, 0.0, 20.0],
-        [12.0, 0.0, 0.0],
-    ];
+    let legs = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 20.0], [6.0, 0.0, 26.0], [12.0, 0.0, 20.0], [12.0, 0.0, 0.0]];
     let (_, words) = fault(legs.clone(), false, 5.0, [6.0, 0.0, 2.0]).expect("refused");
     assert!(words.contains("tears"), "{words}");
     assert!(fault(legs, false, 3.0, [0.0, 0.0, 4.0]).is_none());
@@ -152,25 +119,13 @@ fn folds_tears_and_slips_are_refused() {
         (vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], false),
         (vec![[0.0; 3], [f64::NAN, 0.0, 0.0]], false),
     ] {
-        assert_eq!(
-            fault(line, closed, 1.0, [0.0; 3]).expect("refused").0,
-            "points"
-        );
+        assert_eq!(fault(line, closed, 1.0, [0.0; 3]).expect("refused").0, "points");
     }
     let ball = Sphere::new([0.0; 3], 1.0).expect("ball");
     let mut along = path(wave(), false);
     let first = sub(along.points[1], along.points[0]);
     along.wavelength[1] = 0.0;
-    assert_eq!(
-        Sweep::new(&along, &ball, &[]).expect_err("refused").at,
-        "wavelength"
-    );
-    let straight = Path {
-        normal: Some(first),
-        ..path(vec![[0.0; 3], first], false)
-    };
-    assert_eq!(
-        Sweep::new(&straight, &ball, &[]).expect_err("refused").at,
-        "normal"
-    );
+    assert_eq!(Sweep::new(&along, &ball, &[]).expect_err("refused").at, "wavelength");
+    let straight = Path { normal: Some(first), ..path(vec![[0.0; 3], first], false) };
+    assert_eq!(Sweep::new(&straight, &ball, &[]).expect_err("refused").at, "normal");
 }

@@ -121,15 +121,12 @@ impl Space<'_> {
         let mut kept: Vec<Ball> = Vec::with_capacity(balls.len() / 4);
         let mut at = vec![NONE; self.nearest.len()];
         for ball in balls {
-            let v: [usize; 3] = core::array::from_fn(|a| {
-                (ball.center[a].round().max(0.0) as usize).min(self.grid.shape[a] - 1)
-            });
+            let v: [usize; 3] =
+                core::array::from_fn(|a| (ball.center[a].round().max(0.0) as usize).min(self.grid.shape[a] - 1));
             let slack = (ball.radius * SLACK).min(0.5);
             let covered = self.cube(v).any(|w| {
                 kept.get(at[self.grid.index(w)] as usize).is_some_and(|k| {
-                    let apart = (0..3)
-                        .map(|a| (k.center[a] - ball.center[a]).powi(2))
-                        .sum::<f32>();
+                    let apart = (0..3).map(|a| (k.center[a] - ball.center[a]).powi(2)).sum::<f32>();
                     apart.sqrt() + ball.radius <= k.radius + slack
                 })
             });
@@ -143,10 +140,7 @@ impl Space<'_> {
 
     /// The ball of a voxel, if one ends its growth there.
     fn ball(&self, v: [usize; 3], around: &mut Vec<u32>) -> Option<Ball> {
-        let edge = self
-            .open
-            .filter(|_| self.at_end(v))
-            .map(|room| room(v).max(0.0));
+        let edge = self.open.filter(|_| self.at_end(v)).map(|room| room(v).max(0.0));
         if edge.is_none() && !self.between(v) {
             return None;
         }
@@ -174,9 +168,7 @@ impl Space<'_> {
         let touching = |f: &&Foot| f.distance <= least + WALL && lattice(f.triangle);
         let across = feet.iter().filter(touching).flat_map(|a| {
             let others = feet.iter().filter(touching);
-            others
-                .filter(|b| dot(a.away, b.away) < OPPOSITE)
-                .map(|b| a.distance + b.distance)
+            others.filter(|b| dot(a.away, b.away) < OPPOSITE).map(|b| a.distance + b.distance)
         });
         let wall = across.reduce(f64::min).map(|d| d as f32);
         (least > 0.0 && least.is_finite()).then(|| Ball {
@@ -206,11 +198,7 @@ impl Space<'_> {
             let way = scale(way, 1.0 / rate);
             let to_side = |k: usize| {
                 let off = at[k] - v[k] as f64;
-                if way[k] == 0.0 {
-                    f64::INFINITY
-                } else {
-                    (NEAR - off * way[k].signum()) / way[k].abs()
-                }
+                if way[k] == 0.0 { f64::INFINITY } else { (NEAR - off * way[k].signum()) / way[k].abs() }
             };
             let mut far = to_side(0).min(to_side(1)).min(to_side(2)).max(0.0);
             for f in feet.iter().filter(|f| f.distance > least + TOUCH) {
@@ -243,9 +231,7 @@ impl Space<'_> {
             }
             let m = normals[site.triangle as usize];
             let turn = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
-            let gap = (0..3)
-                .map(|k| (site.point[k] - own.point[k]).powi(2))
-                .sum::<f32>();
+            let gap = (0..3).map(|k| (site.point[k] - own.point[k]).powi(2)).sum::<f32>();
             turn < SMOOTH as f32 || gap > APART
         })
     }
@@ -297,18 +283,14 @@ impl Space<'_> {
         let (xs, ys, zs) = (span(0), span(1), span(2));
         zs.flat_map(move |z| {
             let xs = xs.clone();
-            ys.clone()
-                .flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
+            ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
         })
     }
 
     /// The nearest of these to the voxel.
     fn own(&self, v: [usize; 3], around: &[u32]) -> Option<Foot> {
         let p = v.map(|c| c as f64);
-        around
-            .iter()
-            .map(|t| self.foot(p, *t))
-            .min_by(|a, b| a.distance.total_cmp(&b.distance))
+        around.iter().map(|t| self.foot(p, *t)).min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
     /// The surface about a triangle, as seen from `p`.
@@ -321,13 +303,7 @@ impl Space<'_> {
         let beside = sub(on, below);
         let near = dot(beside, beside) <= BESIDE * BESIDE;
         if near && height >= 0.0 {
-            return Foot {
-                triangle,
-                at: below,
-                away: n,
-                distance: height,
-                plane: true,
-            };
+            return Foot { triangle, at: below, away: n, distance: height, plane: true };
         }
         let off = sub(p, on);
         // A plane that leaves the point on its other side does not stand for the surface: there, the surface turns away.
@@ -344,11 +320,7 @@ impl Space<'_> {
     /// The largest ball that touches `own` and none of the other triangles.
     fn grow(&self, v: [usize; 3], own: Foot, around: &[u32]) -> Grown {
         let p = v.map(|c| c as f64);
-        let mut grown = Grown {
-            foot: own,
-            radius: f64::INFINITY,
-            other: None,
-        };
+        let mut grown = Grown { foot: own, radius: f64::INFINITY, other: None };
         for &t in around.iter().filter(|t| **t != own.triangle) {
             // The place where it touches moves as the ball grows; twice is enough to follow.
             let mut seen = p;
@@ -400,9 +372,7 @@ impl Space<'_> {
                 break;
             }
             // Where the surface is nearer than the ball allows, its end lies behind.
-            let away = self
-                .site(w)
-                .map_or(0.0, |s| apart(w.map(|c| c as f32), s).sqrt());
+            let away = self.site(w).map_or(0.0, |s| apart(w.map(|c| c as f32), s).sqrt());
             if k > 0 && away < own.distance + f64::from(k) - 1.0 {
                 break;
             }
@@ -488,9 +458,7 @@ fn between(directions: impl Iterator<Item = Vec3> + Clone) -> Vec3 {
         return [0.0; 3];
     };
     for _ in 0..24 {
-        let least = directions
-            .clone()
-            .min_by(|a, b| dot(*a, mean).total_cmp(&dot(*b, mean)));
+        let least = directions.clone().min_by(|a, b| dot(*a, mean).total_cmp(&dot(*b, mean)));
         let Some(to) = least.map(|d| sub(d, mean)) else {
             return mean;
         };
@@ -516,11 +484,7 @@ fn closest(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     let on_side = |u: Vec3, v: Vec3| {
         let uv = sub(v, u);
         let square = dot(uv, uv);
-        let t = if square > 0.0 {
-            dot(sub(p, u), uv) / square
-        } else {
-            0.0
-        };
+        let t = if square > 0.0 { dot(sub(p, u), uv) / square } else { 0.0 };
         add(u, scale(uv, t.clamp(0.0, 1.0)))
     };
     let off = |q: &Vec3| dot(sub(p, *q), sub(p, *q));

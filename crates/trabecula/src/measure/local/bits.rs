@@ -16,10 +16,7 @@ pub(super) struct Bits {
 impl Bits {
     pub(super) fn new([nx, ny, nz]: [usize; 3]) -> Bits {
         let stride = nx.div_ceil(WIDE);
-        Bits {
-            words: vec![0; stride * ny * nz],
-            stride,
-        }
+        Bits { words: vec![0; stride * ny * nz], stride }
     }
 
     /// Whether voxel `x` of row `row` is in the set.
@@ -34,11 +31,7 @@ impl Bits {
 
 /// The words of a row that a span of voxels touches, each with the bits of the span.
 pub(super) fn masks(span: Range<usize>) -> impl Iterator<Item = (usize, u64)> {
-    let words = if span.is_empty() {
-        0..0
-    } else {
-        span.start / WIDE..span.end.div_ceil(WIDE)
-    };
+    let words = if span.is_empty() { 0..0 } else { span.start / WIDE..span.end.div_ceil(WIDE) };
     words.map(move |w| {
         let low = span.start.saturating_sub(w * WIDE);
         let high = (span.end - w * WIDE).min(WIDE);
@@ -64,18 +57,8 @@ mod tests {
 
     #[test]
     fn spans_as_words() {
-        for (a, b) in [
-            (0, 0),
-            (0, 1),
-            (3, 64),
-            (3, 65),
-            (63, 64),
-            (64, 130),
-            (10, 200),
-        ] {
-            let found: Vec<usize> = masks(a..b)
-                .flat_map(|(w, m)| ones(m).map(move |i| w * 64 + i))
-                .collect();
+        for (a, b) in [(0, 0), (0, 1), (3, 64), (3, 65), (63, 64), (64, 130), (10, 200)] {
+            let found: Vec<usize> = masks(a..b).flat_map(|(w, m)| ones(m).map(move |i| w * 64 + i)).collect();
             assert_eq!(found, (a..b).collect::<Vec<_>>());
         }
     }

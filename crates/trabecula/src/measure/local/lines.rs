@@ -31,28 +31,14 @@ pub(super) struct Shape<'a> {
 
 impl<'a> Shape<'a> {
     pub(super) fn new(mesh: &'a Mesh, first: Vec3, step: f64) -> Shape<'a> {
-        let vertices: Vec<Vec3> = mesh
-            .vertices
-            .iter()
-            .map(|p| scale(sub(*p, first), 1.0 / step))
-            .collect();
+        let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| scale(sub(*p, first), 1.0 / step)).collect();
         let normals = mesh.triangles.iter().map(|t| {
             let [a, b, c] = t.map(|v| vertices[v as usize]);
             let n = cross(sub(b, a), sub(c, a));
             let length = norm(n);
-            n.map(|x| {
-                if length > 0.0 {
-                    (x / length) as f32
-                } else {
-                    0.0
-                }
-            })
+            n.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 })
         });
-        Shape {
-            normals: normals.collect(),
-            triangles: &mesh.triangles,
-            vertices,
-        }
+        Shape { normals: normals.collect(), triangles: &mesh.triangles, vertices }
     }
 
     pub(super) fn corners(&self, triangle: u32) -> [Vec3; 3] {
@@ -86,11 +72,7 @@ impl Lines {
         }
         let mut next = start.clone();
         let mut hits: Vec<Hit> = Vec::new();
-        hits.resize_with(start[lines], || Hit {
-            at: 0.0,
-            triangle: 0,
-            inwards: false,
-        });
+        hits.resize_with(start[lines], || Hit { at: 0.0, triangle: 0, inwards: false });
         each_hit(shape, size, axis, |line, hit| {
             hits[next[line]] = hit;
             next[line] += 1;
@@ -111,10 +93,7 @@ impl Lines {
                     point[axis] = hit.at;
                     point[lo] = (line % size[lo]) as f32;
                     point[hi] = (line / size[lo]) as f32;
-                    sites.push(Site {
-                        point,
-                        triangle: hit.triangle,
-                    });
+                    sites.push(Site { point, triangle: hit.triangle });
                 }
             }
             kept.push(sites.len());
@@ -153,25 +132,18 @@ fn each_hit(shape: &Shape, size: [usize; 3], axis: usize, mut found: impl FnMut(
             continue;
         }
         let span = |k: usize, end: usize| {
-            let (low, high) = (
-                p[k].min(q[k]).min(r[k]).ceil().max(0.0),
-                p[k].max(q[k]).max(r[k]).floor().min(end as f64 - 1.0),
-            );
+            let (low, high) =
+                (p[k].min(q[k]).min(r[k]).ceil().max(0.0), p[k].max(q[k]).max(r[k]).floor().min(end as f64 - 1.0));
             // Casts saturate: an empty span stays empty.
             low as usize..(high + 1.0).max(0.0) as usize
         };
         for v in span(1, size[hi]) {
             for u in span(0, size[lo]) {
                 let line = [u as f64, v as f64];
-                let passed = side(p, q, line) == turn
-                    && side(q, r, line) == turn
-                    && side(r, p, line) == turn;
+                let passed = side(p, q, line) == turn && side(q, r, line) == turn && side(r, p, line) == turn;
                 if passed {
-                    let hit = Hit {
-                        at: height(corners, [p, q, r], line, axis) as f32,
-                        triangle,
-                        inwards: turn * hand < 0,
-                    };
+                    let hit =
+                        Hit { at: height(corners, [p, q, r], line, axis) as f32, triangle, inwards: turn * hand < 0 };
                     found(v * size[lo] + u, hit);
                 }
             }
@@ -191,9 +163,7 @@ fn side(p: [f64; 2], q: [f64; 2], line: [f64; 2]) -> i8 {
 
 /// Where along the axis the line meets the plane of the triangle, within the triangle's extent.
 fn height(corners: [Vec3; 3], [p, q, r]: [[f64; 2]; 3], line: [f64; 2], axis: usize) -> f64 {
-    let area = |a: [f64; 2], b: [f64; 2]| {
-        (a[0] - line[0]) * (b[1] - line[1]) - (a[1] - line[1]) * (b[0] - line[0])
-    };
+    let area = |a: [f64; 2], b: [f64; 2]| (a[0] - line[0]) * (b[1] - line[1]) - (a[1] - line[1]) * (b[0] - line[0]);
     let weights = [area(q, r), area(r, p), area(p, q)];
     let whole: f64 = weights.iter().sum();
     let z = corners.map(|c| c[axis]);
@@ -221,9 +191,7 @@ mod tests {
             all.map(|line| {
                 let on = &sites[lines.of(line)];
                 assert_eq!(on.len() % 2, 0);
-                on.chunks(2)
-                    .map(|s| f64::from(s[1].point[axis] - s[0].point[axis]))
-                    .sum::<f64>()
+                on.chunks(2).map(|s| f64::from(s[1].point[axis] - s[0].point[axis])).sum::<f64>()
             })
             .sum()
         })

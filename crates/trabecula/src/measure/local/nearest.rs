@@ -26,116 +26,94 @@ pub(super) fn nearest(
 
     // In layers of z.
     let mut flat = vec![NONE; all];
-    flat.par_chunks_mut(nx * ny).enumerate().for_each_init(
-        Envelope::default,
-        |envelope, (z, layer)| {
-            if !watch.tick() {
-                return;
-            }
-            for (y, row) in layer.chunks_mut(nx).enumerate() {
-                along(&lines[0], z * ny + y, sites, 0, row);
-            }
-            for x in 0..nx {
-                envelope.clear();
-                envelope.add_column(
-                    ny,
-                    |y| layer[y * nx + x],
-                    |p| square(p[0] - x as f32),
-                    sites,
-                );
-                envelope.each(ny, |y, id| layer[y * nx + x] = id);
-            }
-            // The y lines of this layer, spread along x, and the nearer of the two kept.
-            let mut other = vec![NONE; nx * ny];
-            let mut column = vec![NONE; ny];
-            for x in 0..nx {
-                along(&lines[1], z * nx + x, sites, 1, &mut column);
-                for y in 0..ny {
-                    other[y * nx + x] = column[y];
-                }
-            }
+    flat.par_chunks_mut(nx * ny).enumerate().for_each_init(Envelope::default, |envelope, (z, layer)| {
+        if !watch.tick() {
+            return;
+        }
+        for (y, row) in layer.chunks_mut(nx).enumerate() {
+            along(&lines[0], z * ny + y, sites, 0, row);
+        }
+        for x in 0..nx {
+            envelope.clear();
+            envelope.add_column(ny, |y| layer[y * nx + x], |p| square(p[0] - x as f32), sites);
+            envelope.each(ny, |y, id| layer[y * nx + x] = id);
+        }
+        // The y lines of this layer, spread along x, and the nearer of the two kept.
+        let mut other = vec![NONE; nx * ny];
+        let mut column = vec![NONE; ny];
+        for x in 0..nx {
+            along(&lines[1], z * nx + x, sites, 1, &mut column);
             for y in 0..ny {
-                let row = &mut layer[y * nx..(y + 1) * nx];
-                envelope.clear();
-                envelope.add_column(
-                    nx,
-                    |x| other[y * nx + x],
-                    |p| square(p[1] - y as f32),
-                    sites,
-                );
-                envelope.each(nx, |x, id| {
-                    let here = [x as f32, y as f32, z as f32];
-                    row[x] = nearer(sites, here, row[x], id);
-                });
+                other[y * nx + x] = column[y];
             }
-        },
-    );
+        }
+        for y in 0..ny {
+            let row = &mut layer[y * nx..(y + 1) * nx];
+            envelope.clear();
+            envelope.add_column(nx, |x| other[y * nx + x], |p| square(p[1] - y as f32), sites);
+            envelope.each(nx, |x, id| {
+                let here = [x as f32, y as f32, z as f32];
+                row[x] = nearer(sites, here, row[x], id);
+            });
+        }
+    });
     watch.check()?;
 
     // Spread along z, into layers of y.
     let mut spread = vec![NONE; all];
-    spread.par_chunks_mut(nx * nz).enumerate().for_each_init(
-        Envelope::default,
-        |envelope, (y, layer)| {
-            if !watch.tick() {
-                return;
-            }
-            for x in 0..nx {
-                let off = |p: [f32; 3]| square(p[0] - x as f32) + square(p[1] - y as f32);
-                envelope.clear();
-                envelope.add_column(nz, |z| flat[(z * ny + y) * nx + x], off, sites);
-                envelope.each(nz, |z, id| layer[z * nx + x] = id);
-            }
-        },
-    );
+    spread.par_chunks_mut(nx * nz).enumerate().for_each_init(Envelope::default, |envelope, (y, layer)| {
+        if !watch.tick() {
+            return;
+        }
+        for x in 0..nx {
+            let off = |p: [f32; 3]| square(p[0] - x as f32) + square(p[1] - y as f32);
+            envelope.clear();
+            envelope.add_column(nz, |z| flat[(z * ny + y) * nx + x], off, sites);
+            envelope.each(nz, |z, id| layer[z * nx + x] = id);
+        }
+    });
     drop(flat);
     watch.check()?;
 
     // The z lines, in layers of y.
     let mut upright = vec![NONE; all];
-    upright.par_chunks_mut(nx * nz).enumerate().for_each_init(
-        Envelope::default,
-        |envelope, (y, layer)| {
-            if !watch.tick() {
-                return;
+    upright.par_chunks_mut(nx * nz).enumerate().for_each_init(Envelope::default, |envelope, (y, layer)| {
+        if !watch.tick() {
+            return;
+        }
+        let mut column = vec![NONE; nz];
+        for x in 0..nx {
+            along(&lines[2], y * nx + x, sites, 2, &mut column);
+            for z in 0..nz {
+                layer[z * nx + x] = column[z];
             }
-            let mut column = vec![NONE; nz];
-            for x in 0..nx {
-                along(&lines[2], y * nx + x, sites, 2, &mut column);
-                for z in 0..nz {
-                    layer[z * nx + x] = column[z];
-                }
-            }
-            let mut row = vec![NONE; nx];
-            for (z, out) in layer.chunks_mut(nx).enumerate() {
-                row.copy_from_slice(out);
-                envelope.clear();
-                envelope.add_column(nx, |x| row[x], |p| square(p[2] - z as f32), sites);
-                envelope.each(nx, |x, id| out[x] = id);
-            }
-        },
-    );
+        }
+        let mut row = vec![NONE; nx];
+        for (z, out) in layer.chunks_mut(nx).enumerate() {
+            row.copy_from_slice(out);
+            envelope.clear();
+            envelope.add_column(nx, |x| row[x], |p| square(p[2] - z as f32), sites);
+            envelope.each(nx, |x, id| out[x] = id);
+        }
+    });
     watch.check()?;
 
     // Spread along y, and the nearer of the two kept.
     let mut found = vec![NONE; all];
-    found.par_chunks_mut(nx * ny).enumerate().for_each_init(
-        Envelope::default,
-        |envelope, (z, layer)| {
-            if !watch.tick() {
-                return;
-            }
-            for x in 0..nx {
-                let off = |p: [f32; 3]| square(p[0] - x as f32) + square(p[2] - z as f32);
-                envelope.clear();
-                envelope.add_column(ny, |y| upright[(y * nz + z) * nx + x], off, sites);
-                envelope.each(ny, |y, id| {
-                    let here = [x as f32, y as f32, z as f32];
-                    layer[y * nx + x] = nearer(sites, here, spread[(y * nz + z) * nx + x], id);
-                });
-            }
-        },
-    );
+    found.par_chunks_mut(nx * ny).enumerate().for_each_init(Envelope::default, |envelope, (z, layer)| {
+        if !watch.tick() {
+            return;
+        }
+        for x in 0..nx {
+            let off = |p: [f32; 3]| square(p[0] - x as f32) + square(p[2] - z as f32);
+            envelope.clear();
+            envelope.add_column(ny, |y| upright[(y * nz + z) * nx + x], off, sites);
+            envelope.each(ny, |y, id| {
+                let here = [x as f32, y as f32, z as f32];
+                layer[y * nx + x] = nearer(sites, here, spread[(y * nz + z) * nx + x], id);
+            });
+        }
+    });
     watch.check()?;
     Ok(found)
 }
@@ -252,15 +230,9 @@ mod tests {
         let found = nearest(size, &sites, &lines, &Watch::new(&Silent, 1)).expect("found");
         for (i, id) in found.iter().enumerate() {
             let here = [i % 22, i / 22 % 19, i / (22 * 19)].map(|c| c as f32);
-            let least = sites
-                .iter()
-                .map(|s| apart(here, s))
-                .fold(f64::INFINITY, f64::min);
+            let least = sites.iter().map(|s| apart(here, s)).fold(f64::INFINITY, f64::min);
             let is = apart(here, &sites[*id as usize]);
-            assert!(
-                (is - least).abs() < 1e-5 * (1.0 + least),
-                "{here:?}: {is} {least}"
-            );
+            assert!((is - least).abs() < 1e-5 * (1.0 + least), "{here:?}: {is} {least}");
         }
     }
 }

@@ -33,14 +33,8 @@ impl Laid {
         if self.kinds.len() > LOOKED {
             return Ok(None);
         }
-        let each = (0..self.kinds.len())
-            .into_par_iter()
-            .map(|m| self.about(m))
-            .collect::<Result<Vec<_>, Fault>>()?;
-        Ok(Some(Collisions {
-            count: each.iter().map(|e| e.count).sum(),
-            at: each.iter().find_map(|e| e.at),
-        }))
+        let each = (0..self.kinds.len()).into_par_iter().map(|m| self.about(m)).collect::<Result<Vec<_>, Fault>>()?;
+        Ok(Some(Collisions { count: each.iter().map(|e| e.count).sum(), at: each.iter().find_map(|e| e.at) }))
     }
 
     /// Those of a hub of one kind.
@@ -55,10 +49,7 @@ impl Laid {
         });
         let (there, aside) = (self.pattern.at(index), self.kinds[kind].aside);
         let held = self.quadors.hold(self.kinds[kind].hub);
-        let held = Aabb {
-            min: sub(held.min, aside),
-            max: sub(held.max, aside),
-        };
+        let held = Aabb { min: sub(held.min, aside), max: sub(held.max, aside) };
         let mut near = vec![(node, index)];
         self.places(&super::carried(&there, &held), &mut |at, _, _, _| {
             let at = at.map(|v| v as u32);
@@ -71,14 +62,8 @@ impl Laid {
         let mut cluster = Cluster::new(&self.pattern);
         for (n, at) in near {
             cluster.add(n, at, |n, at| {
-                let (seen, h) = (
-                    home.after(&self.pattern.at(at)),
-                    self.pattern.nodes[n as usize],
-                );
-                Hub {
-                    center: seen.apply(h.center),
-                    radius: seen.scale * h.radius,
-                }
+                let (seen, h) = (home.after(&self.pattern.at(at)), self.pattern.nodes[n as usize]);
+                Hub { center: seen.apply(h.center), radius: seen.scale * h.radius }
             });
         }
         let graph = cluster.graph;
@@ -87,10 +72,7 @@ impl Laid {
         let own = |b: u32| graph.beams[b as usize].ends.contains(&0);
         let mut own = found.iter().filter(|c| c.beams.iter().any(|b| own(*b)));
         let first = own.next();
-        Ok(Collisions {
-            count: own.count() + usize::from(first.is_some()),
-            at: first.map(|c| there.apply(c.at)),
-        })
+        Ok(Collisions { count: own.count() + usize::from(first.is_some()), at: first.map(|c| there.apply(c.at)) })
     }
 }
 
@@ -105,12 +87,7 @@ struct Cluster<'a> {
 
 impl<'a> Cluster<'a> {
     fn new(pattern: &'a Pattern) -> Self {
-        Cluster {
-            pattern,
-            graph: Graph::default(),
-            names: HashMap::new(),
-            beams: HashSet::new(),
-        }
+        Cluster { pattern, graph: Graph::default(), names: HashMap::new(), beams: HashSet::new() }
     }
 
     fn name(&mut self, n: u32, at: [u32; 3], ball: &impl Fn(u32, [u32; 3]) -> Hub) -> u32 {
@@ -129,8 +106,7 @@ impl<'a> Cluster<'a> {
                     continue;
                 }
                 let sign = if end == 0 { 1 } else { -1 };
-                let other: [i64; 3] =
-                    core::array::from_fn(|a| i64::from(at[a]) + i64::from(sign * s.by[a]));
+                let other: [i64; 3] = core::array::from_fn(|a| i64::from(at[a]) + i64::from(sign * s.by[a]));
                 if (0..3).any(|a| !(0..i64::from(self.pattern.steps[a].1)).contains(&other[a])) {
                     continue;
                 }
@@ -144,10 +120,7 @@ impl<'a> Cluster<'a> {
                 // A beam is as large as its first end is.
                 let node = self.pattern.nodes[s.ends[0] as usize].radius;
                 let grown = self.graph.hubs[ends[0] as usize].radius / node;
-                self.graph.beams.push(Beam {
-                    ends,
-                    profile: Pattern::grown(s.profile, grown),
-                });
+                self.graph.beams.push(Beam { ends, profile: Pattern::grown(s.profile, grown) });
             }
         }
     }

@@ -17,10 +17,7 @@ impl Row {
         for n in (1..leaves).rev() {
             tree[n] = tree[2 * n].union(tree[2 * n + 1]);
         }
-        Row {
-            count: boxes.len(),
-            tree,
-        }
+        Row { count: boxes.len(), tree }
     }
 
     pub fn all(&self) -> Aabb {

@@ -6,22 +6,10 @@ fn places() -> impl Iterator<Item = Vec3> {
 }
 
 fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
-    let strut = |by| Strut {
-        ends: [0, 0],
-        by,
-        profile: Profile::Mid(0.2),
-    };
+    let strut = |by| Strut { ends: [0, 0], by, profile: Profile::Mid(0.2) };
     Pattern {
-        nodes: vec![Hub {
-            center,
-            radius: 0.25,
-        }],
-        struts: vec![
-            strut([1, 0, 0]),
-            strut([0, 1, 0]),
-            strut([0, 0, 1]),
-            strut([1, -1, 0]),
-        ],
+        nodes: vec![Hub { center, radius: 0.25 }],
+        struts: vec![strut([1, 0, 0]), strut([0, 1, 0]), strut([0, 0, 1]), strut([1, -1, 0])],
         steps,
     }
 }
@@ -32,37 +20,14 @@ fn samples() -> [Pattern; 4] {
     let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
     let shrink = Similarity::new(0.9, [0.0, 0.0, 20.0], [0.0; 3], [0.0; 3]);
     [
-        pattern(
-            [
-                (by([1.5, 0.0, 0.0]), 6),
-                (by([0.3, 1.4, 0.0]), 5),
-                (by([0.0, 0.2, 1.6]), 4),
-            ],
-            [0.0; 3],
-        ),
+        pattern([(by([1.5, 0.0, 0.0]), 6), (by([0.3, 1.4, 0.0]), 5), (by([0.0, 0.2, 1.6]), 4)], [0.0; 3]),
+        pattern([(by([1.5, 0.0, 0.0]), 4), (turn(24.0), 12), (by([0.0, 0.0, 1.6]), 5)], [4.0, 0.0, 0.0]),
+        pattern([(turn(20.0), 9), (shrink, 6), (by([0.0, 0.0, 1.6]), 3)], [6.0, 0.0, 0.0]),
         pattern(
             [
                 (by([1.5, 0.0, 0.0]), 4),
-                (turn(24.0), 12),
-                (by([0.0, 0.0, 1.6]), 5),
-            ],
-            [4.0, 0.0, 0.0],
-        ),
-        pattern(
-            [(turn(20.0), 9), (shrink, 6), (by([0.0, 0.0, 1.6]), 3)],
-            [6.0, 0.0, 0.0],
-        ),
-        pattern(
-            [
-                (by([1.5, 0.0, 0.0]), 4),
-                (
-                    Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]),
-                    5,
-                ),
-                (
-                    Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]),
-                    4,
-                ),
+                (Similarity::new(0.95, [10.0, 0.0, 15.0], [1.0; 3], [0.0, 1.4, 0.0]), 5),
+                (Similarity::new(1.0, [0.0, 9.0, 0.0], [0.0; 3], [0.0, 0.2, 1.6]), 4),
             ],
             [3.0, 0.0, 0.0],
         ),
@@ -75,10 +40,7 @@ fn a_pattern_is_what_it_is_written_out() {
         for fillet in [Fillet::None, Fillet::Tau(0.8)] {
             let graph = pattern.expanded().expect("small");
             let (hubs, beams) = pattern.counts();
-            assert_eq!(
-                (graph.hubs.len() as f64, graph.beams.len() as f64),
-                (hubs, beams)
-            );
+            assert_eq!((graph.hubs.len() as f64, graph.beams.len() as f64), (hubs, beams));
             let whole = Quadors::new(&graph, fillet).expect("quadors");
             let laid = Laid::new(pattern.clone(), fillet).expect("laid");
             let b = whole.bounds();
@@ -112,10 +74,7 @@ fn bounds_hold_the_values() {
             for t in places().take(30) {
                 let q: Vec3 = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
                 let v = laid.value(q);
-                assert!(
-                    range.lo - 1e-12 <= v && v <= range.hi + 1e-12,
-                    "{v} {range:?}"
-                );
+                assert!(range.lo - 1e-12 <= v && v <= range.hi + 1e-12, "{v} {range:?}");
             }
         }
     }
@@ -124,11 +83,7 @@ fn bounds_hold_the_values() {
 #[test]
 fn different_hubs_are_few_where_steps_commute() {
     let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
-    let steps = [
-        (by([1.5, 0.0, 0.0]), 1000),
-        (by([0.0, 1.5, 0.0]), 1000),
-        (by([0.0, 0.0, 1.5]), 1000),
-    ];
+    let steps = [(by([1.5, 0.0, 0.0]), 1000), (by([0.0, 1.5, 0.0]), 1000), (by([0.0, 0.0, 1.5]), 1000)];
     let laid = Laid::new(pattern(steps, [0.0; 3]), Fillet::None).expect("laid");
     let (_, kinds) = laid.kinds();
     assert_eq!(kinds.len(), 27);
@@ -142,24 +97,13 @@ fn different_hubs_are_few_where_steps_commute() {
 fn beams_that_run_into_each_other_are_found() {
     let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
     let crossing = |apart: f64, r: f64| {
-        let strut = |ends, by| Strut {
-            ends,
-            by,
-            profile: Profile::Mid(r),
-        };
-        let node = |z| Hub {
-            center: [0.0, 0.0, z],
-            radius: r,
-        };
+        let strut = |ends, by| Strut { ends, by, profile: Profile::Mid(r) };
+        let node = |z| Hub { center: [0.0, 0.0, z], radius: r };
         // Both diagonals of a square, one above the other.
         Pattern {
             nodes: vec![node(0.0), node(apart)],
             struts: vec![strut([0, 0], [1, 1, 0]), strut([1, 1], [1, -1, 0])],
-            steps: [
-                (by([3.0, 0.0, 0.0]), 40),
-                (by([0.0, 3.0, 0.0]), 30),
-                (by([0.0, 0.0, 4.0]), 1),
-            ],
+            steps: [(by([3.0, 0.0, 0.0]), 40), (by([0.0, 3.0, 0.0]), 30), (by([0.0, 0.0, 4.0]), 1)],
         }
     };
     let laid = |p: Pattern| Laid::new(p, Fillet::None).expect("a pattern");

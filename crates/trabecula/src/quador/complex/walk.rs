@@ -37,10 +37,7 @@ pub(super) struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     pub(super) fn new(hub: &'a Hub<'a>, seed: u64) -> Walk<'a> {
-        let shifted = |(i, s): (usize, &Stub)| Affine {
-            a: s.g.a,
-            b: s.g.b + SHIFT * shift(i, seed) * hub.radius,
-        };
+        let shifted = |(i, s): (usize, &Stub)| Affine { a: s.g.a, b: s.g.b + SHIFT * shift(i, seed) * hub.radius };
         Walk {
             hub,
             g: hub.stubs.iter().enumerate().map(shifted).collect(),
@@ -60,13 +57,7 @@ impl<'a> Walk<'a> {
         if !self.hub.sharp {
             // σ is linear in G, and so is its shift.
             let (mut shift, mut t) = (0.0, 1.0);
-            for (i, s) in self
-                .hub
-                .stubs
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| label >> i & 1 == 1)
-            {
+            for (i, s) in self.hub.stubs.iter().enumerate().filter(|(i, _)| label >> i & 1 == 1) {
                 shift += s.share * s.weight * (self.g[i].b - s.g.b);
                 t += s.share * s.share * s.weight;
             }
@@ -82,11 +73,7 @@ impl<'a> Walk<'a> {
     }
 
     fn sharp_g(&self, label: u64) -> Affine {
-        if label == 0 {
-            Affine::default()
-        } else {
-            self.g[label.trailing_zeros() as usize]
-        }
+        if label == 0 { Affine::default() } else { self.g[label.trailing_zeros() as usize] }
     }
 
     /// The plane between two labels, positive towards the greater.
@@ -139,32 +126,16 @@ impl<'a> Walk<'a> {
         let [p, q, r, s] = around;
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
         let all = if self.hub.sharp {
-            [
-                (order(p, q), r),
-                (order(q, r), p),
-                (order(p, r), q),
-                ([0, 0], 0),
-            ]
+            [(order(p, q), r), (order(q, r), p), (order(p, r), q), ([0, 0], 0)]
         } else {
-            [
-                (order(p, q), p ^ s),
-                (order(q, r), p ^ q),
-                (order(s, r), p ^ q),
-                (order(p, s), p ^ q),
-            ]
+            [(order(p, q), p ^ s), (order(q, r), p ^ q), (order(s, r), p ^ q), (order(p, s), p ^ q)]
         };
         // Of a filleted vertex, seams that differ by j end by m and the other way round.
         let (j, m) = (p ^ q, p ^ s);
         let sharp = self.hub.sharp;
         all.into_iter()
             .filter(|(l, _)| l[0] != l[1])
-            .map(move |(l, e)| {
-                if sharp {
-                    (l, e)
-                } else {
-                    (l, if l[0] ^ l[1] == j { m } else { j })
-                }
-            })
+            .map(move |(l, e)| if sharp { (l, e) } else { (l, if l[0] ^ l[1] == j { m } else { j }) })
     }
 
     /// Follows the seam between labels from a place on it along a direction: the conic up to its end, and the event there.
@@ -199,11 +170,7 @@ impl<'a> Walk<'a> {
 
     /// The vertex with these labels nearest to a place, made if it is new.
     fn vertex(&mut self, around: [u64; 4], near: Vec3) -> Option<u32> {
-        let (j, m) = if self.hub.sharp {
-            (around[1], around[2])
-        } else {
-            (around[1], around[3])
-        };
+        let (j, m) = if self.hub.sharp { (around[1], around[2]) } else { (around[1], around[3]) };
         let base = around[0];
         let quadric = self.piece(base).0;
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
@@ -212,10 +179,7 @@ impl<'a> Walk<'a> {
         for _ in 0..3 {
             let slope = scale(quadric.half_slope(at), 2.0);
             let rows = [planes[0].a, planes[1].a, slope];
-            let step = apply(
-                &inverse(&rows),
-                [planes[0].at(at), planes[1].at(at), quadric.at(at)],
-            );
+            let step = apply(&inverse(&rows), [planes[0].at(at), planes[1].at(at), quadric.at(at)]);
             if !step.iter().all(|v| v.is_finite()) {
                 return None;
             }
@@ -242,29 +206,12 @@ impl<'a> Walk<'a> {
         let plane = self.plane(labels);
         let outward = self.piece(labels[0]).0.half_slope(conic.v);
         let left = dot(plane.a, cross(outward, conic.e[0]));
-        let sides = if left > 0.0 {
-            [labels[1], labels[0]]
-        } else {
-            labels
-        };
+        let sides = if left > 0.0 { [labels[1], labels[0]] } else { labels };
         let id = self.arcs.len() as u32;
-        self.arcs.push(Arc {
-            ends,
-            sides,
-            conic,
-            plane,
-        });
-        let distinct = if ends[0] == ends[1] {
-            &ends[..1]
-        } else {
-            &ends
-        };
+        self.arcs.push(Arc { ends, sides, conic, plane });
+        let distinct = if ends[0] == ends[1] { &ends[..1] } else { &ends };
         for &v in distinct {
-            if let Some(slot) = self
-                .at
-                .get_mut(v as usize)
-                .and_then(|s| s.iter_mut().find(|s| **s == NONE))
-            {
+            if let Some(slot) = self.at.get_mut(v as usize).and_then(|s| s.iter_mut().find(|s| **s == NONE)) {
                 *slot = id;
             }
         }
@@ -276,14 +223,7 @@ impl<'a> Walk<'a> {
         let s = self.hub.stubs[i];
         let own = 1u64 << i;
         let (_, sigma) = self.piece(own);
-        let side = unit(cross(
-            s.axis,
-            if s.axis[0].abs() < 0.6 {
-                [1.0, 0.0, 0.0]
-            } else {
-                [0.0, 1.0, 0.0]
-            },
-        ));
+        let side = unit(cross(s.axis, if s.axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
         // An odd azimuth, away from what symmetric hubs have in common.
         let (sin, cos) = 0.737_f64.sin_cos();
         let side = add(scale(side, cos), scale(cross(s.axis, side), sin));
@@ -294,33 +234,17 @@ impl<'a> Walk<'a> {
             if m == i {
                 continue;
             }
-            let f = if self.hub.sharp {
-                self.g[m].plus(-1.0, &self.g[i])
-            } else {
-                self.toggle(m, &sigma)
-            };
+            let f = if self.hub.sharp { self.g[m].plus(-1.0, &self.g[i]) } else { self.toggle(m, &sigma) };
             // p z + f₀ + r ρ(z) = 0.
             let (p, r) = (dot(f.a, s.axis), dot(f.a, side));
-            let (two, one, none) = (
-                p * p - r * r * a,
-                2.0 * p * f.b - r * r * b,
-                f.b * f.b - r * r * c,
-            );
+            let (two, one, none) = (p * p - r * r * a, 2.0 * p * f.b - r * r * b, f.b * f.b - r * r * c);
             let root = (one * one - 4.0 * two * none).max(0.0).sqrt();
             let q = -(one + root.copysign(one)) / 2.0;
             for z in [q / two, none / q] {
-                let good =
-                    z > best.0 && z < s.split && f.at(place(z)).abs() < 1e-7 * self.hub.radius;
+                let good = z > best.0 && z < s.split && f.at(place(z)).abs() < 1e-7 * self.hub.radius;
                 if good {
                     let other = 1u64 << m;
-                    best = (
-                        z,
-                        if self.hub.sharp {
-                            [own.min(other), own.max(other)]
-                        } else {
-                            [own, own | other]
-                        },
-                    );
+                    best = (z, if self.hub.sharp { [own.min(other), own.max(other)] } else { [own, own | other] });
                 }
             }
         }
@@ -352,10 +276,7 @@ impl<'a> Walk<'a> {
                     let v = self.vertices.len() as u32;
                     self.vertices.push(Vertex {
                         at: from,
-                        key: Key {
-                            around: [labels[0], labels[1], u64::MAX, i as u64],
-                            far: false,
-                        },
+                        key: Key { around: [labels[0], labels[1], u64::MAX, i as u64], far: false },
                     });
                     self.at.push([NONE; 4]);
                     self.push([v, v], labels, conic);
@@ -430,11 +351,9 @@ impl<'a> Walk<'a> {
                     if a.ends[0] == a.ends[1] {
                         break;
                     }
-                    let next = self.at[to as usize].iter().find(|&&n| {
-                        n != NONE
-                            && n as usize != arc
-                            && self.arcs[n as usize].sides.contains(&label)
-                    })?;
+                    let next = self.at[to as usize]
+                        .iter()
+                        .find(|&&n| n != NONE && n as usize != arc && self.arcs[n as usize].sides.contains(&label))?;
                     arc = *next as usize;
                     let b = &self.arcs[arc];
                     left = usize::from(b.ends[0] != to);
@@ -445,34 +364,21 @@ impl<'a> Walk<'a> {
                         break;
                     }
                 }
-                let closed =
-                    loops.len() == 1 && self.arcs[first].ends[0] == self.arcs[first].ends[1];
+                let closed = loops.len() == 1 && self.arcs[first].ends[0] == self.arcs[first].ends[1];
                 // Loops without a vertex bound one ring together.
-                let ring = |f: &&mut Face| {
-                    f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1))
-                };
+                let ring = |f: &&mut Face| f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1));
                 if let Some(f) = faces.iter_mut().find(ring) {
                     f.loops.push(loops);
                     continue;
                 }
                 let rim = (label.count_ones() == 1).then(|| label.trailing_zeros());
                 let quadric = self.piece(label).0;
-                faces.push(Face {
-                    label,
-                    quadric,
-                    loops: vec![loops],
-                    rim,
-                });
+                faces.push(Face { label, quadric, loops: vec![loops], rim });
             }
         }
         if self.hub.stubs.is_empty() {
             let quadric = self.piece(0).0;
-            faces.push(Face {
-                label: 0,
-                quadric,
-                loops: Vec::new(),
-                rim: None,
-            });
+            faces.push(Face { label: 0, quadric, loops: Vec::new(), rim: None });
         }
         // Each stub shows, once.
         for i in 0..self.hub.stubs.len() {
@@ -480,11 +386,7 @@ impl<'a> Walk<'a> {
                 return None;
             }
         }
-        let complex = Complex {
-            vertices: self.vertices,
-            arcs: self.arcs,
-            faces,
-        };
+        let complex = Complex { vertices: self.vertices, arcs: self.arcs, faces };
         if complex.euler() != 2 {
             return None;
         }

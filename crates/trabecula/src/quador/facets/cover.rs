@@ -26,13 +26,9 @@ impl Facets<'_> {
             let middle = self.complex.pole(face);
             let place = |i: u32| self.points[i as usize];
             let number = self.points.len() as u32;
-            let fan: Vec<[u32; 3]> = (0..alone.len())
-                .map(|k| [number, alone[k], alone[(k + 1) % alone.len()]])
-                .collect();
-            if fan
-                .iter()
-                .all(|t| turn(middle, place(t[1]), place(t[2])) > 0.0)
-            {
+            let fan: Vec<[u32; 3]> =
+                (0..alone.len()).map(|k| [number, alone[k], alone[(k + 1) % alone.len()]]).collect();
+            if fan.iter().all(|t| turn(middle, place(t[1]), place(t[2])) > 0.0) {
                 self.points.push(middle);
                 return Some(fan);
             }
@@ -45,12 +41,7 @@ impl Facets<'_> {
         let mut outline = loops.pop().unwrap_or_default();
         while !loops.is_empty() {
             // Rings are opened along the shortest bridge.
-            let gap = |a: u32, b: u32| {
-                norm(sub(
-                    unit(self.points[a as usize]),
-                    unit(self.points[b as usize]),
-                ))
-            };
+            let gap = |a: u32, b: u32| norm(sub(unit(self.points[a as usize]), unit(self.points[b as usize])));
             let mut best = (f64::INFINITY, 0, 0, 0);
             for (l, inner) in loops.iter().enumerate() {
                 for (i, &a) in outline.iter().enumerate() {
@@ -63,12 +54,7 @@ impl Facets<'_> {
             }
             let (_, l, i, j) = best;
             let inner = loops.swap_remove(l);
-            let bridge: Vec<u32> = inner[j..]
-                .iter()
-                .chain(&inner[..=j])
-                .chain(&outline[i..=i])
-                .copied()
-                .collect();
+            let bridge: Vec<u32> = inner[j..].iter().chain(&inner[..=j]).chain(&outline[i..=i]).copied().collect();
             outline.splice(i + 1..i + 1, bridge);
         }
         self.ears(outline, face)
@@ -85,11 +71,7 @@ impl Facets<'_> {
         let corner = |k: u32| {
             let [x, y, z] = [k & 1, k >> 1 & 1, k >> 2].map(|s| 3 * s);
             let t = [n + x, n + 1 + y, n + 2 + z];
-            if k.count_ones().is_multiple_of(2) {
-                t
-            } else {
-                [t[0], t[2], t[1]]
-            }
+            if k.count_ones().is_multiple_of(2) { t } else { [t[0], t[2], t[1]] }
         };
         (0..8).map(corner).collect()
     }
@@ -109,12 +91,9 @@ impl Facets<'_> {
             let lies = (lies(face, [p, q, r]) - 0.2).max(1e-4);
             shape * lies / (1.0 + 8.0 * off).powi(2)
         };
-        let ear =
-            |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
+        let ear = |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
         let mut out = Vec::with_capacity(outline.len());
-        let mut worths: Vec<f64> = (0..outline.len())
-            .map(|i| worth(ear(&outline, i)))
-            .collect();
+        let mut worths: Vec<f64> = (0..outline.len()).map(|i| worth(ear(&outline, i))).collect();
         while outline.len() > 3 {
             let n = outline.len();
             let mut order: Vec<usize> = (0..n).filter(|&i| worths[i] > 0.0).collect();
@@ -169,9 +148,7 @@ pub(super) fn strip(axis: Vec3, points: &[Vec3], inner: &[u32], ring: &[u32]) ->
         let (l, h) = (at(&low, i).1, at(&high, j).1);
         let ((next_low, l2), (next_high, h2)) = (at(&low, i + 1), at(&high, j + 1));
         let (low_now, high_now) = (at(&low, i).0, at(&high, j).0);
-        if j >= high.len()
-            || i < low.len() && (next_low - high_now).abs() < (next_high - low_now).abs()
-        {
+        if j >= high.len() || i < low.len() && (next_low - high_now).abs() < (next_high - low_now).abs() {
             out.push([l, l2, h]);
             i += 1;
         } else {

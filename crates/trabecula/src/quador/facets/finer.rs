@@ -34,10 +34,7 @@ impl Facets<'_> {
     /// How far a side is from the surface: at its quarters.
     fn side_off(&self, a: u32, b: u32) -> f64 {
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
-        [0.25, 0.5, 0.75]
-            .map(|s| self.off(add(scale(p, 1.0 - s), scale(q, s))))
-            .into_iter()
-            .fold(0.0, f64::max)
+        [0.25, 0.5, 0.75].map(|s| self.off(add(scale(p, 1.0 - s), scale(q, s)))).into_iter().fold(0.0, f64::max)
     }
 
     /// How far a triangle is from the surface in its middle.
@@ -155,9 +152,7 @@ impl Facets<'_> {
         let [p, q, r, s] = [a, b, c, d].map(|i| self.points[i as usize]);
         let sound = |x: Vec3| {
             // Not so near to turned that rounding to single precision could turn it.
-            let good = |u: Vec3, v: Vec3, w: Vec3| {
-                turn(u, v, w) > 1e-4 * norm(u) * norm(cross(sub(v, u), sub(w, u)))
-            };
+            let good = |u: Vec3, v: Vec3, w: Vec3| turn(u, v, w) > 1e-4 * norm(u) * norm(cross(sub(v, u), sub(w, u)));
             good(p, x, r) && good(x, q, r) && good(q, x, s) && good(x, p, s)
         };
         let side = self.sides.get(&key(a, b)).copied();
@@ -222,9 +217,7 @@ impl Facets<'_> {
             return None;
         }
         let [p, q, r, s] = [a, b, c, d].map(|i| self.points[i as usize]);
-        let good = |u: Vec3, v: Vec3, w: Vec3| {
-            turn(u, v, w) > 1e-3 * norm(u) * norm(cross(sub(v, u), sub(w, u)))
-        };
+        let good = |u: Vec3, v: Vec3, w: Vec3| turn(u, v, w) > 1e-3 * norm(u) * norm(cross(sub(v, u), sub(w, u)));
         (good(r, s, q) && good(s, r, p)).then_some(pair)
     }
 
@@ -232,10 +225,7 @@ impl Facets<'_> {
     fn lying(&self, a: u32, b: u32, pair: &Pair) -> [f64; 2] {
         let [p, q, r, s] = [a, b, pair.c, pair.d].map(|i| self.points[i as usize]);
         let face = &self.complex.faces[self.faces[pair.one as usize] as usize];
-        [
-            lies(face, [p, q, r]).min(lies(face, [q, p, s])),
-            lies(face, [r, s, q]).min(lies(face, [s, r, p])),
-        ]
+        [lies(face, [p, q, r]).min(lies(face, [q, p, s])), lies(face, [r, s, q]).min(lies(face, [s, r, p]))]
     }
 
     /// How far a side and its triangles are from the surface.
@@ -258,9 +248,7 @@ impl Facets<'_> {
         };
         let [before, after] = self.lying(a, b, &pair);
         let across = [pair.c, pair.d];
-        if after < before.min(0.7)
-            || self.pair_off(pair.d, pair.c, [a, b]) > WORTH * self.pair_off(a, b, across)
-        {
+        if after < before.min(0.7) || self.pair_off(pair.d, pair.c, [a, b]) > WORTH * self.pair_off(a, b, across) {
             return false;
         }
         self.turned(a, b, pair);
@@ -283,9 +271,7 @@ impl Facets<'_> {
         let rim = self.complex.faces[self.faces[pair.one as usize] as usize].rim;
         let wide = rim.is_none() && open(r, p, q) + open(s, p, q) > core::f64::consts::PI + 0.05;
         let better = before < 0.5 && after > before + 0.1
-            || wide
-                && after > before.min(0.8)
-                && self.pair_off(pair.d, pair.c, [a, b]) <= self.chord;
+            || wide && after > before.min(0.8) && self.pair_off(pair.d, pair.c, [a, b]) <= self.chord;
         if better {
             self.turned(a, b, pair);
         }

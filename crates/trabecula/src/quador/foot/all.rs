@@ -37,10 +37,7 @@ impl Axes {
             }
             let mu = -1.0 / self.m[i];
             let free: Vec<usize> = (0..3).filter(|&j| same(j)).collect();
-            if free
-                .iter()
-                .any(|&j| (p[j] - mu * self.b[j]).abs() > 1e-5 * size)
-            {
+            if free.iter().any(|&j| (p[j] - mu * self.b[j]).abs() > 1e-5 * size) {
                 continue;
             }
             let middle = [0, 1, 2].map(|j| {
@@ -104,11 +101,7 @@ impl Axes {
         for i in 0..3 {
             let (m, b, p) = (self.m[i], self.b[i], p[i]);
             // m (p − μb)² + 2b (p − μb)(1 + μm).
-            let own = [
-                p * (m * p + 2.0 * b),
-                2.0 * b * (p * m - b) - 2.0 * m * p * b,
-                m * b * b - 2.0 * b * b * m,
-            ];
+            let own = [p * (m * p + 2.0 * b), 2.0 * b * (p * m - b) - 2.0 * m * p * b, m * b * b - 2.0 * b * b * m];
             let mut rest = [0.0; 7];
             times(&squares[(i + 1) % 3], &squares[(i + 2) % 3], &mut rest, 1.0);
             times(&own, &rest[..5], &mut all, 1.0);
@@ -125,11 +118,7 @@ pub(in crate::quador) fn feet_on_arc(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
     let a = sub(c.v, p);
     // With t = tan θ: D = d₀ + d₁t + d₂t², X − p = (a D − q (t e₁ + t² e₂))/D.
     let d = [c.m[0], 2.0 * c.m[1], c.m[2]];
-    let w = [
-        scale(a, d[0]),
-        sub(scale(a, d[1]), scale(c.e[0], c.q)),
-        sub(scale(a, d[2]), scale(c.e[1], c.q)),
-    ];
+    let w = [scale(a, d[0]), sub(scale(a, d[1]), scale(c.e[0], c.q)), sub(scale(a, d[2]), scale(c.e[1], c.q))];
     let n = [
         dot(w[0], w[0]),
         2.0 * dot(w[0], w[1]),
@@ -148,11 +137,7 @@ pub(in crate::quador) fn feet_on_arc(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
     }
     for t in roots(&f[..5]) {
         let theta = t.atan();
-        let theta = if theta < 0.0 {
-            theta + core::f64::consts::PI
-        } else {
-            theta
-        };
+        let theta = if theta < 0.0 { theta + core::f64::consts::PI } else { theta };
         if theta < c.end {
             out.push(c.at(theta));
         }
@@ -184,10 +169,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
     let derived: Vec<f64> = (1..n).map(|k| k as f64 * c[k]).collect();
     // Fujiwara's bound of all roots.
     let lead = c[n - 1];
-    let bound = (0..n - 1)
-        .map(|k| 2.0 * (c[k] / lead).abs().powf(1.0 / (n - 1 - k) as f64))
-        .fold(0.0, f64::max)
-        * 1.01;
+    let bound = (0..n - 1).map(|k| 2.0 * (c[k] / lead).abs().powf(1.0 / (n - 1 - k) as f64)).fold(0.0, f64::max) * 1.01;
     let mut stops = vec![-bound];
     stops.extend(roots(&derived).into_iter().filter(|x| x.abs() < bound));
     stops.push(bound);
@@ -202,9 +184,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
             continue;
         }
         let near = [0.0, 4.0 * f64::EPSILON];
-        out.push(root([x, y], (x + y) / 2.0, rising, near, |x| {
-            [value(x), slope(x)]
-        }));
+        out.push(root([x, y], (x + y) / 2.0, rising, near, |x| [value(x), slope(x)]));
     }
     out.sort_by(f64::total_cmp);
     out
@@ -248,11 +228,7 @@ mod tests {
     fn feet_are_stationary_and_the_nearest_is_among_them() {
         let mut random = Random(7);
         for _ in 0..300 {
-            let mut q = Quadric {
-                m: crate::math::IDENTITY,
-                b: [0.0; 3],
-                c: -1.0,
-            };
+            let mut q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -1.0 };
             for _ in 0..2 {
                 let g = crate::quador::hub::Affine {
                     a: scale(random.direction(), 1.2 * random.next()),

@@ -46,23 +46,9 @@ impl Bit {
         Arc {
             hub,
             stubs: self.label,
-            conic: [
-                q.form(u, u),
-                q.form(u, v),
-                q.form(v, v),
-                dot(slope, u),
-                dot(slope, v),
-                q.at(o),
-            ],
+            conic: [q.form(u, u), q.form(u, v), q.form(v, v), dot(slope, u), dot(slope, v), q.at(o)],
             about,
-            curves: self
-                .curves
-                .iter()
-                .map(|c| Bezier {
-                    points: c.points.map(flat),
-                    weight: c.weight,
-                })
-                .collect(),
+            curves: self.curves.iter().map(|c| Bezier { points: c.points.map(flat), weight: c.weight }).collect(),
         }
     }
 }
@@ -130,10 +116,7 @@ impl<'a> Section<'a> {
         gates: &'a [Gate],
         seed: u64,
     ) -> Section<'a> {
-        let shifted = |(i, s): (usize, &Stub)| Affine {
-            a: s.g.a,
-            b: s.g.b + SHIFT * shift(i, seed) * hub.radius,
-        };
+        let shifted = |(i, s): (usize, &Stub)| Affine { a: s.g.a, b: s.g.b + SHIFT * shift(i, seed) * hub.radius };
         Section {
             hub,
             g: hub.stubs.iter().enumerate().map(shifted).collect(),
@@ -168,10 +151,7 @@ impl<'a> Section<'a> {
         }
         for i in 0..self.cells.len() {
             if let Some(bit) = self.whole(i)? {
-                out.push(Chain {
-                    rims: None,
-                    arcs: vec![bit],
-                });
+                out.push(Chain { rims: None, arcs: vec![bit] });
             }
         }
         // A section that is there has an outline.
@@ -187,8 +167,7 @@ impl<'a> Section<'a> {
 
     fn active(&self, label: u64) -> impl Iterator<Item = (&Stub, &Affine)> {
         let all = self.hub.stubs.iter().zip(&self.g).enumerate();
-        all.filter(move |(i, _)| label >> i & 1 == 1)
-            .map(|(_, both)| both)
+        all.filter(move |(i, _)| label >> i & 1 == 1).map(|(_, both)| both)
     }
 
     /// The cell of a label.
@@ -223,21 +202,10 @@ impl<'a> Section<'a> {
             for (m, (s, g)) in self.hub.stubs.iter().zip(&self.g).enumerate() {
                 let joins = g.plus(-s.share, &sigma);
                 let stays = label >> m & 1 == 1;
-                guards.push((
-                    label ^ 1 << m,
-                    if stays {
-                        none.plus(-1.0, &joins)
-                    } else {
-                        joins
-                    },
-                ));
+                guards.push((label ^ 1 << m, if stays { none.plus(-1.0, &joins) } else { joins }));
             }
         }
-        self.cells.push(Cell {
-            label,
-            quadric,
-            guards,
-        });
+        self.cells.push(Cell { label, quadric, guards });
         self.cells.len() - 1
     }
 
@@ -249,10 +217,7 @@ impl<'a> Section<'a> {
         let way = scale(add(scale(u, cos), scale(v, sin)), 0.137 * self.hub.radius);
         let mut stubs = self.hub.stubs.to_vec();
         stubs.iter_mut().zip(&self.g).for_each(|(s, g)| s.g = *g);
-        let shifted = Hub {
-            stubs: &stubs,
-            ..*self.hub
-        };
+        let shifted = Hub { stubs: &stubs, ..*self.hub };
         let first = shifted.grown(add(self.middle(), way)).active;
         self.cell(first);
         let mut done = 0;
@@ -272,9 +237,7 @@ impl<'a> Section<'a> {
         let (o, q, r) = (self.middle(), &cell.quadric, self.reach);
         let place = |p: [f64; 2]| add(o, add(scale(u, p[0]), scale(v, p[1])));
         // The square within reach, cut by the sides; with each corner the side that begins there.
-        let mut polygon: Vec<Corner> = [[-r, -r], [r, -r], [r, r], [-r, r]]
-            .map(|p| (p, None))
-            .into();
+        let mut polygon: Vec<Corner> = [[-r, -r], [r, -r], [r, r], [-r, r]].map(|p| (p, None)).into();
         for (k, (_, f)) in cell.guards.iter().enumerate() {
             clip(&mut polygon, [f.at(o), dot(f.a, u), dot(f.a, v)], k);
         }
@@ -289,14 +252,8 @@ impl<'a> Section<'a> {
             let w = -(one + (one * one - two * none).sqrt().copysign(one));
             for t in [w / two, none / w] {
                 let at = add(a, scale(way, t));
-                if (0.0..=1.0).contains(&t) && dot(guard.a, onward(q, n, at)) > 0.0 && self.held(at)
-                {
-                    crossings.push(Crossing {
-                        from: cell.label,
-                        to,
-                        at,
-                        used: false,
-                    });
+                if (0.0..=1.0).contains(&t) && dot(guard.a, onward(q, n, at)) > 0.0 && self.held(at) {
+                    crossings.push(Crossing { from: cell.label, to, at, used: false });
                 }
             }
         }
@@ -378,10 +335,7 @@ impl<'a> Section<'a> {
             let i = cell.label.trailing_zeros() as usize;
             let s = &self.hub.stubs[i];
             if !matches!(self.gates[i], Gate::Apart(_)) {
-                let rim = Affine {
-                    a: s.axis,
-                    b: -s.split,
-                };
+                let rim = Affine { a: s.axis, b: -s.split };
                 look(Event::Rim, &rim);
             }
         }
@@ -409,12 +363,7 @@ impl<'a> Section<'a> {
     }
 
     fn bit(&self, label: u64, path: &Path) -> Bit {
-        Bit {
-            label,
-            quadric: piece(self.hub, label).0,
-            height: self.height,
-            curves: path.curves(),
-        }
+        Bit { label, quadric: piece(self.hub, label).0, height: self.height, curves: path.curves() }
     }
 
     /// The whole ellipse of a cell, if it lies in it.

@@ -32,9 +32,7 @@ fn volume(q: &Quadors, normal: Vec3, slack: f64) -> f64 {
     let middle = dot(b.center(), normal);
     // Rules that agree by chance do not in sixteen parts at once.
     let part = |k: i32| middle + reach * f64::from(k - 8) / 8.0;
-    (0..16)
-        .map(|k| heaped(q, normal, [part(k), part(k + 1)], slack, 24))
-        .sum()
+    (0..16).map(|k| heaped(q, normal, [part(k), part(k + 1)], slack, 24)).sum()
 }
 
 #[test]
@@ -46,15 +44,9 @@ fn areas_add_up_to_the_volume() {
             let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
             // About a hundred parts, each for 1e-10 or better, of a volume of three or more.
             let [got, other] = [0; 2].map(|_| volume(&q, random.direction(), 1e-10));
-            assert!(
-                (got - other).abs() < 4e-9 * got,
-                "{n} {fillet:?}: {got} {other}"
-            );
+            assert!((got - other).abs() < 4e-9 * got, "{n} {fillet:?}: {got} {other}");
             let Ok(want) = q.volume() else { continue };
-            assert!(
-                (got - want).abs() < 4e-9 * want,
-                "{n} {fillet:?}: {got} {want}"
-            );
+            assert!((got - want).abs() < 4e-9 * want, "{n} {fillet:?}: {got} {want}");
             compared += 1;
         }
     }
@@ -84,10 +76,7 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
             for arcs in &s.loops {
                 let curves: Vec<_> = arcs.iter().flat_map(|a| &a.curves).collect();
                 for k in 0..curves.len() {
-                    assert_eq!(
-                        curves[k].points[2],
-                        curves[(k + 1) % curves.len()].points[0]
-                    );
+                    assert_eq!(curves[k].points[2], curves[(k + 1) % curves.len()].points[0]);
                 }
                 for a in arcs {
                     for c in &a.curves {
@@ -130,8 +119,7 @@ fn areas_are_what_points_say() {
     for fillet in [Fillet::None, Fillet::Auto] {
         let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
         for _ in 0..4 {
-            let plane = Plane::new([0; 3].map(|_| 20.0 * random.next()), random.direction())
-                .expect("a plane");
+            let plane = Plane::new([0; 3].map(|_| 20.0 * random.next()), random.direction()).expect("a plane");
             let s = q.slice(&plane).expect("a slice");
             let polygons = s.polygons(1e-3);
             let (mut low, mut high, mut length) = ([f64::MAX; 2], [f64::MIN; 2], 0.0);
@@ -184,32 +172,19 @@ fn planes_of_symmetry_are_sliced() {
         assert_eq!(s.loops.len(), 5);
         // Along the tops: what is a line there counts for nothing, up to the width √(2 r δ) of a strip at a depth of δ = 1e-8.
         let s = at(normal, turn);
-        assert!(
-            (s.area - 9.0 * PI).abs() < 240.0 * 3e-4,
-            "{} {}",
-            s.area,
-            s.moved
-        );
+        assert!((s.area - 9.0 * PI).abs() < 240.0 * 3e-4, "{} {}", s.area, s.moved);
         assert_eq!(at(normal, -5.0 * turn).loops.len(), 0);
     }
     // Octet and filleted hubs in their planes of symmetry, through the centre and in the planes of seams.
     for (axes, fillet) in [
         (six(), Fillet::Tau(0.7)),
-        (
-            super::super::tests::orbit([1.0, 1.0, 0.0]),
-            Fillet::Tau(0.8),
-        ),
+        (super::super::tests::orbit([1.0, 1.0, 0.0]), Fillet::Tau(0.8)),
         (super::super::tests::orbit([1.0, 1.0, 0.0]), Fillet::None),
         (super::super::tests::orbit([1.0, 1.0, 1.0]), Fillet::Auto),
     ] {
         let ends: Vec<_> = axes.iter().map(|&u| (u, 10.0, 1.0)).collect();
         let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), fillet).expect("a star");
-        for normal in [
-            [0.0, 0.0, 1.0],
-            unit([1.0, 1.0, 0.0]),
-            unit([1.0, -1.0, 0.0]),
-            unit([1.0, 1.0, 1.0]),
-        ] {
+        for normal in [[0.0, 0.0, 1.0], unit([1.0, 1.0, 0.0]), unit([1.0, -1.0, 0.0]), unit([1.0, 1.0, 1.0])] {
             for h in [0.0, 0.5, 1.0, 1.2, 1.5, 5.0] {
                 let area = |h: f64| {
                     let plane = Plane::new(scale(normal, h), normal).expect("a plane");
@@ -217,10 +192,7 @@ fn planes_of_symmetry_are_sliced() {
                 };
                 // Areas are continuous in height (to a root, where the plane touches a cylinder's length).
                 let (a, b, c) = (area(h - 1e-7), area(h), area(h + 1e-7));
-                assert!(
-                    b > a.min(c) - 2e-2 && b < a.max(c) + 2e-2,
-                    "{fillet:?} {normal:?} {h}: {a} {b} {c}"
-                );
+                assert!(b > a.min(c) - 2e-2 && b < a.max(c) + 2e-2, "{fillet:?} {normal:?} {h}: {a} {b} {c}");
             }
         }
     }
@@ -235,23 +207,11 @@ fn a_slice_far_from_the_origin_keeps_its_digits() {
         h.center = add(h.center, by);
     }
     let far = Quadors::new(&graph, Fillet::Auto).expect("a lattice");
-    for (p, n) in [
-        ([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]),
-        ([5.0, 5.0, 0.3], [0.6, 0.0, 0.8]),
-    ] {
-        let a = near
-            .slice(&Plane::new(p, n).expect("a plane"))
-            .expect("a slice");
-        let b = far
-            .slice(&Plane::new(add(p, by), n).expect("a plane"))
-            .expect("a slice");
+    for (p, n) in [([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), ([5.0, 5.0, 0.3], [0.6, 0.0, 0.8])] {
+        let a = near.slice(&Plane::new(p, n).expect("a plane")).expect("a slice");
+        let b = far.slice(&Plane::new(add(p, by), n).expect("a plane")).expect("a slice");
         // Places are known to 1e-12 there.
-        assert!(
-            (a.area - b.area).abs() < 1e-9 * a.area,
-            "{} {}",
-            a.area,
-            b.area
-        );
+        assert!((a.area - b.area).abs() < 1e-9 * a.area, "{} {}", a.area, b.area);
     }
 }
 
@@ -260,18 +220,8 @@ fn faults_of_planes_say_what_is_wrong() {
     let says = |r: Result<Plane, Fault>, at: &str| assert_eq!(r.expect_err("refused").at, at);
     says(Plane::new([0.0; 3], [0.0; 3]), "normal");
     says(Plane::new([0.0; 3], [f64::NAN, 0.0, 1.0]), "normal");
-    says(
-        Plane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]),
-        "point",
-    );
-    let close = star(
-        1.0,
-        &[
-            ([1.0, 0.0, 0.0], 5.0, 1.0),
-            (unit([1.0, 0.1, 0.0]), 5.0, 1.0),
-        ],
-        |_| Profile::Cone,
-    );
+    says(Plane::new([f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]), "point");
+    let close = star(1.0, &[([1.0, 0.0, 0.0], 5.0, 1.0), (unit([1.0, 0.1, 0.0]), 5.0, 1.0)], |_| Profile::Cone);
     let q = Quadors::new(&close, Fillet::Auto).expect("built");
     let at = |x: f64| q.slice(&Plane::new([x, 0.0, 0.0], [1.0, 0.0, 0.0]).expect("a plane"));
     assert!(at(1.0).expect_err("refused").message.contains("overlap"));

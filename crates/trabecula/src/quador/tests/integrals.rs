@@ -6,9 +6,7 @@ use super::*;
 fn hub_volume(axes: &[Vec3], fillet: Fillet) -> f64 {
     let q = equal(axes, 10.0, fillet);
     assert!(q.shortfalls().is_empty() && q.overlaps().is_empty());
-    integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL)
-        .expect("whole")
-        .volume
+    integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL).expect("whole").volume
 }
 
 #[test]
@@ -28,11 +26,7 @@ fn equal_cylinders_have_the_volume_of_their_formula() {
         let v = hub_volume(&axes, Fillet::None);
         let want = 5.0 * PI * axes.len() as f64 - lost;
         println!("{} {v} {want} {:e}", axes.len(), v - want);
-        assert!(
-            (v - want).abs() < 2e-10 * want,
-            "{} beams: {v} {want}",
-            axes.len()
-        );
+        assert!((v - want).abs() < 2e-10 * want, "{} beams: {v} {want}", axes.len());
     }
 }
 
@@ -57,27 +51,18 @@ fn golden_volumes_of_filleted_hubs() {
         (Fillet::Tau(0.5), 0.105_062_5, 1e-7),
     ] {
         let q = Quadors::new(&graph, fillet).expect("a star");
-        let got =
-            integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL)
-                .expect("whole")
-                .volume;
+        let got = integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL)
+            .expect("whole")
+            .volume;
         assert!((got - want).abs() < digits, "{fillet:?}: {got} {want}");
     }
     // Two balls and a beam.
-    for (profile, volume, area) in [
-        (Profile::Lambda(1.0), 0.106_340_314_3, 1.374_492_862_6),
-        (Profile::Cone, 0.103_000_005_4, 1.353_548_911_6),
-    ] {
-        let q = Quadors::new(
-            &star(0.2, &[([0.0, 0.6, 0.8], 1.0, 0.12)], |_| profile),
-            Fillet::None,
-        )
-        .expect("a star");
+    for (profile, volume, area) in
+        [(Profile::Lambda(1.0), 0.106_340_314_3, 1.374_492_862_6), (Profile::Cone, 0.103_000_005_4, 1.353_548_911_6)]
+    {
+        let q = Quadors::new(&star(0.2, &[([0.0, 0.6, 0.8], 1.0, 0.12)], |_| profile), Fillet::None).expect("a star");
         let m = q.mass().expect("exact");
-        assert!(
-            (m.volume - volume).abs() < 1e-10 && (m.area - area).abs() < 1e-9,
-            "{m:?} {volume} {area}"
-        );
+        assert!((m.volume - volume).abs() < 1e-10 && (m.area - area).abs() < 1e-9, "{m:?} {volume} {area}");
     }
 }
 
@@ -115,10 +100,7 @@ fn a_neck_between_opposite_beams_is_a_body_of_revolution() {
 #[test]
 fn integrals_are_converged_for_every_hub() {
     let mut random = Random(31);
-    let fine = integral::Order {
-        nodes: &[16, 24],
-        differ: 1e-11,
-    };
+    let fine = integral::Order { nodes: &[16, 24], differ: 1e-11 };
     let (mut worst, mut done): ([f64; 3], usize) = ([0.0; 3], 0);
     for n in 1..=14 {
         for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
@@ -154,13 +136,9 @@ fn integrals_are_converged_for_every_hub() {
 fn integrals_are_those_of_points_thrown_at_random() {
     let mut random = Random(41);
     let mut stars = Vec::new();
-    for (n, fillet) in [
-        (2, Fillet::Auto),
-        (3, Fillet::Auto),
-        (5, Fillet::Tau(0.5)),
-        (8, Fillet::Auto),
-        (13, Fillet::Auto),
-    ] {
+    for (n, fillet) in
+        [(2, Fillet::Auto), (3, Fillet::Auto), (5, Fillet::Tau(0.5)), (8, Fillet::Auto), (13, Fillet::Auto)]
+    {
         stars.push((n, random_star(&mut random, n), fillet));
     }
     // Fillets that go round the neck between two beams, all the way and almost.
@@ -187,27 +165,18 @@ fn integrals_are_those_of_points_thrown_at_random() {
         let share = mass.volume / boxed;
         let deviation = (share * (1.0 - share) / f64::from(thrown)).sqrt();
         let found = inside as f64 / f64::from(thrown);
-        assert!(
-            (found - share).abs() < 4.0 * deviation,
-            "{n} {fillet:?}: {found} {share}"
-        );
+        assert!((found - share).abs() < 4.0 * deviation, "{n} {fillet:?}: {found} {share}");
         for a in 0..3 {
             let (mean, square) = (sum[a] / inside as f64, squares[a] / inside as f64);
             let spread = (square - mean * mean).sqrt();
             let off = (mean - mass.centroid()[a]).abs();
-            assert!(
-                off < 4.0 * spread / (inside as f64).sqrt(),
-                "{n} {fillet:?} {a}: {off}"
-            );
+            assert!(off < 4.0 * spread / (inside as f64).sqrt(), "{n} {fillet:?} {a}: {off}");
             // The inertia's diagonal is the spread of the two other axes.
             let inertia = mass.inertia();
             let others = (0..3).map(|k| inertia[k][k]).sum::<f64>() / 2.0 - inertia[a][a];
             let want = (others / mass.volume).sqrt();
             // A sample's spread is within its own share of 1/√n, times what heavy ends add.
-            assert!(
-                (spread / want - 1.0).abs() < 8.0 / (inside as f64).sqrt(),
-                "{n} {a}: {spread} {want}"
-            );
+            assert!((spread / want - 1.0).abs() < 8.0 / (inside as f64).sqrt(), "{n} {a}: {spread} {want}");
         }
     }
 }

@@ -8,9 +8,7 @@ fn equal_hubs_are_found_wherever_they_are() {
     let classes = one.classes();
     // Corners, edges, faces and the inside of a cube, by what is missing.
     assert_eq!((classes.sample.len(), one.len()), (27, 64));
-    let each: f64 = (0..one.len())
-        .map(|i| one.hub_volume(i).expect("exact"))
-        .sum();
+    let each: f64 = (0..one.len()).map(|i| one.hub_volume(i).expect("exact")).sum();
     assert!((one.volume().expect("exact") / each - 1.0).abs() < 1e-12);
 }
 
@@ -45,10 +43,7 @@ fn meshes_are_closed_and_converge_at_second_order() {
             let (mesh, error) = q.mesh(*chord).expect("meshed");
             let m = crate::measure::size(&mesh);
             let name = format!("{} beams {fillet:?} at {chord}", graph.beams.len());
-            assert!(
-                m.closed && m.pieces == 1 && m.cavities == 0,
-                "{name}: {m:?}"
-            );
+            assert!(m.closed && m.pieces == 1 && m.cavities == 0, "{name}: {m:?}");
             // As read back from single precision, too.
             let mut low = mesh.clone();
             let round = |c: &mut f64| *c = f64::from(*c as f32);
@@ -95,25 +90,14 @@ fn symmetric_hubs_are_meshed() {
     ] {
         for fillet in [Fillet::Auto, Fillet::None] {
             let q = equal(&axes, 14.0, fillet);
-            let (mut mesh, _) = q.mesh(0.03).unwrap_or_else(|e| {
-                panic!(
-                    "{axes:?} {fillet:?}: {e} {:#?}",
-                    complex::Complex::new(&q.hub(0))
-                )
-            });
+            let (mut mesh, _) = q
+                .mesh(0.03)
+                .unwrap_or_else(|e| panic!("{axes:?} {fillet:?}: {e} {:#?}", complex::Complex::new(&q.hub(0))));
             let m = crate::measure::size(&mesh);
-            assert!(
-                m.closed && m.euler == 2 && m.pieces == 1,
-                "{fillet:?} {m:?}"
-            );
+            assert!(m.closed && m.euler == 2 && m.pieces == 1, "{fillet:?} {m:?}");
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             mesh.vertices.iter_mut().flatten().for_each(round);
-            assert_eq!(
-                crate::mesh::self_intersections(&mesh, 1),
-                0,
-                "{fillet:?} {}",
-                axes.len()
-            );
+            assert_eq!(crate::mesh::self_intersections(&mesh, 1), 0, "{fillet:?} {}", axes.len());
         }
     }
 }
@@ -127,11 +111,7 @@ fn what_is_drawn_hub_by_hub_is_the_mesh() {
         let mesh = drawn.mesh().expect("joined");
         let streamed: Vec<[Vec3; 3]> = (0..q.len()).flat_map(|i| drawn.hub(i)).collect();
         let placed = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
-        assert!(
-            streamed
-                .iter()
-                .eq(&mesh.triangles.iter().map(placed).collect::<Vec<_>>())
-        );
+        assert!(streamed.iter().eq(&mesh.triangles.iter().map(placed).collect::<Vec<_>>()));
         let (want, got) = (crate::measure::size(&mesh), drawn.figures());
         assert_eq!(got.triangles, mesh.triangles.len());
         assert_eq!((got.euler, got.pieces), (want.euler, want.pieces));

@@ -40,19 +40,11 @@ pub fn close(mesh: &mut Mesh) -> Caps {
     for rim in &loops {
         let at = |i: usize| mesh.vertices[rim[i % rim.len()] as usize];
         caps.holes += 1;
-        caps.length += (0..rim.len())
-            .map(|i| norm(sub(at(i + 1), at(i))))
-            .sum::<f64>();
+        caps.length += (0..rim.len()).map(|i| norm(sub(at(i + 1), at(i)))).sum::<f64>();
         let mut patch = Vec::new();
         part(mesh, &rims, rim, &mut patch);
         let first = mesh.triangles.len();
-        mesh.triangles.extend(fair::smoothed(
-            &mut mesh.vertices,
-            rim,
-            patch,
-            &rims.slopes(rim),
-            &rims.about,
-        ));
+        mesh.triangles.extend(fair::smoothed(&mut mesh.vertices, rim, patch, &rims.slopes(rim), &rims.about));
         caps.area += (first..mesh.triangles.len())
             .map(|i| {
                 let [a, b, c] = mesh.corners(i);
@@ -78,9 +70,7 @@ pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     // A vertex has as many ways in as out, so a walk ends where it began.
     let next = |v: u32, used: &mut [bool]| {
         let first = missing.partition_point(|e| e.0 < v);
-        let i = (first..missing.len())
-            .take_while(|i| missing[*i].0 == v)
-            .find(|i| !used[*i])?;
+        let i = (first..missing.len()).take_while(|i| missing[*i].0 == v).find(|i| !used[*i])?;
         used[i] = true;
         Some(missing[i].1)
     };
@@ -123,11 +113,7 @@ struct Rims {
 impl Rims {
     fn of(mesh: &Mesh, loops: &[Vec<u32>]) -> Rims {
         let corners: HashSet<u32> = loops.iter().flatten().copied().collect();
-        let mut rims = Rims {
-            edges: HashSet::new(),
-            beyond: HashMap::new(),
-            about: fair::About::default(),
-        };
+        let mut rims = Rims { edges: HashSet::new(), beyond: HashMap::new(), about: fair::About::default() };
         for (i, t) in mesh.triangles.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (t[k], t[(k + 1) % 3]);
@@ -137,8 +123,7 @@ impl Rims {
                 }
                 if corners.contains(&a) && corners.contains(&b) {
                     rims.edges.insert((a.min(b), a.max(b)));
-                    rims.beyond
-                        .insert((b, a), super::tree::normal(mesh.corners(i)));
+                    rims.beyond.insert((b, a), super::tree::normal(mesh.corners(i)));
                 }
             }
         }
@@ -147,13 +132,7 @@ impl Rims {
 
     /// Normals beyond the sides of a loop.
     fn slopes(&self, rim: &[u32]) -> Vec<Option<Vec3>> {
-        (0..rim.len())
-            .map(|i| {
-                self.beyond
-                    .get(&(rim[i], rim[(i + 1) % rim.len()]))
-                    .copied()
-            })
-            .collect()
+        (0..rim.len()).map(|i| self.beyond.get(&(rim[i], rim[(i + 1) % rim.len()])).copied()).collect()
     }
 }
 
@@ -179,9 +158,7 @@ fn part(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
                 let way = along[j] - along[i];
                 let saved = way.min(along[n] - way);
                 let cost = norm(sub(at(j), at(i))) / saved.max(f64::MIN_POSITIVE);
-                let new = !rims
-                    .edges
-                    .contains(&(rim[i].min(rim[j]), rim[i].max(rim[j])));
+                let new = !rims.edges.contains(&(rim[i].min(rim[j]), rim[i].max(rim[j])));
                 if new && cost < best.0 {
                     best = (cost, i, j);
                 }
@@ -208,12 +185,7 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
         area: f64,
         middle: u32,
     }
-    let nothing = Best {
-        taken: 0,
-        fold: 0.0,
-        area: 0.0,
-        middle: 0,
-    };
+    let nothing = Best { taken: 0, fold: 0.0, area: 0.0, middle: 0 };
     let mut table = vec![nothing; n * n];
     let slope = |i: usize, k: usize| rims.beyond.get(&(rim[i], rim[k])).copied();
     let sides: Vec<Option<Vec3>> = (0..n).map(|i| slope(i, (i + 1) % n)).collect();
@@ -222,9 +194,7 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
     for span in 2..n {
         for i in 0..n - span {
             let k = i + span;
-            let exists = rims
-                .edges
-                .contains(&(rim[i].min(rim[k]), rim[i].max(rim[k])));
+            let exists = rims.edges.contains(&(rim[i].min(rim[k]), rim[i].max(rim[k])));
             let taken = u32::from(exists && span + 1 < n);
             let mut best: Option<(Best, Vec3)> = None;
             for m in i + 1..k {
@@ -233,11 +203,7 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
                 let facing = if size > 0.0 { unit(area) } else { [0.0; 3] };
                 let (left, right) = (&table[i * n + m], &table[m * n + k]);
                 let beside = |a: usize, b: usize| {
-                    if b == a + 1 {
-                        sides[a]
-                    } else {
-                        Some(normals[a * n + b])
-                    }
+                    if b == a + 1 { sides[a] } else { Some(normals[a * n + b]) }
                 };
                 let mut worst = fold(facing, beside(i, m)).max(fold(facing, beside(m, k)));
                 if span + 1 == n {

@@ -37,60 +37,26 @@ pub fn edges(mesh: &Mesh) -> Result<Pairs, String> {
         (duplicates(mesh), "duplicate triangles"),
         (degenerate(mesh), "degenerate triangles (no area)"),
     ];
-    let found: Vec<String> = defects
-        .iter()
-        .filter(|d| d.0 > 0)
-        .map(|(n, what)| format!("{n} {what}"))
-        .collect();
-    if found.is_empty() {
-        Ok(pairs)
-    } else {
-        Err(found.join(", "))
-    }
+    let found: Vec<String> = defects.iter().filter(|d| d.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    if found.is_empty() { Ok(pairs) } else { Err(found.join(", ")) }
 }
 
 /// Refuses indices out of range and coordinates that cannot be computed with.
 pub fn numbers(mesh: &Mesh) -> Result<(), Fault> {
     let count = mesh.vertices.len();
     if mesh.triangles.len() < 4 {
-        return Err(refuse(format!(
-            "{} triangles: a solid has at least four",
-            mesh.triangles.len()
-        )));
+        return Err(refuse(format!("{} triangles: a solid has at least four", mesh.triangles.len())));
     }
     if mesh.triangles.len() > (u32::MAX / 3) as usize {
-        return Err(refuse(format!(
-            "{} triangles: at most {}",
-            mesh.triangles.len(),
-            u32::MAX / 3
-        )));
+        return Err(refuse(format!("{} triangles: at most {}", mesh.triangles.len(), u32::MAX / 3)));
     }
-    if let Some(i) = mesh
-        .triangles
-        .iter()
-        .position(|t| t.iter().any(|v| *v as usize >= count))
-    {
-        return Err(refuse(format!(
-            "triangle {i} is {:?}, but there are {count} vertices",
-            mesh.triangles[i]
-        )));
+    if let Some(i) = mesh.triangles.iter().position(|t| t.iter().any(|v| *v as usize >= count)) {
+        return Err(refuse(format!("triangle {i} is {:?}, but there are {count} vertices", mesh.triangles[i])));
     }
-    if let Some(i) = mesh
-        .vertices
-        .iter()
-        .position(|p| p.iter().any(|x| !x.is_finite()))
-    {
-        return Err(refuse(format!(
-            "vertex {i} at {:?} is not finite",
-            mesh.vertices[i]
-        )));
+    if let Some(i) = mesh.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(refuse(format!("vertex {i} at {:?} is not finite", mesh.vertices[i])));
     }
-    if mesh
-        .bounds()
-        .size()
-        .iter()
-        .any(|s| !(s * s * s).is_finite())
-    {
+    if mesh.bounds().size().iter().any(|s| !(s * s * s).is_finite()) {
         return Err(refuse(format!(
             "the mesh is {:?} mm large: beyond what can be computed with",
             mesh.bounds().size()
@@ -111,9 +77,7 @@ fn duplicates(mesh: &Mesh) -> usize {
 }
 
 fn degenerate(mesh: &Mesh) -> usize {
-    (0..mesh.triangles.len())
-        .filter(|&i| flat(mesh.corners(i)))
-        .count()
+    (0..mesh.triangles.len()).filter(|&i| flat(mesh.corners(i))).count()
 }
 
 /// Signed volume and area of each body, `number` being the body of each triangle.
@@ -143,9 +107,7 @@ pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
         return Ok(());
     }
     let volume: f64 = sums.iter().map(|s| s.0.abs()).sum();
-    Err(refuse(format!(
-        "the mesh has the volume {volume:e} mm³: flat, not a solid"
-    )))
+    Err(refuse(format!("the mesh has the volume {volume:e} mm³: flat, not a solid")))
 }
 
 /// Whether a closed mesh (edges `pairs`) that does not cross itself is one body with cavities inside it.

@@ -22,9 +22,7 @@ pub fn flat([a, b, c]: [Vec3; 3]) -> bool {
 pub fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
     let vertices = &mesh.vertices;
-    mesh.triangles.retain(|t| {
-        t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && !flat(t.map(|v| vertices[v as usize]))
-    });
+    mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && !flat(t.map(|v| vertices[v as usize])));
     before - mesh.triangles.len()
 }
 
@@ -41,24 +39,16 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         s
     };
     let even = |t: [u32; 3]| {
-        let inversions = [(0, 1), (0, 2), (1, 2)]
-            .iter()
-            .filter(|(i, j)| t[*i] > t[*j]);
+        let inversions = [(0, 1), (0, 2), (1, 2)].iter().filter(|(i, j)| t[*i] > t[*j]);
         inversions.count() % 2 == 0
     };
-    let mut all: Vec<([u32; 3], u32)> = (0..)
-        .zip(&mesh.triangles)
-        .map(|(i, t)| (sorted(t), i))
-        .collect();
+    let mut all: Vec<([u32; 3], u32)> = (0..).zip(&mesh.triangles).map(|(i, t)| (sorted(t), i)).collect();
     all.sort_unstable();
     if all.windows(2).all(|w| w[0].0 != w[1].0) {
         return 0;
     }
     // Distinct triangles at each edge.
-    let distinct = Mesh {
-        vertices: Vec::new(),
-        triangles: all.chunk_by(|a, b| a.0 == b.0).map(|g| g[0].0).collect(),
-    };
+    let distinct = Mesh { vertices: Vec::new(), triangles: all.chunk_by(|a, b| a.0 == b.0).map(|g| g[0].0).collect() };
     let edges = halves(&distinct);
     let others = |a: u32, b: u32| {
         let key = u64::from(a) << 32 | u64::from(b);
@@ -67,9 +57,7 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     };
     // The way most copies face, and how many do.
     let most = |group: &[([u32; 3], u32)]| {
-        let ups = group
-            .iter()
-            .filter(|(_, i)| even(mesh.triangles[*i as usize]));
+        let ups = group.iter().filter(|(_, i)| even(mesh.triangles[*i as usize]));
         let (ups, all) = (ups.count(), group.len());
         (2 * ups >= all, ups.max(all - ups))
     };
@@ -80,21 +68,14 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         group.iter().for_each(|(_, i)| keep[*i as usize] = false);
         let (up, count) = most(group);
         let [a, b, c] = group[0].0;
-        let odd = [others(a, b), others(b, c), others(a, c)]
-            .iter()
-            .filter(|n| *n % 2 == 1)
-            .count();
+        let odd = [others(a, b), others(b, c), others(a, c)].iter().filter(|n| *n % 2 == 1).count();
         let left = if of_two_bodies.contains(&group[0].0) {
             2
         } else {
             usize::from(count == group.len() || group.len() % 2 == 1 || odd >= 2)
         };
-        let facing = group
-            .iter()
-            .filter(|(_, i)| even(mesh.triangles[*i as usize]) == up);
-        facing
-            .take(left)
-            .for_each(|(_, i)| keep[*i as usize] = true);
+        let facing = group.iter().filter(|(_, i)| even(mesh.triangles[*i as usize]) == up);
+        facing.take(left).for_each(|(_, i)| keep[*i as usize] = true);
     }
     let before = mesh.triangles.len();
     let mut kept = keep.iter();
@@ -107,10 +88,7 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
 /// A patch of them has edges along its rim with an even number of other triangles where both copies go on, each in its own
 /// body, and with an odd number where a copy just ends. `others`: how many there are, copies not counted.
 fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
-    let patches = Mesh {
-        vertices: Vec::new(),
-        triangles: alike,
-    };
+    let patches = Mesh { vertices: Vec::new(), triangles: alike };
     let (sides, mut sets) = (halves(&patches), Sets::new(patches.triangles.len()));
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
         for other in &edge[1..] {
@@ -121,11 +99,7 @@ fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> Ha
     let mut votes = vec![0i64; patches.triangles.len()];
     for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
         let (a, b) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
-        let vote = if others(a, b).is_multiple_of(2) {
-            1
-        } else {
-            -1
-        };
+        let vote = if others(a, b).is_multiple_of(2) { 1 } else { -1 };
         votes[sets.root(edge[0].1 / 3) as usize] += vote;
     }
     let found = (0..patches.triangles.len()).filter(|i| votes[sets.root(*i as u32) as usize] > 0);
@@ -152,14 +126,8 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
     let mut rim: Vec<u32> = open_before.iter().flat_map(|h| ends(mesh, *h)).collect();
     rim.sort_unstable();
     rim.dedup();
-    let boxes: Vec<Aabb> = rim
-        .iter()
-        .map(|v| {
-            Aabb::EMPTY
-                .with(mesh.vertices[*v as usize])
-                .grown(allowed(*v) / 2.0)
-        })
-        .collect();
+    let boxes: Vec<Aabb> =
+        rim.iter().map(|v| Aabb::EMPTY.with(mesh.vertices[*v as usize]).grown(allowed(*v) / 2.0)).collect();
     let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
     near(&boxes, &boxes, |i, j| {
         if i < j {
@@ -184,12 +152,7 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
     for t in &mut joined.triangles {
         *t = t.map(|v| sets.root(v));
     }
-    for (v, (s, n)) in joined
-        .vertices
-        .iter_mut()
-        .zip(&sum)
-        .filter(|(_, s)| s.1 > 1)
-    {
+    for (v, (s, n)) in joined.vertices.iter_mut().zip(&sum).filter(|(_, s)| s.1 > 1) {
         *v = scale(*s, 1.0 / *n as f64);
     }
     drop_degenerate(&mut joined);
@@ -246,12 +209,7 @@ pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
             found.push((sides[i], t, v));
         }
     });
-    found.sort_unstable_by(|a, b| {
-        (a.0)
-            .cmp(&b.0)
-            .then(a.1.total_cmp(&b.1))
-            .then(a.2.cmp(&b.2))
-    });
+    found.sort_unstable_by(|a, b| (a.0).cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut done = 0;
     let mut changed: Vec<(usize, [Vec<u32>; 3])> = Vec::new();
     for side in found.chunk_by(|a, b| a.0 == b.0) {
@@ -277,13 +235,7 @@ pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
 fn pieces_of(t: [u32; 3], lists: [Vec<u32>; 3], out: &mut Vec<[u32; 3]>) {
     let mut work = vec![(t, lists)];
     while let Some((t, mut lists)) = work.pop() {
-        let k = (1..3).fold(0, |m, k| {
-            if lists[k].len() > lists[m].len() {
-                k
-            } else {
-                m
-            }
-        });
+        let k = (1..3).fold(0, |m, k| if lists[k].len() > lists[m].len() { k } else { m });
         if lists[k].is_empty() {
             out.push(t);
             continue;

@@ -51,22 +51,14 @@ pub fn creases(mesh: &Mesh) -> Creases {
         let number = creases.segments.len() as u32;
         let along = sub(q, p);
         let run = norm(along);
-        creases.segments.push(Segment {
-            ends: [p, q],
-            turn,
-            run,
-        });
+        creases.segments.push(Segment { ends: [p, q], turn, run });
         let along = scale(along, 1.0 / run);
         for (v, way) in ends.into_iter().zip([along, scale(along, -1.0)]) {
             let at = about.entry(v).or_default();
             if at.count == 1 {
                 straight.push((v, [at.last, number]));
             }
-            *at = About {
-                count: at.count + 1,
-                sum: add(at.sum, way),
-                last: number,
-            };
+            *at = About { count: at.count + 1, sum: add(at.sum, way), last: number };
         }
     }
     straight.retain(|(v, _)| about[v].runs_on(STRAIGHT));
@@ -110,25 +102,11 @@ mod tests {
                 [3.0, 2.0, 0.0],
                 [3.0, -2.0, 0.0],
             ],
-            triangles: vec![
-                [0, 1, 4],
-                [1, 2, 4],
-                [2, 3, 4],
-                [1, 0, 5],
-                [2, 1, 5],
-                [3, 2, 5],
-                [0, 4, 5],
-                [3, 5, 4],
-            ],
+            triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 4, 5], [3, 5, 4]],
         };
         let found = creases(&mesh);
         let of_ridge = |s: &&Segment| s.ends.iter().all(|p| p[1] == 0.0);
-        let runs: Vec<f64> = found
-            .segments
-            .iter()
-            .filter(of_ridge)
-            .map(|s| s.run)
-            .collect();
+        let runs: Vec<f64> = found.segments.iter().filter(of_ridge).map(|s| s.run).collect();
         assert_eq!(runs, [6.0; 3]);
         let other = found.segments.iter().filter(|s| !of_ridge(s));
         assert!(other.clone().count() > 0);

@@ -50,11 +50,7 @@ pub struct Cut {
 /// Two places closer than this are one, mm: above the rounding of all that is computed here.
 pub fn tolerance(mesh: &Mesh) -> f64 {
     let b = mesh.bounds();
-    let largest = b
-        .min
-        .iter()
-        .chain(&b.max)
-        .fold(0.0f64, |m, x| m.max(x.abs()));
+    let largest = b.min.iter().chain(&b.max).fold(0.0f64, |m, x| m.max(x.abs()));
     1e-11 * norm(b.size()) + 64.0 * f64::EPSILON * largest
 }
 
@@ -88,13 +84,7 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
     for (k, i) in order.iter().enumerate() {
         place[*i as usize] = k as u32;
     }
-    let looker = Looker {
-        faces: &faces,
-        tree: &tree,
-        winding: &winding,
-        place: &place,
-        level: least as f64 - 0.5,
-    };
+    let looker = Looker { faces: &faces, tree: &tree, winding: &winding, place: &place, level: least as f64 - 0.5 };
     let whole = |i: usize| segments[i].is_empty() && covers[i].is_empty();
     let kept_whole = looker.patches(mesh, &whole);
     let pieces: Vec<Vec<[Vec3; 3]>> = (0..n)
@@ -106,10 +96,7 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
             looker.pieces(i, &segments[i], &covers[i], eta)
         })
         .collect();
-    let mut out = Mesh {
-        vertices: mesh.vertices.clone(),
-        triangles: Vec::new(),
-    };
+    let mut out = Mesh { vertices: mesh.vertices.clone(), triangles: Vec::new() };
     let (mut inner, mut untouched) = (0, true);
     for i in 0..n {
         if whole(i) {
@@ -137,12 +124,7 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
             out.triangles.push(t);
         }
     }
-    Cut {
-        mesh: out,
-        pairs,
-        inner,
-        untouched,
-    }
+    Cut { mesh: out, pairs, inner, untouched }
 }
 
 /// The largest component of a normal.
@@ -153,11 +135,7 @@ fn steepest(n: Vec3) -> usize {
 fn meeting(mesh: &Mesh, faces: &[Face], eta: f64, i: usize, j: usize) -> Option<Meeting> {
     let (s, t) = (&faces[i], &faces[j]);
     let (p, q) = (s.corners, t.corners);
-    let off = |f: &Face, c: [Vec3; 3]| {
-        c.iter().fold(0.0f64, |m, v| {
-            m.max(dot(f.normal, sub(*v, f.corners[0])).abs())
-        })
-    };
+    let off = |f: &Face, c: [Vec3; 3]| c.iter().fold(0.0f64, |m, v| m.max(dot(f.normal, sub(*v, f.corners[0])).abs()));
     let numbers = (i as u32, j as u32);
     if off(s, q) <= eta || off(t, p) <= eta {
         let axis = steepest(s.normal);
@@ -165,9 +143,7 @@ fn meeting(mesh: &Mesh, faces: &[Face], eta: f64, i: usize, j: usize) -> Option<
         let parted = apart(p, q, eta) || apart(q, p, eta);
         return (!parted).then_some(Meeting::Flat(numbers.0, numbers.1));
     }
-    let common = mesh.triangles[i]
-        .iter()
-        .filter(|v| mesh.triangles[j].contains(v));
+    let common = mesh.triangles[i].iter().filter(|v| mesh.triangles[j].contains(v));
     if common.count() >= 2 {
         return None;
     }
@@ -215,19 +191,11 @@ fn on_plane(v: [u32; 3], p: [Vec3; 3], signs: [i8; 3], face: &Face) -> Option<[V
         if signs[k] == 0 {
             put(p[k]);
         } else if signs[k] * signs[l] < 0 {
-            let (a, b) = if v[k] < v[l] {
-                (p[k], p[l])
-            } else {
-                (p[l], p[k])
-            };
+            let (a, b) = if v[k] < v[l] { (p[k], p[l]) } else { (p[l], p[k]) };
             let height = |x: Vec3| dot(face.normal, sub(x, face.corners[0]));
             let (ha, hb) = (height(a), height(b));
             let share = ha / (ha - hb);
-            let share = if share.is_finite() {
-                share.clamp(0.0, 1.0)
-            } else {
-                0.5
-            };
+            let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 };
             let mut x = add(a, scale(sub(b, a), share));
             // Flat faces stay flat to the last bit.
             let c = face.corners;
@@ -257,10 +225,7 @@ impl Line {
     fn through(a: [f64; 2], b: [f64; 2]) -> Line {
         let d = [b[0] - a[0], b[1] - a[1]];
         let length = d[0].hypot(d[1]);
-        Line {
-            at: a,
-            left: [-d[1] / length, d[0] / length],
-        }
+        Line { at: a, left: [-d[1] / length, d[0] / length] }
     }
 
     /// Distance of a point, positive on the left.
@@ -316,11 +281,7 @@ impl Partition {
                     } else {
                         let t = sa / (sa - sb);
                         let m = [0, 1].map(|k| a[k] + (b[k] - a[k]) * t);
-                        let (at_a, at_b) = if sa > 0.0 {
-                            (left, right)
-                        } else {
-                            (right, left)
-                        };
+                        let (at_a, at_b) = if sa > 0.0 { (left, right) } else { (right, left) };
                         work.push((at_a, a, m));
                         work.push((at_b, m, b));
                     }
@@ -355,20 +316,10 @@ impl Partition {
             }
         }
         let at = |t: f64| [0, 1].map(|k| a[k] + (b[k] - a[k]) * t);
-        (from < to).then(|| {
-            [
-                if from == 0.0 { a } else { at(from) },
-                if to == 1.0 { b } else { at(to) },
-            ]
-        })
+        (from < to).then(|| [if from == 0.0 { a } else { at(from) }, if to == 1.0 { b } else { at(to) }])
     }
 
-    fn split(
-        &self,
-        polygon: &[Vec3],
-        line: &Line,
-        ends: [Vec3; 2],
-    ) -> Option<(Vec<Vec3>, Vec<Vec3>)> {
+    fn split(&self, polygon: &[Vec3], line: &Line, ends: [Vec3; 2]) -> Option<(Vec<Vec3>, Vec<Vec3>)> {
         let side = |p: Vec3| line.side(self.flat(p));
         let sides: Vec<f64> = polygon.iter().map(|p| side(*p)).collect();
         if !(sides.iter().any(|s| *s > self.eta) && sides.iter().any(|s| *s < -self.eta)) {
@@ -389,9 +340,7 @@ impl Partition {
                 let forward = p < q;
                 let (a, b, sa, sb) = if forward { (p, q, s, t) } else { (q, p, t, s) };
                 let x = add(a, scale(sub(b, a), sa / (sa - sb)));
-                let near = ends
-                    .into_iter()
-                    .find(|e| norm(sub(*e, x)) <= 4.0 * self.eta);
+                let near = ends.into_iter().find(|e| norm(sub(*e, x)) <= 4.0 * self.eta);
                 let x = near.unwrap_or(x);
                 left.push(x);
                 right.push(x);
@@ -492,15 +441,9 @@ impl Looker<'_> {
         }
         let decided: Vec<bool> = largest
             .par_iter()
-            .map(|(i, _)| {
-                *i != u32::MAX && {
-                    self.piece_bounds(*i as usize, &self.faces[*i as usize].corners, &[])
-                }
-            })
+            .map(|(i, _)| *i != u32::MAX && { self.piece_bounds(*i as usize, &self.faces[*i as usize].corners, &[]) })
             .collect();
-        (0..n)
-            .map(|i| decided[sets.root(i as u32) as usize])
-            .collect()
+        (0..n).map(|i| decided[sets.root(i as u32) as usize]).collect()
     }
 
     /// The pieces of triangle `i` that bound the solid.

@@ -39,9 +39,8 @@ pub fn smoothed(
     if rim.len() < SMALL {
         return patch;
     }
-    let side: HashMap<(u32, u32), Vec3> = (0..rim.len())
-        .filter_map(|i| slopes[i].map(|n| ((rim[i], rim[(i + 1) % rim.len()]), n)))
-        .collect();
+    let side: HashMap<(u32, u32), Vec3> =
+        (0..rim.len()).filter_map(|i| slopes[i].map(|n| ((rim[i], rim[(i + 1) % rim.len()]), n))).collect();
     let (mut fold, mut count) = (0.0, 0.0);
     for t in &patch {
         let normal = super::tree::normal(t.map(|v| vertices[v as usize]));
@@ -82,9 +81,7 @@ fn refined(vertices: &mut Vec<Vec3>, rim: &[u32], patch: &[[u32; 3]]) -> Vec<[u3
         let [a, b] = [i % n, (i + 1) % n].map(|k| vertices[rim[k] as usize]);
         norm(sub(a, b))
     };
-    let mut spacing: HashMap<u32, f64> = (0..n)
-        .map(|i| (rim[i], (gap(i) + gap(i + n - 1)) / 2.0))
-        .collect();
+    let mut spacing: HashMap<u32, f64> = (0..n).map(|i| (rim[i], (gap(i) + gap(i + n - 1)) / 2.0)).collect();
     let mut fine = patch.to_vec();
     for _ in 0..ROUNDS {
         let mut next = Vec::with_capacity(3 * fine.len());

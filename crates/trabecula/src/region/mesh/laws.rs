@@ -30,9 +30,7 @@ fn apart(mesh: &Mesh) -> Mesh {
     let corners = (0..mesh.triangles.len()).flat_map(|i| mesh.corners(i));
     Mesh {
         vertices: corners.collect(),
-        triangles: (0..mesh.triangles.len() as u32)
-            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-            .collect(),
+        triangles: (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
     }
 }
 
@@ -41,11 +39,9 @@ fn torus(n: u32, m: u32, big: f64, small: f64) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..n {
         for j in 0..m {
-            let [u, v] =
-                [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)].map(|t| t * 2.0 * PI);
+            let [u, v] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)].map(|t| t * 2.0 * PI);
             let r = big + small * v.cos();
-            mesh.vertices
-                .push([r * u.cos(), r * u.sin(), small * v.sin()]);
+            mesh.vertices.push([r * u.cos(), r * u.sin(), small * v.sin()]);
             let at = |i: u32, j: u32| (i % n) * m + j % m;
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
@@ -79,10 +75,7 @@ fn continuous(name: &str, region: &MeshRegion, center: Vec3, reach: f64) {
         let p = add(center, [0; 3].map(|_| random(&mut seed) * reach));
         let q = add(p, [0; 3].map(|_| random(&mut seed) * reach * 0.05));
         let (a, b) = (region.value(p), region.value(q));
-        assert!(
-            (a - b).abs() <= norm(sub(p, q)) * (1.0 + 1e-9) + 1e-12 * reach,
-            "{name}: {a} at {p:?}, {b} at {q:?}"
-        );
+        assert!((a - b).abs() <= norm(sub(p, q)) * (1.0 + 1e-9) + 1e-12 * reach, "{name}: {a} at {p:?}, {b} at {q:?}");
     }
 }
 
@@ -92,12 +85,9 @@ fn holes_are_closed_and_nothing_jumps_across() {
     let volume = whole.volume();
     let mut mesh = whole.clone();
     // Everything about the x axis within 15 degrees, and two lone triangles that touch in a corner.
-    mesh.triangles
-        .retain(|t| t.iter().any(|v| whole.vertices[*v as usize][0] < 0.96));
+    mesh.triangles.retain(|t| t.iter().any(|v| whole.vertices[*v as usize][0] < 0.96));
     let corner = mesh.triangles[0][0];
-    let fan: Vec<usize> = (0..mesh.triangles.len())
-        .filter(|i| mesh.triangles[*i].contains(&corner))
-        .collect();
+    let fan: Vec<usize> = (0..mesh.triangles.len()).filter(|i| mesh.triangles[*i].contains(&corner)).collect();
     mesh.triangles.remove(fan[3]);
     mesh.triangles.remove(fan[0]);
     let region = auto(mesh.clone());
@@ -106,13 +96,7 @@ fn holes_are_closed_and_nothing_jumps_across() {
     let got = region.volume().unwrap();
     // Flat caps would lose 5 ‰.
     assert!((got / volume - 1.0).abs() < 3e-4, "{got} for {volume}");
-    agrees(
-        "hole",
-        &region,
-        &Sphere::new([0.0; 3], 1.0).unwrap(),
-        0.05,
-        1.3,
-    );
+    agrees("hole", &region, &Sphere::new([0.0; 3], 1.0).unwrap(), 0.05, 1.3);
     continuous("hole", &region, [0.97, 0.0, 0.0], 0.4);
     let said = refused(mesh, Repair::Refuse);
     assert!(said.contains("open edges"), "{said}");
@@ -125,14 +109,8 @@ fn flat_holes_are_closed_flat() {
     let mut mesh = Mesh::default();
     for i in 0..n {
         let u = 2.0 * PI * f64::from(i) / f64::from(n);
-        mesh.vertices
-            .extend([[u.cos(), u.sin(), 0.0], [u.cos(), u.sin(), 24.0]]);
-        let (a, b, c, d) = (
-            2 * i as u32,
-            2 * ((i + 1) % n) as u32,
-            2 * ((i + 1) % n) as u32 + 1,
-            2 * i as u32 + 1,
-        );
+        mesh.vertices.extend([[u.cos(), u.sin(), 0.0], [u.cos(), u.sin(), 24.0]]);
+        let (a, b, c, d) = (2 * i as u32, 2 * ((i + 1) % n) as u32, 2 * ((i + 1) % n) as u32 + 1, 2 * i as u32 + 1);
         mesh.triangles.extend([[a, b, c], [a, c, d]]);
     }
     let region = auto(mesh);
@@ -150,16 +128,11 @@ fn flat_holes_are_closed_flat() {
 fn too_many_holes_are_refused_in_numbers() {
     let mut seed = 8;
     let soup = Mesh {
-        vertices: (0..300)
-            .map(|_| [0; 3].map(|_| random(&mut seed)))
-            .collect(),
+        vertices: (0..300).map(|_| [0; 3].map(|_| random(&mut seed))).collect(),
         triangles: (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
     };
     let said = refused(soup, Repair::Auto);
-    assert!(
-        said.contains("100 holes") && said.contains("50.0 %") && said.contains("300 open edges"),
-        "{said}"
-    );
+    assert!(said.contains("100 holes") && said.contains("50.0 %") && said.contains("300 open edges"), "{said}");
     let mut lid = Mesh::cuboid([0.0; 3], [1.0; 3]);
     lid.triangles.truncate(10);
     assert!(refused(lid, Repair::Auto).contains("16.7 %"));
@@ -186,16 +159,14 @@ fn turned_and_doubled_triangles_leave_the_mesh_as_it_was() {
     let mut mesh = whole.clone();
     for i in 0..20 {
         let [a, b, c] = whole.triangles[11 * i];
-        mesh.triangles
-            .push(if i % 2 == 0 { [b, c, a] } else { [a, c, b] });
+        mesh.triangles.push(if i % 2 == 0 { [b, c, a] } else { [a, c, b] });
     }
     let region = auto(mesh);
     assert_eq!(region.repaired().duplicates, 20);
     assert!(near(region.volume().unwrap()));
     // Everything from both sides.
     let mut mesh = whole.clone();
-    mesh.triangles
-        .extend(whole.triangles.iter().map(|[a, b, c]| [*a, *c, *b]));
+    mesh.triangles.extend(whole.triangles.iter().map(|[a, b, c]| [*a, *c, *b]));
     assert!(near(auto(mesh).volume().unwrap()));
 }
 
@@ -210,10 +181,7 @@ fn cavities_are_kept_and_bodies_within_bodies_are_not() {
     let mut mesh = hollow.clone();
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     let region = auto(mesh);
-    assert_eq!(
-        (region.mesh(), region.repaired().bodies_turned),
-        (&hollow, 2)
-    );
+    assert_eq!((region.mesh(), region.repaired().bodies_turned), (&hollow, 2));
     let nested = auto(with(big(), small(), false));
     assert_eq!(nested.volume().unwrap(), big().volume());
     assert_eq!(nested.repaired().inner, 320);
@@ -269,10 +237,7 @@ fn union_volume(boxes: &[(Vec3, Vec3)]) -> f64 {
         for y in cuts[1].windows(2) {
             for z in cuts[2].windows(2) {
                 let c = [x, y, z].map(|w| (w[0] + w[1]) / 2.0);
-                if boxes
-                    .iter()
-                    .any(|b| (0..3).all(|a| b.0[a] < c[a] && c[a] < b.1[a]))
-                {
+                if boxes.iter().any(|b| (0..3).all(|a| b.0[a] < c[a] && c[a] < b.1[a])) {
                     volume += (x[1] - x[0]) * (y[1] - y[0]) * (z[1] - z[0]);
                 }
             }
@@ -293,10 +258,7 @@ fn boxes_agree(boxes: &[(Vec3, Vec3)], turn: &Mat3) {
     let region = auto(moved(mesh, turn, by));
     let want = union_volume(boxes);
     let got = region.volume().unwrap();
-    assert!(
-        (got - want).abs() < 1e-8 * want,
-        "{got} for {want}: {boxes:?}"
-    );
+    assert!((got - want).abs() < 1e-8 * want, "{got} for {want}: {boxes:?}");
     let truth = Union::new(truth).unwrap();
     let mut seed = 77;
     for _ in 0..1500 {
@@ -314,12 +276,7 @@ fn boxes_agree(boxes: &[(Vec3, Vec3)], turn: &Mat3) {
 #[test]
 fn flush_equal_and_touching_boxes_are_united() {
     let unit = ([0.0; 3], [1.0; 3]);
-    let turns = [
-        [0.0; 3],
-        [90.0, 0.0, 0.0],
-        [11.0, 23.0, 37.0],
-        [0.0, 45.0, 0.0],
-    ];
+    let turns = [[0.0; 3], [90.0, 0.0, 0.0], [11.0, 23.0, 37.0], [0.0, 45.0, 0.0]];
     for turn in turns.map(rotation) {
         for other in [
             ([0.0; 3], [1.0; 3]),
@@ -349,22 +306,13 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     let mut seed = 12;
     for pair in cube.triangles.chunks(2) {
         let by = [0; 3].map(|_| 1e-4 * random(&mut seed));
-        let face = Mesh {
-            vertices: cube.vertices.iter().map(|v| add(*v, by)).collect(),
-            triangles: pair.to_vec(),
-        };
+        let face = Mesh { vertices: cube.vertices.iter().map(|v| add(*v, by)).collect(), triangles: pair.to_vec() };
         mesh = with(mesh, face, seed % 3 == 0);
     }
     let region = auto(mesh);
     assert!((region.volume().unwrap() - 1.0).abs() < 1e-3);
     assert_eq!(region.repaired().holes, 0, "{:?}", region.repaired());
-    agrees(
-        "six faces",
-        &region,
-        &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(),
-        1e-3,
-        1.5,
-    );
+    agrees("six faces", &region, &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(), 1e-3, 1.5);
 
     // A corner on a side that its neighbour does not have.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
@@ -385,13 +333,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     let region = auto(mesh);
     assert_eq!(region.repaired().holes, 1);
     assert!((region.volume().unwrap() - 1.0).abs() < 1e-5);
-    agrees(
-        "hair",
-        &region,
-        &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(),
-        1e-4,
-        1.5,
-    );
+    agrees("hair", &region, &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(), 1e-4, 1.5);
 }
 
 #[test]
@@ -405,13 +347,7 @@ fn noise_that_folds_the_surface_is_cut_out() {
     let region = auto(mesh.clone());
     assert!(region.repaired().crossings > 50, "{:?}", region.repaired());
     assert!((region.volume().unwrap() / (4.0 / 3.0 * PI) - 1.0).abs() < 0.02);
-    agrees(
-        "noise",
-        &region,
-        &Sphere::new([0.0; 3], 1.0).unwrap(),
-        0.08,
-        1.3,
-    );
+    agrees("noise", &region, &Sphere::new([0.0; 3], 1.0).unwrap(), 0.08, 1.3);
     continuous("noise", &region, [0.9, 0.0, 0.0], 0.2);
     // Torn apart as well.
     let torn = auto(apart(&mesh));
@@ -421,15 +357,8 @@ fn noise_that_folds_the_surface_is_cut_out() {
 #[test]
 fn neither_order_nor_place_matters() {
     let damaged = || {
-        let mut m = with(
-            ball(3, 1.0, 0.0),
-            moved(
-                ball(3, 0.8, 0.1),
-                &rotation([5.0, 8.0, 3.0]),
-                [0.9, 0.2, 0.1],
-            ),
-            false,
-        );
+        let mut m =
+            with(ball(3, 1.0, 0.0), moved(ball(3, 0.8, 0.1), &rotation([5.0, 8.0, 3.0]), [0.9, 0.2, 0.1]), false);
         for i in 0..30 {
             m.triangles[40 * i].swap(0, 1);
         }
@@ -457,19 +386,14 @@ fn neither_order_nor_place_matters() {
         let p = [0; 3].map(|_| random(&mut seed) * 1.8);
         let d = one.value(p);
         assert!((other.value(p) - d).abs() < 1e-9, "{p:?}");
-        assert!(
-            (turned.value(add(apply(&turn, p), by)) - d).abs() < 1e-9,
-            "{p:?}"
-        );
+        assert!((turned.value(add(apply(&turn, p), by)) - d).abs() < 1e-9, "{p:?}");
     }
 }
 
 #[test]
 fn winding_numbers_are_whole_and_the_tree_is_near_them() {
     let mesh = with(ball(3, 2.0, 0.2), ball(2, 0.8, 0.0), true);
-    let faces: Vec<Face> = (0..mesh.triangles.len())
-        .map(|i| Face::new(mesh.corners(i)))
-        .collect();
+    let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
     let (tree, _) = Tree::new(&faces);
     let winding = Winding::new(&tree);
     let mut seed = 6;
@@ -483,10 +407,7 @@ fn winding_numbers_are_whole_and_the_tree_is_near_them() {
         }
     }
     // Moments up to the second leave an error of the third: an eighth at twice the reach, at least.
-    assert!(
-        worst[0] < 0.02 && worst[1] < worst[0] / 8.0 && worst[2] < worst[1] / 8.0,
-        "{worst:?}"
-    );
+    assert!(worst[0] < 0.02 && worst[1] < worst[0] / 8.0 && worst[2] < worst[1] / 8.0, "{worst:?}");
     // An open surface: the number is that of the plain sum there too.
     let open: Vec<Face> = faces[..500].to_vec();
     let (tree, _) = Tree::new(&open);
@@ -504,10 +425,7 @@ fn degenerate_and_stray_triangles_go() {
     mesh.vertices.push([0.5, 0.0, 0.0]);
     mesh.triangles.extend([[0, 1, 8], [3, 3, 5]]);
     let region = auto(mesh);
-    assert_eq!(
-        (region.volume(), region.repaired().degenerate),
-        (Some(1.0), 2)
-    );
+    assert_eq!((region.volume(), region.repaired().degenerate), (Some(1.0), 2));
     // A flat fin on a side of the box encloses nothing.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([2.0, 0.5, 2.0]);

@@ -62,11 +62,7 @@ impl Normals {
             let longest = longest.into_iter().fold(0.0, f64::max);
             norm(cross(sub(b, a), sub(c, a))) > LOW * longest
         };
-        Normals {
-            faces: order.iter().map(sound).collect(),
-            edges: Vec::new(),
-            corners: Vec::new(),
-        }
+        Normals { faces: order.iter().map(sound).collect(), edges: Vec::new(), corners: Vec::new() }
     }
 
     /// Outward normal (any length) at the nearest point; not numbers where there is none to trust.

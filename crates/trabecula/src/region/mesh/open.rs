@@ -25,11 +25,7 @@ struct OpenMesh {
 }
 
 /// The mesh without its triangles on the planes of `cuts`; `None` if there are none.
-pub(super) fn opened(
-    whole: Arc<MeshRegion>,
-    cuts: &[HalfSpace],
-    found: &mut [bool],
-) -> Option<Region> {
+pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
     let off = OFF * norm(whole.bounds.size());
     let on = |f: &Face, c: &HalfSpace| {
         dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off)
@@ -140,19 +136,9 @@ impl Shape for OpenMesh {
 }
 
 impl OpenMesh {
-    fn fill_part(
-        &self,
-        block: &Block,
-        level: f64,
-        cell: f64,
-        [lo, hi]: [[usize; 3]; 2],
-        out: &mut [f32],
-    ) {
+    fn fill_part(&self, block: &Block, level: f64, cell: f64, [lo, hi]: [[usize; 3]; 2], out: &mut [f32]) {
         let ends = [0, 1, 2].map(|a| [block.axes[a][lo[a]], block.axes[a][hi[a] - 1]]);
-        let b = Aabb {
-            min: ends.map(|e| e[0]),
-            max: ends.map(|e| e[1]),
-        };
+        let b = Aabb { min: ends.map(|e| e[0]), max: ends.map(|e| e[1]) };
         let r = self.bound(&b);
         let far = (r.lo - level > cell).then_some(r.lo - level);
         let far = far.or_else(|| (r.hi - level < -cell).then_some(r.hi - level));

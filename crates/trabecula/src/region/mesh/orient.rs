@@ -78,20 +78,10 @@ impl Body {
         }
         let corners = |i: &u32| mesh.corners(*i as usize);
         if self.triangles.len() <= MANY {
-            return self
-                .triangles
-                .iter()
-                .map(|i| turn(corners(i), p))
-                .sum::<f64>()
-                .abs()
-                > 0.5;
+            return self.triangles.iter().map(|i| turn(corners(i), p)).sum::<f64>().abs() > 0.5;
         }
         let (tree, winding) = self.tree.get_or_insert_with(|| {
-            let faces: Vec<Face> = self
-                .triangles
-                .iter()
-                .map(|i| Face::new(corners(i)))
-                .collect();
+            let faces: Vec<Face> = self.triangles.iter().map(|i| Face::new(corners(i))).collect();
             let tree = Tree::new(&faces).0;
             let winding = Winding::new(&tree);
             (tree, winding)
@@ -104,21 +94,12 @@ impl Body {
 /// that cavities stay, unless it would bound no solid and no cavity. Gives the number of bodies turned.
 pub fn face_out(mesh: &mut Mesh) -> usize {
     let (number, count) = components(mesh);
-    let mut bodies: Vec<Body> = (0..count)
-        .map(|_| Body {
-            triangles: Vec::new(),
-            bounds: Aabb::EMPTY,
-            volume: 0.0,
-            tree: None,
-        })
-        .collect();
+    let mut bodies: Vec<Body> =
+        (0..count).map(|_| Body { triangles: Vec::new(), bounds: Aabb::EMPTY, volume: 0.0, tree: None }).collect();
     for (i, b) in (0..).zip(&number) {
         let body = &mut bodies[*b as usize];
         body.triangles.push(i);
-        body.bounds = mesh
-            .corners(i as usize)
-            .iter()
-            .fold(body.bounds, |b, p| b.with(*p));
+        body.bounds = mesh.corners(i as usize).iter().fold(body.bounds, |b, p| b.with(*p));
     }
     for body in &mut bodies {
         let o = body.bounds.center();
@@ -131,11 +112,7 @@ pub fn face_out(mesh: &mut Mesh) -> usize {
     // From the largest box down, a body comes after all that hold it.
     let extent = |b: &Body| dot(b.bounds.size(), b.bounds.size());
     let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|a, b| {
-        extent(&bodies[*b])
-            .total_cmp(&extent(&bodies[*a]))
-            .then(a.cmp(b))
-    });
+    order.sort_by(|a, b| extent(&bodies[*b]).total_cmp(&extent(&bodies[*a])).then(a.cmp(b)));
     let any_out = bodies.iter().any(|b| b.volume < 0.0);
     let mut flip = vec![false; count];
     for (rank, &i) in order.iter().enumerate() {
@@ -163,9 +140,7 @@ pub fn face_out(mesh: &mut Mesh) -> usize {
             }
         }
         let sense = |j: usize, flip: &[bool]| (bodies[j].volume > 0.0) != flip[j];
-        let about = holders
-            .iter()
-            .map(|&j| if sense(j, &flip) { 1 } else { -1 });
+        let about = holders.iter().map(|&j| if sense(j, &flip) { 1 } else { -1 });
         let about: i32 = about.sum();
         // The nearest holder is the last: boxes shrink along the order.
         flip[i] = holders.last().is_some_and(|&j| flip[j]);

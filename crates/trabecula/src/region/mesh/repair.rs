@@ -69,42 +69,14 @@ impl Repaired {
         });
         let all = [
             s(self.joined, "open corner joined", "open corners joined"),
-            s(
-                self.split,
-                "open edge split at a corner on it",
-                "open edges split at corners on them",
-            ),
-            s(
-                self.degenerate,
-                "triangle without area left out",
-                "triangles without area left out",
-            ),
-            s(
-                self.duplicates,
-                "duplicate triangle left out",
-                "duplicate triangles left out",
-            ),
-            s(
-                self.turned,
-                "flipped triangle turned",
-                "flipped triangles turned",
-            ),
-            s(
-                self.bodies_turned,
-                "body that was inside out turned",
-                "bodies that were inside out turned",
-            ),
+            s(self.split, "open edge split at a corner on it", "open edges split at corners on them"),
+            s(self.degenerate, "triangle without area left out", "triangles without area left out"),
+            s(self.duplicates, "duplicate triangle left out", "duplicate triangles left out"),
+            s(self.turned, "flipped triangle turned", "flipped triangles turned"),
+            s(self.bodies_turned, "body that was inside out turned", "bodies that were inside out turned"),
             holes,
-            s(
-                self.crossings,
-                "crossing pair of triangles cut",
-                "crossing pairs of triangles cut",
-            ),
-            s(
-                self.inner,
-                "triangle inside the solid left out",
-                "triangles inside the solid left out",
-            ),
+            s(self.crossings, "crossing pair of triangles cut", "crossing pairs of triangles cut"),
+            s(self.inner, "triangle inside the solid left out", "triangles inside the solid left out"),
         ];
         let all: Vec<String> = all.into_iter().flatten().collect();
         (!all.is_empty()).then(|| format!("the mesh was repaired: {}", all.join(", ")))
@@ -155,18 +127,12 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
             if crossing == 0 {
                 if check::plain(&mesh, &pairs) {
                     let done = Repaired::default();
-                    return Ok(Boundary {
-                        mesh,
-                        pairs: Some(pairs),
-                        done,
-                    });
+                    return Ok(Boundary { mesh, pairs: Some(pairs), done });
                 }
                 None
             } else {
                 let more = if crossing < MANY { "" } else { " or more" };
-                Some(format!(
-                    "{crossing}{more} pairs of triangles that cross each other"
-                ))
+                Some(format!("{crossing}{more} pairs of triangles that cross each other"))
             }
         }
         Err(found) => Some(found),
@@ -190,11 +156,7 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         let caps = cap::close(&mut mesh);
         (done.holes, done.hole_length, done.hole_area) = (caps.holes, caps.length, caps.area);
         let area = mesh.area();
-        done.hole_share = if caps.area > 0.0 {
-            caps.area / area
-        } else {
-            0.0
-        };
+        done.hole_share = if caps.area > 0.0 { caps.area / area } else { 0.0 };
         if mesh.triangles.is_empty() {
             return Err(refuse(format!(
                 "the mesh of {given} triangles holds no solid: none are left without those that have no area and those that lie on each other; found {}",
@@ -276,21 +238,13 @@ pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary
     check::numbers(&all).ok()?;
     let eta = cut::tolerance(&all);
     let cut = cut::boundary(&all, least);
-    let mesh = if cut.untouched {
-        cut.mesh
-    } else {
-        settled(cut.mesh, eta).ok()?
-    };
+    let mesh = if cut.untouched { cut.mesh } else { settled(cut.mesh, eta).ok()? };
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
         return None;
     }
     let pairs = check::edges(&mesh).ok();
     let pairs = pairs.filter(|_| self_intersections(&mesh, 1) == 0);
-    Some(Boundary {
-        mesh,
-        pairs,
-        done: Repaired::default(),
-    })
+    Some(Boundary { mesh, pairs, done: Repaired::default() })
 }
 
 /// Refuses pieces that leave more open than rounding does: over a closed surface ∫ n dA is zero and ∫ x nᵀ dA is the

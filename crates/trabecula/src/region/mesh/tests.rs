@@ -36,25 +36,16 @@ pub(super) fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
                     vertices.len() as u32 - 1
                 })
             });
-            next.extend([
-                [t[0], m[0], m[2]],
-                [m[0], t[1], m[1]],
-                [m[2], m[1], t[2]],
-                m,
-            ]);
+            next.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
         }
         triangles = next;
     }
     for v in &mut vertices {
         let u = unit(*v);
-        let r =
-            radius * (1.0 + wave * (7.0 * u[0]).sin() * (6.0 * u[1]).sin() * (5.0 * u[2]).cos());
+        let r = radius * (1.0 + wave * (7.0 * u[0]).sin() * (6.0 * u[1]).sin() * (5.0 * u[2]).cos());
         *v = scale(u, r);
     }
-    Mesh {
-        vertices,
-        triangles,
-    }
+    Mesh { vertices, triangles }
 }
 
 /// Both meshes as one, the second turned inside out if asked.
@@ -116,9 +107,7 @@ fn flat_faces_are_exactly_zero() {
 fn distances_and_signs_agree_with_a_plain_search() {
     let hollow = with(ball(3, 2.0, 0.2), ball(1, 0.8, 0.0), true);
     let volume = hollow.volume();
-    let corners: Vec<[Vec3; 3]> = (0..hollow.triangles.len())
-        .map(|i| hollow.corners(i))
-        .collect();
+    let corners: Vec<[Vec3; 3]> = (0..hollow.triangles.len()).map(|i| hollow.corners(i)).collect();
     let region = MeshRegion::new(hollow, Repair::Auto).unwrap();
     assert_eq!(region.volume(), Some(volume));
     check_shape("hollow ball", &region, 2.5, 1.0);
@@ -127,15 +116,7 @@ fn distances_and_signs_agree_with_a_plain_search() {
         let p = [0; 3].map(|_| random(&mut seed) * 2.6);
         let (mut near, mut turns) = (f64::INFINITY, 0.0);
         for c in &corners {
-            near = near.min(
-                Face {
-                    corners: *c,
-                    normal: normal(*c),
-                }
-                .nearest(p)
-                .0
-                .sqrt(),
-            );
+            near = near.min(Face { corners: *c, normal: normal(*c) }.nearest(p).0.sqrt());
             let [a, b, c] = c.map(|q| sub(q, p));
             let (la, lb, lc) = (norm(a), norm(b), norm(c));
             let lower = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
@@ -161,10 +142,7 @@ fn the_seed_never_matters() {
     // The centre of a regular body is equally far from every face.
     let cube = MeshRegion::new(Mesh::cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
     for s in 0..12 {
-        assert_eq!(
-            cube.tree.nearest([0.0; 3], s).triangle,
-            cube.tree.nearest([0.0; 3], 0).triangle
-        );
+        assert_eq!(cube.tree.nearest([0.0; 3], s).triangle, cube.tree.nearest([0.0; 3], 0).triangle);
     }
 }
 
@@ -173,10 +151,7 @@ fn nearest_points_of_a_triangle_by_sampling() {
     let mut seed = 21;
     for _ in 0..300 {
         let corners = [0; 3].map(|_| [0; 3].map(|_| random(&mut seed)));
-        let face = Face {
-            corners,
-            normal: normal(corners),
-        };
+        let face = Face { corners, normal: normal(corners) };
         let p = [0; 3].map(|_| 2.0 * random(&mut seed));
         let (square, away, _) = face.nearest(p);
         assert!((square - dot(away, away)).abs() < 1e-14);
@@ -185,16 +160,12 @@ fn nearest_points_of_a_triangle_by_sampling() {
         for i in 0..=n {
             for j in 0..=n - i {
                 let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                let q = [0, 1, 2]
-                    .map(|a| (1.0 - u - v) * corners[0][a] + u * corners[1][a] + v * corners[2][a]);
+                let q = [0, 1, 2].map(|a| (1.0 - u - v) * corners[0][a] + u * corners[1][a] + v * corners[2][a]);
                 least = least.min(norm(sub(p, q)));
             }
         }
         // The samples are never nearer, and one of them lies within a step of the nearest point.
-        assert!(
-            least >= square.sqrt() - 1e-12
-                && least <= square.sqrt() + 2.0 * 3f64.sqrt() * 2.0 / f64::from(n)
-        );
+        assert!(least >= square.sqrt() - 1e-12 && least <= square.sqrt() + 2.0 * 3f64.sqrt() * 2.0 / f64::from(n));
     }
 }
 
@@ -209,15 +180,9 @@ fn what_is_not_one_solid_is_refused_in_numbers() {
     };
     assert!(MeshRegion::new(good(), Repair::Auto).is_ok());
     assert!(change(&|m| m.triangles.truncate(11)).contains("3 open edges"));
-    assert!(
-        change(&|m| m.triangles[4].swap(0, 1))
-            .contains("3 edges whose two triangles face opposite ways")
-    );
+    assert!(change(&|m| m.triangles[4].swap(0, 1)).contains("3 edges whose two triangles face opposite ways"));
     let double = change(&|m| m.triangles.push(m.triangles[2]));
-    assert!(
-        double.contains("3 edges with more than two") && double.contains("1 duplicate"),
-        "{double}"
-    );
+    assert!(double.contains("3 edges with more than two") && double.contains("1 duplicate"), "{double}");
     assert!(change(&|m| m.vertices[7] = m.vertices[6]).contains("degenerate"));
     assert!(change(&|m| m.triangles.iter_mut().for_each(|t| t.swap(0, 1))).contains("inside out"));
     assert!(change(&|m| m.vertices[3][1] = f64::INFINITY).contains("vertex 3"));
@@ -241,20 +206,12 @@ fn corners_written_with_two_roundings_are_one() {
     // Every triangle its own corners, off by less than single precision tells at 11 mm.
     let mut seed = 4;
     let corners: Vec<Vec3> = (0..12).flat_map(|i| mesh.corners(i)).collect();
-    mesh.vertices = corners
-        .iter()
-        .map(|p| p.map(|x| x + 2e-7 * random(&mut seed)))
-        .collect();
+    mesh.vertices = corners.iter().map(|p| p.map(|x| x + 2e-7 * random(&mut seed))).collect();
     mesh.triangles = (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
     assert!((region.volume().unwrap() - 1.0).abs() < 1e-5);
     mesh.vertices[0][0] += 1e-3;
-    assert!(
-        MeshRegion::new(mesh, Repair::Refuse)
-            .unwrap_err()
-            .message
-            .contains("open edges")
-    );
+    assert!(MeshRegion::new(mesh, Repair::Refuse).unwrap_err().message.contains("open edges"));
 }
 
 /// Not a test of right or wrong: prints the rates that the documentation cites, of a clean mesh and of two that cross.
@@ -269,13 +226,10 @@ fn rates() {
         *v = add(*v, [60.0, 10.0, 5.0]);
     }
     let mut open = clean.clone();
-    open.triangles
-        .retain(|t| t.iter().any(|v| clean.vertices[*v as usize][0] < 98.0));
-    for (name, mesh) in [
-        ("clean", clean.clone()),
-        ("with a hole", open),
-        ("two that cross", with(clean.clone(), other, false)),
-    ] {
+    open.triangles.retain(|t| t.iter().any(|v| clean.vertices[*v as usize][0] < 98.0));
+    for (name, mesh) in
+        [("clean", clean.clone()), ("with a hole", open), ("two that cross", with(clean.clone(), other, false))]
+    {
         let t = Instant::now();
         let region = MeshRegion::new(mesh.clone(), Repair::Auto).unwrap();
         println!(
@@ -294,36 +248,24 @@ fn rates() {
         let mut out = vec![0.0; points.len()];
         let t = Instant::now();
         region.values(&points, &mut out);
-        println!(
-            "  {:.0} ns per random query near the surface",
-            t.elapsed().as_nanos() as f64 / points.len() as f64
-        );
+        println!("  {:.0} ns per random query near the surface", t.elapsed().as_nanos() as f64 / points.len() as f64);
         let t = Instant::now();
         let winding = Winding::new(&region.tree);
         let made = t.elapsed();
         let t = Instant::now();
-        let inside = points
-            .iter()
-            .filter(|p| winding.at(&region.tree, **p, REACH, |_| false) > 0.5)
-            .count();
+        let inside = points.iter().filter(|p| winding.at(&region.tree, **p, REACH, |_| false) > 0.5).count();
         println!(
             "  moments in {made:?}, {:.0} ns per winding number, {inside} inside",
             t.elapsed().as_nanos() as f64 / points.len() as f64
         );
         let n = 256;
-        let axis: Vec<f64> = (0..n)
-            .map(|i| -115.0 + 260.0 * i as f64 / (n - 1) as f64)
-            .collect();
+        let axis: Vec<f64> = (0..n).map(|i| -115.0 + 260.0 * i as f64 / (n - 1) as f64).collect();
         let t = Instant::now();
-        let tiles: Vec<(usize, usize, usize)> = (0..512)
-            .map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32))
-            .collect();
+        let tiles: Vec<(usize, usize, usize)> = (0..512).map(|i| (i % 8 * 32, i / 8 % 8 * 32, i / 64 * 32)).collect();
         let inside: usize = tiles
             .par_iter()
             .map(|&(x, y, z)| {
-                let block = Block {
-                    axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]],
-                };
+                let block = Block { axes: [&axis[x..x + 32], &axis[y..y + 32], &axis[z..z + 32]] };
                 let mut out = vec![0f32; block.len()];
                 region.fill(&block, &mut out);
                 out.iter().filter(|v| **v < 0.0).count()

@@ -49,10 +49,7 @@ pub fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
 impl Face {
     /// The triangle of these corners, which has area.
     pub fn new(corners: [Vec3; 3]) -> Face {
-        Face {
-            corners,
-            normal: normal(corners),
-        }
+        Face { corners, normal: normal(corners) }
     }
 
     /// The nearest point of the triangle to `p`: squared distance, vector from it to `p`, feature.
@@ -127,28 +124,14 @@ impl Tree {
     ///
     /// Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies (2007).
     pub fn new(faces: &[Face]) -> (Tree, Vec<u32>) {
-        let boxes: Vec<Aabb> = faces
-            .iter()
-            .map(|f| f.corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)))
-            .collect();
+        let boxes: Vec<Aabb> = faces.iter().map(|f| f.corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))).collect();
         let mut order: Vec<u32> = (0..faces.len() as u32).collect();
         let mut nodes = Vec::with_capacity(faces.len());
         build(&boxes, &mut order, 0, 0, &mut nodes);
         let all = nodes[0].bounds;
-        let largest = all
-            .min
-            .iter()
-            .chain(&all.max)
-            .fold(0.0f64, |m, x| m.max(x.abs()));
+        let largest = all.min.iter().chain(&all.max).fold(0.0f64, |m, x| m.max(x.abs()));
         let faces = order.iter().map(|i| faces[*i as usize]).collect();
-        (
-            Tree {
-                nodes,
-                faces,
-                tie: 16.0 * f64::EPSILON * largest,
-            },
-            order,
-        )
+        (Tree { nodes, faces, tie: 16.0 * f64::EPSILON * largest }, order)
     }
 
     /// The rounding that a distance to the mesh carries, mm.
@@ -170,17 +153,10 @@ impl Tree {
     /// near: it makes the search shorter and never changes the answer.
     pub fn nearest(&self, p: Vec3, seed: u32) -> Hit {
         let (square, away, feature) = self.faces[seed as usize].nearest(p);
-        let mut best = Hit {
-            square,
-            away,
-            triangle: seed,
-            feature,
-        };
+        let mut best = Hit { square, away, triangle: seed, feature };
         // Boxes are searched while they may hold a tie, so that rounding cannot make the seed matter.
         let reach = |square: f64| {
-            let d = square.sqrt() * (1.0 + 1e-12)
-                + self.tie
-                + 1e-14 * p.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            let d = square.sqrt() * (1.0 + 1e-12) + self.tie + 1e-14 * p.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             d * d
         };
         let mut limit = reach(square);
@@ -201,25 +177,14 @@ impl Tree {
                             if square < best.square {
                                 limit = reach(square);
                             }
-                            best = Hit {
-                                square,
-                                away,
-                                triangle: k,
-                                feature,
-                            };
+                            best = Hit { square, away, triangle: k, feature };
                         }
                     }
                     break;
                 }
                 let (first, second) = (i + 1, node.at);
-                let mut near = (
-                    first,
-                    square_distance(&self.nodes[first as usize].bounds, p),
-                );
-                let mut far = (
-                    second,
-                    square_distance(&self.nodes[second as usize].bounds, p),
-                );
+                let mut near = (first, square_distance(&self.nodes[first as usize].bounds, p));
+                let mut far = (second, square_distance(&self.nodes[second as usize].bounds, p));
                 if far.1 < near.1 {
                     (near, far) = (far, near);
                 }
@@ -260,24 +225,13 @@ fn half_area(b: &Aabb) -> f64 {
 
 /// Appends the subtree of the triangles `order`, which stand from `first` on.
 fn build(boxes: &[Aabb], order: &mut [u32], first: usize, depth: usize, nodes: &mut Vec<Node>) {
-    let bounds = order
-        .iter()
-        .fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
+    let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
     let here = nodes.len();
-    nodes.push(Node {
-        bounds,
-        at: first as u32,
-        count: order.len() as u32,
-    });
+    nodes.push(Node { bounds, at: first as u32, count: order.len() as u32 });
     if order.len() <= LEAF {
         return;
     }
-    let middle = if depth < DEEP {
-        split(boxes, order)
-    } else {
-        None
-    }
-    .unwrap_or(order.len() / 2);
+    let middle = if depth < DEEP { split(boxes, order) } else { None }.unwrap_or(order.len() / 2);
     let (left, right) = order.split_at_mut(middle);
     build(boxes, left, first, depth + 1, nodes);
     let second = nodes.len() as u32;

@@ -98,35 +98,23 @@ impl Moments {
             area += n;
             middle = add(middle, scale(add(a, add(b, c)), n / 3.0));
         }
-        let center = if area > 0.0 {
-            scale(middle, 1.0 / area)
-        } else {
-            bounds.center()
-        };
+        let center = if area > 0.0 { scale(middle, 1.0 / area) } else { bounds.center() };
         let square = |p: &Vec3| {
             let d = sub(*p, center);
             dot(d, d)
         };
         let corners = faces.iter().flat_map(|f| &f.corners);
-        let mut m = Moments {
-            center,
-            radius: corners.map(square).fold(0.0, f64::max).sqrt(),
-            ..Moments::default()
-        };
+        let mut m = Moments { center, radius: corners.map(square).fold(0.0, f64::max).sqrt(), ..Moments::default() };
         for f in faces {
             let [a, b, c] = f.corners.map(|p| sub(p, center));
             let n = scale(cross(sub(b, a), sub(c, a)), 0.5);
             let s = add(a, add(b, c));
             // The mean of x over the triangle, and that of x x.
             let x = scale(s, 1.0 / 3.0);
-            let xx =
-                |i: usize, j: usize| (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]) / 12.0;
+            let xx = |i: usize, j: usize| (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]) / 12.0;
             m.normal = add(m.normal, n);
             m.trace += dot(x, n);
-            for (k, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
-                .into_iter()
-                .enumerate()
-            {
+            for (k, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
                 m.first[k] += 0.5 * (x[i] * n[j] + x[j] * n[i]);
             }
             let q = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]].map(|[i, j]| xx(i, j));
@@ -169,9 +157,7 @@ impl Moments {
             (&self.vector, -1.5 * per.powi(4)),
             (&self.cubic, 7.5 * per.powi(4)),
         ];
-        let all = parts
-            .iter()
-            .flat_map(|(v, by)| v.iter().map(move |x| x * by));
+        let all = parts.iter().flat_map(|(v, by)| v.iter().map(move |x| x * by));
         for (o, v) in out.iter_mut().zip(all) {
             *o = v as f32;
         }
@@ -237,23 +223,19 @@ impl Node {
     fn far(&self, p: Vec3) -> (Lanes, Lanes) {
         let [x, y, z] = [0, 1, 2].map(|a| {
             let c = &self.center[a];
-            Lanes(core::array::from_fn(|k| {
-                ((c[k] - p[a]) * self.per[k]) as f32
-            }))
+            Lanes(core::array::from_fn(|k| ((c[k] - p[a]) * self.per[k]) as f32))
         });
         let t = &self.terms;
         let square = x * x + y * y + z * z;
         let inverse = square.map(|s| 1.0 / s);
         let cube = inverse * inverse.map(f32::sqrt);
-        let quadric =
-            (t[4] * x + t[7] * y + t[9] * z) * x + (t[5] * y + t[8] * z) * y + t[6] * z * z;
+        let quadric = (t[4] * x + t[7] * y + t[9] * z) * x + (t[5] * y + t[8] * z) * y + t[6] * z * z;
         let cubic = x * x * (t[13] * x + t[16] * y + t[17] * z)
             + y * y * (t[14] * y + t[18] * x + t[19] * z)
             + z * z * (t[15] * z + t[20] * x + t[21] * y)
             + t[22] * x * y * z;
         let vector = t[10] * x + t[11] * y + t[12] * z;
-        let sum =
-            t[0] * x + t[1] * y + t[2] * z + t[3] + (quadric + vector + cubic * inverse) * inverse;
+        let sum = t[0] * x + t[1] * y + t[2] * z + t[3] + (quadric + vector + cubic * inverse) * inverse;
         (square, sum * cube)
     }
 }
@@ -271,11 +253,7 @@ impl Winding {
         let mut range = vec![(0u32, 0u32); nodes.len()];
         for i in (0..nodes.len()).rev() {
             let n = &nodes[i];
-            range[i] = if n.count > 0 {
-                (n.at, n.at + n.count)
-            } else {
-                (range[i + 1].0, range[n.at as usize].1)
-            };
+            range[i] = if n.count > 0 { (n.at, n.at + n.count) } else { (range[i + 1].0, range[n.at as usize].1) };
         }
         let moments: Vec<Moments> = nodes
             .par_iter()
@@ -333,11 +311,7 @@ impl Winding {
     /// replaced set holds it.
     pub fn at(&self, tree: &Tree, p: Vec3, reach: f64, skip: impl Fn(u32) -> bool) -> f64 {
         let limit = (reach * reach) as f32;
-        let mut angle = Angle {
-            re: 1.0,
-            im: 0.0,
-            full: 0,
-        };
+        let mut angle = Angle { re: 1.0, im: 0.0, full: 0 };
         let mut sum = 0f64;
         let mut work = Vec::with_capacity(64);
         work.push(0u32);
@@ -378,9 +352,7 @@ mod tests {
 
     fn some(count: usize, seed: &mut u64) -> Vec<Face> {
         let mut point = || [0; 3].map(|_| random(seed));
-        (0..count)
-            .map(|_| Face::new([point(), point(), point()]))
-            .collect()
+        (0..count).map(|_| Face::new([point(), point(), point()])).collect()
     }
 
     /// The m-th term of 1/|r − x| has a gradient in x of at most m |x|^(m−1) / |r|^(m+1), so what three terms of the
@@ -431,11 +403,7 @@ mod tests {
             let faces = some(60, &mut seed);
             let (tree, _) = Tree::new(&faces);
             let winding = Winding::new(&tree);
-            for p in [
-                [0.0; 3],
-                faces[7].corners[0],
-                [0; 3].map(|_| random(&mut seed)),
-            ] {
+            for p in [[0.0; 3], faces[7].corners[0], [0; 3].map(|_| random(&mut seed))] {
                 let all = winding.at(&tree, p, 1e9, |_| false);
                 assert!((all - plain(&faces, p)).abs() < 1e-12, "{all}");
                 let without = winding.at(&tree, p, 1e9, |k| k == 3);
@@ -445,9 +413,8 @@ mod tests {
         }
         // Twelve times about: whole turns are counted.
         let ball = super::super::tests::ball(1, 1.0, 0.0);
-        let faces: Vec<Face> = (0..12 * ball.triangles.len())
-            .map(|i| Face::new(ball.corners(i % ball.triangles.len())))
-            .collect();
+        let faces: Vec<Face> =
+            (0..12 * ball.triangles.len()).map(|i| Face::new(ball.corners(i % ball.triangles.len()))).collect();
         let (tree, _) = Tree::new(&faces);
         let all = Winding::new(&tree).at(&tree, [0.1, 0.2, 0.3], 1e9, |_| false);
         assert!((all - 12.0).abs() < 1e-12, "{all}");

@@ -4,8 +4,8 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::{
-    HalfSpace, Shape, along, apart, coordinate_axis, direction, fill_rows, finite, flat, joined,
-    joined_gradient, length, one_face, rounded,
+    HalfSpace, Shape, along, apart, coordinate_axis, direction, fill_rows, finite, flat, joined, joined_gradient,
+    length, one_face, rounded,
 };
 use crate::face::{Face, Tree};
 use crate::fault::Fault;
@@ -33,13 +33,7 @@ impl Cylinder {
             let (from, to) = (base[a], base[a] + axis[a] * height);
             (a, [from.min(to), from.max(to)])
         });
-        Ok(Cylinder {
-            base,
-            axis,
-            radius,
-            height,
-            aligned,
-        })
+        Ok(Cylinder { base, axis, radius, height, aligned })
     }
 
     /// Signed distances to the barrel and to the caps.
@@ -49,17 +43,11 @@ impl Cylinder {
         match self.aligned {
             Some((a, [lo, hi])) => {
                 let (u, v) = (d[(a + 1) % 3], d[(a + 2) % 3]);
-                [
-                    (u * u + v * v).sqrt() - self.radius,
-                    (lo - p[a]).max(p[a] - hi),
-                ]
+                [(u * u + v * v).sqrt() - self.radius, (lo - p[a]).max(p[a] - hi)]
             }
             None => {
                 let h = dot(d, self.axis);
-                [
-                    norm(sub(d, scale(self.axis, h))) - self.radius,
-                    (-h).max(h - self.height),
-                ]
+                [norm(sub(d, scale(self.axis, h))) - self.radius, (-h).max(h - self.height)]
             }
         }
     }
@@ -75,13 +63,7 @@ impl Cylinder {
         let radial = unit(sub(d, scale(self.axis, dot(d, self.axis))));
         if radial == [0.0; 3] {
             // On the axis every radial direction is as good: take one square to it.
-            let least = (0..3).fold(0, |m, a| {
-                if self.axis[a].abs() < self.axis[m].abs() {
-                    a
-                } else {
-                    m
-                }
-            });
+            let least = (0..3).fold(0, |m, a| if self.axis[a].abs() < self.axis[m].abs() { a } else { m });
             let mut e = [0.0; 3];
             e[least] = 1.0;
             return unit(cross(self.axis, e));
@@ -90,11 +72,8 @@ impl Cylinder {
     }
 
     pub(super) fn gradient(&self, p: Vec3) -> Vec3 {
-        let cap = if dot(sub(p, self.base), self.axis) * 2.0 < self.height {
-            scale(self.axis, -1.0)
-        } else {
-            self.axis
-        };
+        let cap =
+            if dot(sub(p, self.base), self.axis) * 2.0 < self.height { scale(self.axis, -1.0) } else { self.axis };
         joined_gradient(self.sides(p), [self.radial(p), cap])
     }
 
@@ -112,10 +91,7 @@ impl Cylinder {
                 let cap = |v: f64| (lo - v).max(v - hi);
                 let ends = [b.min[a], b.max[a]].map(cap);
                 let low = ends[0].min(ends[1]).min(cap(middle));
-                (
-                    apart(b, self.base, &[(a + 1) % 3, (a + 2) % 3]),
-                    Interval::new(low, ends[0].max(ends[1])),
-                )
+                (apart(b, self.base, &[(a + 1) % 3, (a + 2) % 3]), Interval::new(low, ends[0].max(ends[1])))
             }
             None => {
                 let far = norm(b.size()) / 2.0;
@@ -124,13 +100,8 @@ impl Cylinder {
                 let far = far + 1e-14 * (far + norm(sub(b.center(), self.base)));
                 let h = along(b, self.base, self.axis);
                 let cap = |v: f64| (-v).max(v - self.height);
-                let low = cap((self.height / 2.0).clamp(h.lo, h.hi))
-                    .min(cap(h.lo))
-                    .min(cap(h.hi));
-                (
-                    Interval::new((r - far).max(0.0), r + far),
-                    Interval::new(low, cap(h.lo).max(cap(h.hi))),
-                )
+                let low = cap((self.height / 2.0).clamp(h.lo, h.hi)).min(cap(h.lo)).min(cap(h.hi));
+                (Interval::new((r - far).max(0.0), r + far), Interval::new(low, cap(h.lo).max(cap(h.hi))))
             }
         };
         [Interval::new(r.lo - self.radius, r.hi - self.radius), h]
@@ -174,10 +145,7 @@ impl Shape for Cylinder {
             return Tree::EMPTY;
         }
         let ends = [false, true].map(|top| match self.aligned {
-            Some((a, ends)) => flat(
-                (a, [ends[0] - by, ends[1] + by][usize::from(top)], top),
-                out,
-            ),
+            Some((a, ends)) => flat((a, [ends[0] - by, ends[1] + by][usize::from(top)], top), out),
             None => {
                 let normal = scale(self.axis, if top { 1.0 } else { -1.0 });
                 let height = if top { self.height + by } else { -by };

@@ -42,11 +42,7 @@ impl Tetrahedron {
         let corners = if six < 0.0 { [a, c, b, d] } else { corners };
         let faces = FACES.map(|f| f.map(|i| corners[i]));
         let normals = faces.map(|[a, b, c]| cross(sub(b, a), sub(c, a)));
-        let longest = faces
-            .iter()
-            .flatten()
-            .map(|p| norm(sub(*p, corners[0])))
-            .fold(0.0, f64::max);
+        let longest = faces.iter().flatten().map(|p| norm(sub(*p, corners[0]))).fold(0.0, f64::max);
         // Six volumes over twice a face is the height upon it.
         let flat = |n: &Vec3| six.abs() <= FLAT * longest * norm(*n);
         if longest == 0.0 || normals.iter().any(|n| norm(*n) == 0.0 || flat(n)) {
@@ -70,11 +66,7 @@ impl Tetrahedron {
                 return Err(Fault::new("sharpness", message));
             }
         }
-        Ok(Tetrahedron {
-            corners,
-            planes,
-            sharpness,
-        })
+        Ok(Tetrahedron { corners, planes, sharpness })
     }
 
     /// The distances joined.
@@ -101,18 +93,13 @@ impl Tetrahedron {
         };
         let w = d.map(|v| (k * (v - d[first])).exp());
         let sum: f64 = w.iter().sum();
-        (0..4).fold([0.0; 3], |g, i| {
-            add(g, scale(self.planes[i].normal, w[i] / sum))
-        })
+        (0..4).fold([0.0; 3], |g, i| add(g, scale(self.planes[i].normal, w[i] / sum)))
     }
 
     /// The joined function grows with each distance.
     pub(super) fn range(&self, b: &Aabb) -> Interval {
         let each = self.planes.map(|h| along(b, h.point, h.normal));
-        Interval::new(
-            self.joined(each.map(|i| i.lo)),
-            self.joined(each.map(|i| i.hi)),
-        )
+        Interval::new(self.joined(each.map(|i| i.lo)), self.joined(each.map(|i| i.hi)))
     }
 }
 
@@ -133,11 +120,7 @@ impl Shape for Tetrahedron {
         if self.sharpness.is_none() {
             return Tree::All(self.planes.map(|h| Arc::new(h).faces(by, out)).to_vec());
         }
-        if by == 0.0 {
-            one_face(self, out)
-        } else {
-            rounded(self, by, out)
-        }
+        if by == 0.0 { one_face(self, out) } else { rounded(self, by, out) }
     }
 
     fn volume(&self) -> Option<f64> {
@@ -154,12 +137,7 @@ mod tests {
     use crate::field::Field;
     use crate::region::tests::check_shape;
 
-    const CORNERS: [Vec3; 4] = [
-        [-1.0, -0.8, -1.0],
-        [1.2, -0.9, -1.0],
-        [0.1, 1.4, -1.0],
-        [0.2, 0.1, 1.5],
-    ];
+    const CORNERS: [Vec3; 4] = [[-1.0, -0.8, -1.0], [1.2, -0.9, -1.0], [0.1, 1.4, -1.0], [0.2, 0.1, 1.5]];
 
     #[test]
     fn both_forms_keep_the_laws_of_a_shape() {
@@ -179,12 +157,7 @@ mod tests {
     #[test]
     fn a_smooth_maximum_draws_back_from_edges_and_corners() {
         // A regular one: the other planes are so far off that they count for nothing at this sharpness.
-        let regular = [
-            [1.0; 3],
-            [1.0, -1.0, -1.0],
-            [-1.0, 1.0, -1.0],
-            [-1.0, -1.0, 1.0],
-        ];
+        let regular = [[1.0; 3], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
         let k = 60.0;
         let soft = Tetrahedron::new(regular, Some(k)).unwrap();
         let edge: Vec3 = [1.0, 0.0, 0.0];
@@ -207,10 +180,7 @@ mod tests {
         flat[3][2] = -1.0;
         assert_eq!(Tetrahedron::new(flat, None).unwrap_err().at, "corners");
         for k in [0.0, -1.0, f64::NAN, 1.0] {
-            assert_eq!(
-                Tetrahedron::new(CORNERS, Some(k)).unwrap_err().at,
-                "sharpness"
-            );
+            assert_eq!(Tetrahedron::new(CORNERS, Some(k)).unwrap_err().at, "sharpness");
         }
     }
 }

@@ -49,9 +49,7 @@ fn uncovered(mesh: &TetMesh, points: &[Vec3]) -> Vec<Vec3> {
     let bounds = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
     // About a point in a cell.
     let [x, y, z] = bounds.size();
-    let cell = (x * y * z / points.len().max(1) as f64)
-        .cbrt()
-        .max(1e-9 * norm(bounds.size()));
+    let cell = (x * y * z / points.len().max(1) as f64).cbrt().max(1e-9 * norm(bounds.size()));
     let index = |p: Vec3| p.map(|v| (v / cell).floor() as i64);
     let mut at: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
     for (i, p) in points.iter().enumerate() {
@@ -60,10 +58,7 @@ fn uncovered(mesh: &TetMesh, points: &[Vec3]) -> Vec<Vec3> {
     let mut covered = vec![false; points.len()];
     for i in 0..mesh.tets.len() {
         let p = mesh.corners(i);
-        let b = p
-            .iter()
-            .fold(Aabb::EMPTY, |b, p| b.with(*p))
-            .intersection(bounds);
+        let b = p.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)).intersection(bounds);
         if b.is_empty() {
             continue;
         }

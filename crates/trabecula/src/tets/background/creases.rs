@@ -42,14 +42,10 @@ impl Work<'_> {
     /// Gives an edge a node where it is wanted: an end that is moved, or a new one, whichever leaves the better shapes. Tells
     /// whether it did.
     fn given(&mut self, found: &Crossed, least: f64, room: bool) -> bool {
-        let Crossed {
-            edge, place, rank, ..
-        } = *found;
+        let Crossed { edge, place, rank, .. } = *found;
         let ends = edge.map(|n| self.mesh.nodes[n as usize]);
         let near = 0.5 * norm(sub(ends[0], ends[1]));
-        let free = |i: &usize| {
-            rank > 1 && self.held[edge[*i] as usize] < rank && norm(sub(place, ends[*i])) < near
-        };
+        let free = |i: &usize| rank > 1 && self.held[edge[*i] as usize] < rank && norm(sub(place, ends[*i])) < near;
         let end = |i: usize| {
             let at = self.around.of(edge[i] as usize);
             (self.left(at, &edge[i..=i], place, least), Some(edge[i]))
@@ -167,11 +163,8 @@ struct Crossed {
 fn crossed(work: &Work) -> Vec<Crossed> {
     let (region, mesh) = (work.region, &work.mesh);
     let faces = mesh.boundary_faces();
-    let mut edges: Vec<[u32; 2]> = faces
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .filter(|[a, b]| a < b)
-        .collect();
+    let mut edges: Vec<[u32; 2]> =
+        faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(|[a, b]| a < b).collect();
     edges.par_sort_unstable();
     let ends = |e: &[u32; 2]| e.map(|n| mesh.nodes[n as usize]);
     let middle = |e: &[u32; 2]| {
@@ -196,12 +189,7 @@ fn crossed(work: &Work) -> Vec<Crossed> {
             && region.value(place).abs() < OFF * length
             && within(region, *m, place)
             && !work.bars(place);
-        near.then_some(Crossed {
-            edge: *e,
-            off: off.abs(),
-            place,
-            rank,
-        })
+        near.then_some(Crossed { edge: *e, off: off.abs(), place, rank })
     };
     let all = edges.par_iter().zip(&middles).zip(&off);
     let mut found: Vec<Crossed> = all.filter_map(look).collect();

@@ -26,13 +26,7 @@ pub(super) fn features(work: &mut Work, least: f64) {
     let faces = mesh.boundary_faces();
     let points: Vec<Vec3> = faces
         .iter()
-        .map(|f| {
-            scale(
-                f.iter()
-                    .fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize])),
-                1.0 / 3.0,
-            )
-        })
+        .map(|f| scale(f.iter().fold([0.0; 3], |s, n| add(s, mesh.nodes[*n as usize])), 1.0 / 3.0))
         .collect();
     let planes = touching(region, &points);
     let mut at: Vec<Vec<u32>> = vec![Vec::new(); mesh.nodes.len()];
@@ -48,13 +42,8 @@ pub(super) fn features(work: &mut Work, least: f64) {
             let p = mesh.nodes[n];
             let near: Vec<Plane> = at[n].iter().map(|f| planes[*f as usize]).collect();
             let (place, rank) = meeting(region, p, &near)?;
-            let others = at[n]
-                .iter()
-                .flat_map(|f| faces[*f as usize])
-                .filter(|m| *m as usize != n);
-            let shortest = others
-                .map(|m| norm(sub(mesh.nodes[m as usize], p)))
-                .fold(f64::INFINITY, f64::min);
+            let others = at[n].iter().flat_map(|f| faces[*f as usize]).filter(|m| *m as usize != n);
+            let shortest = others.map(|m| norm(sub(mesh.nodes[m as usize], p))).fold(f64::INFINITY, f64::min);
             let way = norm(sub(place, p));
             let near = way < REACH * shortest && region.value(place).abs() < 0.02 * shortest;
             near.then_some((rank, way / shortest, n, place))
@@ -77,10 +66,7 @@ pub(super) fn features(work: &mut Work, least: f64) {
 pub(super) fn meeting(region: &dyn Field, p: Vec3, near: &[Plane]) -> Option<(Vec3, usize)> {
     let near = distinct(near)?;
     let (first, _) = nearest(p, &near);
-    let closer: Vec<Vec3> = near
-        .iter()
-        .map(|(q, _)| add(first, scale(sub(*q, first), CLOSER)))
-        .collect();
+    let closer: Vec<Vec3> = near.iter().map(|(q, _)| add(first, scale(sub(*q, first), CLOSER))).collect();
     Some(nearest(first, &distinct(&touching(region, &closer))?))
 }
 
@@ -93,8 +79,7 @@ pub(super) fn touching(region: &dyn Field, points: &[Vec3]) -> Vec<Plane> {
         .zip(points.par_chunks(BATCH))
         .for_each(|((v, g), p)| region.gradients(p, v, g));
     let foot = points.iter().zip(&v).zip(&g);
-    foot.map(|((p, v), g)| (sub(*p, scale(*g, *v)), *g))
-        .collect()
+    foot.map(|((p, v), g)| (sub(*p, scale(*g, *v)), *g)).collect()
 }
 
 /// One plane of each direction; `None` if all are of one smooth face.

@@ -51,15 +51,9 @@ impl Grid {
         let size = bounds.size();
         // The lattice is laid evenly about the region, planes on both sides of its bounds where it fits.
         let steps = size.map(|l| (2.0 * l / cube).round());
-        let origin =
-            core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
-        let mut grid = Grid {
-            keys: Vec::new(),
-            tets: Vec::new(),
-            bisected: false,
-            origin,
-            unit: cube / f64::from(UNIT),
-        };
+        let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
+        let mut grid =
+            Grid { keys: Vec::new(), tets: Vec::new(), bisected: false, origin, unit: cube / f64::from(UNIT) };
         let many = || too_many(most);
         if size.iter().any(|l| l / cube > 1e5) {
             return Err(many());
@@ -115,10 +109,7 @@ impl Grid {
     /// The box of a block of cubes.
     fn block(&self, low: [i32; 3], high: [i32; 3]) -> Aabb {
         let reach = |c: [i32; 3]| self.place(c.map(|c| c * UNIT));
-        Aabb {
-            min: reach(low),
-            max: reach(high),
-        }
+        Aabb { min: reach(low), max: reach(high) }
     }
 
     /// The tetrahedra about the three faces on a cube's upper sides.
@@ -187,9 +178,7 @@ impl Grid {
             let mut i = 0;
             while i < self.tets.len() {
                 let t = self.tets[i];
-                let torn = super::super::EDGES
-                    .iter()
-                    .any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
+                let torn = super::super::EDGES.iter().any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
                 if !torn && (fine[i] || !self.coarse(t, region, size)?) {
                     fine[i] = true;
                     i += 1;
@@ -238,9 +227,7 @@ impl Grid {
             let first = self.keys[t[a] as usize].iter().all(|k| k % UNIT == 0);
             (self.length2(t[a], t[b]), first)
         };
-        super::super::EDGES
-            .into_iter()
-            .fold([0, 1], |m, e| if rank(e) > rank(m) { e } else { m })
+        super::super::EDGES.into_iter().fold([0, 1], |m, e| if rank(e) > rank(m) { e } else { m })
     }
 
     /// Whether a tetrahedron that may have a part in the region is larger than it is to be.
@@ -285,7 +272,6 @@ fn named(a: u32, b: u32) -> [u32; 2] {
 }
 
 fn too_many(most: usize) -> Fault {
-    let message =
-        format!("a mesh of this size would have more than {most} tetrahedra; use a greater one");
+    let message = format!("a mesh of this size would have more than {most} tetrahedra; use a greater one");
     Fault::new("size", message)
 }

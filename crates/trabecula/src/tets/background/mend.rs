@@ -63,23 +63,13 @@ fn pinches(mesh: &TetMesh) -> HashSet<u32> {
             continue;
         }
         let groups = groups(mesh, n as u32, around.of(n));
-        let size = |of: &Vec<u32>| {
-            of.iter()
-                .map(|i| volume(mesh.corners(*i as usize)))
-                .sum::<f64>()
-        };
+        let size = |of: &Vec<u32>| of.iter().map(|i| volume(mesh.corners(*i as usize))).sum::<f64>();
         if let [_] = groups.as_slice() {
             // A hole through the tetrahedra at the node: nothing short of all of them mends it for sure.
             away.extend(groups.iter().flatten());
             continue;
         }
-        let most = (0..groups.len()).fold(0, |m, i| {
-            if size(&groups[i]) > size(&groups[m]) {
-                i
-            } else {
-                m
-            }
-        });
+        let most = (0..groups.len()).fold(0, |m, i| if size(&groups[i]) > size(&groups[m]) { i } else { m });
         let rest = groups.iter().enumerate().filter(|(i, _)| *i != most);
         away.extend(rest.flat_map(|(_, of)| of));
     }
@@ -101,11 +91,7 @@ fn cycles(link: &[[u32; 2]]) -> usize {
     }
     let mut starts: Vec<u32> = link.iter().map(|e| e[0]).collect();
     starts.sort_unstable();
-    if starts.windows(2).any(|w| w[0] == w[1]) {
-        usize::MAX
-    } else {
-        count
-    }
+    if starts.windows(2).any(|w| w[0] == w[1]) { usize::MAX } else { count }
 }
 
 /// The tetrahedra at a node in groups that hang together by faces at the node.
@@ -129,9 +115,8 @@ fn groups(mesh: &TetMesh, n: u32, tets: &[u32]) -> Vec<Vec<u32>> {
         let mut i = 0;
         while i < group.len() {
             let here = &faces[group[i]];
-            let (near, far): (Vec<usize>, Vec<usize>) = left
-                .iter()
-                .partition(|j| faces[**j].iter().any(|f| here.contains(f)));
+            let (near, far): (Vec<usize>, Vec<usize>) =
+                left.iter().partition(|j| faces[**j].iter().any(|f| here.contains(f)));
             group.extend(near);
             left = far;
             i += 1;

@@ -39,10 +39,7 @@ pub(super) fn improve(work: &mut Work, n: usize) -> bool {
     let start = mesh.nodes[n];
     let (mut sum, mut length, mut count) = ([0.0; 3], 0.0, 0.0);
     for t in around.of(n) {
-        for m in mesh.tets[*t as usize]
-            .into_iter()
-            .filter(|m| *m as usize != n)
-        {
+        for m in mesh.tets[*t as usize].into_iter().filter(|m| *m as usize != n) {
             let d = sub(mesh.nodes[m as usize], start);
             (sum, length, count) = (add(sum, d), length + norm(d), count + 1.0);
         }

@@ -33,22 +33,9 @@ enum Side {
 pub(super) fn stuff(grid: &Grid, region: &dyn Field) -> (TetMesh, Vec<bool>) {
     let mut nodes = grid.places();
     let values = values(region, &nodes);
-    let mut sides: Vec<Side> = values
-        .iter()
-        .map(|v| {
-            if *v < 0.0 {
-                Side::Inside
-            } else {
-                Side::Outside
-            }
-        })
-        .collect();
-    let tets: Vec<[u32; 4]> = grid
-        .tets
-        .iter()
-        .copied()
-        .filter(|t| t.iter().any(|n| sides[*n as usize] == Side::Inside))
-        .collect();
+    let mut sides: Vec<Side> = values.iter().map(|v| if *v < 0.0 { Side::Inside } else { Side::Outside }).collect();
+    let tets: Vec<[u32; 4]> =
+        grid.tets.iter().copied().filter(|t| t.iter().any(|n| sides[*n as usize] == Side::Inside)).collect();
     let crossing = crossings(&tets, &sides);
     let cuts = roots(region, &nodes, &values, &crossing);
 
@@ -81,29 +68,18 @@ pub(super) fn stuff(grid: &Grid, region: &dyn Field) -> (TetMesh, Vec<bool>) {
             on.push(true);
         }
     }
-    let mut filler = Filler {
-        grid,
-        sides: &sides,
-        names: &names,
-        out: Vec::with_capacity(tets.len()),
-    };
+    let mut filler = Filler { grid, sides: &sides, names: &names, out: Vec::with_capacity(tets.len()) };
     for t in &tets {
         filler.fill(*t);
     }
-    let mesh = TetMesh {
-        nodes,
-        tets: filler.out,
-        zones: Vec::new(),
-    };
+    let mesh = TetMesh { nodes, tets: filler.out, zones: Vec::new() };
     (mesh, on)
 }
 
 /// Values at points, on all threads.
 pub(super) fn values(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
     let mut out = vec![0.0; points.len()];
-    out.par_chunks_mut(BATCH)
-        .zip(points.par_chunks(BATCH))
-        .for_each(|(o, p)| field.values(p, o));
+    out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
     out
 }
 
@@ -121,10 +97,7 @@ fn reach(grid: &Grid, tets: &[[u32; 4]]) -> Vec<f64> {
             }
         }
     }
-    shortest
-        .iter()
-        .map(|l| LEAST * (*l as f64).sqrt())
-        .collect()
+    shortest.iter().map(|l| LEAST * (*l as f64).sqrt()).collect()
 }
 
 /// The edges with one node inside and one outside, in that order; sorted.
@@ -145,77 +118,62 @@ fn crossings(tets: &[[u32; 4]], sides: &[Side]) -> Vec<[u32; 2]> {
 
 /// Where each edge crosses the surface, and the share of the way from its inner node: by false position with halved
 /// weights (the Illinois method), which brackets the place.
-fn roots(
-    region: &dyn Field,
-    nodes: &[Vec3],
-    values: &[f64],
-    edges: &[[u32; 2]],
-) -> Vec<(Vec3, f64)> {
+fn roots(region: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]]) -> Vec<(Vec3, f64)> {
     const ROUNDS: usize = 40;
     let mut found = vec![([0.0; 3], 0.0); edges.len()];
-    found
-        .par_chunks_mut(BATCH)
-        .zip(edges.par_chunks(BATCH))
-        .for_each(|(found, edges)| {
-            let at = |e: &[u32; 2], t: f64| -> Vec3 {
-                let (p, q) = (nodes[e[0] as usize], nodes[e[1] as usize]);
-                core::array::from_fn(|k| p[k] + t * (q[k] - p[k]))
-            };
-            // Of each: the bracket, and the values at its ends.
-            let mut state: Vec<[f64; 4]> = edges
+    found.par_chunks_mut(BATCH).zip(edges.par_chunks(BATCH)).for_each(|(found, edges)| {
+        let at = |e: &[u32; 2], t: f64| -> Vec3 {
+            let (p, q) = (nodes[e[0] as usize], nodes[e[1] as usize]);
+            core::array::from_fn(|k| p[k] + t * (q[k] - p[k]))
+        };
+        // Of each: the bracket, and the values at its ends.
+        let mut state: Vec<[f64; 4]> =
+            edges.iter().map(|[a, b]| [0.0, 1.0, values[*a as usize], values[*b as usize]]).collect();
+        let mut last = vec![0i8; edges.len()];
+        let mut open: Vec<usize> = (0..edges.len()).collect();
+        let (mut points, mut new) = (Vec::new(), Vec::new());
+        for round in 0..ROUNDS {
+            points.clear();
+            let guesses: Vec<f64> = open
                 .iter()
-                .map(|[a, b]| [0.0, 1.0, values[*a as usize], values[*b as usize]])
+                .map(|i| {
+                    let [lo, hi, vlo, vhi] = state[*i];
+                    // Bisection now and then, for fields with kinks.
+                    let t = if round % 8 == 7 { 0.5 * (lo + hi) } else { lo + (hi - lo) * vlo / (vlo - vhi) };
+                    t.clamp(lo, hi)
+                })
                 .collect();
-            let mut last = vec![0i8; edges.len()];
-            let mut open: Vec<usize> = (0..edges.len()).collect();
-            let (mut points, mut new) = (Vec::new(), Vec::new());
-            for round in 0..ROUNDS {
-                points.clear();
-                let guesses: Vec<f64> = open
-                    .iter()
-                    .map(|i| {
-                        let [lo, hi, vlo, vhi] = state[*i];
-                        // Bisection now and then, for fields with kinks.
-                        let t = if round % 8 == 7 {
-                            0.5 * (lo + hi)
-                        } else {
-                            lo + (hi - lo) * vlo / (vlo - vhi)
-                        };
-                        t.clamp(lo, hi)
-                    })
-                    .collect();
-                points.extend(open.iter().zip(&guesses).map(|(i, t)| at(&edges[*i], *t)));
-                new.resize(points.len(), 0.0);
-                region.values(&points, &mut new);
-                let mut left = Vec::new();
-                for ((i, t), v) in open.iter().zip(&guesses).zip(&new) {
-                    let s = &mut state[*i];
-                    if *v < 0.0 {
-                        (s[0], s[2]) = (*t, *v);
-                        if last[*i] == -1 {
-                            s[3] *= 0.5;
-                        }
-                        last[*i] = -1;
-                    } else {
-                        (s[1], s[3]) = (*t, *v);
-                        if last[*i] == 1 {
-                            s[2] *= 0.5;
-                        }
-                        last[*i] = 1;
+            points.extend(open.iter().zip(&guesses).map(|(i, t)| at(&edges[*i], *t)));
+            new.resize(points.len(), 0.0);
+            region.values(&points, &mut new);
+            let mut left = Vec::new();
+            for ((i, t), v) in open.iter().zip(&guesses).zip(&new) {
+                let s = &mut state[*i];
+                if *v < 0.0 {
+                    (s[0], s[2]) = (*t, *v);
+                    if last[*i] == -1 {
+                        s[3] *= 0.5;
                     }
-                    found[*i] = (at(&edges[*i], *t), *t);
-                    let scale =
-                        values[edges[*i][0] as usize].abs() + values[edges[*i][1] as usize].abs();
-                    if v.abs() > 1e-12 * scale && s[1] - s[0] > 1e-14 {
-                        left.push(*i);
+                    last[*i] = -1;
+                } else {
+                    (s[1], s[3]) = (*t, *v);
+                    if last[*i] == 1 {
+                        s[2] *= 0.5;
                     }
+                    last[*i] = 1;
                 }
-                open = left;
-                if open.is_empty() {
-                    break;
+                found[*i] = (at(&edges[*i], *t), *t);
+                let scale = values[edges[*i][0] as usize].abs() + values[edges[*i][1] as usize].abs();
+                if v.abs() > 1e-12 * scale && s[1] - s[0] > 1e-14 {
+                    left.push(*i);
                 }
             }
-        });
+            open = left;
+            if open.is_empty() {
+                break;
+            }
+        }
+    });
     found
 }
 
@@ -240,13 +198,7 @@ impl Filler<'_> {
             ([], _, _) => {}
             (_, _, []) => self.out.push(t),
             ([a], _, _) => {
-                let piece = core::array::from_fn(|k| {
-                    if outside.contains(&k) {
-                        [*a, k]
-                    } else {
-                        node(k)
-                    }
-                });
+                let piece = core::array::from_fn(|k| if outside.contains(&k) { [*a, k] } else { node(k) });
                 self.emit(t, piece);
             }
             (&[a, b], &[z], &[d]) => {
@@ -264,10 +216,7 @@ impl Filler<'_> {
             }
             (&[a, b], _, &[c, d]) => {
                 // The diagonals in the faces a b c and a b d begin at the cut of the longer edge.
-                let [p, q] = [
-                    self.ordered(t, [[a, c], [b, c]]),
-                    self.ordered(t, [[a, d], [b, d]]),
-                ];
+                let [p, q] = [self.ordered(t, [[a, c], [b, c]]), self.ordered(t, [[a, d], [b, d]])];
                 let [a, b] = p;
                 if p == q {
                     self.emit(t, [node(a), [a, c], [a, d], node(b)]);
@@ -291,21 +240,13 @@ impl Filler<'_> {
 
     /// The inner nodes of two crossed edges, that of the greater rank first.
     fn ordered(&self, t: [u32; 4], [e, f]: [[usize; 2]; 2]) -> [usize; 2] {
-        if self.rank(t, e) > self.rank(t, f) {
-            [e[0], f[0]]
-        } else {
-            [f[0], e[0]]
-        }
+        if self.rank(t, e) > self.rank(t, f) { [e[0], f[0]] } else { [f[0], e[0]] }
     }
 
     /// Adds a piece, turned so that it is oriented as the tetrahedron is.
     fn emit(&mut self, t: [u32; 4], piece: [Corner; 4]) {
         let name = |[i, o]: Corner| {
-            if i == o {
-                t[i]
-            } else {
-                self.names[&[t[i], t[o]]]
-            }
+            if i == o { t[i] } else { self.names[&[t[i], t[o]]] }
         };
         let mut nodes = piece.map(name);
         if turned(piece) {

@@ -20,14 +20,7 @@ pub(super) struct Work<'a> {
 
 impl<'a> Work<'a> {
     pub fn new(region: &'a dyn Field, mesh: TetMesh, on: Vec<bool>) -> Work<'a> {
-        Work {
-            region,
-            around: Around::new(&mesh),
-            held: vec![0; on.len()],
-            on,
-            mesh,
-            barred: Vec::new(),
-        }
+        Work { region, around: Around::new(&mesh), held: vec![0; on.len()], on, mesh, barred: Vec::new() }
     }
 
     /// Whether nothing may be moved here.
@@ -65,10 +58,7 @@ pub(super) struct Around(Vec<Vec<u32>>);
 impl Around {
     pub fn new(mesh: &TetMesh) -> Around {
         let mut count = vec![0; mesh.nodes.len()];
-        mesh.tets
-            .iter()
-            .flatten()
-            .for_each(|n| count[*n as usize] += 1);
+        mesh.tets.iter().flatten().for_each(|n| count[*n as usize] += 1);
         let mut at: Vec<Vec<u32>> = count.into_iter().map(Vec::with_capacity).collect();
         for (i, t) in (0..).zip(&mesh.tets) {
             t.iter().for_each(|n| at[*n as usize].push(i));
