@@ -5,8 +5,8 @@ use std::sync::Mutex;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use trabecula::design::DesignError;
-use trabecula::extract::Stopped;
 use trabecula::fault::Fault;
+use trabecula::progress::Stopped;
 
 /// `trabecula.DesignError` with the fields of the core's own.
 pub fn design(py: Python<'_>, e: &DesignError) -> PyErr {

@@ -7,10 +7,10 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use trabecula::extract::Surface;
 use trabecula::math::{cross, norm, sub};
 use trabecula::render::{Tint, View, png, render};
 use trabecula::simplify::{Goal, simplify};
+use trabecula::surface_mesh::SurfaceMesh;
 use trabecula::{io, measure};
 
 use crate::error;
@@ -24,21 +24,21 @@ type Void = (f64, [f64; 3], ([f64; 3], [f64; 3]));
 /// A triangle mesh.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Mesh {
-    surface: Surface,
+    surface: SurfaceMesh,
     /// Whether it is known which triangles are cuts.
     split: bool,
     design: String,
 }
 
 impl Mesh {
-    pub fn new(surface: Surface, design: String) -> Self {
+    pub fn new(surface: SurfaceMesh, design: String) -> Self {
         Mesh { surface, split: true, design }
     }
 
     /// A mesh of which nothing more is known.
     fn bare(mesh: trabecula::mesh::Mesh) -> Self {
         let cut = vec![false; mesh.triangles.len()];
-        Mesh { surface: Surface { mesh, cut }, split: false, design: String::new() }
+        Mesh { surface: SurfaceMesh { mesh, cut }, split: false, design: String::new() }
     }
 }
 
@@ -104,7 +104,7 @@ impl Mesh {
     fn split_by(&self, py: Python<'_>, region: &Region) -> PyResult<Mesh> {
         let (mesh, region) = (&self.surface.mesh, &region.region);
         let surface =
-            run(py, None, None, |_| Surface { cut: measure::cut_triangles(mesh, &**region), mesh: mesh.clone() })?;
+            run(py, None, None, |_| SurfaceMesh { cut: measure::cut_triangles(mesh, &**region), mesh: mesh.clone() })?;
         Ok(Mesh { surface, split: true, design: self.design.clone() })
     }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use trabecula::extract::Progress;
+use trabecula::progress::Progress;
 
 use crate::error;
 

@@ -9,9 +9,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use trabecula::design::{self, Built, Node};
-use trabecula::extract::{self, Stopped};
+use trabecula::extract;
 use trabecula::field::Field;
 use trabecula::map::{Map, Misfit};
+use trabecula::progress::Stopped;
 use trabecula::region::Repaired;
 use trabecula::truss::Beams;
 use trabecula::{io, measure};
@@ -319,7 +320,7 @@ impl Solid {
         let made = run(py, threads, progress, |_| self.built.lone_beams()?.mesh(chord))?;
         let (mesh, error) = made.map_err(error::fault)?;
         let cut = vec![false; mesh.triangles.len()];
-        let surface = extract::Surface { mesh, cut };
+        let surface = trabecula::surface_mesh::SurfaceMesh { mesh, cut };
         Ok((Mesh::new(surface, self.design.clone()), error))
     }
 
@@ -424,7 +425,7 @@ impl Region {
 /// Occupancy on a grid of cubic voxels.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Voxels {
-    voxels: extract::Voxels,
+    voxels: trabecula::voxels::Voxels,
 }
 
 #[pymethods]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
-use trabecula::extract::Surface;
 use trabecula::io::{self, Elements};
+use trabecula::surface_mesh::SurfaceMesh;
 use trabecula::tets::TetMesh as Core;
 
 use crate::design::Folder;
@@ -133,7 +133,7 @@ impl TetMesh {
     fn boundary(&self, py: Python<'_>) -> PyResult<Mesh> {
         let mesh = run(py, None, None, |_| self.tets.mesh.boundary())?;
         let cut = vec![true; mesh.triangles.len()];
-        Ok(Mesh::new(Surface { mesh, cut }, String::new()))
+        Ok(Mesh::new(SurfaceMesh { mesh, cut }, String::new()))
     }
 
     /// The least dihedral angle (degrees) and the size (mm) of each tetrahedron.

@@ -14,9 +14,10 @@ use rayon::prelude::*;
 use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::io::stl;
-use crate::math::Vec3;
-use crate::mesh::Mesh;
+use crate::progress::{Progress, Stopped};
 use crate::solid::Solid;
+use crate::surface_mesh::SurfaceMesh;
+use crate::voxels::Voxels;
 
 mod bodies;
 mod by;
@@ -40,55 +41,6 @@ pub use islands::{Island, Islands, Pieces};
 pub use sift::Store;
 pub use tets::{Foretold, Join, foretold};
 use tile::{Scratch, View};
-
-/// Told how far the work is; answers whether to go on.
-pub trait Progress: Sync {
-    /// `done` of `total` equal steps. `false` stops the work.
-    fn step(&self, done: u64, total: u64) -> bool;
-}
-
-/// Never stops, says nothing.
-pub struct Silent;
-
-impl Progress for Silent {
-    fn step(&self, _: u64, _: u64) -> bool {
-        true
-    }
-}
-
-/// Why an extraction ended without a result.
-#[derive(Debug)]
-pub enum Stopped {
-    /// The progress said so.
-    Interrupted,
-    /// The output could not be written.
-    Io(io::Error),
-    /// The request cannot be met (a spacing too fine for single precision, an unbounded region …).
-    Refused(Fault),
-}
-
-/// A surface mesh and which of its triangles lie on the region's boundary rather than on the lattice.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Surface {
-    /// The mesh.
-    pub mesh: Mesh,
-    /// For each triangle, whether it is a cut (on the region's boundary).
-    pub cut: Vec<bool>,
-}
-
-impl Surface {
-    /// The lattice alone, without its cuts: open where the region ends.
-    pub fn uncapped(&self) -> Surface {
-        let mut runs: Vec<std::ops::Range<u64>> = Vec::new();
-        for i in (0u64..).zip(&self.cut).filter(|(_, cut)| !**cut).map(|(i, _)| i) {
-            match runs.last_mut() {
-                Some(r) if r.end == i => r.end += 1,
-                _ => runs.push(i..i + 1),
-            }
-        }
-        only(self, &runs)
-    }
-}
 
 /// What a streamed extraction wrote.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -298,7 +250,7 @@ where
 ///
 /// # Errors
 /// A spacing or region for which no grid can be made; an interruption; more than 2³² vertices.
-pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surface, Stopped> {
+pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
     Ok(surface_of(solid, edge, Islands::Keep, progress)?.0)
 }
 
@@ -312,13 +264,13 @@ pub fn surface_of(
     edge: f64,
     islands: Islands,
     progress: &dyn Progress,
-) -> Result<(Surface, Pieces), Stopped> {
+) -> Result<(SurfaceMesh, Pieces), Stopped> {
     if let Some(tiling) = solid.explicit() {
         return tets::surface(tiling, edge, islands, progress);
     }
     let grid = Grid::new(solid, edge).map_err(Stopped::Refused)?;
     let middle = solid.region.bounds().center();
-    let mut out = Surface::default();
+    let mut out = SurfaceMesh::default();
     let mut census = Census::default();
     // Vertices on the borders of tiles, by name.
     let mut border: ByName<u32> = ByName::default();
@@ -346,31 +298,9 @@ pub fn surface_of(
     not_empty(out.mesh.triangles.len() as u64, edge)?;
     let found = census.judge(islands).map_err(Stopped::Refused)?;
     if found.pieces.dropped > 0 {
-        out = only(&out, &sift::runs(&found.parts));
+        out = out.select(&sift::runs(&found.parts));
     }
     Ok((out, found.pieces))
-}
-
-/// The surface of some runs of the triangles, vertices in the order that they had.
-fn only(all: &Surface, runs: &[std::ops::Range<u64>]) -> Surface {
-    let runs = || runs.iter().map(|r| r.start as usize..r.end as usize);
-    let mut names = vec![u32::MAX; all.mesh.vertices.len()];
-    for v in runs().flat_map(|r| all.mesh.triangles[r].as_flattened()) {
-        names[*v as usize] = 0;
-    }
-    let mut out = Surface::default();
-    for (name, place) in names.iter_mut().zip(&all.mesh.vertices) {
-        if *name == 0 {
-            *name = out.mesh.vertices.len() as u32;
-            out.mesh.vertices.push(*place);
-        }
-    }
-    for run in runs() {
-        let triangles = all.mesh.triangles[run.clone()].iter();
-        out.mesh.triangles.extend(triangles.map(|t| t.map(|v| names[v as usize])));
-        out.cut.extend_from_slice(&all.cut[run]);
-    }
-    out
 }
 
 /// Steps told while records move up, for each step told while they were made: they move that much faster.
@@ -479,21 +409,8 @@ fn finish<W: Store>(found: Found, triangles: u64, sifting: Option<&Sifting>, out
 ///
 /// # Errors
 /// Steps below 4 or above 64.
-pub fn stencil(ready: &crate::cell::tet::Ready, steps: usize, progress: &dyn Progress) -> Result<Surface, Stopped> {
+pub fn stencil(ready: &crate::cell::tet::Ready, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
     tets::stencil(ready, steps, progress)
-}
-
-/// Occupancy on a grid of cubic voxels.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Voxels {
-    /// Lower corner of the first voxel, mm.
-    pub origin: Vec3,
-    /// Edge of a voxel, mm.
-    pub step: f64,
-    /// Number of voxels along x, y, z.
-    pub shape: [usize; 3],
-    /// 1 where the voxel's centre is solid, x fastest.
-    pub solid: Vec<u8>,
 }
 
 /// Voxels of edge `step` (mm) that cover the region's bounds, centred on them.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::extract::Surface;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::surface_mesh::SurfaceMesh;
 
 mod chart;
 mod font;
@@ -104,7 +104,7 @@ impl Camera {
 /// Perspective with a narrow lens, fitted to the bounds, +Z up. The lattice is smooth and warm, cuts by the region's
 /// boundary are flat and cool; with a tint, both have its colours. The picture is the same for any number of threads. A side of 0 pixels gives no
 /// rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
-pub fn render(surface: &Surface, view: &View, tint: Option<&Tint>) -> Vec<u8> {
+pub fn render(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>) -> Vec<u8> {
     let [w, h] = view.size;
     let pixels = w.saturating_mul(h);
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {

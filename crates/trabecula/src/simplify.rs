@@ -15,11 +15,12 @@
 
 use std::collections::HashSet;
 
-use crate::extract::{Progress, Stopped, Surface};
 use crate::fault::{Fault, counted, number};
 use crate::math::Vec3;
 use crate::measure;
 use crate::mesh::Mesh;
+use crate::progress::{Progress, Stopped};
+use crate::surface_mesh::SurfaceMesh;
 
 mod drift;
 mod edges;
@@ -64,7 +65,7 @@ pub struct Report {
 /// # Errors
 /// A goal that is none; a mesh that is not closed, manifold and free of self-intersection after rounding to single
 /// precision; an interruption.
-pub fn simplify(surface: &Surface, goal: &Goal, progress: &dyn Progress) -> Result<(Surface, Report), Stopped> {
+pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> Result<(SurfaceMesh, Report), Stopped> {
     let (tolerance, target) = checked(goal).map_err(Stopped::Refused)?;
     let mesh = &surface.mesh;
     let size = |m: &Mesh| (m.triangles.len(), m.volume(), m.area());
@@ -183,7 +184,7 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
 
 /// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use, so that
 /// what is near in space is near in memory.
-fn in_order(surface: &Surface) -> Surface {
+fn in_order(surface: &SurfaceMesh) -> SurfaceMesh {
     let mesh = &surface.mesh;
     let b = mesh.bounds();
     let longest = b.size().iter().fold(0.0f64, |m, s| m.max(*s));
@@ -200,7 +201,7 @@ fn in_order(surface: &Surface) -> Surface {
         .collect();
     keys.sort_unstable();
     let mut names = vec![NONE; mesh.vertices.len()];
-    let mut out = Surface::default();
+    let mut out = SurfaceMesh::default();
     for (_, t) in keys {
         let triangle = mesh.triangles[t as usize].map(|v| {
             let name = &mut names[v as usize];
@@ -232,9 +233,9 @@ fn spread(x: u64) -> u64 {
 }
 
 /// The triangles that are left.
-fn gathered(work: Work, cut: &[bool]) -> Surface {
+fn gathered(work: Work, cut: &[bool]) -> SurfaceMesh {
     let mut names = vec![NONE; work.places.len()];
-    let mut out = Surface::default();
+    let mut out = SurfaceMesh::default();
     for (t, corners) in work.links.triangles.iter().enumerate() {
         if corners[0] == NONE {
             continue;

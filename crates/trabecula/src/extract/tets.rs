@@ -25,13 +25,15 @@ use rayon::prelude::*;
 
 use super::bodies::Sum;
 use super::islands::{Islands, Pieces};
-use super::{Estimate, Progress, Sifting, Stopped, Store, Summary, Surface, finish, not_empty, only, sift};
+use super::{Estimate, Sifting, Store, Summary, finish, not_empty, sift};
 use crate::cell::tet::{Grid, Nodes, Ready};
 use crate::fault::{Fault, number};
 use crate::io::stl;
 use crate::map::Tets;
 use crate::map::tets::NONE;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::progress::{Progress, Stopped};
+use crate::surface_mesh::SurfaceMesh;
 use crate::tets::TetMesh;
 use crate::tiling::{Level, Tiling};
 use census::Links;
@@ -308,9 +310,9 @@ pub(super) fn surface(
     edge: f64,
     islands: Islands,
     progress: &dyn Progress,
-) -> Result<(Surface, Pieces), Stopped> {
+) -> Result<(SurfaceMesh, Pieces), Stopped> {
     let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
-    let (mut out, mut links, mut shared) = (Surface::default(), Links::default(), Shared::default());
+    let (mut out, mut links, mut shared) = (SurfaceMesh::default(), Links::default(), Shared::default());
     work.each(progress, false, |start, chunk| {
         let (mut sums, mut places) = (&chunk.sums[..], &chunk.places[..]);
         for (t, piece) in (start..).zip(&chunk.pieces) {
@@ -333,7 +335,7 @@ pub(super) fn surface(
     not_empty(out.mesh.triangles.len() as u64, edge)?;
     let found = links.census().judge(islands).map_err(Stopped::Refused)?;
     if found.pieces.dropped > 0 {
-        out = only(&out, &sift::runs(&found.parts));
+        out = out.select(&sift::runs(&found.parts));
     }
     Ok((out, found.pieces))
 }
@@ -375,7 +377,7 @@ pub(super) fn stream_stl<W: Store>(
 }
 
 /// A ready cell in a single regular tetrahedron.
-pub(super) fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<Surface, Stopped> {
+pub(super) fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
     let stencil = ready.stencil().map_err(Stopped::Refused)?;
     let h = 0.5f64.sqrt() / 2.0;
     let mesh = TetMesh {

@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 
 use super::invalid;
-use crate::extract::Voxels;
+use crate::voxels::Voxels;
 
 /// Writes voxels as image data with the cell array `solid` (`UInt8`), raw and appended.
 ///

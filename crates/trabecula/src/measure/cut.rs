@@ -53,7 +53,8 @@ pub fn cut_triangles(mesh: &Mesh, region: &dyn Field) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extract::{Silent, surface};
+    use crate::extract::surface;
+    use crate::progress::Silent;
     use crate::region::{Cuboid, Sphere};
     use crate::solid::Solid;
     use std::sync::Arc;

@@ -12,10 +12,10 @@
 use rayon::prelude::*;
 
 use super::depth::depths;
-use crate::extract::{Progress, Stopped};
 use crate::fault::{Fault, number};
 use crate::field::{Block, Field};
 use crate::math::{Aabb, Vec3};
+use crate::progress::{Progress, Stopped};
 use crate::solid::Solid;
 
 /// What hangs by a neck thinner than this share of the lattice's own is dangling.
@@ -267,7 +267,7 @@ fn around(i: usize, side: usize) -> [Option<usize>; 6] {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::extract::Silent;
+    use crate::progress::Silent;
     use crate::region::{Cuboid, Cylinder, Region, Sphere, Union};
     use std::sync::Arc;
 

@@ -13,11 +13,12 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use rayon::prelude::*;
 
 use super::{defects, size};
-use crate::extract::{Progress, Stopped, Surface};
 use crate::fault::{Fault, counted};
 use crate::field::Block;
 use crate::math::{Aabb, Vec3};
+use crate::progress::{Progress, Stopped};
 use crate::region::Region;
+use crate::surface_mesh::SurfaceMesh;
 
 mod balls;
 mod bits;
@@ -128,14 +129,14 @@ impl<'a> Watch<'a> {
 }
 
 /// The bounds that the voxels cover.
-fn bounds(surface: &Surface, region: Option<&Region>) -> Aabb {
+fn bounds(surface: &SurfaceMesh, region: Option<&Region>) -> Aabb {
     let own = surface.mesh.bounds();
     region.map_or(own, |r| own.union(r.bounds()))
 }
 
 /// The step (mm) that is taken if none is asked for: an eighth of the mean wall 2 V / A, or more, so that there are at
 /// most 2²⁴ voxels.
-pub fn usual_step(surface: &Surface, region: Option<&Region>) -> f64 {
+pub fn usual_step(surface: &SurfaceMesh, region: Option<&Region>) -> f64 {
     let wall = 2.0 * surface.mesh.volume() / surface.mesh.area();
     let [x, y, z] = bounds(surface, region).size();
     (wall / STEPS).max((x * y * z / USUAL).cbrt())
@@ -146,7 +147,7 @@ pub fn usual_step(surface: &Surface, region: Option<&Region>) -> f64 {
 /// # Errors
 /// A step that is no length, too coarse to show anything, or so fine that there would be more than 2³³ voxels; bounds
 /// that are not finite.
-pub fn voxels_for(surface: &Surface, region: Option<&Region>, step: f64) -> Result<[usize; 3], Fault> {
+pub fn voxels_for(surface: &SurfaceMesh, region: Option<&Region>, step: f64) -> Result<[usize; 3], Fault> {
     let refuse = |message: String| Err(Fault::new("step", message));
     if !(step.is_finite() && step > 0.0) {
         return refuse(format!("is {step}; it must be a finite number greater than 0, mm"));
@@ -177,7 +178,7 @@ pub fn voxels_for(surface: &Surface, region: Option<&Region>, step: f64) -> Resu
 /// A mesh that is not closed or is inside out; steps as in `voxels_for`, or so coarse that no voxel's centre is in the
 /// solid; an interruption.
 pub fn thickness(
-    surface: &Surface,
+    surface: &SurfaceMesh,
     region: Option<&Region>,
     step: f64,
     progress: &dyn Progress,

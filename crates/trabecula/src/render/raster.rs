@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::Camera;
-use crate::extract::Surface;
 use crate::math::sub;
+use crate::surface_mesh::SurfaceMesh;
 
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
@@ -24,7 +24,7 @@ pub(super) struct Raster {
 impl Raster {
     /// Draws all triangles. Bands of rows are independent, and within one the triangles come in their own order, so
     /// the result does not depend on the number of threads.
-    pub(super) fn draw(surface: &Surface, camera: &Camera, size: [usize; 2]) -> Raster {
+    pub(super) fn draw(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Raster {
         let mesh = &surface.mesh;
         let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();
         let rows = size[1].div_ceil(BAND);
@@ -104,7 +104,7 @@ fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32],
 }
 
 /// Barycentric coordinates in space of the point `p` of triangle `i`.
-pub(super) fn weights(surface: &Surface, i: u32, p: crate::math::Vec3) -> [f64; 3] {
+pub(super) fn weights(surface: &SurfaceMesh, i: u32, p: crate::math::Vec3) -> [f64; 3] {
     use crate::math::{cross, dot};
     let [a, b, c] = surface.mesh.corners(i as usize);
     let n = cross(sub(b, a), sub(c, a));

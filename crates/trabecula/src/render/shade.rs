@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::raster::{NONE, Raster, weights};
 use super::{Camera, Tint, View};
-use crate::extract::Surface;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::surface_mesh::SurfaceMesh;
 
 /// Colours in linear light.
 const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];
@@ -23,7 +23,7 @@ pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
 }
 
 /// Premultiplied colour and cover of each sample.
-pub(super) fn shade(surface: &Surface, camera: &Camera, raster: &Raster, tint: Option<&Tint>) -> Vec<[f32; 4]> {
+pub(super) fn shade(surface: &SurfaceMesh, camera: &Camera, raster: &Raster, tint: Option<&Tint>) -> Vec<[f32; 4]> {
     let normals = Normals::of(surface);
     let [w, h] = raster.size;
     let open = occlusion(camera, raster);
@@ -84,7 +84,7 @@ impl Shadows {
     const SIZE: usize = 2048;
 
     /// Draws the surface as seen along the light.
-    fn cast(surface: &Surface, key: Vec3) -> Shadows {
+    fn cast(surface: &SurfaceMesh, key: Vec3) -> Shadows {
         let size = [Self::SIZE; 2];
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
@@ -151,7 +151,7 @@ impl Normals {
     /// Cosine of the angle from which on faces meet in an edge: 35°.
     const EDGE: f64 = 0.82;
 
-    fn of(surface: &Surface) -> Normals {
+    fn of(surface: &SurfaceMesh) -> Normals {
         let mesh = &surface.mesh;
         let mut sums = vec![[0.0f32; 3]; mesh.vertices.len()];
         for (i, t) in mesh.triangles.iter().enumerate() {
@@ -179,7 +179,7 @@ impl Normals {
     }
 
     /// The normal at a vertex of a face whose own is `flat`.
-    fn at(&self, surface: &Surface, vertex: usize, flat: Vec3) -> Vec3 {
+    fn at(&self, surface: &SurfaceMesh, vertex: usize, flat: Vec3) -> Vec3 {
         let Some(around) = self.edges.get(&vertex) else {
             return self.smooth[vertex].map(f64::from);
         };
@@ -190,7 +190,7 @@ impl Normals {
 }
 
 /// Twice the area of a triangle, along its normal.
-fn area(surface: &Surface, triangle: usize) -> Vec3 {
+fn area(surface: &SurfaceMesh, triangle: usize) -> Vec3 {
     let [a, b, c] = surface.mesh.corners(triangle);
     cross(sub(b, a), sub(c, a))
 }

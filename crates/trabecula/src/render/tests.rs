@@ -2,8 +2,8 @@ use super::*;
 use crate::mesh::Mesh;
 
 /// A surface of a function on a cube by cutting the six tetrahedra of each grid cell, closed at the cube's faces.
-fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> Surface {
-    let mut s = Surface::default();
+fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {
+    let mut s = SurfaceMesh::default();
     let corner = |i: usize, k: usize| (i >> k) & 1;
     let mut ids = std::collections::HashMap::new();
     let point = |g: [usize; 3]| g.map(|c| c as f64 / n as f64);
@@ -65,11 +65,11 @@ const VIEW: View = View { size: [160, 120], azimuth: 35.0, elevation: 25.0 };
 
 #[test]
 fn nothing_gives_the_background() {
-    let rgb = render(&Surface::default(), &VIEW, None);
+    let rgb = render(&SurfaceMesh::default(), &VIEW, None);
     assert_eq!(rgb.len(), 160 * 120 * 3);
     assert!(rgb.iter().all(|v| *v > 200));
-    assert!(render(&Surface::default(), &View { size: [0, 9], ..VIEW }, None).is_empty());
-    assert!(render(&Surface::default(), &View { size: [usize::MAX, 2], ..VIEW }, None).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, None).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, None).is_empty());
 }
 
 #[test]
@@ -77,9 +77,9 @@ fn one_triangle_fills_what_it_should() {
     let mesh =
         Mesh { vertices: vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 1.0, 1.0]], triangles: vec![[0, 1, 2]] };
     // Seen along −x it is half of a square that fills 92 % of the height.
-    let s = Surface { mesh, cut: vec![false] };
+    let s = SurfaceMesh { mesh, cut: vec![false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200] };
-    let (with, without) = (render(&s, &view, None), render(&Surface::default(), &view, None));
+    let (with, without) = (render(&s, &view, None), render(&SurfaceMesh::default(), &view, None));
     let pixels = with.chunks(3).zip(without.chunks(3)).filter(|(a, b)| a != b).count() as f64;
     let want = 0.5 * (0.92f64 * 200.0).powi(2);
     assert!((pixels / want - 1.0).abs() < 0.02, "{pixels} {want}");
@@ -87,7 +87,7 @@ fn one_triangle_fills_what_it_should() {
     for azimuth in [90.0, 180.0, f64::NAN] {
         assert_eq!(render(&s, &View { azimuth, ..view }, None).len(), 200 * 200 * 3);
     }
-    let point = Surface { mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0, 0, 0]] }, cut: vec![] };
+    let point = SurfaceMesh { mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0, 0, 0]] }, cut: vec![] };
     assert_eq!(render(&point, &view, None), without);
 }
 
@@ -98,7 +98,7 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
         vertices: [square(0.0), square(0.1)].concat(),
         triangles: vec![[4, 5, 6], [4, 6, 7], [0, 1, 2], [0, 2, 3]],
     };
-    let s = Surface { mesh, cut: vec![true, true, false, false] };
+    let s = SurfaceMesh { mesh, cut: vec![true, true, false, false] };
     let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60] };
     let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
     let front = middle(render(&s, &view, None));

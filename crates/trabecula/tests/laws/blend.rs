@@ -5,12 +5,13 @@ use std::sync::Arc;
 use trabecula::blend::{Blend, By, Constituent, Phases, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, Loader};
-use trabecula::extract::{Silent, surface};
+use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Sigmoid};
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::math::{Aabb, Interval, Vec3};
+use trabecula::progress::Silent;
 use trabecula::solid::Solid;
 
 use crate::common::{check, cuboid};

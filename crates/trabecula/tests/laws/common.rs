@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::{Islands, Silent, Stopped, Summary, Surface, stream_stl};
+use trabecula::extract::{Islands, Summary, stream_stl};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
@@ -14,8 +14,10 @@ use trabecula::map::{Affine, Map};
 use trabecula::math::Vec3;
 use trabecula::measure::{non_manifold_vertices, self_intersections, size};
 use trabecula::mesh::Mesh;
+use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
+use trabecula::surface_mesh::SurfaceMesh;
 
 pub fn ball(center: Vec3, radius: f64) -> Region {
     Arc::new(Sphere::new(center, radius).expect("ball"))
@@ -120,7 +122,7 @@ pub fn fault(mesh: &Mesh) -> Option<&'static str> {
 }
 
 /// Every guarantee.
-pub fn check(what: &str, s: &Surface) {
+pub fn check(what: &str, s: &SurfaceMesh) {
     assert_eq!(s.cut.len(), s.mesh.triangles.len(), "{what}");
     if let Some(why) = fault(&s.mesh) {
         panic!("{what}: {why}");
@@ -129,7 +131,7 @@ pub fn check(what: &str, s: &Surface) {
 
 /// What keeps a solid's surface from bounding one, in memory or streamed: tiles that a vertex is common to must each put
 /// it in the same place.
-pub fn fault_of(solid: &Solid, edge: f64, s: &Surface) -> Option<&'static str> {
+pub fn fault_of(solid: &Solid, edge: f64, s: &SurfaceMesh) -> Option<&'static str> {
     fault(&s.mesh).or_else(|| match stream(solid, edge, Islands::Keep) {
         Ok((bytes, _)) if bytes == stl(s) => None,
         _ => Some("streamed otherwise"),
@@ -137,7 +139,7 @@ pub fn fault_of(solid: &Solid, edge: f64, s: &Surface) -> Option<&'static str> {
 }
 
 /// Every guarantee, in memory and streamed.
-pub fn check_both(what: &str, solid: &Solid, edge: f64, s: &Surface) {
+pub fn check_both(what: &str, solid: &Solid, edge: f64, s: &SurfaceMesh) {
     if let Some(why) = fault_of(solid, edge, s) {
         panic!("{what}: {why}");
     }
@@ -151,7 +153,7 @@ pub fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Su
 }
 
 /// The mesh as a file of its triangles in their order.
-pub fn stl(s: &Surface) -> Vec<u8> {
+pub fn stl(s: &SurfaceMesh) -> Vec<u8> {
     let mut bytes = Vec::new();
     trabecula::io::write_mesh(&s.mesh, "stl", &Default::default(), &mut bytes).expect("memory");
     bytes

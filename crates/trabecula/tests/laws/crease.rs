@@ -5,15 +5,17 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use trabecula::cell::Part;
-use trabecula::extract::{Silent, Surface, surface};
+use trabecula::extract::surface;
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use trabecula::mesh::Mesh;
+use trabecula::progress::Silent;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
+use trabecula::surface_mesh::SurfaceMesh;
 
 use super::common::{Random, cases, check, check_both, cuboid, lattice};
 
@@ -187,7 +189,7 @@ pub fn far(truth: &MeshRegion, mesh: &Mesh, edge: f64) -> f64 {
     far.count() as f64 / points.len() as f64
 }
 
-pub fn of(region: Region, edge: f64) -> Surface {
+pub fn of(region: Region, edge: f64) -> SurfaceMesh {
     surface(&full(region), edge, &Silent).expect("surface")
 }
 
@@ -291,7 +293,7 @@ fn edges_are_kept_where_a_lattice_meets_them() {
             let (s, round) = (of(truth.clone()), of(Arc::new(Rounded(truth.clone()))));
             let solid = Solid::new(truth.clone(), Some(field.clone()), 0.6);
             check_both(&format!("{name}, {cell}"), &solid, edge, &s);
-            let share = |s: &Surface| {
+            let share = |s: &SurfaceMesh| {
                 let off = in_lattice(&truth, &*field, &s.mesh, edge);
                 off.iter().filter(|d| **d > edge / 20.0).count() as f64 / off.len() as f64
             };

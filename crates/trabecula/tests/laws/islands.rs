@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{Islands, Pieces, Progress, Silent, Stopped, stream_stl, surface, surface_of};
+use trabecula::extract::{Islands, Pieces, stream_stl, surface, surface_of};
 use trabecula::io::read_mesh;
 use trabecula::measure::size;
 use trabecula::mesh::Mesh;
+use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
 

@@ -3,18 +3,20 @@
 use std::sync::Arc;
 
 use trabecula::cell::{Cell, Part, Series, named};
-use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
+use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::math::{Vec3, add, apply, rotation};
 use trabecula::measure::{Spread, size, thickness, usual_step, voxels_for};
 use trabecula::mesh::Mesh;
+use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
+use trabecula::surface_mesh::SurfaceMesh;
 
-fn bare(mesh: Mesh) -> Surface {
-    Surface { cut: vec![false; mesh.triangles.len()], mesh }
+fn bare(mesh: Mesh) -> SurfaceMesh {
+    SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh }
 }
 
 fn wall(mesh: Mesh, step: f64) -> Spread {
@@ -31,7 +33,7 @@ fn turned(mut mesh: Mesh, degrees: Vec3) -> Mesh {
     mesh
 }
 
-fn full(region: Region, edge: f64) -> Surface {
+fn full(region: Region, edge: f64) -> SurfaceMesh {
     let solid = Solid::new(region, None, 1.0);
     surface(&solid, edge, &Silent).expect("surface")
 }
@@ -41,7 +43,7 @@ fn ball(center: Vec3, radius: f64) -> Sphere {
 }
 
 /// A cube of gyroid, cells of 4 mm.
-fn gyroid(part: Part, fraction: f64, edge: f64) -> (Surface, Region) {
+fn gyroid(part: Part, fraction: f64, edge: f64) -> (SurfaceMesh, Region) {
     let cell = Cell::new(Series::new(named("gyroid").expect("gyroid").terms()).expect("series"));
     let map = Affine::rigid([4.0; 3], [0.0; 3], [0.0; 3], &[]).expect("map");
     let level = Level::Fraction(Grade::Constant(fraction));

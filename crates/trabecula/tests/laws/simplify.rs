@@ -6,14 +6,16 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::Part;
-use trabecula::extract::{Progress, Silent, Stopped, Surface, surface};
+use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
 use trabecula::math::{Vec3, add, cross, dot, norm, scale, sub};
 use trabecula::measure::size;
 use trabecula::mesh::Mesh;
+use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Region};
 use trabecula::simplify::{Goal, Report, simplify};
+use trabecula::surface_mesh::SurfaceMesh;
 
 use crate::common::{ball, check, drawn, lattice_at, region, solid};
 
@@ -81,7 +83,7 @@ fn farthest(from: &Mesh, to: &Mesh, reach: f64) -> f64 {
 }
 
 /// Simplifies, and holds the result to every promise. Gives the distance that was measured, too.
-fn held(what: &str, s: &Surface, goal: Goal) -> (Surface, Report, f64) {
+fn held(what: &str, s: &SurfaceMesh, goal: Goal) -> (SurfaceMesh, Report, f64) {
     let (made, report) = simplify(s, &goal, &Silent).expect(what);
     check(what, &made);
     let (a, b) = (size(&s.mesh), size(&made.mesh));
@@ -107,7 +109,7 @@ fn down_to(triangles: usize) -> Goal {
     Goal { triangles: Some(triangles), ..Goal::default() }
 }
 
-fn of(region: Region, edge: f64) -> Surface {
+fn of(region: Region, edge: f64) -> SurfaceMesh {
     surface(&solid(region, None), edge, &Silent).expect("surface")
 }
 
@@ -197,7 +199,7 @@ fn cuts_stay_what_they_are() {
     let fine = surface(&solid(cube(1.5), Some(field)), 1.0 / 32.0, &Silent).expect("surface");
     let (made, report, _) = held("gyroid", &fine, within(0.005));
     println!("gyroid: {:?}", report.triangles);
-    let area = |s: &Surface, cut: bool| -> f64 {
+    let area = |s: &SurfaceMesh, cut: bool| -> f64 {
         let own = (0..s.cut.len()).filter(|i| s.cut[*i] == cut);
         own.map(|i| {
             let [a, b, c] = s.mesh.corners(i);
@@ -231,7 +233,7 @@ fn same_bytes_for_any_number_of_threads() {
 #[test]
 fn what_cannot_be_done_is_refused_with_numbers() {
     let fine = of(cube(1.0), 0.1);
-    let refused = |s: &Surface, goal: Goal| match simplify(s, &goal, &Silent) {
+    let refused = |s: &SurfaceMesh, goal: Goal| match simplify(s, &goal, &Silent) {
         Err(Stopped::Refused(f)) => f.to_string(),
         other => panic!("{other:?}"),
     };

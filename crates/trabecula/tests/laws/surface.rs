@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{Islands, Silent, Stopped, stream_stl, surface, voxels};
+use trabecula::extract::{Islands, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
 use trabecula::measure::size;
 use trabecula::mesh::Mesh;
+use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere};
 
 use crate::common::{ball, cases, check, check_both, drawn, lattice_at, region, solid};

@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
-use trabecula::extract::{Silent, surface};
+use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::math::{Aabb, Mat3, Vec3, add, apply, dot, norm, scale, sub, transpose, unit};
+use trabecula::progress::Silent;
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;
 

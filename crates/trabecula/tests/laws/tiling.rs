@@ -7,14 +7,16 @@ use std::sync::Arc;
 use crate::common::{Random, ball, cases, check, fault};
 use trabecula::cell::tet::{Stencil, ready, ready_cells};
 use trabecula::cell::{Part, Series, Term};
-use trabecula::extract::{self, Islands, Silent, Stopped, Surface};
+use trabecula::extract::{self, Islands};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
 use trabecula::math::norm;
 use trabecula::measure::size;
+use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{MeshRegion, Repair};
 use trabecula::solid::Solid;
+use trabecula::surface_mesh::SurfaceMesh;
 use trabecula::symmetry::{Group, Side};
 use trabecula::tets::{TetMesh, background};
 use trabecula::tiling::{Amount, Level, Share, Tiling};
@@ -66,7 +68,7 @@ fn solid(tiling: Tiling, explicit: bool) -> Solid {
     solid
 }
 
-pub fn made(tiling: Tiling, steps: f64, explicit: bool) -> (Surface, extract::Pieces) {
+pub fn made(tiling: Tiling, steps: f64, explicit: bool) -> (SurfaceMesh, extract::Pieces) {
     let edge = tiling.map.mean_edge() / steps;
     let solid = solid(tiling, explicit);
     extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface")

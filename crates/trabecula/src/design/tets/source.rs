@@ -4,11 +4,12 @@ use crate::design::Loader;
 use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
-use crate::extract::{self, Silent, Stopped};
+use crate::extract;
 use crate::fault::{Fault, number};
 use crate::io::{self, Elements, Shape};
 use crate::math::scale;
 use crate::mesh::Mesh;
+use crate::progress::{Silent, Stopped};
 use crate::solid::Solid;
 use crate::tets::{Checked, TetMesh};
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::Watch;
 use super::lines::{Lines, NONE, Site};
-use crate::extract::Stopped;
+use crate::progress::Stopped;
 
 /// Passes over the grid's layers, as they are counted by the watch.
 pub(super) const PASSES: [usize; 3] = [0, 2, 2];
@@ -212,9 +212,9 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extract::Silent;
     use crate::measure::local::lines::Shape;
     use crate::mesh::samples::torus;
+    use crate::progress::Silent;
 
     #[test]
     fn every_voxel_finds_the_nearest_of_all_sites() {
