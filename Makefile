@@ -79,7 +79,7 @@ demo/hip_stem.png: $(VENV)/.installed $(DEMO) $(PART) scripts/demo_summary.py
 test: core-test python-test docs-test
 
 core-test: $(VENV)/.made
-	cargo test --release --locked -p trabecula
+	cargo test --release --locked --workspace
 
 CASES ?= 2000
 campaign: $(VENV)/.test-tools

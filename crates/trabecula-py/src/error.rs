@@ -2,10 +2,10 @@
 
 use std::sync::Mutex;
 
+use geometry::fault::Fault;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use trabecula::design::DesignError;
-use trabecula::fault::Fault;
 use trabecula::progress::Stopped;
 
 /// `trabecula.DesignError` with the fields of the core's own.

@@ -104,7 +104,7 @@ mod _core {
     /// A space group: its number, its name, and its operations as rotations and translations (in parts of 24).
     #[pyfunction]
     fn group(symbol: &str) -> PyResult<(Option<u16>, String, Operations)> {
-        let group = trabecula::symmetry::Group::named(symbol).map_err(crate::error::fault)?;
+        let group = geometry::symmetry::Group::named(symbol).map_err(crate::error::fault)?;
         let operations = group.operations.iter();
         let operations = operations.map(|o| (o.rotation, o.translation)).collect();
         Ok((group.number, group.name, operations))

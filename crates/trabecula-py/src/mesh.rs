@@ -3,15 +3,16 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use geometry::math::{cross, norm, sub};
+use geometry::measure;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use trabecula::math::{cross, norm, sub};
 use trabecula::render::{Tint, View, png, render};
 use trabecula::simplify::{Goal, simplify};
 use trabecula::surface_mesh::SurfaceMesh;
-use trabecula::{io, measure};
+use trabecula::{analysis, io};
 
 use crate::error;
 use crate::file;
@@ -36,7 +37,7 @@ impl Mesh {
     }
 
     /// A mesh of which nothing more is known.
-    fn bare(mesh: trabecula::mesh::Mesh) -> Self {
+    fn bare(mesh: geometry::mesh::Mesh) -> Self {
         let cut = vec![false; mesh.triangles.len()];
         Mesh { surface: SurfaceMesh { mesh, cut }, split: false, design: String::new() }
     }
@@ -88,7 +89,7 @@ impl Mesh {
         let vertices = rows.map(|p| [p[0], p[1], p[2]]).collect();
         let rows = corners.rows().into_iter();
         let triangles = rows.map(|t| [t[0], t[1], t[2]].map(|v| v as u32)).collect();
-        let mut made = Mesh::bare(trabecula::mesh::Mesh { vertices, triangles });
+        let mut made = Mesh::bare(geometry::mesh::Mesh { vertices, triangles });
         if let Some(cut) = cut.filter(|c| c.len() == made.surface.cut.len()) {
             (made.surface.cut, made.split) = (cut, true);
         }
@@ -104,7 +105,7 @@ impl Mesh {
     fn split_by(&self, py: Python<'_>, region: &Region) -> PyResult<Mesh> {
         let (mesh, region) = (&self.surface.mesh, &region.region);
         let surface =
-            run(py, None, None, |_| SurfaceMesh { cut: measure::cut_triangles(mesh, &**region), mesh: mesh.clone() })?;
+            run(py, None, None, |_| SurfaceMesh { cut: analysis::cut_triangles(mesh, &**region), mesh: mesh.clone() })?;
         Ok(Mesh { surface, split: true, design: self.design.clone() })
     }
 
@@ -252,10 +253,10 @@ impl Mesh {
     ) -> PyResult<(f64, [usize; 3], f64)> {
         let region = region.map(|r| r.region.clone());
         run(py, None, None, |_| {
-            let step = step.unwrap_or_else(|| measure::usual_step(&self.surface, region.as_ref()));
-            let shape = measure::voxels_for(&self.surface, region.as_ref(), step)?;
+            let step = step.unwrap_or_else(|| analysis::usual_step(&self.surface, region.as_ref()));
+            let shape = analysis::voxels_for(&self.surface, region.as_ref(), step)?;
             let count = shape.iter().map(|n| *n as f64).product::<f64>();
-            Ok((step, shape, count * measure::BYTES_PER_VOXEL))
+            Ok((step, shape, count * analysis::BYTES_PER_VOXEL))
         })?
         .map_err(error::fault)
     }
@@ -271,9 +272,9 @@ impl Mesh {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>)> {
         let region = region.map(|r| r.region.clone());
-        let found = run(py, threads, progress, |p| measure::thickness(&self.surface, region.as_ref(), step, p))?
+        let found = run(py, threads, progress, |p| analysis::thickness(&self.surface, region.as_ref(), step, p))?
             .map_err(error::stopped)?;
-        let dict = |s: &measure::Spread| -> PyResult<Bound<'py, PyDict>> {
+        let dict = |s: &analysis::Spread| -> PyResult<Bound<'py, PyDict>> {
             let d = PyDict::new(py);
             d.set_item("min", s.min)?;
             d.set_item("p05", s.p05)?;

@@ -15,7 +15,7 @@ use trabecula::map::{Map, Misfit};
 use trabecula::progress::Stopped;
 use trabecula::region::Repaired;
 use trabecula::truss::Beams;
-use trabecula::{io, measure};
+use trabecula::{analysis, io};
 
 use crate::design::Folder;
 use crate::error;
@@ -157,7 +157,7 @@ impl Solid {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bits> {
         let found =
-            run(py, threads, progress, |p| measure::dangling(&self.built.solid, neck, p))?.map_err(error::stopped)?;
+            run(py, threads, progress, |p| analysis::dangling(&self.built.solid, neck, p))?.map_err(error::stopped)?;
         Ok((found.count, found.volume, found.largest, found.neck, found.step))
     }
 

@@ -3,12 +3,12 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use geometry::tetmesh::TetMesh as Core;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
 use trabecula::io::{self, Elements};
 use trabecula::surface_mesh::SurfaceMesh;
-use trabecula::tets::TetMesh as Core;
 
 use crate::design::Folder;
 use crate::error;
@@ -183,7 +183,7 @@ pub fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
 }
 
 /// The tetrahedra that a mesher of Python's makes of a surface.
-pub fn tetrahedra(name: &str, surface: &trabecula::mesh::Mesh, size: f64, limit: f64) -> Result<Core, String> {
+pub fn tetrahedra(name: &str, surface: &geometry::mesh::Mesh, size: f64, limit: f64) -> Result<Core, String> {
     Python::attach(|py| {
         let make = || -> PyResult<Core> {
             let flat = surface.vertices.clone().into_flattened().into_pyarray(py);

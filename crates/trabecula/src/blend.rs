@@ -22,9 +22,9 @@ mod weights;
 
 use std::sync::Arc;
 
-use crate::fault::Fault;
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, add, scale, sub};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, add, scale, sub};
 
 pub use constituent::Constituent;
 pub use joint::Phases;

@@ -20,7 +20,7 @@ pub use series::{Series, Term};
 
 use std::sync::OnceLock;
 
-use crate::math::{Interval, Mat3, Vec3, add, apply, norm, scale, spectral_norm, transpose};
+use geometry::math::{Interval, Mat3, Vec3, add, apply, norm, scale, spectral_norm, transpose};
 
 /// Which part of space about the level is solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -39,16 +39,16 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
-use crate::fault::Fault;
 use crate::io::Elements;
 use crate::lattice::Lattice;
-use crate::mesh::Mesh;
 use crate::quador::Quadors;
 use crate::region::{Region, Repaired};
 use crate::solid::Solid;
-use crate::tets::TetMesh;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
+use geometry::fault::Fault;
+use geometry::mesh::Mesh;
+use geometry::tetmesh::TetMesh;
 use read::RegionIn;
 
 pub use blend::Blended;

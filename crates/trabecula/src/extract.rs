@@ -11,13 +11,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use rayon::Scope;
 use rayon::prelude::*;
 
-use crate::fault::Fault;
 use crate::field::{Block, Field};
 use crate::io::stl;
 use crate::progress::{Progress, Stopped};
 use crate::solid::Solid;
 use crate::surface_mesh::SurfaceMesh;
 use crate::voxels::Voxels;
+use geometry::fault::Fault;
 
 mod bodies;
 mod by;

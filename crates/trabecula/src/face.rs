@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3};
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// A smooth function, negative towards the solid.
 #[derive(Clone)]

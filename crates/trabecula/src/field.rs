@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::math::{Aabb, Interval, Vec3};
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// The nodes of a structured block: every combination of the three coordinate lists (mm), x running fastest.
 #[derive(Clone, Copy, Debug)]

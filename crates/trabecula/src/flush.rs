@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use crate::face::{Body, Face, Sign};
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale};
+use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale};
 
 /// How far a face that is flush is moved, as a share of the region's size.
 const APART: f64 = 1e-5;
@@ -146,7 +146,7 @@ fn places(face: &dyn Field, bounds: &Aabb) -> Vec<(Vec3, Vec3)> {
     let tolerance = FLUSH * norm(size);
     (0..LOOKS)
         .filter(|&i| values[i].abs() <= tolerance && bounds.distance(points[i]) <= tolerance)
-        .map(|i| (points[i], crate::math::unit(gradients[i])))
+        .map(|i| (points[i], geometry::math::unit(gradients[i])))
         .collect()
 }
 
@@ -157,7 +157,7 @@ fn flush(other: &dyn Field, places: &[(Vec3, Vec3)], size: f64) -> Option<bool> 
     other.gradients(&points, &mut values, &mut gradients);
     // Faces that cross have a curve in common: no place lies on it but by chance.
     let along = |i: usize| {
-        let way = dot(crate::math::unit(gradients[i]), places[i].1);
+        let way = dot(geometry::math::unit(gradients[i]), places[i].1);
         (values[i].abs() <= FLUSH * size && way.abs() > 1.0 - 1e-6).then_some(way > 0.0)
     };
     let found: Vec<bool> = (0..points.len()).filter_map(along).collect();

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::fault::Fault;
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
 
 mod formula;
 mod polyline;

@@ -18,7 +18,7 @@ pub use table::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
 pub use wire::{Facts, Wire};
 
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// A hub: a ball that beams meet in.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::fault::Fault;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::mesh::Mesh;
 
 mod elements;
 mod join;

@@ -9,7 +9,7 @@ use crate::cell::{Cell, Cut, Distance, Part};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use crate::map::Map;
-use crate::math::{
+use geometry::math::{
     Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm, transpose,
 };
 

@@ -4,12 +4,12 @@
 //! Lengths are mm, angles degrees at the door, phases turns; negative is solid; triangles are counter-clockwise
 //! seen from outside.
 
+pub mod analysis;
 pub mod blend;
 pub mod cell;
 pub mod design;
 pub mod extract;
 pub mod face;
-pub mod fault;
 pub mod field;
 mod flush;
 pub mod grade;
@@ -17,9 +17,7 @@ pub mod graph;
 pub mod io;
 pub mod lattice;
 pub mod map;
-pub mod math;
-pub mod measure;
-pub mod mesh;
+pub mod mesher;
 pub mod pattern;
 pub mod progress;
 pub mod quador;
@@ -29,9 +27,6 @@ pub mod simplify;
 pub mod skin;
 pub mod solid;
 pub mod surface_mesh;
-pub mod symmetry;
-pub mod tets;
 pub mod tiling;
 pub mod truss;
-mod union;
 pub mod voxels;

@@ -21,9 +21,9 @@ pub use tets::Tets;
 
 use std::sync::Arc;
 
-use crate::fault::Fault;
 use crate::field::Block;
-use crate::math::{
+use geometry::fault::Fault;
+use geometry::math::{
     Aabb, IDENTITY, Mat3, Vec3, add, apply, determinant, inverse, product, rotation, scale, spectral_norm, transpose,
 };
 
@@ -296,7 +296,7 @@ impl Rows<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{norm, sub};
+    use geometry::math::{norm, sub};
 
     #[test]
     fn lattice_vectors_are_those_of_the_conventions() {

@@ -10,9 +10,9 @@ mod laid;
 
 pub use laid::Laid;
 
-use crate::fault::{Fault, counted, number};
 use crate::graph::{Beam, Graph, Hub, Profile};
-use crate::math::{IDENTITY, Mat3, Vec3, add, apply, product, rotation, scale, sub, transpose};
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{IDENTITY, Mat3, Vec3, add, apply, product, rotation, scale, sub, transpose};
 
 /// x → s R x + t.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ impl Similarity {
     pub fn commutes(&self, other: &Similarity, size: f64) -> bool {
         let (a, b) = (self.after(other), other.after(self));
         let turn = (0..9).all(|n| (a.turn[n / 3][n % 3] - b.turn[n / 3][n % 3]).abs() < 1e-12);
-        let far = size + crate::math::norm(a.shift);
+        let far = size + geometry::math::norm(a.shift);
         turn && (0..3).all(|i| (a.shift[i] - b.shift[i]).abs() < 1e-12 * far)
     }
 }

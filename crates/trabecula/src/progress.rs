@@ -2,7 +2,7 @@
 
 use std::io;
 
-use crate::fault::Fault;
+use geometry::fault::Fault;
 
 /// Receives the progress of a computation and may stop it.
 pub trait Progress: Sync {

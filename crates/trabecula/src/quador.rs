@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
-use crate::fault::{Fault, counted, number};
 use crate::graph::Graph;
-use crate::math::{Aabb, Vec3, norm, scale, sub};
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{Aabb, Vec3, norm, scale, sub};
 
 pub mod bezier;
 mod classes;
@@ -211,8 +211,10 @@ impl Quadors {
                 let (shortfall, overlaps) = round(i, h.radius, stubs, fillet);
                 let hub = Hub { radius: h.radius, stubs, sharp };
                 let local = hub.bounds();
-                let bounds =
-                    Aabb { min: crate::math::add(h.center, local.min), max: crate::math::add(h.center, local.max) };
+                let bounds = Aabb {
+                    min: geometry::math::add(h.center, local.min),
+                    max: geometry::math::add(h.center, local.max),
+                };
                 let (first, last) = (firsts[i], firsts[i + 1]);
                 (
                     Ball { center: h.center, radius: h.radius, first, last, bounds, bend: hub.bend() },

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::face::{Face, Tree};
 use crate::field::{Block, Field};
-use crate::math::Aabb;
+use geometry::math::Aabb;
 
 mod csg;
 mod mesh;
@@ -86,7 +86,7 @@ pub type Region = Arc<dyn Shape>;
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::math::{Vec3, add, norm, scale, sub};
+    use geometry::math::{Vec3, add, norm, scale, sub};
 
     /// A number in [-1, 1) from a linear congruential generator.
     pub fn random(seed: &mut u64) -> f64 {

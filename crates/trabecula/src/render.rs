@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 mod chart;
 mod font;

@@ -15,12 +15,12 @@
 
 use std::collections::HashSet;
 
-use crate::fault::{Fault, counted, number};
-use crate::math::Vec3;
-use crate::measure;
-use crate::mesh::Mesh;
 use crate::progress::{Progress, Stopped};
 use crate::surface_mesh::SurfaceMesh;
+use geometry::fault::{Fault, counted, number};
+use geometry::math::Vec3;
+use geometry::measure;
+use geometry::mesh::Mesh;
 
 mod drift;
 mod edges;

@@ -7,12 +7,12 @@
 use std::sync::Arc;
 
 use crate::face::{Body, Face, Sign, Tree};
-use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::flush;
 use crate::grade::Grade;
-use crate::math::{Aabb, Interval, Vec3, add, cross, norm, scale, sub, unit};
 use crate::region::{HalfSpace, Region};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, add, cross, norm, scale, sub, unit};
 
 /// The least thickness (mm) that faces are moved by at once; the rest of a thickness that varies is added point by point.
 const LEAST: f64 = 1e-6;

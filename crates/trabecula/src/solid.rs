@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::face::{Body, Face, Tree};
 use crate::field::{Block, Field};
 use crate::flush;
-use crate::math::{Aabb, Interval, Vec3};
 use crate::region::Region;
 use crate::tiling::Tiling;
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// What a design means: the part of the region in which the field is negative, or that is filled anyway.
 #[derive(Clone)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::mesh::Mesh;
+use geometry::mesh::Mesh;
 
 /// A surface mesh and which of its triangles lie on the region's boundary rather than on the lattice.
 #[derive(Clone, Debug, Default, PartialEq)]

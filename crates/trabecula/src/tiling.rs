@@ -17,7 +17,7 @@ use crate::cell::tet::{Bary, Stencil};
 use crate::cell::{Cut, Part};
 use crate::field::Field;
 use crate::map::Tets;
-use crate::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
+use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
 pub use level::{Amount, Spread};
@@ -88,9 +88,9 @@ impl Tiling {
         });
         let steep = steep.fold(0.0, f64::max);
         let corners = cells[0].stencil.corners();
-        let along = [0, 1, 2].map(|i| crate::math::sub(corners[i], corners[3]));
+        let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
         // All tetrahedra of cells are regular: with edges of another length the stretch is that much more.
-        let size = |s: &Stencil| norm(crate::math::sub(s.corners()[0], s.corners()[3]));
+        let size = |s: &Stencil| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
         let longest = cells.iter().map(|c| size(&c.stencil)).fold(0.0, f64::max);
         let more = longest / size(&cells[0].stencil);
         let of = |t: usize| {
@@ -282,7 +282,7 @@ impl Tiling {
     /// The length of a cell's period in tetrahedra of mean edge, mm.
     pub fn wavelength(&self) -> f64 {
         let s = &self.cells[0].stencil;
-        let edge = norm(crate::math::sub(s.corners()[0], s.corners()[1]));
+        let edge = norm(geometry::math::sub(s.corners()[0], s.corners()[1]));
         self.map.mean_edge() / edge
     }
 }

@@ -1,6 +1,6 @@
 //! Occupancy on a grid of cubic voxels.
 
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// Occupancy on a grid of cubic voxels.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,7 +8,7 @@ use super::quantile::{Spot, add_times, quantile};
 use super::simplex::Place;
 use super::strand::Strand;
 use super::table::Table;
-use crate::math::{Vec3, add, scale, sub};
+use geometry::math::{Vec3, add, scale, sub};
 
 /// The ends of what is solid: the lower, the upper.
 pub(super) const LOW: usize = 0;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::field::Field;
 use crate::lattice::Lattice;
-use crate::math::{Vec3, add, scale};
+use geometry::math::{Vec3, add, scale};
 
 /// One of what is blended.
 #[derive(Clone)]

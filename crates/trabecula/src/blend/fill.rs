@@ -8,7 +8,7 @@ use super::Blend;
 use super::mixed::Mixed;
 use super::strand;
 use crate::field::Block;
-use crate::math::{Aabb, Interval, Vec3};
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// Nodes along an edge of a cube.
 const CUBE: usize = 8;

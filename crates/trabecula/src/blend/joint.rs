@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use super::constituent::Constituent;
 use crate::map::Map;
-use crate::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
+use geometry::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
 /// How the phases of the lattices of a blend go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

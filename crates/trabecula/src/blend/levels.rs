@@ -16,7 +16,7 @@ use super::simplex::Grid;
 use super::strand::Strand;
 use super::table::Table;
 use super::weights::Weights;
-use crate::math::{Aabb, Interval, Vec3, add, scale};
+use geometry::math::{Aabb, Interval, Vec3, add, scale};
 
 /// The quantiles of lattices at a point, [a, b] each, and those of a blend of them: the lower end Σ wᵢ aᵢ, and the upper so
 /// far above it, or above none, as the fractions make.

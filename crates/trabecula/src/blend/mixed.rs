@@ -8,7 +8,7 @@ use super::added::{HIGH, Row};
 use super::fill::Line;
 use super::simplex::Place;
 use super::strand::Strand;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// What is found on the rows of a block where several lattices may be.
 pub(super) struct Mixed {

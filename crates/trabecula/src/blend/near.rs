@@ -3,7 +3,7 @@
 use super::levels::Levels;
 use super::quantile::Spot;
 use super::strand::Strand;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// So many cubes of neighbourhoods are remembered.
 const KEPT: usize = 32;

@@ -2,7 +2,7 @@
 
 use super::Blend;
 use super::added::End;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// What a lattice of a blend is at points: its core and its upper end with their slopes (per mm), and the quantiles of both
 /// ends where levels vary.

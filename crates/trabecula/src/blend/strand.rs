@@ -5,7 +5,7 @@ use super::constituent::{Constituent, gradients_of, values_of};
 use crate::cell::Part;
 use crate::field::{Block, Field};
 use crate::lattice::{self, Lattice, Level};
-use crate::math::{Aabb, Interval, Vec3, add, scale};
+use geometry::math::{Aabb, Interval, Vec3, add, scale};
 
 /// How far below all its values the lower end of a network's interval lies, in shares of its range; also how far below
 /// zero its quantile is counted.

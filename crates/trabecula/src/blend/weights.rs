@@ -1,7 +1,7 @@
 //! How much each lattice of a blend counts: shares that make one everywhere.
 
 use crate::grade::Grade;
-use crate::math::{Aabb, Interval, Vec3, add, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, add, scale, sub};
 
 /// Shares up to this count as none and the others are stretched to make one again, so that a weight with a long tail
 /// (a logistic) has an end, continuously.

@@ -10,7 +10,7 @@
 use super::Part;
 use rayon::prelude::*;
 
-use crate::math::{Vec3, add, scale, sub, unit};
+use geometry::math::{Vec3, add, scale, sub, unit};
 
 mod critical;
 mod forest;

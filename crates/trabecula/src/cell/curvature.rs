@@ -2,7 +2,7 @@
 
 use super::series::Series;
 use super::thickness::least;
-use crate::math::{Mat3, Vec3, apply, dot, eigen, norm, product, scale, transpose};
+use geometry::math::{Mat3, Vec3, apply, dot, eigen, norm, product, scale, transpose};
 
 /// Least radius of curvature (mm) of the surface f = 0 where phases are u = `to_phase` · x; infinite where it is flat,
 /// `None` where there is no surface.
@@ -42,12 +42,12 @@ mod tests {
     #[test]
     fn folding_limits_of_cubic_cells() {
         for (name, limit) in [("gyroid", 0.37), ("diamond", 0.31), ("primitive", 0.32), ("iwp", 0.21)] {
-            let unit = crate::math::IDENTITY;
+            let unit = geometry::math::IDENTITY;
             let found = 2.0 * radius(&series(name), &unit).expect("a surface");
             println!("{name} {found:.5}");
             assert!((found - limit).abs() < 0.005, "{name} {found}");
             // Lengths scale, whatever the rotation.
-            let turned = crate::math::rotation([20.0, 35.0, 50.0]).map(|r| scale(r, 0.25));
+            let turned = geometry::math::rotation([20.0, 35.0, 50.0]).map(|r| scale(r, 0.25));
             let again = 2.0 * radius(&series(name), &turned).expect("a surface");
             assert!((again / (4.0 * found) - 1.0).abs() < 1e-6, "{name} {again}");
         }
@@ -61,13 +61,13 @@ mod tests {
         let rods = Series::new(vec![wave([1, 0, 0], 1.0, 0.0), wave([0, 1, 0], 1.0, 0.0), wave([0, 0, 0], -1.9, 0.0)])
             .expect("series");
         let a = 0.9f64.acos();
-        let found = radius(&rods, &crate::math::IDENTITY).expect("a surface");
+        let found = radius(&rods, &geometry::math::IDENTITY).expect("a surface");
         // Curvature on the axis: f_yy / |f_x| = cos 0 / sin a; on the diagonal cos b / (√2 sin b), cos b = 0.95.
         let b = 0.95f64.acos();
         let on_axis = a.sin() / core::f64::consts::TAU;
         let on_diagonal = 2f64.sqrt() * b.sin() / b.cos() / core::f64::consts::TAU;
         assert!((found - on_axis.min(on_diagonal)).abs() < 1e-5, "{found} {on_axis} {on_diagonal}");
         let walls = Series::new(vec![wave([1, 0, 0], 1.0, 0.0)]).expect("series");
-        assert!(radius(&walls, &crate::math::IDENTITY).is_some_and(|r| r > 1e6));
+        assert!(radius(&walls, &geometry::math::IDENTITY).is_some_and(|r| r > 1e6));
     }
 }

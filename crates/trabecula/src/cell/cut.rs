@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Part;
 use crate::field::Field;
-use crate::math::{Interval, Vec3, add, scale};
+use geometry::math::{Interval, Vec3, add, scale};
 
 /// A part, or one side of a sheet alone: the sheet |f| − t is the greater of f − t and −f − t, each of which is smooth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

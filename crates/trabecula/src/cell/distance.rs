@@ -15,7 +15,7 @@ use super::quantile::Quantile;
 use super::series::Series;
 use super::spline::Spline;
 use super::thickness::least;
-use crate::math::{Interval, Mat3, Vec3, apply, inverse, norm, transpose};
+use geometry::math::{Interval, Mat3, Vec3, apply, inverse, norm, transpose};
 
 /// Nodes on the least radius of curvature of the mid-surface.
 const FINE: f64 = 8.0;
@@ -160,7 +160,7 @@ impl Distance {
 pub(super) mod tests {
     use super::super::named;
     use super::*;
-    use crate::math::{add, dot, rotation, scale, sub, unit};
+    use geometry::math::{add, dot, rotation, scale, sub, unit};
 
     pub(in crate::cell) fn series(name: &str) -> Series {
         Series::new(named(name).expect(name).terms()).expect(name)

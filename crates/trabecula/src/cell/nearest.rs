@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::series::Series;
-use crate::math::{Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, add, apply, dot, inverse, norm, product, scale, sub, transpose, unit};
 
 /// The nearest points of the surface to the nodes of a grid.
 pub(super) struct Search<'a> {

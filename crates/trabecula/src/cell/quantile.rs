@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::Part;
 use super::series::Series;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// Cubes along an axis for a wave of index one; finer waves get proportionally more.
 const CUBES: usize = 96;

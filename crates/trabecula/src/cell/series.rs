@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::fault::Fault;
-use crate::math::{Complex, Mat3, Vec3, complex_product, dot, scale, sin_cos_turns};
+use geometry::fault::Fault;
+use geometry::math::{Complex, Mat3, Vec3, complex_product, dot, scale, sin_cos_turns};
 
 mod kernel;
 

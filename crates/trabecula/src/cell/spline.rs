@@ -7,7 +7,7 @@
 
 use multiversion::multiversion;
 
-use crate::math::{Interval, Mat3, Vec3, apply, norm, transpose};
+use geometry::math::{Interval, Mat3, Vec3, apply, norm, transpose};
 
 /// Nodes that a knot interval sees beyond its own.
 const PAD: usize = 3;

@@ -17,8 +17,8 @@ pub use ready::{Ready, ready, ready_cells};
 use std::sync::OnceLock;
 
 use super::{Part, Series};
-use crate::fault::{Fault, number};
-use crate::math::{Interval, Vec3, add, dot, scale, sub};
+use geometry::fault::{Fault, number};
+use geometry::math::{Interval, Vec3, add, dot, scale, sub};
 
 /// Barycentric coordinates; their sum is one.
 pub type Bary = [f64; 4];

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Part;
 use super::connect::{Function, critical, sample};
-use crate::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Samples of the mid-surface along each axis of the torus.
 const SAMPLES: usize = 24;
@@ -124,7 +124,7 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
     let mut e = [0.0; 3];
     e[k] = 1.0;
     let a = unit(sub(e, scale(n, dot(e, n))));
-    (a, crate::math::cross(n, a))
+    (a, geometry::math::cross(n, a))
 }
 
 /// Narrowest neck diameter (mm) of the lower (f ≤ iso) or upper (f ≥ iso) part, where u = `to_phase` · x: twice the
@@ -234,7 +234,7 @@ mod tests {
     }
 
     fn cubic(wavelength: f64) -> Mat3 {
-        crate::math::IDENTITY.map(|r| r.map(|v| v / wavelength))
+        geometry::math::IDENTITY.map(|r| r.map(|v| v / wavelength))
     }
 
     fn about(found: Option<f64>, want: f64, tolerance: f64) {
@@ -248,8 +248,8 @@ mod tests {
             about(wall(&slabs, t, &cubic(5.0)), 5.0 * t.asin() / PI, 1e-8);
         }
         // Stretched and turned: only the length along the phase's gradient counts.
-        let r = crate::math::rotation([20.0, 35.0, 50.0]);
-        let map = crate::math::product(&[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]], &transpose(&r));
+        let r = geometry::math::rotation([20.0, 35.0, 50.0]);
+        let map = geometry::math::product(&[[0.25, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]], &transpose(&r));
         about(wall(&slabs, 0.3, &map), 4.0 * 0.3f64.asin() / PI, 1e-8);
     }
 

@@ -13,12 +13,12 @@ use super::pattern;
 use super::place::{LOOKS, Place};
 use super::{Built, Warning};
 use super::{map, sample};
-use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::graph::{self, Radii, Trim, Wire, sized};
-use crate::math::{Vec3, norm};
 use crate::quador::{Fillet, Quadors};
 use crate::truss::{Beams, Truss};
+use geometry::fault::{Fault, number};
+use geometry::math::{Vec3, norm};
 
 pub(super) use told::{held, inside, lone, report, share};
 use told::{tell_cleaned, warn};

@@ -10,8 +10,8 @@ use super::grade::{Allowed, grade};
 use super::place::Place;
 use super::sample;
 use crate::blend::{Blend, By, Constituent, Weights};
-use crate::fault::number;
-use crate::math::{Vec3, add, norm, scale, sub};
+use geometry::fault::number;
+use geometry::math::{Vec3, add, norm, scale, sub};
 
 impl BlendSpec {
     /// The names of its lattices, in the order of their weights.

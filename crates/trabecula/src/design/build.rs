@@ -11,12 +11,12 @@ use super::{
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
-use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::solid::Solid;
 use crate::truss::Beams;
+use geometry::fault::number;
 
 /// How far from the origin a region may reach, mm: a thousand kilometres.
 const FARTHEST: f64 = 1e9;

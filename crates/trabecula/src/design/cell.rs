@@ -7,9 +7,9 @@ use super::error::DesignError;
 use super::place::finite;
 use super::{Loader, samples};
 use crate::cell::{Cell, Series, Term, named};
-use crate::fault::Fault;
-use crate::math::sin_cos_turns;
-use crate::symmetry::{Group, Side};
+use geometry::fault::Fault;
+use geometry::math::sin_cos_turns;
+use geometry::symmetry::{Group, Side};
 
 /// The cell, and its name if it has one.
 pub(super) fn cell<'a>(

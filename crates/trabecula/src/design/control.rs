@@ -9,10 +9,10 @@ use super::level::check_varied;
 use super::place::{Place, finite};
 use super::region::{self, Notes};
 use super::samples;
-use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::{Grade, Polyline, Rbf, Sigmoid};
-use crate::math::{Aabb, Interval, Vec3, norm, scale};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, norm, scale};
 
 /// One less a number.
 struct Rest(Arc<dyn Field>);

@@ -1,6 +1,6 @@
 //! What can be wrong with a design: the place, what was found, what is allowed, the nearest right word.
 
-use crate::fault::{Fault, nearest};
+use geometry::fault::{Fault, nearest};
 
 /// A refused design.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -6,9 +6,9 @@ use super::data::{GradeKind, GradeSpec};
 use super::error::DesignError;
 use super::place::{Place, finite};
 use super::{control, samples};
-use crate::fault::number;
 use crate::grade::{Formula, Grade};
-use crate::math::{norm, unit};
+use geometry::fault::number;
+use geometry::math::{norm, unit};
 
 /// What values an amount may take.
 #[derive(Clone, Copy, PartialEq)]

@@ -6,11 +6,11 @@ use super::grade::{Allowed, grade};
 use super::place::{Place, finite};
 use super::sample;
 use crate::cell::{Cell, Part};
-use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
+use geometry::fault::number;
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its

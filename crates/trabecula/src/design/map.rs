@@ -8,11 +8,11 @@ use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::{Place, finite};
 use super::{control, samples};
-use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::map::{Affine, Map, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
-use crate::math::{dot, norm, scale, sub, unit};
+use geometry::fault::number;
+use geometry::math::{dot, norm, scale, sub, unit};
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
 const TURN: f64 = 45.0;

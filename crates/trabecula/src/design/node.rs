@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::DesignError;
-use crate::fault::{counted, nearest, number};
+use geometry::fault::{counted, nearest, number};
 
 /// A value with the line it stands on.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,9 +8,9 @@ use super::error::DesignError;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use super::{Built, Warning};
-use crate::fault::{counted, number};
 use crate::graph::{Hub, Profile};
 use crate::pattern::{Laid, Pattern, Similarity, Strut};
+use geometry::fault::{counted, number};
 
 /// Most repeats of a step: every one is kept as a turn, a scale and a shift.
 const COUNT: f64 = 1e6;

@@ -3,8 +3,8 @@
 use super::Loader;
 use super::error::DesignError;
 use crate::face::Body;
-use crate::fault::number;
 use crate::region::Region;
+use geometry::fault::number;
 
 /// Points at which a design is looked at.
 pub(super) const LOOKS: usize = 8_000;

@@ -8,8 +8,8 @@ use super::error::DesignError;
 use super::node::{At, Node};
 use crate::cell::tet::ready_cells;
 use crate::cell::{catalogue, named};
-use crate::fault::{self, counted};
-use crate::symmetry::Group;
+use geometry::fault::{self, counted};
+use geometry::symmetry::Group;
 
 mod beams;
 mod blend;

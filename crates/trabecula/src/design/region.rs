@@ -6,13 +6,13 @@ use super::data::*;
 use super::error::DesignError;
 use super::place::finite;
 use super::{Loader, Warning};
-use crate::fault::{Fault, number};
 use crate::io;
-use crate::math::{add, scale, sub};
 use crate::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Repaired, Shape, Sphere,
     Tetrahedron, Union,
 };
+use geometry::fault::{Fault, number};
+use geometry::math::{add, scale, sub};
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
 const SMALL: f64 = 1.0;

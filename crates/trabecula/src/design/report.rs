@@ -5,13 +5,13 @@ use std::cell::LazyCell;
 use serde_json::{Value as Json, json};
 
 use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
+use crate::analysis;
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::extract;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
-use crate::measure;
 use crate::truss::Beams;
 
 /// The least and the greatest of a number over a region.
@@ -266,7 +266,7 @@ pub(super) fn transitions(built: &Built) -> Json {
     let Some(b) = &built.blend else {
         return json!([]);
     };
-    let found = measure::transitions(&built.solid, &b.blend);
+    let found = analysis::transitions(&built.solid, &b.blend);
     let each = found.iter().map(|t| {
         json!({
             "between": t.between.map(|i| &b.names[i]),

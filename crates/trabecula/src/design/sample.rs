@@ -1,7 +1,7 @@
 //! Points inside a region, always the same ones.
 
-use crate::math::{Aabb, Vec3};
 use crate::region::Region;
+use geometry::math::{Aabb, Vec3};
 
 /// About `count` points inside the region, spread evenly: Halton's sequence in bases 2, 3 and 5 over the bounds, which
 /// keeps step with no lattice, unlike a grid. Fewer come where the region is a tiny share of its bounds. Also the

@@ -11,13 +11,13 @@ use super::error::DesignError;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
-use crate::fault::{Fault, counted, number};
 use crate::field::Field;
 use crate::grade::{Grade, Samples};
 use crate::io;
-use crate::math::{Aabb, Vec3};
 use crate::region::{MeshRegion, Repair, Shape as _};
 pub(super) use field::{field, several};
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{Aabb, Vec3};
 pub(super) use grid::grid;
 
 pub(super) fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {

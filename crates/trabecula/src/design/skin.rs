@@ -10,12 +10,12 @@ use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Design, Loader, region, sample};
 use crate::face::Body;
-use crate::fault::number;
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::Vec3;
 use crate::region::{HalfSpace, Intersection, Region};
 use crate::skin::skin;
+use geometry::fault::number;
+use geometry::math::Vec3;
 
 /// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `space`.
 pub(super) fn filled(

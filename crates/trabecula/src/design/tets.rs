@@ -10,9 +10,10 @@ use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::{LOOKS, Place};
 use super::{Loader, Node, Warning, read, region, sample};
-use crate::fault::{Fault, counted, number};
-use crate::math::{Vec3, add, scale};
-use crate::tets::{Checked, Fit, Quality, SLIVER, TetMesh, background};
+use crate::mesher::{self, Fit, background};
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{Vec3, add, scale};
+use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
 use source::{from_file, surface, triangles, wild};
 
 /// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
@@ -130,7 +131,7 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionSpec, place: &Place) -> Result
     if let TetsSpec::Made(made) = spec {
         mesh.zones = zones(&mesh, made, &place.path, place.loader, &mut notes)?;
     }
-    let fit = fit.unwrap_or_else(|| mesh.fit(&**place.region, &inside));
+    let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**place.region, &inside));
     let todo = match spec {
         TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
         TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",

@@ -15,13 +15,13 @@ use super::warn::{amount_key, gaps};
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series, named};
-use crate::fault::{Fault, number};
 use crate::grade::Grade;
 use crate::map::Tets;
-use crate::mesh::Mesh;
 use crate::region::{MeshRegion, Region, Repair};
-use crate::symmetry::Group;
 use crate::tiling::{Amount, Level, Share, Tiling};
+use geometry::fault::{Fault, number};
+use geometry::mesh::Mesh;
+use geometry::symmetry::Group;
 
 /// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
 const OVERLAP: f64 = 0.2;
@@ -406,8 +406,8 @@ fn apart(stencil: &Stencil, part: Part, [min, max]: [f64; 2], path: &str, warnin
         };
         let message = format!(
             "at solid fraction {fraction} the tetrahedral cell is in {} with {} on each face, so the lattice may fall apart; {limit}",
-            crate::fault::counted(count.pieces, "piece"),
-            crate::fault::counted(count.ports, "port"),
+            geometry::fault::counted(count.pieces, "piece"),
+            geometry::fault::counted(count.ports, "port"),
         );
         warnings.push(Warning { path: path.to_string(), message });
     }

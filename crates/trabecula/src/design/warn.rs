@@ -6,9 +6,9 @@ use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Warning, map, sample};
 use crate::cell::Distance;
-use crate::fault::number;
 use crate::field::Field;
 use crate::lattice::Lattice;
+use geometry::fault::number;
 
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;

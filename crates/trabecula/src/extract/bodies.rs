@@ -5,8 +5,8 @@
 //! in x. On such a line the surface lets in and out of the solid by turns, at vertices. The two ends of a stretch of
 //! solid bound the same piece of it, so they join a cavity to what it lies in, without a look inside.
 
-use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
-use crate::union::{find, unite};
+use geometry::math::{Aabb, Vec3, cross, dot, norm, sub};
+use geometry::union_find::{find, unite};
 
 use super::grid::TILE;
 use super::signs::{bits, within};

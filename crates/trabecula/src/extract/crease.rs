@@ -27,7 +27,7 @@ mod web;
 use std::cmp::Ordering;
 
 use crate::field::Field;
-use crate::math::{Vec3, add, dot, scale, sub};
+use geometry::math::{Vec3, add, dot, scale, sub};
 
 use super::by::By;
 use super::grid::{Grid, Local};

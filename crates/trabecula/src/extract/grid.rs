@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 
 use crate::face::{Face, Sign, Tree};
-use crate::fault::{Fault, number};
 use crate::field::Block;
-use crate::math::Aabb;
 use crate::solid::Solid;
+use geometry::fault::{Fault, number};
+use geometry::math::Aabb;
 
 use super::crease;
 

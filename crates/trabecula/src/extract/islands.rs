@@ -11,9 +11,9 @@
 
 use std::collections::HashMap;
 
-use crate::fault::{Fault, number};
-use crate::math::{Aabb, Vec3};
-use crate::union::{find, unite};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Vec3};
+use geometry::union_find::{find, unite};
 
 use super::bodies::{Bodies, LINES, NONE, Sum};
 use super::by::ByName;

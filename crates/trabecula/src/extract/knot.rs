@@ -19,8 +19,8 @@ mod simplex;
 use std::collections::HashSet;
 use std::ops::Range;
 
-use crate::math::{Vec3, add, scale};
-use crate::mesh::{Mesh, is_embedded};
+use geometry::math::{Vec3, add, scale};
+use geometry::mesh::{Mesh, is_embedded};
 
 use super::by::By;
 use super::crease::{Edges, Fits};

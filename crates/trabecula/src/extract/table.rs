@@ -115,7 +115,7 @@ fn fan(ring: &[usize]) -> Vec<[u8; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Vec3, cross, dot, sub};
+    use geometry::math::{Vec3, cross, dot, sub};
 
     fn point(e: usize, t: f64) -> Vec3 {
         let (corner, axis) = EDGES[e];

@@ -24,7 +24,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use crate::field::Block;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 use super::bodies::Bodies;
 use super::cap;

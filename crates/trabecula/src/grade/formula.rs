@@ -1,7 +1,7 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
 
-use crate::fault::Fault;
-use crate::math::{Aabb, Interval, Vec3};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3};
 
 mod operation;
 mod parse;

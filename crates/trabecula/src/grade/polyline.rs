@@ -1,8 +1,8 @@
 //! Distance to a line of control points.
 
-use crate::fault::{Fault, counted};
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::fault::{Fault, counted};
+use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Least sharpness of the smooth form: below it its weights make noticeably more than one.
 pub const LEAST_SHARPNESS: f64 = 10.0;

@@ -1,8 +1,8 @@
 //! Gaussian radial basis functions through control points.
 
-use crate::fault::{Fault, number};
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
 
 /// Most control points: their equations are solved as they are.
 pub const MOST: usize = 2000;

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use crate::fault::{Fault, counted};
-use crate::math::{Aabb, Interval, Vec3, cross, determinant, dot, norm, sub};
+use geometry::fault::{Fault, counted};
+use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, norm, sub};
 
 /// Cells of the grid along each side of the blocks whose ranges are kept.
 const BLOCK: usize = 4;

@@ -2,7 +2,7 @@
 
 use super::Grade;
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, scale};
+use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// The share of a logistic curve that is left out at either end, so that the step has ends.
 const TAIL: f64 = 0.02;

@@ -5,9 +5,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::fault::Fault;
-use crate::math::{Vec3, norm, sub};
-use crate::symmetry::{Group, Operation};
+use geometry::fault::Fault;
+use geometry::math::{Vec3, norm, sub};
+use geometry::symmetry::{Group, Operation};
 
 /// A unit cell by name.
 #[derive(Clone, Copy, Debug)]

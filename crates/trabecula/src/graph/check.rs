@@ -2,7 +2,7 @@
 
 use super::wire::{Stars, Wire};
 use super::{Graph, Profile};
-use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
+use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
 impl Graph {
     /// The frame of the graph.

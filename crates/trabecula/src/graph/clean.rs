@@ -3,8 +3,8 @@
 use std::collections::{HashMap, HashSet};
 
 use super::wire::{Stars, Wire};
-use crate::math::{Vec3, norm, sub};
-use crate::union::{find, unite};
+use geometry::math::{Vec3, norm, sub};
+use geometry::union_find::{find, unite};
 
 /// What a clean-up did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use super::catalogue::Net;
 use super::wire::Wire;
-use crate::fault::{Fault, number};
 use crate::map::Map;
-use crate::math::{Aabb, Vec3, add, determinant};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Vec3, add, determinant};
 
 /// Most struts of a frame that is made: beyond it the memory goes into gigabytes.
 pub const MOST: f64 = 1e7;
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::graph::{catalogue, named};
     use crate::map::{Affine, Round};
-    use crate::math::{norm, sub};
+    use geometry::math::{norm, sub};
 
     fn affine(w: f64) -> Map {
         Map::Affine(Affine::rigid([w; 3], [10.0, 20.0, 30.0], [0.3, 0.1, 0.2], &[]).expect("map"))

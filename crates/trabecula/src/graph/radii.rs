@@ -2,9 +2,9 @@
 
 use super::wire::Wire;
 use super::{Beam, Graph, Hub, Profile};
-use crate::fault::{Fault, number};
 use crate::grade::Grade;
-use crate::math::{Vec3, add, scale};
+use geometry::fault::{Fault, number};
+use geometry::math::{Vec3, add, scale};
 
 /// How thick beams are.
 #[derive(Clone, Default)]

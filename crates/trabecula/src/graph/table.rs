@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::wire::Wire;
-use crate::fault::Fault;
-use crate::math::Vec3;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
 
 /// Nodes of a table.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::wire::Wire;
 use crate::field::Field;
-use crate::math::{Vec3, add, norm, scale, sub};
+use geometry::math::{Vec3, add, norm, scale, sub};
 
 /// What becomes of struts that leave the region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

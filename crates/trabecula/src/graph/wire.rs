@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use crate::math::{Vec3, dot, norm, sub, unit};
-use crate::union::unite;
+use geometry::math::{Vec3, dot, norm, sub, unit};
+use geometry::union_find::unite;
 
 /// Nodes, and struts between them.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::fault::{Fault, counted};
-use crate::math::{Vec3, add, scale};
-use crate::tets::{CUBE, TetMesh, volume};
+use geometry::fault::{Fault, counted};
+use geometry::math::{Vec3, add, scale};
+use geometry::tetmesh::{CUBE, TetMesh, volume};
 
 /// Points and cells; kinds are VTK's numbers of cell types.
 #[derive(Clone, Debug, Default, PartialEq)]

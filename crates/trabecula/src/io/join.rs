@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use crate::fault::Fault;
-use crate::math::Vec3;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
+use geometry::mesh::Mesh;
 
 /// A multiplicative hasher: keys are coordinates, and a fast join matters more than resisting chosen keys.
 #[derive(Default)]

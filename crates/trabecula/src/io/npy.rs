@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 
 use super::invalid;
-use crate::fault::Fault;
+use geometry::fault::Fault;
 
 /// The numbers of an array and its shape, the first index running fastest.
 ///

@@ -8,8 +8,8 @@ use super::join::Joiner;
 use super::number::push_u32;
 use super::text::{Lines, at_line, parse, position, shown, words};
 use super::{Metadata, in_order, invalid};
-use crate::fault::Fault;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::mesh::Mesh;
 
 /// Writes OBJ; coordinates are the shortest decimal text that reads back to the same double.
 pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {

@@ -4,8 +4,8 @@
 
 use super::join::Joiner;
 use super::text::{Lines, at_line, parse, position, shown, words};
-use crate::fault::Fault;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::mesh::Mesh;
 
 /// Reads text OFF with or without normals, colours and texture coordinates (NOFF, COFF, STOFF), which are dropped.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use flate2::read::ZlibDecoder;
 
-use crate::fault::Fault;
+use geometry::fault::Fault;
 
 /// Most pixels of a picture.
 const MOST: usize = 1 << 28;

@@ -7,9 +7,9 @@ use std::io::{self, Write};
 use super::join::Joiner;
 use super::text::{at_line, parse, shown, words};
 use super::{in_order, invalid};
-use crate::fault::Fault;
-use crate::math::Vec3;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
+use geometry::mesh::Mesh;
 
 /// Writes binary PLY. Coordinates are double precision: nothing is rounded.
 pub fn write<W: Write>(mesh: &Mesh, out: &mut W) -> io::Result<()> {

@@ -7,9 +7,9 @@ use std::io::{self, Write};
 use super::join::Joiner;
 use super::text::{Lines, at_line, position, shown, words};
 use super::{in_order, invalid};
-use crate::fault::Fault;
-use crate::math::Vec3;
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
+use geometry::mesh::Mesh;
 
 pub(crate) const HEADER: usize = 84;
 pub(crate) const RECORD: usize = 50;

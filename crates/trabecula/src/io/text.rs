@@ -1,6 +1,6 @@
 //! Lines, words and numbers of text files, with the line for messages.
 
-use crate::fault::Fault;
+use geometry::fault::Fault;
 
 /// The lines of a file, numbered from one. A backslash at a line's end joins the next line to it.
 pub struct Lines<'a> {

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use super::number::{push_f32, push_u32};
 use super::{Metadata, in_order, invalid};
-use crate::mesh::Mesh;
+use geometry::mesh::Mesh;
 
 mod deflate;
 mod read;

@@ -9,8 +9,8 @@ use std::io::Read;
 use super::elements::Elements;
 use super::text::shown;
 use super::threemf::xml::{Event, Scanner, attribute};
-use crate::fault::Fault;
-use crate::math::Vec3;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
 
 /// A named array with so many numbers for each point or cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -384,8 +384,8 @@ mod tests {
             .iter()
             .map(|t| {
                 let p = t.map(|i| points[i as usize]);
-                let e = [1, 2, 3].map(|i| crate::math::sub(p[i], p[0]));
-                crate::math::determinant(&e) / 6.0
+                let e = [1, 2, 3].map(|i| geometry::math::sub(p[i], p[0]));
+                geometry::math::determinant(&e) / 6.0
             })
             .sum();
         assert!((volume - 1.0).abs() < 1e-15 && of.iter().all(|c| *c == 0));

@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use crate::tets::TetMesh;
+use geometry::tetmesh::TetMesh;
 
 /// Writes a tetrahedral mesh as an unstructured grid, raw and appended, with numbers for each tetrahedron by name; the
 /// zones, where there are any, as `zone`.

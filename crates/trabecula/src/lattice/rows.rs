@@ -6,7 +6,7 @@ use super::Lattice;
 use crate::cell::{Distance, Series, Term};
 use crate::field::Block;
 use crate::map::{self, Affine};
-use crate::math::{Complex, Vec3, add, apply, complex_product, dot, sin_cos_turns, transpose};
+use geometry::math::{Complex, Vec3, add, apply, complex_product, dot, sin_cos_turns, transpose};
 
 /// The core on the rows of a block.
 ///

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use rayon::prelude::*;
 
 use super::grid::Grid;
-use crate::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
+use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
 
 /// A number over the region: its mean, its 95th percentile, its greatest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,9 +89,9 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
     let greatest = spectral_norm(&relative);
     // |det| is the product of all three stretches; the least is one over that of the inverse.
     let cofactors = [
-        crate::math::cross(relative[1], relative[2]),
-        crate::math::cross(relative[2], relative[0]),
-        crate::math::cross(relative[0], relative[1]),
+        geometry::math::cross(relative[1], relative[2]),
+        geometry::math::cross(relative[2], relative[0]),
+        geometry::math::cross(relative[0], relative[1]),
     ];
     let least = density.abs() / spectral_norm(&cofactors);
     let shear = [(0, 1), (0, 2), (1, 2)].map(|(a, b)| (angle(j[a], j[b]) - 90.0).abs()).into_iter().fold(0.0, f64::max);

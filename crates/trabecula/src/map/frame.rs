@@ -4,9 +4,9 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::grid::Grid;
-use crate::fault::{Fault, number};
 use crate::grade::Grade;
-use crate::math::{
+use geometry::fault::{Fault, number};
+use geometry::math::{
     IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
 
@@ -329,7 +329,7 @@ impl FirstOf for Mat3 {
 mod tests {
     use super::*;
     use crate::grade::Formula;
-    use crate::math::{Aabb, apply};
+    use geometry::math::{Aabb, apply};
 
     fn formula(text: &str) -> Grade {
         Grade::Formula(Formula::parse(text).expect("formula"))

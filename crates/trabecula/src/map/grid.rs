@@ -1,6 +1,6 @@
 //! A grid of nodes over a box, ends included.
 
-use crate::math::{Aabb, Vec3};
+use geometry::math::{Aabb, Vec3};
 
 /// Nodes origin + step · (i, j, k), 0 ≤ i < shape, x running fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]

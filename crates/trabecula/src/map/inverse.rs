@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Map, Phase};
-use crate::math::{Aabb, Vec3, add, apply, determinant, inverse, norm, scale, sub};
+use geometry::math::{Aabb, Vec3, add, apply, determinant, inverse, norm, scale, sub};
 
 /// Steps of Newton's method, after which a phase counts as not found.
 const STEPS: usize = 40;

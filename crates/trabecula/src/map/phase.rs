@@ -11,10 +11,10 @@ use super::grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
 use super::tilt::Tilt;
-use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];

@@ -15,7 +15,7 @@ use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
 
 use super::grid::Grid;
 use super::tilt::Tilt;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// Residual, relative to the first, at which conjugate gradients end.
 const RESIDUAL: f64 = 1e-7;
@@ -236,7 +236,7 @@ fn turn(from: &[f64], to: &mut [f64], n: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Aabb;
+    use geometry::math::Aabb;
 
     fn noise(seed: u64) -> impl FnMut() -> f64 {
         let mut s = seed;
@@ -308,7 +308,7 @@ mod tests {
             let k: Vec<Vec3> = (0..g.len())
                 .map(|i| {
                     let turn = 0.25 * (g.node(i)[0] - first) / (last - first);
-                    let (s, c) = crate::math::sin_cos_turns(turn);
+                    let (s, c) = geometry::math::sin_cos_turns(turn);
                     [c, s, 0.0]
                 })
                 .collect();

@@ -1,8 +1,8 @@
 //! Maps that wrap a lattice round an axis or a centre, with a whole number of cells around, so that it closes.
 
 use super::inverse::{corners, whole};
-use crate::fault::{Fault, number};
-use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
 
 /// A lattice wrapped round an axis or about a centre. Phases are (r/λ, n θ/2π, z/λ) on a cylinder and (r/λ, n φ/2π,
 /// n θ/2π) on a sphere: φ round the axis, θ from it, n cells around and half as many from pole to pole.
@@ -214,7 +214,7 @@ impl Round {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::spectral_norm;
+    use geometry::math::spectral_norm;
 
     fn places() -> impl Iterator<Item = Vec3> {
         (1..400).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| 20.0 * (s * f64::from(i)).fract() - 10.0))

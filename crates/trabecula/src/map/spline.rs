@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::grid::Grid;
 use crate::field::Block;
-use crate::math::{Aabb, Mat3, Vec3};
+use geometry::math::{Aabb, Mat3, Vec3};
 
 /// Fewest nodes along an axis.
 pub(super) const LEAST: usize = 6;
@@ -341,9 +341,9 @@ fn slopes(t: f64) -> [f64; 4] {
 /// A bound of the spectral norm, at most a seventh above it: λ of the greatest of M Mᵀ, to the eighth, is at most the sum
 /// of all.
 fn longest(m: &Mat3) -> f64 {
-    let mut a = crate::math::product(m, &crate::math::transpose(m));
+    let mut a = geometry::math::product(m, &geometry::math::transpose(m));
     for _ in 0..2 {
-        a = crate::math::product(&a, &a);
+        a = geometry::math::product(&a, &a);
     }
     // tr (A⁴)² = Σ aᵢⱼ², A = M Mᵀ; the eighth root for A, half of it for M.
     let trace: f64 = a.as_flattened().iter().map(|v| v * v).sum();
@@ -404,7 +404,7 @@ fn prefilter(from: &[f64], to: &mut [f64], n: usize, inner: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{norm, spectral_norm, sub};
+    use geometry::math::{norm, spectral_norm, sub};
 
     fn grid() -> Grid {
         let b = Aabb { min: [-1.0, 0.5, 2.0], max: [2.0, 2.5, 4.4] };

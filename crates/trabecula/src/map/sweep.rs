@@ -13,9 +13,9 @@ mod room;
 mod tests;
 
 use super::inverse::whole;
-use crate::fault::{Fault, number};
 use crate::field::Field;
-use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
 use line::{Knot, Spans, carried, spline};
 
 /// Steps of the line between control points.

@@ -3,9 +3,9 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use crate::fault::Fault;
-use crate::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
-use crate::tets::TetMesh;
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, inverse, norm, scale, sub, transpose};
+use geometry::tetmesh::TetMesh;
 
 /// No tetrahedron.
 pub const NONE: u32 = u32::MAX;
@@ -293,8 +293,8 @@ impl Tets {
     }
 
     /// The boundary, counter-clockwise seen from outside.
-    pub fn boundary(&self) -> crate::mesh::Mesh {
-        let mut out = crate::mesh::Mesh::default();
+    pub fn boundary(&self) -> geometry::mesh::Mesh {
+        let mut out = geometry::mesh::Mesh::default();
         let mut names: HashMap<u32, u32> = HashMap::new();
         for t in 0..self.len() {
             for (face, f) in FACES.iter().enumerate() {

@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 
 use super::grid::Grid;
-use crate::math::{Vec3, add, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
 /// The part of the weight that is no multiple of the identity.
 pub(super) struct Tilt {

@@ -7,12 +7,12 @@ mod row;
 use rayon::prelude::*;
 
 use super::{MOST, Pattern, Similarity, Strut};
-use crate::fault::{Fault, number};
 use crate::field::Field;
 use crate::graph::Graph;
-use crate::math::{Aabb, Interval, Vec3, add, apply, norm, scale, sub};
 use crate::quador::{Fillet, Quadors};
 use classes::Classes;
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, add, apply, norm, scale, sub};
 use row::Row;
 
 /// A hub that stands for all of its class.

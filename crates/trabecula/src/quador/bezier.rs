@@ -1,6 +1,6 @@
 //! Arcs of conics as rational quadratic Bézier curves, and the area beside them.
 
-use crate::math::{Vec3, add, cross, dot, scale, unit};
+use geometry::math::{Vec3, add, cross, dot, scale, unit};
 
 use super::quadric::{Conic, Quadric};
 
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_circle_is_four_curves_and_its_area() {
-        let q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -4.0 };
+        let q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -4.0 };
         let (n, from) = ([0.0, 0.0, 1.0], [2.0, 0.0, 0.0]);
         let path = Path::new(&q, n, from, onward(&q, n, from)).and_then(|p| p.until(None)).expect("a circle");
         let curves = path.curves();

@@ -7,9 +7,9 @@
 
 use std::sync::OnceLock;
 
-use crate::fault::Fault;
 use crate::field::Field;
-use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
 
 use super::Quadors;
 use super::complex::{Complex, Face};
@@ -126,7 +126,7 @@ impl Nearest<'_> {
                 if let Some(p) = patches.iter_mut().find(|p| p.label == f.label) {
                     p.bounds = p.bounds.union(bounds);
                 } else {
-                    let (m, _) = crate::math::eigen(&f.quadric.m);
+                    let (m, _) = geometry::math::eigen(&f.quadric.m);
                     patches.push(Patch {
                         label: f.label,
                         quadric: f.quadric,

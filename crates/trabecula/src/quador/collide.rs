@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::fault::{Fault, counted};
 use crate::graph::place;
-use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
+use geometry::fault::{Fault, counted};
+use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
 use super::Quadors;
 use super::index::Index;

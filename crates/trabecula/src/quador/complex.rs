@@ -3,9 +3,9 @@
 //! A face is told by its *label*, the stubs that shape it. Crossing a seam one stub joins or leaves (in a sharp hub one takes
 //! over), where an affine function vanishes; `walk` finds the whole by following seams from event to event.
 
-use crate::fault::Fault;
-use crate::math::{Vec3, add, cross, norm, scale, sub, unit};
-use crate::union::{find, unite};
+use geometry::fault::Fault;
+use geometry::math::{Vec3, add, cross, norm, scale, sub, unit};
+use geometry::union_find::{find, unite};
 
 use super::bezier::{Bezier, curves};
 use super::hub::{Affine, Hub};

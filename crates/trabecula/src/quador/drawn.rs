@@ -3,10 +3,10 @@
 use core::f64::consts::{PI, TAU};
 use std::collections::HashMap;
 
-use crate::fault::Fault;
-use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
-use crate::mesh::Mesh;
-use crate::union::unite;
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::mesh::Mesh;
+use geometry::union_find::unite;
 
 use super::Quadors;
 use super::classes::Classes;

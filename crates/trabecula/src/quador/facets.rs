@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::complex::{Arc, Complex, MERGE};
 use super::hub::Hub;

@@ -5,7 +5,7 @@
 
 use super::Quadors;
 use crate::field::Field;
-use crate::math::{Aabb, Interval, Vec3, dot, scale, sub};
+use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Hubs that the bound of a box looks at one by one.
 const MOST: usize = 96;

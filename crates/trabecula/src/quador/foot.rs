@@ -4,7 +4,7 @@
 //! xᵢ = (pᵢ − μbᵢ)/(1 + μmᵢ). The feet that can be nearest are found by the sign of 1 + μM; `all` finds every one. Each is then brought
 //! to the last digit by Newton's method.
 
-use crate::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
+use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
 
 use super::quadric::Quadric;
 

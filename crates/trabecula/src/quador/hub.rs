@@ -9,7 +9,7 @@
 //! τ of a pair is the product of a number t of each stub. Then R is always positive definite, and the stubs that shape a
 //! point are those with g > tσ, where σ = Σ t (g − tσ)/(1 − t²) over them: one equation for one number.
 
-use crate::math::{Aabb, Vec3, add, dot, norm, scale, sub};
+use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
 /// An affine function of the place in a hub's frame: a·x + b.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -268,7 +268,7 @@ impl Hub<'_> {
             t += s.share * s.share * s.weight;
         }
         tensor(sum, -1.0 / t);
-        crate::math::spectral_norm(&m)
+        geometry::math::spectral_norm(&m)
     }
 
     /// The middle of the crotch of two stubs, where they would have met in a crease, and the fillet's radius of curvature there

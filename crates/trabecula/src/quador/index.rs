@@ -1,6 +1,6 @@
 //! Boxes in a uniform grid: which of them hold a point.
 
-use crate::math::{Aabb, Vec3};
+use geometry::math::{Aabb, Vec3};
 
 /// Boxes by the cells of a grid that they touch.
 #[derive(Clone, Debug, Default)]

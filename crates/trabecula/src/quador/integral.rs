@@ -9,8 +9,8 @@ use core::f64::consts::{FRAC_PI_4, PI};
 
 use rayon::prelude::*;
 
-use crate::fault::Fault;
-use crate::math::{Mat3, Vec3, add, dot, norm, scale, sub};
+use geometry::fault::Fault;
+use geometry::math::{Mat3, Vec3, add, dot, norm, scale, sub};
 
 use super::Quadors;
 use super::classes::Classes;

@@ -8,9 +8,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::fault::{Fault, number};
-use crate::math::{Aabb, Vec3, add, dot, sub};
-use crate::mesh::Mesh;
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Vec3, add, dot, sub};
+use geometry::mesh::Mesh;
 
 use super::Quadors;
 use super::drawn::{Drawn, Part};
@@ -161,7 +161,7 @@ impl Drawn<'_> {
                 let of = t.iter().fold(Aabb::EMPTY, |b, n| b.with(v[*n as usize]));
                 !of.intersection(common).is_empty()
             });
-            crate::mesh::self_intersections(&mesh, 1) > 0
+            geometry::mesh::self_intersections(&mesh, 1) > 0
         })
     }
 }

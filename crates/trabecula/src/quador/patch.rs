@@ -9,7 +9,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
 use super::bezier::{Bezier, Path, curves, onward};
 use super::complex::{Complex, Face};
@@ -428,7 +428,7 @@ mod tests {
 
     #[test]
     fn the_matrix_is_the_quadric_elsewhere() {
-        let mut q = Quadric { m: crate::math::IDENTITY, b: [0.1, -0.2, 0.3], c: -1.0 };
+        let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.1, -0.2, 0.3], c: -1.0 };
         q.square(-0.7, &super::super::hub::Affine { a: [1.0, 2.0, -0.5], b: 0.3 });
         let (center, x) = ([3.0, -1.0, 2.0], [0.3, 0.8, -0.4]);
         let m = matrix(&q, center);

@@ -5,8 +5,8 @@
 //! in closed form: ρ² = (λ − 1)z² − 2λd₁z + r₁² + λd₁². Growing λ it is an ellipsoid, a paraboloid or cylinder (λ = 1),
 //! a sheet of a two-sheeted hyperboloid, the common tangent cone, a one-sheeted hyperboloid, and last a pinched double cone.
 
-use crate::fault::{Fault, number};
 use crate::graph::Profile;
+use geometry::fault::{Fault, number};
 
 /// A beam between two balls, in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

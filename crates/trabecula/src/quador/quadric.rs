@@ -1,6 +1,6 @@
 //! Quadrics, and the conics that planes cut out of them.
 
-use crate::math::{Mat3, Vec3, add, apply, determinant, dot, inverse, scale};
+use geometry::math::{Mat3, Vec3, add, apply, determinant, dot, inverse, scale};
 
 use super::hub::{Affine, Hub};
 
@@ -80,7 +80,7 @@ impl Quadric {
 
 /// What a hub is made of where the stubs of `label` are active: its quadric, and σ.
 pub fn piece(hub: &Hub, label: u64) -> (Quadric, Affine) {
-    let mut q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -hub.radius * hub.radius };
+    let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -hub.radius * hub.radius };
     let (mut sigma, mut t) = (Affine::default(), 1.0);
     for (i, s) in hub.stubs.iter().enumerate() {
         if label >> i & 1 == 0 {
@@ -123,7 +123,7 @@ impl Conic {
     /// a straight line.
     pub fn new(q: &Quadric, normal: Vec3, v: Vec3, tangent: Vec3) -> Option<Conic> {
         let m11 = q.form(tangent, tangent);
-        let mut e2 = crate::math::cross(normal, tangent);
+        let mut e2 = geometry::math::cross(normal, tangent);
         let mut slope = 2.0 * dot(q.half_slope(v), e2);
         // Growing θ moves along +e₁: −q/m₁₁ > 0.
         if slope * m11 > 0.0 {

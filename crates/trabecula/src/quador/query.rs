@@ -3,7 +3,7 @@
 //! Along a line S is a quadratic and each G a line, so N is a quadratic between the places where a stub joins or leaves, each
 //! of which is the root of a line. Each stretch is one quadratic to be solved.
 
-use crate::math::{Aabb, Vec3, add, dot, scale, sub, unit};
+use geometry::math::{Aabb, Vec3, add, dot, scale, sub, unit};
 
 use super::Quadors;
 use super::hub::Hub;

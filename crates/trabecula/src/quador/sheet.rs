@@ -9,7 +9,7 @@
 //! What has no such form, areas and moments, is integrated across too: from B, over σ = η/(2 + νζ), which is central projection from
 //! the place opposite, or along the axis.
 
-use crate::math::{Vec3, add, apply, cross, determinant, dot, eigen, scale, sub, unit};
+use geometry::math::{Vec3, add, apply, cross, determinant, dot, eigen, scale, sub, unit};
 
 use super::complex::{Complex, Face};
 use super::hub::Hub;

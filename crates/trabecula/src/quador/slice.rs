@@ -9,8 +9,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::fault::{Fault, counted, number};
-use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::Quadors;
 use super::bezier::Bezier;

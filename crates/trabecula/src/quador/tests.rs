@@ -4,7 +4,7 @@ mod meshes;
 use super::*;
 use crate::field::Field;
 use crate::graph::{self, Beam, Profile};
-use crate::math::{add, dot, norm, scale, unit};
+use geometry::math::{add, dot, norm, scale, unit};
 
 /// Numbers between 0 and 1 that are the same every time.
 pub(super) struct Random(pub u64);
@@ -178,8 +178,8 @@ fn fillets_end_before_the_beams_are_parted() {
             }
             let hub = q.hub(0);
             for (i, s) in hub.stubs.iter().enumerate() {
-                let side = unit(crate::math::cross(s.axis, [0.3, 0.5, 0.81]));
-                let other = crate::math::cross(s.axis, side);
+                let side = unit(geometry::math::cross(s.axis, [0.3, 0.5, 0.81]));
+                let other = geometry::math::cross(s.axis, side);
                 for k in 0..64 {
                     let z = s.split * (1.0 + 1e-9);
                     let (sin, cos) = (f64::from(k) / 64.0 * core::f64::consts::TAU).sin_cos();

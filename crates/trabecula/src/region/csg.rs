@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::meshes::{List, Meshes};
 use super::{HalfSpace, MeshRegion, Region, Shape};
 use crate::face::{Face, Tree};
-use crate::fault::Fault;
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3};
 
 /// What lies in any of the regions: the least of their distances.
 pub struct Union(List);

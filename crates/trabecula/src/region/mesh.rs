@@ -4,10 +4,10 @@ use std::sync::{Arc, OnceLock};
 
 use super::{HalfSpace, Offset, Region, Shape, one_face};
 use crate::face;
-use crate::fault::Fault;
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
-use crate::mesh::Mesh;
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
+use geometry::mesh::Mesh;
 
 mod cap;
 mod check;

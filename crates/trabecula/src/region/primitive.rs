@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use super::{Offset, Shape, one_face};
 use crate::face::{Face, Plane, Tree};
-use crate::fault::{Fault, number};
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
 
 use cylinder::Barrel;
 pub use cylinder::Cylinder;

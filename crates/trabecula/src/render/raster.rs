@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::Camera;
-use crate::math::sub;
 use crate::surface_mesh::SurfaceMesh;
+use geometry::math::sub;
 
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
@@ -104,8 +104,8 @@ fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32],
 }
 
 /// Barycentric coordinates in space of the point `p` of triangle `i`.
-pub(super) fn weights(surface: &SurfaceMesh, i: u32, p: crate::math::Vec3) -> [f64; 3] {
-    use crate::math::{cross, dot};
+pub(super) fn weights(surface: &SurfaceMesh, i: u32, p: geometry::math::Vec3) -> [f64; 3] {
+    use geometry::math::{cross, dot};
     let [a, b, c] = surface.mesh.corners(i as usize);
     let n = cross(sub(b, a), sub(c, a));
     let whole = dot(n, n);

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::raster::{NONE, Raster, weights};
 use super::{Camera, Tint, View};
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Colours in linear light.
 const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::Mesh;
+use geometry::mesh::Mesh;
 
 /// A surface of a function on a cube by cutting the six tetrahedra of each grid cell, closed at the cube's faces.
 fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {

@@ -17,7 +17,7 @@
 //! The bound adds up what each collapse can have done at worst, wherever on the triangle that was, and so is larger than
 //! the distance, by a factor of some three to eight.
 
-use crate::math::{Vec3, cross, dot, scale, sub, unit};
+use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
 /// The least area, as a share of the patch's mean, that a triangle shows along the direction.
 const SHOWN: f64 = 1e-9;

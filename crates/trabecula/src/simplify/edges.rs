@@ -1,7 +1,7 @@
 //! Which edges are kept: sharp ones, and borders between the lattice's surface and cuts.
 
 use super::links::{Links, NONE, next, prev};
-use crate::math::{Vec3, add, cross, dot, norm, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, sub};
 
 /// Cosine of the turn, 30 degrees, from which an edge counts as sharp.
 const SHARP: f64 = 0.866_025_403_784_438_6;

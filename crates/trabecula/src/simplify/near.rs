@@ -3,8 +3,8 @@
 //! The tree is made once, over the triangles in the order of a space-filling curve. Triangles that a collapse changes
 //! keep their places in it, and the boxes above them grow.
 
-use crate::math::{Vec3, cross, dot, sub};
-use crate::mesh::{Mesh, is_embedded};
+use geometry::math::{Vec3, cross, dot, sub};
+use geometry::mesh::{Mesh, is_embedded};
 
 /// Triangles under a leaf.
 const LEAF: usize = 4;

@@ -2,7 +2,7 @@
 //!
 //! M. Garland and P. S. Heckbert, Surface simplification using quadric error metrics, 1997.
 
-use crate::math::{Vec3, add, cross, dot, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, scale, sub};
 
 /// Directions in which the planes say next to nothing keep to the middle of the edge: this share of the mean
 /// eigenvalue is added to all.

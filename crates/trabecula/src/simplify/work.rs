@@ -6,7 +6,7 @@ use super::links::{Links, NONE, next, prev};
 use super::near::{Bounds, Prism, Tree};
 use super::quadric::Quadric;
 use super::queue::{Candidate, Queue};
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Most triangles about a vertex.
 const CROWD: usize = 48;

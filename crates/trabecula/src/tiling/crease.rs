@@ -4,7 +4,7 @@ use super::Tiling;
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Grid};
 use crate::map::tets::NONE;
-use crate::math::{Vec3, add, dot, norm, scale};
+use geometry::math::{Vec3, add, dot, norm, scale};
 
 /// Steps along the edge of a face on which traces are looked at.
 const STEPS: usize = 24;

@@ -8,7 +8,7 @@ use super::{Level, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Grid, Nodes, Stencil};
 use crate::map::Tets;
-use crate::math::{Vec3, add, norm, scale};
+use geometry::math::{Vec3, add, norm, scale};
 
 /// Steps along the edge on which the mid-surface is looked at.
 const STEPS: usize = 6;

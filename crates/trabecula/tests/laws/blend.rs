@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use geometry::math::{Aabb, Interval, Vec3};
 use trabecula::blend::{Blend, By, Constituent, Phases, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, Loader};
@@ -10,7 +11,6 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Sigmoid};
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::math::{Aabb, Interval, Vec3};
 use trabecula::progress::Silent;
 use trabecula::solid::Solid;
 

@@ -4,13 +4,13 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use geometry::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
+use geometry::mesh::Mesh;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
-use trabecula::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
-use trabecula::mesh::Mesh;
 use trabecula::progress::Silent;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;

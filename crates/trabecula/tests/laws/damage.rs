@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use crate::common::{Random, cases, fault_of, lattice};
+use geometry::math::{Vec3, add, apply, cross, norm, rotation, scale, sub, unit};
+use geometry::mesh::Mesh;
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::field::Field;
-use trabecula::math::{Vec3, add, apply, cross, norm, rotation, scale, sub, unit};
-use trabecula::mesh::Mesh;
 use trabecula::progress::Silent;
 use trabecula::region::{CAPPED, MeshRegion, Repair, Shape};
 use trabecula::solid::Solid;

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use geometry::math::Vec3;
 use trabecula::design::{Built, Design, DesignError, Loader};
 use trabecula::field::Field;
-use trabecula::math::Vec3;
 
 struct Files(HashMap<String, Vec<u8>>);
 
@@ -167,7 +167,7 @@ fn principal_directions_are_followed() {
     // Where the principal values cross there is no direction to follow, and beside it that of a tensor interpolated between
     // nodes is rough.
     for p in places().filter(|p| (p[1] - 9.0 / 2.6).abs() > 1.5) {
-        let det = |m: &trabecula::map::Map| trabecula::math::determinant(&m.jacobian(p));
+        let det = |m: &trabecula::map::Map| geometry::math::determinant(&m.jacobian(p));
         assert!((det(a) / det(b) - 1.0).abs() < 0.05, "{} {}", det(a), det(b));
     }
     let map = "phase = { wavelength = 2, direction = { field = { path = \"result.vtu\", array = \"v\" } } }";

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use crate::common::{Random, cases, fault_of, lattice};
+use geometry::math::{Mat3, Vec3, add, apply, rotation, scale};
+use geometry::mesh::Mesh;
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
-use trabecula::math::{Mat3, Vec3, add, apply, rotation, scale};
-use trabecula::mesh::Mesh;
 use trabecula::progress::Silent;
 use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,

@@ -3,12 +3,12 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
+use geometry::measure::size;
+use geometry::mesh::Mesh;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{Islands, Pieces, stream_stl, surface, surface_of};
 use trabecula::io::read_mesh;
-use trabecula::measure::size;
-use trabecula::mesh::Mesh;
 use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
@@ -86,7 +86,7 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
     let (all, found) = surface_of(solid, edge, Islands::Keep, &Silent).expect("surface");
     let measured = size(&all.mesh);
     let figures = |p: &Pieces| (p.pieces as usize, p.cavities as usize, p.euler);
-    let of = |m: &trabecula::measure::Size| (m.pieces, m.cavities, m.euler);
+    let of = |m: &geometry::measure::Size| (m.pieces, m.cavities, m.euler);
     assert_eq!(figures(&found), of(&measured), "{what}");
     assert_eq!((found.others + 1, found.dropped), (found.pieces, 0), "{what}");
     let best = largest(&all.mesh);

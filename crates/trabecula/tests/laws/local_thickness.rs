@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
+use geometry::math::{Vec3, add, apply, rotation};
+use geometry::measure::size;
+use geometry::mesh::Mesh;
+use trabecula::analysis::{Spread, thickness, usual_step, voxels_for};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::math::{Vec3, add, apply, rotation};
-use trabecula::measure::{Spread, size, thickness, usual_step, voxels_for};
-use trabecula::mesh::Mesh;
 use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;

@@ -4,14 +4,14 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::measure::size;
+use geometry::mesh::Mesh;
 use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
-use trabecula::math::{Vec3, add, cross, dot, norm, scale, sub};
-use trabecula::measure::size;
-use trabecula::mesh::Mesh;
 use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Region};
 use trabecula::simplify::{Goal, Report, simplify};

@@ -3,14 +3,14 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use geometry::math::{Aabb, Interval, Vec3, norm, sub};
+use geometry::mesh::Mesh;
 use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{surface, voxels};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
-use trabecula::math::{Aabb, Interval, Vec3, norm, sub};
-use trabecula::mesh::Mesh;
 use trabecula::progress::Silent;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union};
 use trabecula::skin::skin;
@@ -111,7 +111,7 @@ fn an_open_face_has_no_skin_and_its_walls_are_full() {
 
 fn area(mesh: &Mesh, i: usize) -> f64 {
     let [a, b, c] = mesh.corners(i);
-    norm(trabecula::math::cross(sub(b, a), sub(c, a))) / 2.0
+    norm(geometry::math::cross(sub(b, a), sub(c, a))) / 2.0
 }
 
 #[test]

@@ -4,14 +4,14 @@ use std::f64::consts::PI;
 use std::io::Cursor;
 use std::sync::Arc;
 
+use geometry::measure::size;
+use geometry::mesh::Mesh;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{Islands, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
-use trabecula::measure::size;
-use trabecula::mesh::Mesh;
 use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere};
 

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::common::{Random, ball, cases, cuboid, fault, region};
+use geometry::math::{Aabb, Interval, Vec3, dot, scale};
+use geometry::tetmesh::TetMesh;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::math::{Aabb, Interval, Vec3, dot, scale};
+use trabecula::mesher::{ANGLES, Fit, background};
 use trabecula::region::{Difference, HalfSpace, Intersection, Region};
-use trabecula::tets::{ANGLES, Fit, TetMesh, background};
 
 /// Points inside a field's bounds where it is negative.
 fn inside(field: &dyn Field, bounds: &Aabb) -> Vec<Vec3> {

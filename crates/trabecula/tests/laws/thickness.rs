@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use geometry::math::{Aabb, Mat3, Vec3, add, apply, dot, norm, scale, sub, transpose, unit};
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
 use trabecula::extract::surface;
@@ -11,7 +12,6 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::math::{Aabb, Mat3, Vec3, add, apply, dot, norm, scale, sub, transpose, unit};
 use trabecula::progress::Silent;
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;

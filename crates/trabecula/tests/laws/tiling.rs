@@ -5,20 +5,21 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use crate::common::{Random, ball, cases, check, fault};
+use geometry::math::norm;
+use geometry::measure::size;
+use geometry::symmetry::{Group, Side};
+use geometry::tetmesh::TetMesh;
 use trabecula::cell::tet::{Stencil, ready, ready_cells};
 use trabecula::cell::{Part, Series, Term};
 use trabecula::extract::{self, Islands};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
-use trabecula::math::norm;
-use trabecula::measure::size;
+use trabecula::mesher::background;
 use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{MeshRegion, Repair};
 use trabecula::solid::Solid;
 use trabecula::surface_mesh::SurfaceMesh;
-use trabecula::symmetry::{Group, Side};
-use trabecula::tets::{TetMesh, background};
 use trabecula::tiling::{Amount, Level, Share, Tiling};
 
 /// n³ cubes of six tetrahedra each, nodes moved about and numbered at random.

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::common::{Random, check};
 use super::tiling::{cell, made, map, shaken};
+use geometry::math::{Aabb, dot, norm, sub};
 use trabecula::cell::tet::{Grid, Nodes, ready_cells};
 use trabecula::field::Field;
 use trabecula::map::Tets;
-use trabecula::math::{Aabb, dot, norm, sub};
 use trabecula::tiling::{Level, Tiling};
 
 #[test]

@@ -1,6 +1,6 @@
 //! Critical points of a function on the torus, from its gradients.
 
-use crate::math::{Mat3, Vec3, add, dot, eigen, norm, scale, sub};
+use geometry::math::{Mat3, Vec3, add, dot, eigen, norm, scale, sub};
 
 /// Values and gradients per turn at phases.
 pub(in crate::cell) type Function<'a> = &'a (dyn Fn(&[Vec3], &mut [f64], &mut [Vec3]) + Sync);

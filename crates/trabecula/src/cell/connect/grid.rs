@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::critical::Function;
 use super::sublattice::Int3;
-use crate::math::{Vec3, norm, sub};
+use geometry::math::{Vec3, norm, sub};
 
 /// The directions of edges from a node: direction k has the bits of k + 1 along x, y, z (Freudenthal).
 pub(super) const DIRECTIONS: [Int3; 7] = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];

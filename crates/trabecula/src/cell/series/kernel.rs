@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::Term;
-use crate::math::{Vec3, sin_cos_turns};
+use geometry::math::{Vec3, sin_cos_turns};
 
 /// Points handled at once; the compiler turns each loop over them into vector instructions.
 const LANES: usize = 8;

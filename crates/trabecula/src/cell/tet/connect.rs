@@ -6,7 +6,7 @@
 
 use super::nodes::{Grid, Nodes};
 use super::{Count, Part, Stencil};
-use crate::union::unite;
+use geometry::union_find::unite;
 
 /// Steps along the edge of the tetrahedron.
 const STEPS: usize = 48;

@@ -2,7 +2,7 @@
 
 use super::nodes::{Grid, Nodes};
 use super::{Part, Stencil};
-use crate::math::Interval;
+use geometry::math::Interval;
 
 /// Steps along the edge of the tetrahedron, coarse and fine: their two fractions give one of fourth order (Richardson).
 const STEPS: [usize; 2] = [40, 80];

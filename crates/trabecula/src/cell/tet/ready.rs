@@ -9,9 +9,9 @@ use serde_json::{Map, Value as Json, json};
 
 use super::super::{Part, Series, Term};
 use super::Stencil;
-use crate::fault::Fault;
-use crate::math::scale;
-use crate::symmetry::{Group, Side};
+use geometry::fault::Fault;
+use geometry::math::scale;
+use geometry::symmetry::{Group, Side};
 
 use Side::{Im, Re};
 

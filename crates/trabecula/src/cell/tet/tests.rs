@@ -1,5 +1,5 @@
 use super::*;
-use crate::symmetry::{Group, Side};
+use geometry::symmetry::{Group, Side};
 
 use Part::{Lower, Sheet};
 use Side::{Im, Re};

@@ -6,11 +6,11 @@ use super::whole;
 use crate::design::data::*;
 use crate::design::place::Place;
 use crate::design::{Built, Warning, pattern};
-use crate::fault::{counted, number};
 use crate::graph::Cleaned;
-use crate::math::Vec3;
 use crate::pattern::Laid;
 use crate::truss::{Beams, Truss};
+use geometry::fault::{counted, number};
+use geometry::math::Vec3;
 
 /// An angle between beams (degrees) below which it is warned of.
 const NARROW: f64 = 15.0;

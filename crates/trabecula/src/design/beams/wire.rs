@@ -8,11 +8,11 @@ use crate::design::grade::{Allowed, grade};
 use crate::design::level::check_varied;
 use crate::design::place::{Place, finite};
 use crate::design::samples;
-use crate::fault::{Fault, counted, number};
 use crate::grade::Grade;
 use crate::graph::{self, Graph, Nodes, Profile, Radii, Wire};
-use crate::math::{Aabb, Vec3, norm, sub};
 use crate::quador::pencil::Pencil;
+use geometry::fault::{Fault, counted, number};
+use geometry::math::{Aabb, Vec3, norm, sub};
 
 /// Nodes within this share of the mean length of struts are one.
 const ONE: f64 = 1e-6;

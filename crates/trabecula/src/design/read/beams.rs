@@ -3,8 +3,8 @@
 use super::{Read, grade, map, three};
 use crate::design::data::*;
 use crate::design::node::At;
-use crate::fault::{counted, number};
 use crate::graph::catalogue;
+use geometry::fault::{counted, number};
 
 const KEYS: [&str; 12] =
     ["cell", "map", "nodes", "struts", "pattern", "radius", "hub", "profile", "fillet", "trim", "dangling", "merge"];

@@ -7,7 +7,7 @@ use super::grade::grade;
 use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::node::At;
-use crate::fault::counted;
+use geometry::fault::counted;
 
 /// The blend of lattices with these names.
 pub(super) fn blend(at: &At, names: &[&str]) -> Read<BlendSpec> {

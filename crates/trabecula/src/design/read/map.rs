@@ -6,7 +6,7 @@ use super::grade::control;
 use super::{Read, grade, region, three};
 use crate::design::data::*;
 use crate::design::node::{At, Fields};
-use crate::fault::counted;
+use geometry::fault::counted;
 
 /// Ways to say how cells are turned, of which one is given.
 const TURNS: [&str; 7] = ["rotate", "rotate_x", "rotate_y", "rotate_z", "direction", "frame", "stress"];

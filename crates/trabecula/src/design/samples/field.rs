@@ -6,10 +6,10 @@ use super::{bytes, extension, percent, pick};
 use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
-use crate::fault::{Fault, counted, number};
 use crate::grade::{Grade, Samples};
 use crate::io::{self, Shape};
-use crate::math::Aabb;
+use geometry::fault::{Fault, counted, number};
+use geometry::math::Aabb;
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
@@ -109,8 +109,8 @@ fn components(
             let (mut sum, mut weight) = (vec![0.0; points.len()], vec![0.0; points.len()]);
             for (t, cell) in tets.iter().zip(&of) {
                 let p = t.map(|i| points[i as usize]);
-                let edges = [1, 2, 3].map(|i| crate::math::sub(p[i], p[0]));
-                let volume = crate::math::determinant(&edges).abs();
+                let edges = [1, 2, 3].map(|i| geometry::math::sub(p[i], p[0]));
+                let volume = geometry::math::determinant(&edges).abs();
                 for i in t.map(|i| i as usize) {
                     sum[i] += volume * own[*cell as usize];
                     weight[i] += volume;

@@ -4,9 +4,9 @@ use super::{bytes, extension, percent, pick};
 use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
-use crate::fault::Fault;
 use crate::grade::Samples;
 use crate::io::{self, Shape};
+use geometry::fault::Fault;
 
 pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");

@@ -5,13 +5,13 @@ use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::extract;
-use crate::fault::{Fault, number};
 use crate::io::{self, Elements, Shape};
-use crate::math::scale;
-use crate::mesh::Mesh;
 use crate::progress::{Silent, Stopped};
 use crate::solid::Solid;
-use crate::tets::{Checked, TetMesh};
+use geometry::fault::{Fault, number};
+use geometry::math::scale;
+use geometry::mesh::Mesh;
+use geometry::tetmesh::{Checked, TetMesh};
 
 /// Names under which programs write the zones of cells.
 const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "material", "zones"];

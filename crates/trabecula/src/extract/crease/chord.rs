@@ -1,8 +1,8 @@
 //! The lines in which a face meets the side of a cell.
 
 use super::{Edges, Key, Seen, nearest};
-use crate::math::{self, Vec3, norm, scale, sub};
-use crate::mesh::exact::{drop_axis, orient2d};
+use geometry::math::{self, Vec3, norm, scale, sub};
+use geometry::mesh::exact::{drop_axis, orient2d};
 
 /// Most corners of a chord: few corners of meshes have more than three edges that all run through one side.
 const BENDS: usize = 3;

@@ -7,7 +7,7 @@ use super::rim::{Step, rims};
 use super::side::{Part, Side};
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot, middle};
-use crate::math::{Vec3, add, scale};
+use geometry::math::{Vec3, add, scale};
 
 /// How often a cell is filled anew from another point inside, if single precision muddles it.
 const TRIES: usize = 6;

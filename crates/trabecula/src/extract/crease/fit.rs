@@ -19,7 +19,7 @@ use crate::extract::key::Key;
 use crate::extract::knot::Knots;
 use crate::extract::signs::Signs;
 use crate::extract::tile::Nodes;
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// Points that are no nodes, and the sides of cells that they divide.
 #[derive(Default)]

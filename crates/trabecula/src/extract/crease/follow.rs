@@ -6,7 +6,7 @@ use super::Edges;
 use crate::extract::grid::{Grid, TILE};
 use crate::extract::tile::Nodes;
 use crate::face::Creases;
-use crate::math::{Vec3, add, scale, sub};
+use geometry::math::{Vec3, add, scale, sub};
 
 /// Straight edges that are this many steps long or more are shown, however little the face turns there.
 const LONG: f64 = 3.0;

@@ -8,7 +8,7 @@ use super::{Edges, Grid, Nodes, nearest, within};
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, middle};
 use crate::field::Field;
-use crate::math::{Vec3, add, norm, scale, sub};
+use geometry::math::{Vec3, add, norm, scale, sub};
 
 /// More pieces of edges than this in one cell are not looked at one by one: they are far shorter than a step.
 const MOST: usize = 128;

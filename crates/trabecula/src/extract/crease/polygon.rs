@@ -1,6 +1,6 @@
 //! Simple polygons in triangles.
 
-use crate::mesh::exact::orient2d;
+use geometry::mesh::exact::orient2d;
 
 /// The triangles of a simple polygon the flattest of which is as little flat as can be: of all its triangulations the one
 /// that rounding harms least. `other`: ones that are nearly as good, each number another.

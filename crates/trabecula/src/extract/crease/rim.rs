@@ -6,8 +6,8 @@ use super::patch::Patches;
 use super::polygon::triangles;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
-use crate::math::{add, scale, sub};
-use crate::mesh::exact::drop_axis;
+use geometry::math::{add, scale, sub};
+use geometry::mesh::exact::drop_axis;
 
 /// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
 const INNER: f64 = 0.5;

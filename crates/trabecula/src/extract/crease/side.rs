@@ -11,8 +11,8 @@ use super::polygon::triangles;
 use crate::extract::key::Key;
 use crate::extract::knot::{Knots, Simplex, Spot};
 use crate::extract::signs::bits;
-use crate::math::Vec3;
-use crate::mesh::exact::{drop_axis, orient2d};
+use geometry::math::Vec3;
+use geometry::mesh::exact::{drop_axis, orient2d};
 
 /// A side of a cell, cut along its chords and into triangles.
 pub(in crate::extract) struct Side {

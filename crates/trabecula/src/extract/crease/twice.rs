@@ -1,7 +1,7 @@
 //! Grid edges that a face crosses twice.
 
 use super::{Edges, Seen};
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// Crossings nearer to each other than so many times what points keep from nodes are left out. Beyond the edge a side is
 /// then cut off straight, by much more than what is left out.

@@ -6,7 +6,7 @@ use super::fill::{Base, Tet};
 use super::patch::Patch;
 use crate::extract::by::By;
 use crate::extract::knot::{Knots, middle};
-use crate::math::{Vec3, cross, dot, scale, sub, unit};
+use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
 /// A point that is behind all that bounds a volume by so many steps is taken at once, if that is more than it must be.
 const DEEP: f64 = 0.1;

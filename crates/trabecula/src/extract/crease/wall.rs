@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
-use crate::math::{Vec3, add, scale, sub};
+use geometry::math::{Vec3, add, scale, sub};
 
 /// How much smaller than the cell the one is in which walls end.
 const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];

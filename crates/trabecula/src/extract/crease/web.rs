@@ -2,7 +2,7 @@
 
 use super::patch::{Cell, Patch, Rim};
 use crate::extract::knot::middle;
-use crate::math::{Vec3, add, cross, dot, norm, sub, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, sub, unit};
 
 /// Ends of edges and points of rims are the same if they are this many times as near to each other as points come to nodes:
 /// corners are moved into their sides by as much.

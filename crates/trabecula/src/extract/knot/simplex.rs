@@ -3,7 +3,7 @@
 use super::Knots;
 use crate::extract::key::Key;
 use crate::extract::signs::bits;
-use crate::math::{Vec3, add, cross, scale, sub};
+use geometry::math::{Vec3, add, cross, scale, sub};
 
 /// Vertices of a simplex of the grid, in rising order; or of one of a fitted cell, which may be points as well.
 #[derive(Clone, Copy)]
@@ -150,7 +150,7 @@ impl Knots<'_> {
                 [0, 1, 2, 3].map(|skip| {
                     let c: Vec<usize> = (0..4).filter(|c| *c != skip).collect();
                     let row = |r: usize| [m[r][c[0]], m[r][c[1]], m[r][c[2]]];
-                    let d = crate::math::dot(row(0), cross(row(1), row(2)));
+                    let d = geometry::math::dot(row(0), cross(row(1), row(2)));
                     if skip % 2 == 0 { d } else { -d }
                 })
             }

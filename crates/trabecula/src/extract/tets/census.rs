@@ -8,10 +8,10 @@ use super::super::bodies::Sum;
 use super::super::islands::Census;
 use super::piece::{NONE as NOBODY, Piece, Run};
 use super::template::PAIRS;
-use crate::fault::Fault;
 use crate::map::Tets;
 use crate::map::tets::NONE;
-use crate::union::{find, unite};
+use geometry::fault::Fault;
+use geometry::union_find::{find, unite};
 
 /// Bodies and pieces of the tetrahedra so far. Each tetrahedron adds its bodies, then its pieces of solid.
 #[derive(Default)]

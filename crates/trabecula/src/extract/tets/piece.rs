@@ -14,7 +14,7 @@ use super::root::first_root;
 use super::template::{FACES, PAIRS, Template, Tile, pair};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
-use crate::union::{find, unite};
+use geometry::union_find::{find, unite};
 
 /// How near a node a corner of the surface may come, in steps: what rounding must not reach.
 pub(super) const MARGIN: f64 = 0.01;

@@ -1,6 +1,6 @@
 //! Where a cubic first rises through zero.
 
-use crate::math::root;
+use geometry::math::root;
 
 /// The first place in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
 pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {

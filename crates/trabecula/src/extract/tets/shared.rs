@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use super::super::Stopped;
 use super::piece::Piece;
-use crate::fault::Fault;
 use crate::map::tets::NONE;
-use crate::math::Vec3;
+use geometry::fault::Fault;
+use geometry::math::Vec3;
 
 /// Where the vertices that tetrahedra share stand in the whole mesh: the first of those on each simplex of the tetrahedral
 /// mesh. They come in the same order in every tetrahedron.

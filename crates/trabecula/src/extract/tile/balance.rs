@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::{Nodes, Scratch, numbered};
 use crate::extract::grid::{Grid, Local};
-use crate::math::Vec3;
+use geometry::math::Vec3;
 
 /// A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature; the cosine.
 const EDGE: f32 = 0.7;

@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use super::{BATCH, Nodes, Numbers, Scratch, Vertex};
 use crate::extract::signs::{Signs, below};
 use crate::field::Field;
-use crate::math::unit;
+use geometry::math::unit;
 
 /// Lists the vertices of plain cells, face by face.
 pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {

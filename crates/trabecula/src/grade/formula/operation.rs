@@ -2,7 +2,7 @@
 
 use core::f64::consts::{LN_10, PI, TAU};
 
-use crate::math::Interval;
+use geometry::math::Interval;
 
 /// Everything: the range of a result that may be anything, or undefined.
 pub(super) const ALL: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY };

@@ -10,7 +10,7 @@
 
 use super::Instruction;
 use super::operation::{FUNCTIONS, Operation};
-use crate::fault::{Fault, counted, nearest};
+use geometry::fault::{Fault, counted, nearest};
 
 /// The longest formula, in bytes.
 const LONGEST: usize = 4096;

@@ -6,11 +6,11 @@ use std::collections::hash_map::Entry;
 use super::MODEL;
 use super::xml::{Event, Scanner, attribute, required};
 use super::zip::Archive;
-use crate::fault::{Fault, counted};
 use crate::io::join::Joiner;
 use crate::io::text::{parse, shown};
-use crate::math::{Mat3, Vec3, add, apply, determinant, scale};
-use crate::mesh::Mesh;
+use geometry::fault::{Fault, counted};
+use geometry::math::{Mat3, Vec3, add, apply, determinant, scale};
+use geometry::mesh::Mesh;
 
 /// Components may nest this deep; deeper is a loop.
 const DEPTH: usize = 32;
@@ -23,7 +23,7 @@ struct Placement {
 }
 
 impl Placement {
-    const NONE: Placement = Placement { m: crate::math::IDENTITY, shift: [0.0; 3] };
+    const NONE: Placement = Placement { m: geometry::math::IDENTITY, shift: [0.0; 3] };
 
     fn of(&self, x: Vec3) -> Vec3 {
         add(apply(&self.m, x), self.shift)
@@ -31,7 +31,7 @@ impl Placement {
 
     /// This one after `inner`.
     fn after(&self, inner: &Placement) -> Placement {
-        Placement { m: crate::math::product(&self.m, &inner.m), shift: self.of(inner.shift) }
+        Placement { m: geometry::math::product(&self.m, &inner.m), shift: self.of(inner.shift) }
     }
 }
 

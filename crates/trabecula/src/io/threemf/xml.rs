@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::fault::Fault;
 use crate::io::text::shown;
+use geometry::fault::Fault;
 
 /// What stands next in the document.
 pub enum Event<'a> {

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use flate2::{Compress, Compression, Crc, Decompress, FlushCompress, FlushDecompress, Status};
 
-use crate::fault::Fault;
+use geometry::fault::Fault;
 
 /// Sizes from here on are written in 64 bits.
 pub const LIMIT: u64 = u32::MAX as u64;

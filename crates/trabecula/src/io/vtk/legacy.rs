@@ -1,8 +1,8 @@
 //! The legacy format: a header of text, then text or big-endian numbers.
 
 use super::{Array, Data, Elements, Shape, check, fault, numbers};
-use crate::fault::Fault;
 use crate::io::text::{parse, shown};
+use geometry::fault::Fault;
 
 struct Reader<'a> {
     bytes: &'a [u8],

@@ -1,7 +1,7 @@
 use super::*;
 use crate::grade::Formula;
 use crate::map::{Affine, Map};
-use crate::math::rotation;
+use geometry::math::rotation;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! A line through control points: its cubics, and frames carried along it.
 
-use crate::fault::Fault;
-use crate::math::{Vec3, add, dot, norm, scale, sub, unit};
+use geometry::fault::Fault;
+use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
 
 /// A step of the line.
 #[derive(Clone, Copy, Debug)]

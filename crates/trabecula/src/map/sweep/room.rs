@@ -1,9 +1,9 @@
 //! How far from its line a sweep is sound: where cells fold, where they tear, and within what distance neither can be.
 
 use super::{FINE, Knot, Sweep};
-use crate::fault::Fault;
 use crate::field::Field;
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::fault::Fault;
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 impl Sweep {
     /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at

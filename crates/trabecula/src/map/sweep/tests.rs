@@ -71,7 +71,7 @@ fn slopes_places_and_bounds_agree() {
             let back = map.position(map.phase(*p)).expect("place");
             assert!(norm(sub(back, *p)) < 1e-7, "{closed} {p:?} {back:?}");
             let b = Aabb { min: *p, max: p.map(|x| x + 0.2) };
-            let steep = crate::math::spectral_norm(&map.jacobian(p.map(|x| x + 0.13)));
+            let steep = geometry::math::spectral_norm(&map.jacobian(p.map(|x| x + 0.13)));
             assert!(steep <= map.stretch(&b) * (1.0 + 1e-9), "{closed} {p:?}");
         }
     }

@@ -5,11 +5,11 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::Laid;
-use crate::fault::Fault;
 use crate::graph::{Beam, Graph, Hub};
-use crate::math::{Aabb, Vec3, sub};
 use crate::pattern::Pattern;
 use crate::quador::{Fillet, Quadors};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Vec3, sub};
 
 /// Most kinds of hubs that are looked at.
 const LOOKED: usize = 4096;

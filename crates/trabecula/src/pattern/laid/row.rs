@@ -1,6 +1,6 @@
 //! Boxes by their order.
 
-use crate::math::Aabb;
+use geometry::math::Aabb;
 
 /// Boxes in a row, by a tree over their order: what is next in order is near in space.
 pub(super) struct Row {

@@ -5,7 +5,7 @@
 //! the radius, which keeps events apart, and what comes out shorter than that is made one place afterwards. Pieces touch along a
 //! seam, so a seam that is off by δ is off the surface by δ².
 
-use crate::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
 use super::super::hub::{Affine, Hub, Stub};
 use super::super::quadric::{Conic, Quadric, piece};

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::complex::Face;
 use super::finer::lies;

@@ -3,7 +3,7 @@
 //! What is too far off is turned before it is halved: of the two ways across four corners one often runs along the surface where the
 //! other cuts through it, as on a beam all that runs along it. So triangles become long where the surface is straight.
 
-use crate::math::{Vec3, add, cross, dot, norm, root, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, root, scale, sub};
 
 use super::super::complex::Face;
 use super::{Facets, Side, key, turn};

@@ -3,7 +3,7 @@
 //! Q(x(μ)) = 0 is a polynomial of degree six in μ. On an arc X = v + W/D with W and D quadratic forms of the angle's sine and cosine, it is
 //! one of degree four. All real roots are found, between those of the derivative.
 
-use crate::math::{Vec3, add, apply, dot, norm, root, scale, sub, transpose};
+use geometry::math::{Vec3, add, apply, dot, norm, root, scale, sub, transpose};
 
 use super::super::quadric::Conic;
 use super::Axes;
@@ -193,9 +193,9 @@ fn roots(c: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::unit;
     use crate::quador::quadric::Quadric;
     use crate::quador::tests::Random;
+    use geometry::math::unit;
 
     #[test]
     fn all_real_roots_are_found() {
@@ -228,7 +228,7 @@ mod tests {
     fn feet_are_stationary_and_the_nearest_is_among_them() {
         let mut random = Random(7);
         for _ in 0..300 {
-            let mut q = Quadric { m: crate::math::IDENTITY, b: [0.0; 3], c: -1.0 };
+            let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -1.0 };
             for _ in 0..2 {
                 let g = crate::quador::hub::Affine {
                     a: scale(random.direction(), 1.2 * random.next()),

@@ -5,7 +5,7 @@
 //! least root of a few quadratics. As in the surface's own walk each stub's G is shifted, for the seams alone, by its own few 1e-12
 //! of the radius, so that the events of symmetric hubs fall apart; each arc lies on the quadric itself.
 
-use crate::math::{Vec3, add, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
 use super::super::bezier::{Bezier, Path, onward};
 use super::super::complex::shift;

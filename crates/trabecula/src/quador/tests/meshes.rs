@@ -41,7 +41,7 @@ fn meshes_are_closed_and_converge_at_second_order() {
         let exact = q.mass().expect("exact");
         for (chord, sum) in chords.iter().zip(&mut errors) {
             let (mesh, error) = q.mesh(*chord).expect("meshed");
-            let m = crate::measure::size(&mesh);
+            let m = geometry::measure::size(&mesh);
             let name = format!("{} beams {fillet:?} at {chord}", graph.beams.len());
             assert!(m.closed && m.pieces == 1 && m.cavities == 0, "{name}: {m:?}");
             // As read back from single precision, too.
@@ -49,8 +49,8 @@ fn meshes_are_closed_and_converge_at_second_order() {
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             low.vertices.iter_mut().flatten().for_each(round);
             for mesh in [&mesh, &low] {
-                assert_eq!(crate::mesh::self_intersections(mesh, 1), 0, "{name}");
-                let flat = (0..mesh.triangles.len()).any(|i| crate::mesh::degenerate(mesh, i));
+                assert_eq!(geometry::mesh::self_intersections(mesh, 1), 0, "{name}");
+                let flat = (0..mesh.triangles.len()).any(|i| geometry::mesh::degenerate(mesh, i));
                 assert!(!flat, "{name}");
             }
             assert!(error <= *chord, "{name}: {error}");
@@ -93,11 +93,11 @@ fn symmetric_hubs_are_meshed() {
             let (mut mesh, _) = q
                 .mesh(0.03)
                 .unwrap_or_else(|e| panic!("{axes:?} {fillet:?}: {e} {:#?}", complex::Complex::new(&q.hub(0))));
-            let m = crate::measure::size(&mesh);
+            let m = geometry::measure::size(&mesh);
             assert!(m.closed && m.euler == 2 && m.pieces == 1, "{fillet:?} {m:?}");
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             mesh.vertices.iter_mut().flatten().for_each(round);
-            assert_eq!(crate::mesh::self_intersections(&mesh, 1), 0, "{fillet:?} {}", axes.len());
+            assert_eq!(geometry::mesh::self_intersections(&mesh, 1), 0, "{fillet:?} {}", axes.len());
         }
     }
 }
@@ -112,7 +112,7 @@ fn what_is_drawn_hub_by_hub_is_the_mesh() {
         let streamed: Vec<[Vec3; 3]> = (0..q.len()).flat_map(|i| drawn.hub(i)).collect();
         let placed = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
         assert!(streamed.iter().eq(&mesh.triangles.iter().map(placed).collect::<Vec<_>>()));
-        let (want, got) = (crate::measure::size(&mesh), drawn.figures());
+        let (want, got) = (geometry::measure::size(&mesh), drawn.figures());
         assert_eq!(got.triangles, mesh.triangles.len());
         assert_eq!((got.euler, got.pieces), (want.euler, want.pieces));
         // Sums of thousands of terms in another order.

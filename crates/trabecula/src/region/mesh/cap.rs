@@ -10,8 +10,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::edges::{halves, rises};
 use super::fair;
-use crate::math::{Vec3, cross, dot, norm, sub, unit};
-use crate::mesh::Mesh;
+use geometry::math::{Vec3, cross, dot, norm, sub, unit};
+use geometry::mesh::Mesh;
 
 /// Loops of more corners are parted by chords first: the search takes the cube of their number.
 const LONG: usize = 160;

@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use super::edges::{ends, halves};
 use super::tree::normal;
 use crate::face::{Creases, Segment};
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::Mesh;
-use crate::union;
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::mesh::Mesh;
+use geometry::union_find;
 
 /// The least turn of the normal across a crease, radians (10°): below it a rounded edge is off by a twentieth of a step.
 const TURN: f64 = 0.175;
@@ -75,14 +75,14 @@ pub fn creases(mesh: &Mesh) -> Creases {
 fn measure_runs(segments: &mut [Segment], pairs: impl Iterator<Item = [u32; 2]>) {
     let mut root: Vec<u32> = (0..segments.len() as u32).collect();
     for [a, b] in pairs {
-        union::unite(&mut root, a, b);
+        union_find::unite(&mut root, a, b);
     }
     let mut runs = vec![0.0; segments.len()];
     for (i, s) in (0..).zip(&*segments) {
-        runs[union::find(&mut root, i) as usize] += s.run;
+        runs[union_find::find(&mut root, i) as usize] += s.run;
     }
     for (i, s) in (0..).zip(segments) {
-        s.run = runs[union::find(&mut root, i) as usize];
+        s.run = runs[union_find::find(&mut root, i) as usize];
     }
 }
 

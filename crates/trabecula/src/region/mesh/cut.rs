@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use super::edges::{Sets, halves, rises};
 use super::tree::{Face, Tree};
 use super::winding::Winding;
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::exact::{drop_axis, orient2d, orient3d};
-use crate::mesh::{Mesh, near_pairs};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::mesh::exact::{drop_axis, orient2d, orient3d};
+use geometry::mesh::{Mesh, near_pairs};
 
 /// How two triangles meet.
 enum Meeting {

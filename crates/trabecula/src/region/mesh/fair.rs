@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Loops of fewer corners are left as they are: there is nothing to bend.
 const SMALL: usize = 7;

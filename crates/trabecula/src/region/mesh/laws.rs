@@ -4,9 +4,9 @@ use proptest::prelude::*;
 
 use super::tests::{ball, with};
 use super::*;
-use crate::math::{Mat3, add, apply, rotation};
 use crate::region::tests::random;
 use crate::region::{Cuboid, Cylinder, Sphere, Union};
+use geometry::math::{Mat3, add, apply, rotation};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

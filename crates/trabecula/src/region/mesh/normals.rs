@@ -6,8 +6,8 @@
 
 use super::check::Pairs;
 use super::tree::{Face, Feature, Hit, Tree};
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::Mesh;
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::mesh::Mesh;
 
 /// No normal: comparisons with it do not hold.
 const NONE: Vec3 = [f64::NAN; 3];

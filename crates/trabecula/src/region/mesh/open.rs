@@ -6,8 +6,8 @@ use super::tree::{Face, Hit, Tree};
 use super::{MeshRegion, NOTHING, one_face};
 use crate::face;
 use crate::field::{Block, Field};
-use crate::math::{Aabb, Interval, Vec3, dot, norm, scale};
 use crate::region::{HalfSpace, Offset, Region, Shape};
+use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
 
 /// Corners of a triangle on a plane may stand this far off it, as a share of the mesh's size: files hold coordinates in
 /// single precision.

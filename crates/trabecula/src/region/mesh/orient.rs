@@ -3,8 +3,8 @@
 use super::edges::{components, halves, rises};
 use super::tree::{Face, Tree};
 use super::winding::{Winding, turn};
-use crate::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
-use crate::mesh::Mesh;
+use geometry::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
+use geometry::mesh::Mesh;
 
 /// Corners of a body at which it is asked whether another one holds it.
 const LOOKS: usize = 32;

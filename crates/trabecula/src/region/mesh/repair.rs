@@ -2,9 +2,9 @@
 
 use super::check::{self, Pairs};
 use super::{cap, clean, cut, orient};
-use crate::fault::Fault;
-use crate::math::{add, cross, norm, scale, sub};
-use crate::mesh::{Mesh, self_intersections};
+use geometry::fault::Fault;
+use geometry::math::{add, cross, norm, scale, sub};
+use geometry::mesh::{Mesh, self_intersections};
 
 /// Caps may make up this share of the repaired surface. A cap is a guess: at a tenth of the surface, over a hole a
 /// fifth of the part wide, it can be wrong by a tenth of that width, which is the size of a cell of most lattices.

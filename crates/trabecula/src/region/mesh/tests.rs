@@ -1,7 +1,7 @@
 use super::tree::normal;
 use super::*;
-use crate::math::add;
 use crate::region::tests::{check_shape, random};
+use geometry::math::add;
 use std::collections::HashMap;
 
 /// An icosphere of 20·4ⁿ triangles, its radius waved by `wave`.

@@ -11,7 +11,7 @@ use core::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::tree::{Face, Tree};
-use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Solid angle of a triangle seen from `p`, over 4π: positive where the normal points away from `p`.
 pub fn turn(corners: [Vec3; 3], p: Vec3) -> f64 {
@@ -89,7 +89,7 @@ struct Moments {
 }
 
 impl Moments {
-    fn of(faces: &[Face], bounds: &crate::math::Aabb) -> Moments {
+    fn of(faces: &[Face], bounds: &geometry::math::Aabb) -> Moments {
         let mut area = 0.0;
         let mut middle = [0.0; 3];
         for f in faces {
@@ -378,7 +378,7 @@ mod tests {
                 })
                 .sum();
             for _ in 0..20 {
-                let way = crate::math::unit([0; 3].map(|_| random(&mut seed)));
+                let way = geometry::math::unit([0; 3].map(|_| random(&mut seed)));
                 let beta = 1.05 + 6.0 * random(&mut seed).powi(4);
                 let r = beta / node.per[0];
                 let p = add(center, scale(way, r));

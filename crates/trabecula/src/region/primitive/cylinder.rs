@@ -8,9 +8,9 @@ use super::{
     length, one_face, rounded,
 };
 use crate::face::{Face, Tree};
-use crate::fault::Fault;
 use crate::field::Block;
-use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// A solid cylinder of circular section with flat caps.
 #[derive(Clone, Copy, Debug, PartialEq)]

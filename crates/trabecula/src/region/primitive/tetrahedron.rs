@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{HalfSpace, Shape, along, finite, one_face, rounded};
 use crate::face::{Face, Tree};
-use crate::fault::{Fault, number};
-use crate::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 
 /// The faces, counter-clockwise seen from outside where corners are in positive order.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];

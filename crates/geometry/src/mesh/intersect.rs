@@ -1,0 +1,338 @@
+//! Self-intersection of a mesh, decided exactly for its f64 coordinates.
+
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::exact::{drop_axis, orient2d, orient3d, plane_axis};
+use crate::math::{Aabb, Vec3};
+use crate::mesh::{Mesh, degenerate};
+
+/// Triangles in a leaf of the tree.
+const LEAF: usize = 4;
+
+/// The number of pairs of triangles that meet elsewhere than in their common vertices or edge, or `limit` if there
+/// are at least so many.
+///
+/// Touching counts: a vertex of one on another, a crossing, an overlap in a plane, two neighbours folded onto each
+/// other, a triangle given twice. Triangles without area are left out (`defects` counts them). Vertices are common
+/// when they have the same index.
+pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
+    let mut order: Vec<u32> =
+        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
+    let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| bounds(t.map(|v| mesh.vertices[v as usize]))).collect();
+    let Some(tree) = Tree::build(&boxes, &mut order) else {
+        return 0;
+    };
+    let found = AtomicUsize::new(0);
+    order.par_chunks(256).for_each(|part| {
+        for &i in part {
+            if found.load(Ordering::Relaxed) >= limit {
+                return;
+            }
+            let b = &boxes[i as usize];
+            tree.visit(b, &mut |range| {
+                for &j in &order[range] {
+                    if j > i && overlap(b, &boxes[j as usize]) && meet(mesh, i as usize, j as usize) {
+                        found.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            });
+        }
+    });
+    found.into_inner().min(limit)
+}
+
+/// Whether no two triangles of a small mesh meet elsewhere than in their common vertices or edge, and none is flat.
+pub fn is_embedded(mesh: &Mesh) -> bool {
+    let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
+    (0..boxes.len()).all(|i| {
+        let meets = |j| overlap(&boxes[i], &boxes[j]) && meet(mesh, i, j);
+        !degenerate(mesh, i) && !(0..i).any(meets)
+    })
+}
+
+/// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
+/// same for any number of threads. Triangles without area are left out.
+pub fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) -> Option<T> + Sync) -> Vec<T> {
+    let mut order: Vec<u32> =
+        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
+    let boxes: Vec<Aabb> =
+        (0..mesh.triangles.len()).into_par_iter().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
+    let Some(tree) = Tree::build(&boxes, &mut order) else {
+        return Vec::new();
+    };
+    let found: Vec<Vec<T>> = order
+        .par_chunks(256)
+        .map(|part| {
+            let mut found = Vec::new();
+            for &i in part {
+                let b = &boxes[i as usize];
+                tree.visit(b, &mut |range| {
+                    let near = order[range].iter().filter(|j| **j > i);
+                    let touching = near.filter(|j| overlap(b, &boxes[**j as usize]));
+                    found.extend(touching.filter_map(|j| f(i as usize, *j as usize)));
+                });
+            }
+            found
+        })
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
+fn bounds(corners: [Vec3; 3]) -> Aabb {
+    corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
+}
+
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
+}
+
+/// A tree of boxes over a permutation of the triangles (or of whatever the boxes hold).
+pub struct Tree {
+    bounds: Aabb,
+    range: (usize, usize),
+    children: Option<Box<(Tree, Tree)>>,
+}
+
+impl Tree {
+    /// Builds the tree and sorts `order` into its leaves; `None` without triangles.
+    pub fn build(boxes: &[Aabb], order: &mut [u32]) -> Option<Tree> {
+        (!order.is_empty()).then(|| Tree::split(boxes, order, 0))
+    }
+
+    fn split(boxes: &[Aabb], order: &mut [u32], first: usize) -> Tree {
+        let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        let range = (first, first + order.len());
+        if order.len() <= LEAF {
+            return Tree { bounds, range, children: None };
+        }
+        let size = bounds.size();
+        let axis = (0..3).fold(0, |a, k| if size[k] > size[a] { k } else { a });
+        let key = |i: &u32| boxes[*i as usize].min[axis] + boxes[*i as usize].max[axis];
+        let half = order.len() / 2;
+        order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+        let (left, right) = order.split_at_mut(half);
+        let children = if range.1 - range.0 > 4096 {
+            rayon::join(|| Tree::split(boxes, left, first), || Tree::split(boxes, right, first + half))
+        } else {
+            (Tree::split(boxes, left, first), Tree::split(boxes, right, first + half))
+        };
+        Tree { bounds, range, children: Some(Box::new(children)) }
+    }
+
+    /// Calls `leaf` with the span of every leaf whose box touches `b`.
+    pub fn visit(&self, b: &Aabb, leaf: &mut impl FnMut(core::ops::Range<usize>)) {
+        if !overlap(&self.bounds, b) {
+            return;
+        }
+        match &self.children {
+            None => leaf(self.range.0..self.range.1),
+            Some(c) => {
+                c.0.visit(b, leaf);
+                c.1.visit(b, leaf);
+            }
+        }
+    }
+}
+
+/// Whether triangles `i` and `j` meet elsewhere than in their common vertices or edge. Both have area.
+pub fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
+    let (s, t) = (mesh.triangles[i], mesh.triangles[j]);
+    let at = |v: u32| mesh.vertices[v as usize];
+    let (p, q) = (s.map(at), t.map(at));
+    let common = |k: &usize| t.contains(&s[*k]);
+    let alone = |k: &usize| !s.contains(&t[*k]);
+    match (0..3).filter(common).count() {
+        0 => (0..3).any(|k| crosses(p[k], p[(k + 1) % 3], q) || crosses(q[k], q[(k + 1) % 3], p)),
+        1 => {
+            // The common part is convex and holds the common vertex; if it is more, a ray from that vertex leaves one
+            // of the triangles through the opposite side while still in the other.
+            let k = (0..3).find(common).unwrap_or(0);
+            let l = (0..3).find(|l| t[*l] == s[k]).unwrap_or(0);
+            crosses(p[(k + 1) % 3], p[(k + 2) % 3], q) || crosses(q[(l + 1) % 3], q[(l + 2) % 3], p)
+        }
+        2 => {
+            // Two planes through the common edge meet in its line alone, unless they are one plane.
+            let (Some(k), Some(l)) = ((0..3).find(|k| !common(k)), (0..3).find(alone)) else {
+                return true;
+            };
+            let (v, w) = (p[(k + 1) % 3], p[(k + 2) % 3]);
+            if orient3d(v, w, p[k], q[l]) != 0 {
+                return false;
+            }
+            plane_axis(v, w, p[k]).is_none_or(|axis| {
+                let [v, w, a, b] = [v, w, p[k], q[l]].map(|c| drop_axis(c, axis));
+                orient2d(v, w, a) == orient2d(v, w, b)
+            })
+        }
+        _ => true,
+    }
+}
+
+/// Whether the segment a b meets the triangle t (with area), ends and sides included.
+fn crosses(a: Vec3, b: Vec3, t: [Vec3; 3]) -> bool {
+    let (sa, sb) = (orient3d(t[0], t[1], t[2], a), orient3d(t[0], t[1], t[2], b));
+    if sa * sb > 0 {
+        return false;
+    }
+    if sa == 0 && sb == 0 {
+        return plane_axis(t[0], t[1], t[2])
+            .is_some_and(|axis| crosses_flat(drop_axis(a, axis), drop_axis(b, axis), t.map(|c| drop_axis(c, axis))));
+    }
+    // The line meets the plane in one point, within the triangle unless it passes sides on different hands.
+    let sides = [0, 1, 2].map(|k| orient3d(a, b, t[k], t[(k + 1) % 3]));
+    !(sides.contains(&1) && sides.contains(&-1))
+}
+
+/// The same in a plane.
+fn crosses_flat(a: [f64; 2], b: [f64; 2], t: [[f64; 2]; 3]) -> bool {
+    let inside = |p| {
+        let turns = [0, 1, 2].map(|k| orient2d(t[k], t[(k + 1) % 3], p));
+        !(turns.contains(&1) && turns.contains(&-1))
+    };
+    inside(a) || inside(b) || (0..3).any(|k| segments_meet(a, b, t[k], t[(k + 1) % 3]))
+}
+
+/// Whether two segments in a plane meet, ends included.
+fn segments_meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
+    let (sc, sd) = (orient2d(a, b, c), orient2d(a, b, d));
+    let (sa, sb) = (orient2d(c, d, a), orient2d(c, d, b));
+    if [sa, sb, sc, sd] == [0; 4] {
+        // On one line: they meet where their extents do on both axes.
+        return (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
+    }
+    sa * sb <= 0 && sc * sd <= 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{cube, flipped, join, tetrahedron, torus};
+    use super::*;
+
+    /// The count for two triangles given by corners; equal corners are one vertex.
+    fn pair(s: [Vec3; 3], t: [Vec3; 3]) -> usize {
+        let mut mesh = Mesh::default();
+        for tri in [s, t] {
+            let ids = tri.map(|p| {
+                let found = mesh.vertices.iter().position(|v| *v == p);
+                found.unwrap_or_else(|| {
+                    mesh.vertices.push(p);
+                    mesh.vertices.len() - 1
+                }) as u32
+            });
+            mesh.triangles.push(ids);
+        }
+        // Whatever the order of triangles and corners, and in mirrored axes.
+        let n = self_intersections(&mesh, 10);
+        for turn in 0..3 {
+            for axis in 0..3 {
+                let mut m = mesh.clone();
+                m.triangles[0].rotate_left(turn);
+                m.triangles[1].swap(turn, (turn + 1) % 3);
+                m.triangles.swap(0, 1);
+                m.vertices.iter_mut().for_each(|v| v.rotate_left(axis));
+                assert_eq!(self_intersections(&m, 10), n);
+            }
+        }
+        n
+    }
+
+    const T: [Vec3; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+    #[test]
+    fn pairs_without_common_vertices() {
+        for (t, want, what) in [
+            ([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [5.0, 5.0, 0.5]], 1, "an edge pierces"),
+            ([[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [2.0, 1.0, 1.0]], 0, "above, parallel"),
+            ([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [5.0, 5.0, 0.5]], 0, "beside"),
+            ([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]], 1, "a corner on the inside"),
+            ([[2.0, 0.0, 0.0], [2.0, -1.0, 1.0], [2.0, -1.0, -1.0]], 1, "a corner on a side"),
+            ([[2.0, 0.0, -1.0], [2.0, 0.0, 1.0], [2.0, -1.0, 0.0]], 1, "a side across a side"),
+            ([[1.0, 0.5, 0.0], [2.0, 0.5, 0.0], [1.0, 1.5, 0.0]], 1, "in the plane, within"),
+            ([[-1.0, -1.0, 0.0], [9.0, -1.0, 0.0], [-1.0, 9.0, 0.0]], 1, "in the plane, around"),
+            ([[1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [2.0, 1.0, 0.0]], 1, "in the plane, across"),
+            ([[5.0, 5.0, 0.0], [6.0, 5.0, 0.0], [5.0, 6.0, 0.0]], 0, "in the plane, apart"),
+            ([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 0.0]], 1, "in the plane, along a side"),
+            ([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, -1.0, 1.0]], 1, "hinged along a part of a side"),
+            ([[2.0, 2.0, 0.0], [3.0, 3.0, 0.0], [3.0, 3.0, 1.0]], 1, "a corner on the long side"),
+            ([[2.0, 2.0, 1e-300], [3.0, 3.0, 1.0], [3.0, 2.0, 1.0]], 0, "a hair above the long side"),
+            ([[0.0, 0.0, 1e-17], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]], 0, "a hair above a corner"),
+        ] {
+            assert_eq!(pair(T, t), want, "{what}");
+        }
+    }
+
+    #[test]
+    fn pairs_with_a_common_vertex() {
+        let o = [0.0; 3];
+        for (t, want, what) in [
+            ([o, [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], 0, "in the plane, opposite"),
+            ([o, [1.0, 2.0, 0.0], [2.0, 1.0, 0.0]], 1, "in the plane, within"),
+            ([o, [8.0, 1.0, 0.0], [8.0, 2.0, 0.0]], 1, "in the plane, through the far side"),
+            ([o, [8.0, 0.0, 0.0], [8.0, -2.0, 0.0]], 1, "in the plane, along a side"),
+            ([o, [0.0, -1.0, 1.0], [0.0, -1.0, -1.0]], 0, "upright, outside"),
+            ([o, [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]], 1, "upright, through the inside"),
+            ([o, [9.0, 9.0, 1.0], [9.0, 9.0, -1.0]], 1, "upright, through the whole"),
+            ([o, [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]], 1, "a side lies in it"),
+            ([o, [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]], 1, "a side lies on its side"),
+            ([o, [1.0, 1.0, 1.0], [1.0, 2.0, 1.0]], 0, "rising"),
+        ] {
+            assert_eq!(pair(T, t), want, "{what}");
+        }
+    }
+
+    #[test]
+    fn pairs_with_a_common_edge() {
+        let [a, b, _] = T;
+        for (c, want, what) in [
+            ([1.0, -1.0, 0.0], 0, "flat neighbours"),
+            ([1.0, 1.0, 0.0], 1, "folded flat, within"),
+            ([9.0, 9.0, 0.0], 1, "folded flat, beyond"),
+            ([1.0, 1.0, 1e-300], 0, "folded to a hair"),
+            ([1.0, 1.0, 1.0], 0, "a roof"),
+        ] {
+            assert_eq!(pair(T, [b, a, c]), want, "{what}");
+        }
+        assert_eq!(pair(T, [T[1], T[0], T[2]]), 1, "the same triangle again");
+    }
+
+    #[test]
+    fn solids() {
+        assert_eq!(self_intersections(&Mesh::default(), 9), 0);
+        assert_eq!(self_intersections(&tetrahedron(), 9), 0);
+        assert_eq!(self_intersections(&torus(64, 48), 9), 0);
+        let nested = join(&[cube([0.0; 3], 4.0), flipped(cube([1.0; 3], 2.0))]);
+        assert_eq!(self_intersections(&nested, 9), 0);
+        let crossing = join(&[cube([0.0; 3], 2.0), cube([1.0; 3], 2.0)]);
+        assert!(self_intersections(&crossing, 1000) > 6);
+        assert_eq!(self_intersections(&crossing, 3), 3);
+        let touching = join(&[cube([0.0; 3], 1.0), cube([1.0, 0.0, 0.0], 1.0)]);
+        assert!(self_intersections(&touching, 1000) > 0);
+    }
+
+    #[test]
+    fn random_triangles_agree_with_all_pairs() {
+        let mut s = 5u64;
+        let mut next = || {
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (s >> 61) as f64
+        };
+        // Corners on a grid of 8³: touching, coplanar and repeated cases abound.
+        let mut mesh = Mesh::default();
+        for v in 0..300u32 {
+            mesh.vertices.push([next(), next(), next()]);
+            if v % 3 == 2 {
+                mesh.triangles.push([v - 2, v - 1, v]);
+            }
+        }
+        let mut all = 0;
+        for i in 0..100 {
+            for j in i + 1..100 {
+                all += usize::from(!degenerate(&mesh, i) && !degenerate(&mesh, j) && meet(&mesh, i, j));
+            }
+        }
+        assert!(all > 50);
+        assert_eq!(self_intersections(&mesh, usize::MAX), all);
+    }
+}

@@ -1,0 +1,202 @@
+//! Edges of the region that edges of the boundary cut across: a node is put where they pass.
+
+use rayon::prelude::*;
+
+use super::features::{meeting, touching};
+use super::shape::shape;
+use super::smooth::improve;
+use super::stuff::values;
+use super::work::Work;
+use crate::field::Field;
+use geometry::math::{Vec3, add, norm, scale, sub};
+
+/// An edge of the boundary is looked at if its middle is farther from the surface than this share of its length.
+const OFF: f64 = 0.02;
+/// One that cuts no edge of the region is halved if it is farther off than this share of its length: over an arc of its own
+/// length for radius it would be 0.13.
+const SHORT: f64 = 0.1;
+/// How often the nodes around are looked at to make room.
+const PASSES: usize = 3;
+/// Where planes that touch the region are looked for along it: near its ends too, as the nearer an edge of the region
+/// passes to one, the less of the boundary's edge is on its side.
+const LOOKS: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// Moves an end of, or halves, edges of the boundary that cut across an edge or corner of the region, so that there is a node
+/// on it; and halves those that cut a curve short. As far as no tetrahedron gets worse than `least` or than the worst beside
+/// it was; with `room` once the nodes around have made room.
+pub(super) fn creases(work: &mut Work, least: f64, room: bool) {
+    let mut moved = vec![false; work.mesh.nodes.len()];
+    for found in crossed(work) {
+        let edge = found.edge;
+        if edge.iter().any(|n| moved[*n as usize]) {
+            continue;
+        }
+        if work.given(&found, least, room) {
+            edge.iter().for_each(|n| moved[*n as usize] = true);
+            moved.resize(work.mesh.nodes.len(), true);
+        }
+    }
+}
+
+impl Work<'_> {
+    /// Gives an edge a node where it is wanted: an end that is moved, or a new one, whichever leaves the better shapes. Tells
+    /// whether it did.
+    fn given(&mut self, found: &Crossed, least: f64, room: bool) -> bool {
+        let Crossed { edge, place, rank, .. } = *found;
+        let ends = edge.map(|n| self.mesh.nodes[n as usize]);
+        let near = 0.5 * norm(sub(ends[0], ends[1]));
+        let free = |i: &usize| rank > 1 && self.held[edge[*i] as usize] < rank && norm(sub(place, ends[*i])) < near;
+        let end = |i: usize| {
+            let at = self.around.of(edge[i] as usize);
+            (self.left(at, &edge[i..=i], place, least), Some(edge[i]))
+        };
+        let mut ways: Vec<(f64, Option<u32>)> = (0..2).filter(free).map(end).collect();
+        let at = self.around.edge(&self.mesh, edge);
+        ways.push((self.left(&at, &edge, place, least), None));
+        ways.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // For a curve nobody makes room.
+        ways.retain(|w| room && rank > 1 || w.0 >= 0.0);
+        ways.into_iter().any(|(left, end)| match end {
+            Some(n) => self.moves(n as usize, found, left >= 0.0, least),
+            None => self.halves(&at, found, left >= 0.0, least),
+        })
+    }
+
+    /// By how much the worst of some tetrahedra is above what is allowed when each of `nodes` in turn is put to `place`.
+    fn left(&self, of: &[u32], nodes: &[u32], place: Vec3, least: f64) -> f64 {
+        let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
+        for t in of {
+            let (t, p) = (self.mesh.tets[*t as usize], self.mesh.corners(*t as usize));
+            before = before.min(shape(p));
+            for n in nodes {
+                let moved = core::array::from_fn(|i| if t[i] == *n { place } else { p[i] });
+                after = after.min(shape(moved));
+            }
+        }
+        after - least.min(before)
+    }
+
+    /// Moves a node to where it is wanted; tells whether it stays there.
+    fn moves(&mut self, n: usize, to: &Crossed, good: bool, least: f64) -> bool {
+        let ring = self.ring(self.around.of(n));
+        let bar = self.bar(&ring, least);
+        let old = core::mem::replace(&mut self.mesh.nodes[n], to.place);
+        let held = core::mem::replace(&mut self.held[n], to.rank);
+        let done = good || self.room(&ring, bar);
+        if !done {
+            self.mesh.nodes[n] = old;
+            self.held[n] = held;
+        }
+        done
+    }
+
+    /// Puts a node on an edge, whose tetrahedra are `at`; tells whether it stays.
+    fn halves(&mut self, at: &[u32], to: &Crossed, good: bool, least: f64) -> bool {
+        let mut ring = self.ring(at);
+        let bar = self.bar(&ring, least);
+        let count = self.mesh.tets.len();
+        ring.push(self.mesh.nodes.len());
+        self.split(to.edge, to.place, if to.rank > 1 { to.rank } else { 0 });
+        let done = good || self.room(&ring, bar);
+        if !done {
+            self.unsplit(to.edge, count);
+        }
+        done
+    }
+
+    /// The nodes of some tetrahedra, ascending.
+    fn ring(&self, of: &[u32]) -> Vec<usize> {
+        let nodes = of.iter().flat_map(|t| self.mesh.tets[*t as usize]);
+        let mut ring: Vec<usize> = nodes.map(|n| n as usize).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        ring
+    }
+
+    /// The worst shape about some nodes, or `least` if that is worse.
+    fn bar(&self, ring: &[usize], least: f64) -> f64 {
+        ring.iter().fold(least, |m, n| m.min(self.worst(*n).0))
+    }
+
+    /// Lets nodes make room for one that came among them until none of their tetrahedra is worse than `bar`; where that cannot
+    /// be they go back.
+    fn room(&mut self, ring: &[usize], bar: f64) -> bool {
+        let old: Vec<Vec3> = ring.iter().map(|n| self.mesh.nodes[*n]).collect();
+        for _ in 0..PASSES {
+            for n in ring {
+                if self.held[*n] == 0 {
+                    improve(self, *n);
+                }
+            }
+            if ring.iter().all(|n| self.worst(*n).0 >= bar) {
+                return true;
+            }
+        }
+        for (n, p) in ring.iter().zip(old) {
+            self.mesh.nodes[*n] = p;
+        }
+        false
+    }
+}
+
+/// Whether the way from a point to a place of the surface is all on one side of it: else there is another wall, or a gap,
+/// between.
+fn within(region: &dyn Field, p: Vec3, place: Vec3) -> bool {
+    let points = [0.0, 0.3, 0.6, 0.9].map(|s| add(p, scale(sub(place, p), s)));
+    let mut v = [0.0; 4];
+    region.values(&points, &mut v);
+    v.iter().all(|v| *v < 0.0) || v.iter().all(|v| *v > 0.0)
+}
+
+/// An edge of the boundary that is off the surface.
+struct Crossed {
+    edge: [u32; 2],
+    /// How far its middle is (mm).
+    off: f64,
+    /// Where a node is wanted, and in how many directions the region holds it there: a smooth face in one, an edge in two.
+    place: Vec3,
+    rank: usize,
+}
+
+/// The boundary's edges that cut across edges or corners of the region, or cut a curve short; corners first, then those that
+/// are farthest off.
+fn crossed(work: &Work) -> Vec<Crossed> {
+    let (region, mesh) = (work.region, &work.mesh);
+    let faces = mesh.boundary_faces();
+    let mut edges: Vec<[u32; 2]> =
+        faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(|[a, b]| a < b).collect();
+    edges.par_sort_unstable();
+    let ends = |e: &[u32; 2]| e.map(|n| mesh.nodes[n as usize]);
+    let middle = |e: &[u32; 2]| {
+        let [p, q] = ends(e);
+        scale(add(p, q), 0.5)
+    };
+    let middles: Vec<Vec3> = edges.iter().map(middle).collect();
+    let off = values(region, &middles);
+    let look = |((e, m), off): ((&[u32; 2], &Vec3), &f64)| {
+        let [p, q] = ends(e);
+        let along = sub(q, p);
+        let length = norm(along);
+        if off.abs() < OFF * length {
+            return None;
+        }
+        let points = LOOKS.map(|s| add(p, scale(along, s)));
+        let planes = touching(region, &points);
+        let found = meeting(region, *m, &planes).filter(|(_, rank)| *rank > 1);
+        let short = || (off.abs() > SHORT * length).then_some((planes[2].0, 1));
+        let (place, rank) = found.or_else(short)?;
+        let near = norm(sub(place, *m)) < length
+            && region.value(place).abs() < OFF * length
+            && within(region, *m, place)
+            && !work.bars(place);
+        near.then_some(Crossed { edge: *e, off: off.abs(), place, rank })
+    };
+    let all = edges.par_iter().zip(&middles).zip(&off);
+    let mut found: Vec<Crossed> = all.filter_map(look).collect();
+    let order = |a: &Crossed, b: &Crossed| {
+        let rank = b.rank.cmp(&a.rank);
+        rank.then(b.off.total_cmp(&a.off)).then(a.edge.cmp(&b.edge))
+    };
+    found.sort_by(order);
+    found
+}

@@ -1,0 +1,277 @@
+//! The background: a body-centred cubic lattice of tetrahedra about a region, bisected where it is to be finer.
+//!
+//! Two cubic lattices, each with its nodes in the middle of the other's cubes. A tetrahedron has an edge of each as
+//! opposite edges (long, the cube's edge) and four between them (short, √3/2 of it); its dihedral angles are 60° and 90°.
+//! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007.
+//!
+//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first of them at half
+//! the size (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
+
+use std::collections::HashMap;
+
+use crate::field::Field;
+use crate::grade::Grade;
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Vec3, norm, sub};
+use geometry::tetmesh::quality::size_of;
+
+/// Units of a node's whole coordinates in the edge of a cube: it can be halved so often.
+const UNIT: i32 = 1 << 12;
+/// Cubes along the edge of a block that is looked at, or left out, as a whole.
+const BLOCK: i32 = 4;
+
+/// Tetrahedra on nodes of whole coordinates.
+pub(super) struct Grid {
+    /// Nodes in units.
+    pub keys: Vec<[i32; 3]>,
+    /// Tetrahedra, positive; in those that are not bisected nodes 0, 1 are of one lattice and 2, 3 of the other.
+    pub tets: Vec<[u32; 4]>,
+    /// Whether any was bisected.
+    pub bisected: bool,
+    origin: Vec3,
+    unit: f64,
+}
+
+/// The direction of an edge: how many of its coordinates differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Along {
+    /// Along an axis.
+    Axis,
+    /// Along the diagonal of a square.
+    Face,
+    /// Along the diagonal of a cube.
+    Body,
+}
+
+impl Grid {
+    /// The tetrahedra of the lattice with cubes of edge `cube` (mm) that may have a part in the region.
+    ///
+    /// **Errors**: more than `most` tetrahedra.
+    pub fn new(region: &dyn Field, bounds: &Aabb, cube: f64, most: usize) -> Result<Grid, Fault> {
+        let size = bounds.size();
+        // The lattice is laid evenly about the region, planes on both sides of its bounds where it fits.
+        let steps = size.map(|l| (2.0 * l / cube).round());
+        let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
+        let mut grid =
+            Grid { keys: Vec::new(), tets: Vec::new(), bisected: false, origin, unit: cube / f64::from(UNIT) };
+        let many = || too_many(most);
+        if size.iter().any(|l| l / cube > 1e5) {
+            return Err(many());
+        }
+        let end = size.map(|l| (l / cube).ceil() as i32 + 1);
+        if grid.surely_more(region, end, most) {
+            return Err(many());
+        }
+        let mut names = HashMap::new();
+        let mut todo = vec![([-1; 3], end)];
+        while let Some((low, high)) = todo.pop() {
+            let block = grid.block(low, high);
+            if region.bound(&block.grown(0.5 * cube)).lo > 0.0 {
+                continue;
+            }
+            if (0..3).any(|a| high[a] - low[a] > BLOCK) {
+                todo.extend(halves(low, high));
+                continue;
+            }
+            for z in low[2]..high[2] {
+                for y in low[1]..high[1] {
+                    for x in low[0]..high[0] {
+                        grid.cube([x, y, z], &mut names);
+                    }
+                }
+            }
+            if grid.tets.len() > most {
+                return Err(many());
+            }
+        }
+        Ok(grid)
+    }
+
+    /// Whether blocks that lie in the region hold more than `most` tetrahedra: told without making them.
+    fn surely_more(&self, region: &dyn Field, end: [i32; 3], most: usize) -> bool {
+        let mut count = 0.0;
+        let mut todo = vec![([-1; 3], end)];
+        while let Some((low, high)) = todo.pop() {
+            let range = region.bound(&self.block(low, high));
+            let extent: [i32; 3] = core::array::from_fn(|a| high[a] - low[a]);
+            if range.hi < 0.0 {
+                count += 12.0 * extent.iter().map(|e| f64::from(*e)).product::<f64>();
+                if count > most as f64 {
+                    return true;
+                }
+            } else if range.lo <= 0.0 && extent.iter().any(|e| *e > 8 * BLOCK) {
+                todo.extend(halves(low, high));
+            }
+        }
+        false
+    }
+
+    /// The box of a block of cubes.
+    fn block(&self, low: [i32; 3], high: [i32; 3]) -> Aabb {
+        let reach = |c: [i32; 3]| self.place(c.map(|c| c * UNIT));
+        Aabb { min: reach(low), max: reach(high) }
+    }
+
+    /// The tetrahedra about the three faces on a cube's upper sides.
+    fn cube(&mut self, c: [i32; 3], names: &mut HashMap<[i32; 3], u32>) {
+        let mut name = |key: [i32; 3]| {
+            *names.entry(key).or_insert_with(|| {
+                self.keys.push(key);
+                self.keys.len() as u32 - 1
+            })
+        };
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let here = c.map(|x| x * UNIT + UNIT / 2);
+            let mut beyond = here;
+            beyond[axis] += UNIT;
+            let corner = |du: i32, dv: i32| {
+                let mut k = c.map(|x| x * UNIT);
+                k[axis] += UNIT;
+                k[u] += du * UNIT;
+                k[v] += dv * UNIT;
+                k
+            };
+            let ring = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            for i in 0..4 {
+                let t = [ring[i], ring[(i + 1) % 4], here, beyond].map(&mut name);
+                self.tets.push(t);
+            }
+        }
+    }
+
+    /// The place of a node (mm).
+    pub fn place(&self, key: [i32; 3]) -> Vec3 {
+        core::array::from_fn(|a| self.origin[a] + self.unit * f64::from(key[a]))
+    }
+
+    /// The places of all nodes (mm).
+    pub fn places(&self) -> Vec<Vec3> {
+        self.keys.iter().map(|k| self.place(*k)).collect()
+    }
+
+    /// The squared length of an edge, in units.
+    pub fn length2(&self, a: u32, b: u32) -> i64 {
+        let (a, b) = (self.keys[a as usize], self.keys[b as usize]);
+        (0..3).map(|k| i64::from(a[k] - b[k]).pow(2)).sum()
+    }
+
+    /// The direction of an edge.
+    pub fn along(&self, a: u32, b: u32) -> Along {
+        let (a, b) = (self.keys[a as usize], self.keys[b as usize]);
+        match (0..3).filter(|k| a[*k] != b[*k]).count() {
+            1 => Along::Axis,
+            2 => Along::Face,
+            _ => Along::Body,
+        }
+    }
+
+    /// Bisects tetrahedra that may have a part in the region until each is of the size asked for at its middle, within
+    /// the sixth root of two, and neighbours share whole faces.
+    ///
+    /// **Errors**: a size that is not positive; more than `most` tetrahedra.
+    pub fn refine(&mut self, region: &dyn Field, size: &Grade, most: usize) -> Result<(), Fault> {
+        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut fine = vec![false; self.tets.len()];
+        loop {
+            let mut changed = false;
+            let mut i = 0;
+            while i < self.tets.len() {
+                let t = self.tets[i];
+                let torn = geometry::tetmesh::EDGES.iter().any(|[a, b]| middles.contains_key(&named(t[*a], t[*b])));
+                if !torn && (fine[i] || !self.coarse(t, region, size)?) {
+                    fine[i] = true;
+                    i += 1;
+                    continue;
+                }
+                let [a, b] = self.longest(t);
+                let m = match middles.get(&named(t[a], t[b])) {
+                    Some(m) => *m,
+                    None => {
+                        let (p, q) = (self.keys[t[a] as usize], self.keys[t[b] as usize]);
+                        if (0..3).any(|k| (p[k] + q[k]) % 2 != 0) {
+                            let message = format!(
+                                "the least size is less than a thousandth of the greatest; the background is bisected \
+                                 at most {} times",
+                                3 * UNIT.ilog2()
+                            );
+                            return Err(Fault::new("size", message));
+                        }
+                        self.keys.push(core::array::from_fn(|k| (p[k] + q[k]) / 2));
+                        let m = self.keys.len() as u32 - 1;
+                        middles.insert(named(t[a], t[b]), m);
+                        m
+                    }
+                };
+                self.tets[i][b] = m;
+                let mut other = t;
+                other[a] = m;
+                self.tets.push(other);
+                fine[i] = false;
+                fine.push(false);
+                changed = true;
+                self.bisected = true;
+                if self.tets.len() > most {
+                    return Err(too_many(most));
+                }
+            }
+            if !changed {
+                return Ok(());
+            }
+        }
+    }
+
+    /// The places of the ends of the longest edge; of two the one of the first lattice.
+    fn longest(&self, t: [u32; 4]) -> [usize; 2] {
+        let rank = |[a, b]: [usize; 2]| {
+            let first = self.keys[t[a] as usize].iter().all(|k| k % UNIT == 0);
+            (self.length2(t[a], t[b]), first)
+        };
+        geometry::tetmesh::EDGES.into_iter().fold([0, 1], |m, e| if rank(e) > rank(m) { e } else { m })
+    }
+
+    /// Whether a tetrahedron that may have a part in the region is larger than it is to be.
+    fn coarse(&self, t: [u32; 4], region: &dyn Field, size: &Grade) -> Result<bool, Fault> {
+        let p = t.map(|n| self.place(self.keys[n as usize]));
+        let middle: Vec3 = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
+        let reach = p.iter().map(|p| norm(sub(*p, middle))).fold(0.0, f64::max);
+        let mine = size_of(geometry::tetmesh::volume(p));
+        let mut wanted = [0.0; 5];
+        size.values(&[middle, p[0], p[1], p[2], p[3]], &mut wanted);
+        let least = wanted.into_iter().fold(f64::INFINITY, f64::min);
+        if mine <= wanted[0] * 2f64.powf(1.0 / 6.0) && mine <= 2.0 * least {
+            return Ok(false);
+        }
+        if region.value(middle) > reach {
+            return Ok(false);
+        }
+        if !(wanted[0] > 0.0 && least > 0.0) {
+            let message = format!(
+                "size is {} mm at {}; it must be greater than 0 in the region and near it",
+                number(wanted[0].min(least)),
+                geometry::tetmesh::check::place(middle)
+            );
+            return Err(Fault::new("size", message));
+        }
+        Ok(true)
+    }
+}
+
+/// A block's halves along its longest side, the upper one first.
+fn halves(low: [i32; 3], high: [i32; 3]) -> [([i32; 3], [i32; 3]); 2] {
+    let extent = |a: usize| high[a] - low[a];
+    let axis = (0..3).fold(0, |m, a| if extent(a) > extent(m) { a } else { m });
+    let (mut left, mut right) = (high, low);
+    left[axis] = low[axis] + extent(axis) / 2;
+    right[axis] = left[axis];
+    [(right, high), (low, left)]
+}
+
+fn named(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+fn too_many(most: usize) -> Fault {
+    let message = format!("a mesh of this size would have more than {most} tetrahedra; use a greater one");
+    Fault::new("size", message)
+}

@@ -1,0 +1,26 @@
+//! How good a tetrahedron is, while nodes are moved.
+
+use geometry::math::Vec3;
+use geometry::tetmesh::{quality::dihedral_cosines, volume};
+
+/// The least and the greatest dihedral angle (degrees) that cutting leaves in a lattice that is not bisected.
+///
+/// Source: Labelle & Shewchuk 2007, whose proof goes through all ways of cutting.
+pub const ANGLES: [f64; 2] = [10.7, 164.8];
+
+/// 1 where the worst dihedral angle is one of `ANGLES`, more where all are better (16 in a regular tetrahedron); a small
+/// angle and one short of 180 degrees count by the squares of what they are short of. Negative without volume.
+pub(super) fn shape(p: [Vec3; 4]) -> f64 {
+    // 1 − cos 10.7°, 1 + cos 164.8°.
+    const SMALL: f64 = 0.017_387;
+    const LARGE: f64 = 0.034_984;
+    let v = volume(p);
+    if v <= 0.0 {
+        return -1.0;
+    }
+    dihedral_cosines(p).into_iter().fold(f64::INFINITY, |m, c| {
+        // NaN, of a face without area, counts as bad.
+        let worst = ((1.0 - c) / SMALL).min((1.0 + c) / LARGE);
+        if worst.is_nan() { -1.0 } else { m.min(worst) }
+    })
+}
