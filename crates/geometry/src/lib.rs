@@ -3,9 +3,15 @@
 //! Lengths are mm; triangles are counter-clockwise seen from outside.
 
 pub mod fault;
+pub mod formats;
 pub mod math;
 pub mod measure;
 pub mod mesh;
+pub mod progress;
+pub mod render;
+pub mod simplify;
+pub mod surface_mesh;
 pub mod symmetry;
 pub mod tetmesh;
 pub mod union_find;
+pub mod voxels;

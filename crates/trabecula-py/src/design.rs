@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use geometry::formats::Elements;
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use trabecula::design::{self, Loader, Node, Value};
-use trabecula::io::Elements;
 
 use crate::error;
 use crate::run::run;

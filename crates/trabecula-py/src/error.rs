@@ -3,10 +3,10 @@
 use std::sync::Mutex;
 
 use geometry::fault::Fault;
+use geometry::progress::Stopped;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use trabecula::design::DesignError;
-use trabecula::progress::Stopped;
 
 /// `trabecula.DesignError` with the fields of the core's own.
 pub fn design(py: Python<'_>, e: &DesignError) -> PyErr {

@@ -83,7 +83,7 @@ mod _core {
         width: usize,
         height: usize,
     ) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {
-        use trabecula::render::{self, Chart};
+        use geometry::render::{self, Chart};
         let bytes = crate::run::run(py, None, None, |_| {
             let charts: Vec<Chart> = charts
                 .into_iter()

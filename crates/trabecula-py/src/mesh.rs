@@ -3,16 +3,17 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use geometry::formats;
 use geometry::math::{cross, norm, sub};
 use geometry::measure;
+use geometry::render::{Tint, View, png, render};
+use geometry::simplify::{Goal, simplify};
+use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use trabecula::render::{Tint, View, png, render};
-use trabecula::simplify::{Goal, simplify};
-use trabecula::surface_mesh::SurfaceMesh;
-use trabecula::{analysis, io};
+use trabecula::analysis;
 
 use crate::error;
 use crate::file;
@@ -49,7 +50,7 @@ impl Mesh {
     #[staticmethod]
     fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
         let by_place = extension.eq_ignore_ascii_case("stl");
-        let read = run(py, None, None, |_| match io::read_mesh(bytes, extension) {
+        let read = run(py, None, None, |_| match formats::read_mesh(bytes, extension) {
             Ok(loaded) if by_place => Ok(loaded.mesh.joined_where_open()),
             Ok(loaded) => Ok(loaded.mesh),
             Err(f) => Err(f),
@@ -296,10 +297,10 @@ impl Mesh {
     /// Writes the mesh to `path` in the format `extension`.
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
         let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
-        let meta = io::Metadata { title, design: self.design.clone(), application };
+        let meta = formats::Metadata { title, design: self.design.clone(), application };
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
-            io::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;
+            formats::write_mesh(&self.surface.mesh, extension, &meta, &mut out)?;
             out.flush()
         })?;
         Ok(written?)

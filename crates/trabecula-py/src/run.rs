@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
+use geometry::progress::Progress;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use trabecula::progress::Progress;
 
 use crate::error;
 

@@ -3,19 +3,20 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use geometry::formats;
+use geometry::progress::Stopped;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use trabecula::analysis;
 use trabecula::design::{self, Built, Node};
 use trabecula::extract;
 use trabecula::field::Field;
 use trabecula::map::{Map, Misfit};
-use trabecula::progress::Stopped;
 use trabecula::region::Repaired;
 use trabecula::truss::Beams;
-use trabecula::{analysis, io};
 
 use crate::design::Folder;
 use crate::error;
@@ -290,7 +291,7 @@ impl Solid {
             let drawn = beams.drawn(chord).map_err(Stopped::Refused)?;
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
             let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
-            io::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out).map_err(Stopped::Io)?;
+            formats::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out).map_err(Stopped::Io)?;
             Ok((drawn.figures(), drawn.error()))
         })?;
         let (f, error) = made.map_err(error::stopped)?;
@@ -320,7 +321,7 @@ impl Solid {
         let made = run(py, threads, progress, |_| self.built.lone_beams()?.mesh(chord))?;
         let (mesh, error) = made.map_err(error::fault)?;
         let cut = vec![false; mesh.triangles.len()];
-        let surface = trabecula::surface_mesh::SurfaceMesh { mesh, cut };
+        let surface = geometry::surface_mesh::SurfaceMesh { mesh, cut };
         Ok((Mesh::new(surface, self.design.clone()), error))
     }
 
@@ -425,7 +426,7 @@ impl Region {
 /// Occupancy on a grid of cubic voxels.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct Voxels {
-    voxels: trabecula::voxels::Voxels,
+    voxels: geometry::voxels::Voxels,
 }
 
 #[pymethods]
@@ -461,8 +462,8 @@ impl Voxels {
         let written = run(py, None, None, |_| {
             let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
             match extension {
-                "npy" => io::write_npy(v.shape, &v.solid, &mut out)?,
-                _ => io::write_vti(v, &mut out)?,
+                "npy" => formats::write_npy(v.shape, &v.solid, &mut out)?,
+                _ => formats::write_vti(v, &mut out)?,
             }
             out.flush()
         })?;

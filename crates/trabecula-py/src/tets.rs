@@ -3,12 +3,12 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
+use geometry::formats::{self, Elements};
+use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh as Core;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
-use trabecula::io::{self, Elements};
-use trabecula::surface_mesh::SurfaceMesh;
 
 use crate::design::Folder;
 use crate::error;
@@ -147,7 +147,7 @@ impl TetMesh {
         let done = run(py, None, None, |_| {
             let (angles, sizes) = self.tets.mesh.shapes();
             let mut out = BufWriter::new(file::anew(&path)?);
-            io::write_vtu(&self.tets.mesh, &[("least_dihedral", angles), ("size", sizes)], &mut out)?;
+            formats::write_vtu(&self.tets.mesh, &[("least_dihedral", angles), ("size", sizes)], &mut out)?;
             out.flush()
         })?;
         Ok(done?)

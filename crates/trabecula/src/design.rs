@@ -39,7 +39,6 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::cell::Cell;
-use crate::io::Elements;
 use crate::lattice::Lattice;
 use crate::quador::Quadors;
 use crate::region::{Region, Repaired};
@@ -47,6 +46,7 @@ use crate::solid::Solid;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
 use geometry::fault::Fault;
+use geometry::formats::Elements;
 use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use read::RegionIn;

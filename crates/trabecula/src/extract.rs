@@ -12,12 +12,12 @@ use rayon::Scope;
 use rayon::prelude::*;
 
 use crate::field::{Block, Field};
-use crate::io::stl;
-use crate::progress::{Progress, Stopped};
 use crate::solid::Solid;
-use crate::surface_mesh::SurfaceMesh;
-use crate::voxels::Voxels;
 use geometry::fault::Fault;
+use geometry::formats::stl;
+use geometry::progress::{Progress, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
+use geometry::voxels::Voxels;
 
 mod bodies;
 mod by;

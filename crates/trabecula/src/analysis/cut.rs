@@ -54,9 +54,9 @@ pub fn cut_triangles(mesh: &Mesh, region: &dyn Field) -> Vec<bool> {
 mod tests {
     use super::*;
     use crate::extract::surface;
-    use crate::progress::Silent;
     use crate::region::{Cuboid, Sphere};
     use crate::solid::Solid;
+    use geometry::progress::Silent;
     use std::sync::Arc;
 
     #[test]

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 
 use super::depth::depths;
 use crate::field::{Block, Field};
-use crate::progress::{Progress, Stopped};
 use crate::solid::Solid;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
+use geometry::progress::{Progress, Stopped};
 
 /// What hangs by a neck thinner than this share of the lattice's own is dangling.
 const THIN: f64 = 0.5;
@@ -267,8 +267,8 @@ fn around(i: usize, side: usize) -> [Option<usize>; 6] {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::progress::Silent;
     use crate::region::{Cuboid, Cylinder, Region, Sphere, Union};
+    use geometry::progress::Silent;
     use std::sync::Arc;
 
     #[test]

@@ -13,12 +13,12 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use rayon::prelude::*;
 
 use crate::field::Block;
-use crate::progress::{Progress, Stopped};
 use crate::region::Region;
-use crate::surface_mesh::SurfaceMesh;
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Vec3};
 use geometry::measure::{defects, size};
+use geometry::progress::{Progress, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 
 mod balls;
 mod bits;

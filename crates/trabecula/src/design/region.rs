@@ -6,12 +6,12 @@ use super::data::*;
 use super::error::DesignError;
 use super::place::finite;
 use super::{Loader, Warning};
-use crate::io;
 use crate::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Repaired, Shape, Sphere,
     Tetrahedron, Union,
 };
 use geometry::fault::{Fault, number};
+use geometry::formats;
 use geometry::math::{add, scale, sub};
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
@@ -201,7 +201,7 @@ fn mesh(spec: &MeshSpec, path: &str, loader: &dyn Loader, notes: &mut Notes) -> 
     }
     let bytes = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let of_file = |f: Fault| DesignError::new(&at, format!("{}: {f}", spec.path)).found(&spec.path);
-    let mut loaded = io::read_mesh(&bytes, &extension).map_err(of_file)?;
+    let mut loaded = formats::read_mesh(&bytes, &extension).map_err(of_file)?;
     if let (true, Some(unit)) = (loaded.in_mm, spec.unit)
         && unit != Unit::Mm
     {

@@ -13,10 +13,10 @@ use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
 use crate::field::Field;
 use crate::grade::{Grade, Samples};
-use crate::io;
 use crate::region::{MeshRegion, Repair, Shape as _};
 pub(super) use field::{field, several};
 use geometry::fault::{Fault, counted, number};
+use geometry::formats;
 use geometry::math::{Aabb, Vec3};
 pub(super) use grid::grid;
 
@@ -38,14 +38,14 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
     let file = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let kind = extension(&spec.path);
     let (shape, values) = if kind == "npy" {
-        let (shape, values) = io::read_npy(&file).map_err(wrong)?;
+        let (shape, values) = formats::read_npy(&file).map_err(wrong)?;
         let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
             let message = format!("the array has shape {shape:?}; a cell has three dimensions [x, y, z]");
             wrong(Fault::new("", message))
         })?;
         (shape, values)
-    } else if io::READABLE.contains(&kind.as_str()) {
-        let mesh = io::read_mesh(&file, &kind).map_err(wrong)?.mesh;
+    } else if formats::READABLE.contains(&kind.as_str()) {
+        let mesh = formats::read_mesh(&file, &kind).map_err(wrong)?.mesh;
         let solid = MeshRegion::new(mesh, Repair::Auto).map_err(wrong)?;
         let (b, size) = (solid.bounds(), solid.bounds().size());
         let points: Vec<Vec3> = (0..CELL.pow(3))
@@ -57,7 +57,7 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
         let inside = |v: &f64| if *v < 0.0 { 1.0 } else { 0.0 };
         ([CELL; 3], values.iter().map(inside).collect())
     } else {
-        let known = io::READABLE.join(", ");
+        let known = formats::READABLE.join(", ");
         let message = format!("the name must end in npy, {known}; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     };
@@ -102,7 +102,7 @@ pub(super) fn grade(
 }
 
 /// The array of this name, or the only one.
-fn pick<'a>(arrays: &'a [io::Array], name: Option<&str>) -> Result<&'a io::Array, String> {
+fn pick<'a>(arrays: &'a [formats::Array], name: Option<&str>) -> Result<&'a formats::Array, String> {
     let listed = || {
         let names: Vec<String> = arrays
             .iter()

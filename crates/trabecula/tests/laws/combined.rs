@@ -5,12 +5,12 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use geometry::math::{Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
+use geometry::progress::Silent;
 use trabecula::cell::Part;
 use trabecula::extract::{Islands, surface};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
-use trabecula::progress::Silent;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;

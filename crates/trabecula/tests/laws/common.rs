@@ -7,6 +7,8 @@ use std::sync::Arc;
 use geometry::math::Vec3;
 use geometry::measure::{non_manifold_vertices, self_intersections, size};
 use geometry::mesh::Mesh;
+use geometry::progress::{Silent, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
 use trabecula::extract::{Islands, Summary, stream_stl};
@@ -14,10 +16,8 @@ use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
-use trabecula::surface_mesh::SurfaceMesh;
 
 pub fn ball(center: Vec3, radius: f64) -> Region {
     Arc::new(Sphere::new(center, radius).expect("ball"))
@@ -155,7 +155,7 @@ pub fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Su
 /// The mesh as a file of its triangles in their order.
 pub fn stl(s: &SurfaceMesh) -> Vec<u8> {
     let mut bytes = Vec::new();
-    trabecula::io::write_mesh(&s.mesh, "stl", &Default::default(), &mut bytes).expect("memory");
+    geometry::formats::write_mesh(&s.mesh, "stl", &Default::default(), &mut bytes).expect("memory");
     bytes
 }
 

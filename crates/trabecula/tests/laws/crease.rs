@@ -6,16 +6,16 @@ use std::sync::Arc;
 
 use geometry::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use geometry::mesh::Mesh;
+use geometry::progress::Silent;
+use geometry::surface_mesh::SurfaceMesh;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
-use trabecula::progress::Silent;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
-use trabecula::surface_mesh::SurfaceMesh;
 
 use super::common::{Random, cases, check, check_both, cuboid, lattice};
 

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use crate::common::{Random, cases, fault_of, lattice};
 use geometry::math::{Vec3, add, apply, cross, norm, rotation, scale, sub, unit};
 use geometry::mesh::Mesh;
+use geometry::progress::Silent;
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::field::Field;
-use trabecula::progress::Silent;
 use trabecula::region::{CAPPED, MeshRegion, Repair, Shape};
 use trabecula::solid::Solid;
 

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use crate::common::{Random, cases, fault_of, lattice};
 use geometry::math::{Mat3, Vec3, add, apply, rotation, scale};
 use geometry::mesh::Mesh;
+use geometry::progress::Silent;
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
-use trabecula::progress::Silent;
 use trabecula::region::{
     Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
 };

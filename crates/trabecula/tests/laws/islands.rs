@@ -3,13 +3,13 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
+use geometry::formats::read_mesh;
 use geometry::measure::size;
 use geometry::mesh::Mesh;
+use geometry::progress::{Progress, Silent, Stopped};
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{Islands, Pieces, stream_stl, surface, surface_of};
-use trabecula::io::read_mesh;
-use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
 

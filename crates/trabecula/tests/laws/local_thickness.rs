@@ -5,16 +5,16 @@ use std::sync::Arc;
 use geometry::math::{Vec3, add, apply, rotation};
 use geometry::measure::size;
 use geometry::mesh::Mesh;
+use geometry::progress::{Progress, Silent, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 use trabecula::analysis::{Spread, thickness, usual_step, voxels_for};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
-use trabecula::surface_mesh::SurfaceMesh;
 
 fn bare(mesh: Mesh) -> SurfaceMesh {
     SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use geometry::math::{Aabb, Vec3, determinant, norm, sub};
 use geometry::measure::{is_embedded, size};
+use geometry::progress::Silent;
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Map, Orientation, Phase, Settings, Wanted};
-use trabecula::progress::Silent;
 use trabecula::region::{Cuboid, Region};
 use trabecula::solid::Solid;
 

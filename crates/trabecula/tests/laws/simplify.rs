@@ -7,15 +7,15 @@ use std::sync::Arc;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::measure::size;
 use geometry::mesh::Mesh;
+use geometry::progress::{Progress, Silent, Stopped};
+use geometry::simplify::{Goal, Report, simplify};
+use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
-use trabecula::progress::{Progress, Silent, Stopped};
 use trabecula::region::{Cuboid, Cylinder, Region};
-use trabecula::simplify::{Goal, Report, simplify};
-use trabecula::surface_mesh::SurfaceMesh;
 
 use crate::common::{ball, check, drawn, lattice_at, region, solid};
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use geometry::math::{Aabb, Interval, Vec3, norm, sub};
 use geometry::mesh::Mesh;
+use geometry::progress::Silent;
 use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::{surface, voxels};
 use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
-use trabecula::progress::Silent;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;

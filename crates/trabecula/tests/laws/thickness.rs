@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use geometry::math::{Aabb, Mat3, Vec3, add, apply, dot, norm, scale, sub, transpose, unit};
+use geometry::progress::Silent;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
 use trabecula::extract::surface;
@@ -12,7 +13,6 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::progress::Silent;
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;
 

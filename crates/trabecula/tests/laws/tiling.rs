@@ -7,6 +7,8 @@ use std::sync::Arc;
 use crate::common::{Random, ball, cases, check, fault};
 use geometry::math::norm;
 use geometry::measure::size;
+use geometry::progress::{Silent, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 use geometry::symmetry::{Group, Side};
 use geometry::tetmesh::TetMesh;
 use trabecula::cell::tet::{Stencil, ready, ready_cells};
@@ -16,10 +18,8 @@ use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
 use trabecula::mesher::background;
-use trabecula::progress::{Silent, Stopped};
 use trabecula::region::{MeshRegion, Repair};
 use trabecula::solid::Solid;
-use trabecula::surface_mesh::SurfaceMesh;
 use trabecula::tiling::{Amount, Level, Share, Tiling};
 
 /// n³ cubes of six tetrahedra each, nodes moved about and numbered at random.
@@ -251,7 +251,7 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
     let (told, bytes) = &streams[0];
     assert_eq!(told.pieces, pieces);
     assert!((told.volume / surface.mesh.volume() - 1.0).abs() < 1e-12);
-    let back = trabecula::io::read_mesh(bytes, "stl").expect("STL").mesh;
+    let back = geometry::formats::read_mesh(bytes, "stl").expect("STL").mesh;
     assert_eq!(back.triangles.len(), surface.mesh.triangles.len());
     assert_eq!(fault(&back), None);
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use geometry::math::{Aabb, Vec3};
+use geometry::progress::Silent;
 use trabecula::blend::{Blend, By, Constituent, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, Loader};
@@ -11,7 +12,6 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
-use trabecula::progress::Silent;
 
 use crate::common::check;
 

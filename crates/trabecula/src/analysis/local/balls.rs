@@ -11,8 +11,8 @@ use super::bits::{Bits, masks, ones};
 use super::lines::{NONE, Shape, Site};
 use super::nearest::apart;
 use super::{Grid, Watch};
-use crate::progress::Stopped;
 use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
+use geometry::progress::Stopped;
 
 /// Two touching places whose directions differ by less than 30° are one: the surface is smooth between them.
 const SMOOTH: f64 = 0.866;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::Watch;
 use super::lines::{Lines, NONE, Site};
-use crate::progress::Stopped;
+use geometry::progress::Stopped;
 
 /// Passes over the grid's layers, as they are counted by the watch.
 pub(super) const PASSES: [usize; 3] = [0, 2, 2];
@@ -213,8 +213,8 @@ impl Envelope {
 mod tests {
     use super::*;
     use crate::analysis::local::lines::Shape;
-    use crate::progress::Silent;
     use geometry::mesh::samples::torus;
+    use geometry::progress::Silent;
 
     #[test]
     fn every_voxel_finds_the_nearest_of_all_sites() {

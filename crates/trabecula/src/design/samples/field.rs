@@ -7,8 +7,8 @@ use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::grade::{Grade, Samples};
-use crate::io::{self, Shape};
 use geometry::fault::{Fault, counted, number};
+use geometry::formats::{self, Shape};
 use geometry::math::Aabb;
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
@@ -57,7 +57,7 @@ fn components(
     spec: &FieldSpec,
     path: &str,
     place: &Place,
-    choose: impl Fn(&io::Array) -> Result<Vec<usize>, DesignError>,
+    choose: impl Fn(&formats::Array) -> Result<Vec<usize>, DesignError>,
 ) -> Result<Vec<Samples>, DesignError> {
     let at = format!("{path}.path");
     let file = bytes(&spec.path, &at, place)?;
@@ -66,7 +66,7 @@ fn components(
         let message = format!("the name must end in vtu, vtk or vti; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     }
-    let data = io::read_vtk(&file).map_err(wrong)?;
+    let data = formats::read_vtk(&file).map_err(wrong)?;
     let array = pick(&data.arrays, Some(&spec.array))
         .map_err(|m| DesignError::new(format!("{path}.array"), m).found(&spec.array))?;
     if let Some(n) = array.values.iter().position(|v| !v.is_finite()) {

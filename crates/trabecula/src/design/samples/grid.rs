@@ -5,8 +5,8 @@ use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::grade::Samples;
-use crate::io::{self, Shape};
 use geometry::fault::Fault;
+use geometry::formats::{self, Shape};
 
 pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
@@ -16,7 +16,7 @@ pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Res
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let (origin, step, shape, values) = match extension(&spec.path).as_str() {
         "npy" => {
-            let (shape, values) = io::read_npy(&file).map_err(wrong)?;
+            let (shape, values) = formats::read_npy(&file).map_err(wrong)?;
             let shape: [usize; 3] = shape.clone().try_into().map_err(|_| {
                 wrong(Fault::new("", format!("the array has shape {shape:?}; a grid has three dimensions [x, y, z]")))
             })?;
@@ -31,7 +31,7 @@ pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Res
             (origin, step.three(), shape, values)
         }
         "vti" | "vtk" => {
-            let data = io::read_vtk(&file).map_err(wrong)?;
+            let data = formats::read_vtk(&file).map_err(wrong)?;
             let Shape::Image { origin, step, nodes } = data.shape else {
                 return Err(wrong(Fault::new("", "the file holds a mesh; use the grade field for it")));
             };
@@ -106,7 +106,7 @@ fn stack(spec: &GridSpec, at: &str, place: &Place) -> Result<([usize; 3], Vec<f6
     for name in &names {
         let wrong = |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
         let file = bytes(name, at, place)?;
-        for picture in io::read_pictures(&file).map_err(|f| wrong(f.message))? {
+        for picture in formats::read_pictures(&file).map_err(|f| wrong(f.message))? {
             let [w, h] = picture.size;
             let first = *size.get_or_insert(picture.size);
             if first != picture.size {

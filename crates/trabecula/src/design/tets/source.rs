@@ -5,12 +5,12 @@ use crate::design::data::*;
 use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::extract;
-use crate::io::{self, Elements, Shape};
-use crate::progress::{Silent, Stopped};
 use crate::solid::Solid;
 use geometry::fault::{Fault, number};
+use geometry::formats::{self, Elements, Shape};
 use geometry::math::scale;
 use geometry::mesh::Mesh;
+use geometry::progress::{Silent, Stopped};
 use geometry::tetmesh::{Checked, TetMesh};
 
 /// Names under which programs write the zones of cells.
@@ -35,7 +35,7 @@ pub(super) fn triangles(file: &MeshSpec, loader: &dyn Loader) -> Result<Mesh, De
     let path = "region.mesh.path";
     let bytes = loader.load(&file.path).map_err(|e| DesignError::new(path, e).found(&file.path))?;
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e);
-    let loaded = io::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
+    let loaded = formats::read_mesh(&bytes, kind).map_err(|f| DesignError::fault(path, f))?;
     let unit = file.unit.map_or(1.0, Unit::in_mm) * file.scale;
     let mut mesh = loaded.mesh;
     mesh.vertices.iter_mut().for_each(|p| *p = scale(*p, unit));
@@ -77,7 +77,7 @@ pub(super) fn from_file(
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
     let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
         let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
-        let data = io::read_vtk(&bytes).map_err(wrong)?;
+        let data = formats::read_vtk(&bytes).map_err(wrong)?;
         let Shape::Mesh(elements) = data.shape else {
             let message = format!("{}: an image; a mesh of tetrahedra is needed", file.path);
             return Err(DesignError::new(at, message).found(&file.path));

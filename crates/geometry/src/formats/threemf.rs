@@ -1,0 +1,91 @@
+//! 3MF, core specification: one object in millimetres, with the design that it came from as metadata.
+//!
+//! Source: 3MF Consortium, 3D Manufacturing Format Core Specification 1.2; ECMA-376-2, Open Packaging Conventions.
+
+use std::io::{self, Write};
+
+use super::number::{push_f32, push_u32};
+use super::{Metadata, in_order, invalid};
+use crate::mesh::Mesh;
+
+mod deflate;
+mod read;
+pub(super) mod xml;
+mod zip;
+
+pub use read::read;
+
+const MODEL: &str = "3D/3dmodel.model";
+const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+const TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>
+"#;
+const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="rel0" Target="/3D/3dmodel.model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>
+"#;
+
+/// Writes 3MF. Coordinates are rounded to single precision, which is what readers of the format hold.
+///
+/// The model is deflated in pieces on all threads; the pieces join to one stream, since each ends at a byte.
+pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
+    if mesh.vertices.len() >= i32::MAX as usize || mesh.triangles.len() >= i32::MAX as usize {
+        return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
+    }
+    let mut model = zip::Entry::new(MODEL);
+    let mut head = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\" \
+         xmlns:trabecula=\"urn:trabecula:design\">\n"
+    );
+    let facts = [("Title", &meta.title), ("Application", &meta.application), ("trabecula:Design", &meta.design)];
+    for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
+        head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", xml::escaped(text)));
+    }
+    head.push_str("<resources>\n<object id=\"1\" type=\"model\">\n<mesh>\n<vertices>\n");
+    model.push(zip::deflate(head.as_bytes()));
+    let points = |r: std::ops::Range<usize>| {
+        let mut text = Vec::with_capacity(r.len() * 48);
+        for p in &mesh.vertices[r] {
+            let [x, y, z] = p.map(|v| v as f32);
+            text.extend_from_slice(b"<vertex x=\"");
+            push_f32(&mut text, x);
+            text.extend_from_slice(b"\" y=\"");
+            push_f32(&mut text, y);
+            text.extend_from_slice(b"\" z=\"");
+            push_f32(&mut text, z);
+            text.extend_from_slice(b"\"/>\n");
+        }
+        zip::deflate_rows(&text)
+    };
+    let mut put = |piece| {
+        model.push(piece);
+        Ok(())
+    };
+    in_order(mesh.vertices.len(), 1 << 14, points, &mut put)?;
+    put(zip::deflate(b"</vertices>\n<triangles>\n"))?;
+    let faces = |r: std::ops::Range<usize>| {
+        let mut text = Vec::with_capacity(r.len() * 56);
+        for [a, b, c] in &mesh.triangles[r] {
+            text.extend_from_slice(b"<triangle v1=\"");
+            push_u32(&mut text, *a);
+            text.extend_from_slice(b"\" v2=\"");
+            push_u32(&mut text, *b);
+            text.extend_from_slice(b"\" v3=\"");
+            push_u32(&mut text, *c);
+            text.extend_from_slice(b"\"/>\n");
+        }
+        zip::deflate_rows(&text)
+    };
+    in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)?;
+    let tail = "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
+    put(zip::deflate(tail.as_bytes()))?;
+    let mut types = zip::Entry::new("[Content_Types].xml");
+    types.push(zip::deflate(TYPES.as_bytes()));
+    let mut relations = zip::Entry::new("_rels/.rels");
+    relations.push(zip::deflate(RELATIONS.as_bytes()));
+    zip::write(&[types, relations, model], zip::LIMIT, out)
+}

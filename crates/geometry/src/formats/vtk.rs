@@ -1,0 +1,440 @@
+//! Results on grids and meshes in VTK's formats: image data (VTI), unstructured grids (VTU), and the legacy format (VTK).
+//!
+//! Source: Kitware, VTK File Formats.
+
+mod legacy;
+
+use std::io::Read;
+
+use super::elements::Elements;
+use super::text::shown;
+use super::threemf::xml::{Event, Scanner, attribute};
+use crate::fault::Fault;
+use crate::math::Vec3;
+
+/// A named array with so many numbers for each point or cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Its name.
+    pub name: String,
+    /// Whether it belongs to cells rather than points.
+    pub of_cells: bool,
+    /// Numbers for each point or cell.
+    pub components: usize,
+    /// All of them.
+    pub values: Vec<f64>,
+}
+
+/// Where arrays are given.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Nodes of a grid along the axes, x fastest.
+    Image {
+        /// The first node, mm.
+        origin: Vec3,
+        /// Steps, mm.
+        step: Vec3,
+        /// Nodes along each axis.
+        nodes: [usize; 3],
+    },
+    /// Points and cells.
+    Mesh(Elements),
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Data {
+    /// Where.
+    pub shape: Shape,
+    /// What.
+    pub arrays: Vec<Array>,
+}
+
+pub(super) fn fault(message: impl Into<String>) -> Fault {
+    Fault::new("", message)
+}
+
+/// Reads VTI, VTU (ASCII, base64 or raw, compressed by zlib or not) or legacy VTK (ASCII or binary).
+///
+/// **Errors**: what is none of these; truncated or malformed files; other data sets.
+pub fn read_vtk(bytes: &[u8]) -> Result<Data, Fault> {
+    if bytes.trim_ascii_start().starts_with(b"# vtk") {
+        return legacy::read(bytes);
+    }
+    xml(bytes)
+}
+
+/// A `DataArray` element, not yet decoded.
+struct Raw<'a> {
+    name: String,
+    kind: String,
+    components: usize,
+    format: String,
+    offset: usize,
+    text: &'a [u8],
+    section: String,
+}
+
+/// How the numbers of a file are laid down.
+struct Layout<'a> {
+    big: bool,
+    wide: bool,
+    zlib: bool,
+    /// Bytes after the underscore of the appended data, and whether they are base64.
+    appended: Option<(&'a [u8], bool)>,
+}
+
+fn find(bytes: &[u8], what: &[u8]) -> Option<usize> {
+    bytes.windows(what.len()).position(|w| w == what)
+}
+
+fn xml(bytes: &[u8]) -> Result<Data, Fault> {
+    let appended = find(bytes, b"<AppendedData");
+    // What comes after may be raw bytes and is no XML.
+    let head = &bytes[..appended.unwrap_or(bytes.len())];
+    let mut layout = Layout { big: false, wide: false, zlib: false, appended: None };
+    if let Some(at) = appended {
+        let rest = &bytes[at..];
+        let end = find(rest, b">").ok_or_else(|| fault("the file ends early: truncated"))?;
+        let base64 = attribute(&rest[13..end], "encoding").is_some_and(|e| &*e == b"base64");
+        let from = find(&rest[end..], b"_").ok_or_else(|| fault("the appended data are missing"))?;
+        layout.appended = Some((&rest[end + from + 1..], base64));
+    }
+    let mut scanner = Scanner::of(head, "VTK file");
+    let (mut section, mut raw): (String, Vec<Raw>) = (String::new(), Vec::new());
+    let (mut kind, mut extent, mut origin, mut step) = (String::new(), None, [0.0; 3], [1.0; 3]);
+    let (mut points, mut cells) = (0, 0);
+    let (mut root, mut pieces) = (false, 0);
+    let text = |of: &[u8], name: &str| attribute(of, name).map(|v| String::from_utf8_lossy(&v).into_owned());
+    let three = |of: &[u8], name: &str| -> Result<Option<Vec3>, Fault> {
+        let Some(t) = text(of, name) else {
+            return Ok(None);
+        };
+        let v: Vec<f64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+        v.try_into().map(Some).map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
+    };
+    loop {
+        let event = match scanner.next() {
+            Ok(Some(e)) => e,
+            Ok(None) => break,
+            // The root has no end before the appended data.
+            Err(_) if appended.is_some() => break,
+            Err(e) => return Err(e),
+        };
+        let Event::Start { name, attributes, .. } = event else {
+            continue;
+        };
+        match name {
+            b"VTKFile" => {
+                root = true;
+                kind = text(attributes, "type").unwrap_or_default();
+                layout.big = text(attributes, "byte_order").as_deref() == Some("BigEndian");
+                layout.wide = text(attributes, "header_type").as_deref() == Some("UInt64");
+                layout.zlib = match text(attributes, "compressor").as_deref() {
+                    None => false,
+                    Some("vtkZLibDataCompressor") => true,
+                    Some(other) => {
+                        return Err(fault(format!("compressed by {other}; save it compressed by zlib or not at all")));
+                    }
+                };
+                if kind != "ImageData" && kind != "UnstructuredGrid" {
+                    return Err(fault(format!(
+                        "a VTK file of {kind}; ImageData (vti) and UnstructuredGrid (vtu) are read"
+                    )));
+                }
+            }
+            b"ImageData" => {
+                origin = three(attributes, "Origin")?.unwrap_or(origin);
+                step = three(attributes, "Spacing")?.unwrap_or(step);
+                let t = text(attributes, "WholeExtent").unwrap_or_default();
+                let v: Vec<i64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+                extent = <[i64; 6]>::try_from(v).ok();
+            }
+            b"Piece" => {
+                pieces += 1;
+                let number = |n: &str| text(attributes, n).and_then(|t| t.parse().ok()).unwrap_or(0usize);
+                (points, cells) = (number("NumberOfPoints"), number("NumberOfCells"));
+            }
+            b"PointData" | b"CellData" | b"Points" | b"Cells" => {
+                section = String::from_utf8_lossy(name).into_owned();
+            }
+            b"DataArray" => {
+                let from = scanner.at();
+                let end = find(&head[from..], b"<").map_or(head.len(), |e| from + e);
+                raw.push(Raw {
+                    name: text(attributes, "Name").unwrap_or_default(),
+                    kind: text(attributes, "type").unwrap_or_default(),
+                    components: text(attributes, "NumberOfComponents").and_then(|t| t.parse().ok()).unwrap_or(1),
+                    format: text(attributes, "format").unwrap_or_else(|| "ascii".into()),
+                    offset: text(attributes, "offset").and_then(|t| t.parse().ok()).unwrap_or(0),
+                    text: &head[from..end],
+                    section: section.clone(),
+                });
+            }
+            _ => {}
+        }
+    }
+    if !root {
+        return Err(fault("no VTK file: it begins neither with \"# vtk\" nor has an element VTKFile"));
+    }
+    if pieces != 1 {
+        return Err(fault(format!("a file of {pieces} pieces; save it as one")));
+    }
+    let mut arrays = Vec::new();
+    let (mut place, mut connectivity, mut offsets, mut types) = (None, None, None, None);
+    for r in &raw {
+        let values = decode(r, &layout).map_err(|f| fault(format!("array \"{}\": {}", r.name, f.message)))?;
+        match (r.section.as_str(), r.name.as_str()) {
+            ("Points", _) => place = Some(values),
+            ("Cells", "connectivity") => connectivity = Some(values),
+            ("Cells", "offsets") => offsets = Some(values),
+            ("Cells", "types") => types = Some(values),
+            ("PointData" | "CellData", _) => arrays.push(Array {
+                name: r.name.clone(),
+                of_cells: r.section == "CellData",
+                components: r.components.max(1),
+                values,
+            }),
+            _ => {}
+        }
+    }
+    let shape = if kind == "ImageData" {
+        let e = extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
+        let nodes = core::array::from_fn(|a| (e[2 * a + 1] - e[2 * a] + 1).clamp(1, 1 << 40) as usize);
+        points = nodes.iter().product();
+        cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).product();
+        Shape::Image { origin: core::array::from_fn(|a| origin[a] + e[2 * a] as f64 * step[a]), step, nodes }
+    } else {
+        let missing = |what: &str| fault(format!("the grid has no {what}"));
+        let place = place.ok_or_else(|| missing("points"))?;
+        let (connectivity, offsets, types) = (
+            connectivity.ok_or_else(|| missing("connectivity"))?,
+            offsets.ok_or_else(|| missing("offsets"))?,
+            types.ok_or_else(|| missing("cell types"))?,
+        );
+        if place.len() != 3 * points || types.len() != cells || offsets.len() != cells {
+            return Err(fault(format!(
+                "the grid says {points} points and {cells} cells, and has {} and {}",
+                place.len() / 3,
+                types.len()
+            )));
+        }
+        Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?)
+    };
+    check(&arrays, points, cells)?;
+    Ok(Data { shape, arrays })
+}
+
+/// Refuses arrays that do not have a tuple for each point or cell.
+pub(super) fn check(arrays: &[Array], points: usize, cells: usize) -> Result<(), Fault> {
+    for a in arrays {
+        let (count, what) = if a.of_cells { (cells, "cells") } else { (points, "points") };
+        if count.checked_mul(a.components) != Some(a.values.len()) {
+            return Err(fault(format!(
+                "array \"{}\" has {} numbers; {count} {what} of {} components need {}",
+                a.name,
+                a.values.len(),
+                a.components,
+                count.saturating_mul(a.components)
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn decode(r: &Raw, layout: &Layout) -> Result<Vec<f64>, Fault> {
+    let bytes = match r.format.as_str() {
+        "ascii" => {
+            let words = r.text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+            return words
+                .map(|w| super::text::parse(w).ok_or_else(|| fault(format!("{} is not a number", shown(w)))))
+                .collect();
+        }
+        "binary" => blocks(&unbase64(r.text, layout)?, layout)?,
+        "appended" => {
+            let (all, base64) = layout.appended.ok_or_else(|| fault("the file has no appended data"))?;
+            let from = all.get(r.offset..).ok_or_else(|| fault("its data begin after the end of the file"))?;
+            if base64 { blocks(&unbase64(from, layout)?, layout)? } else { blocks(from, layout)? }
+        }
+        other => return Err(fault(format!("the format \"{other}\" is not known"))),
+    };
+    numbers(&bytes, &r.kind, layout.big)
+}
+
+/// Numbers of a VTK type from bytes.
+pub(super) fn numbers(bytes: &[u8], kind: &str, big: bool) -> Result<Vec<f64>, Fault> {
+    let width = match kind {
+        "Float64" | "Int64" | "UInt64" => 8,
+        "Float32" | "Int32" | "UInt32" => 4,
+        "Int16" | "UInt16" => 2,
+        "Int8" | "UInt8" => 1,
+        _ => return Err(fault(format!("the type \"{kind}\" is not a number"))),
+    };
+    let read = |b: &[u8]| {
+        let mut w = [0u8; 8];
+        for (i, v) in b.iter().enumerate() {
+            w[if big { width - 1 - i } else { i }] = *v;
+        }
+        let v = u64::from_le_bytes(w);
+        match kind {
+            "Float64" => f64::from_bits(v),
+            "Float32" => f64::from(f32::from_bits(v as u32)),
+            "Int64" => v as i64 as f64,
+            "Int32" => f64::from(v as u32 as i32),
+            "Int16" => f64::from(v as u16 as i16),
+            "Int8" => f64::from(v as u8 as i8),
+            _ => v as f64,
+        }
+    };
+    Ok(bytes.chunks_exact(width).map(read).collect())
+}
+
+/// A number of the header's width at `at`.
+fn header(bytes: &[u8], at: usize, layout: &Layout) -> Result<usize, Fault> {
+    let width = if layout.wide { 8 } else { 4 };
+    let kind = if layout.wide { "UInt64" } else { "UInt32" };
+    let cut = || fault("its data end early: truncated");
+    let b = bytes.get(at * width..(at + 1) * width).ok_or_else(cut)?;
+    Ok(numbers(b, kind, layout.big)?[0] as usize)
+}
+
+/// The bytes behind a header: their number, or the blocks that they are compressed in.
+fn blocks(bytes: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
+    let width = if layout.wide { 8 } else { 4 };
+    let cut = || fault("its data end early: truncated");
+    if !layout.zlib {
+        let n = header(bytes, 0, layout)?;
+        let end = n.checked_add(width).ok_or_else(cut)?;
+        return Ok(bytes.get(width..end).ok_or_else(cut)?.to_vec());
+    }
+    let count = header(bytes, 0, layout)?;
+    let mut at = count.checked_add(3).and_then(|n| n.checked_mul(width)).ok_or_else(cut)?;
+    let mut out = Vec::new();
+    for i in 0..count {
+        let end = at.checked_add(header(bytes, 3 + i, layout)?).ok_or_else(cut)?;
+        let block = bytes.get(at..end).ok_or_else(cut)?;
+        flate2::read::ZlibDecoder::new(block)
+            .read_to_end(&mut out)
+            .map_err(|e| fault(format!("its compressed data are damaged: {e}")))?;
+        at = end;
+    }
+    Ok(out)
+}
+
+/// Base64 up to the first byte that is none; headers and data are encoded apart and joined.
+fn unbase64(text: &[u8], layout: &Layout) -> Result<Vec<u8>, Fault> {
+    let digit = |b: u8| match b {
+        b'A'..=b'Z' => Some(b - b'A'),
+        b'a'..=b'z' => Some(b - b'a' + 26),
+        b'0'..=b'9' => Some(b - b'0' + 52),
+        b'+' => Some(62),
+        b'/' => Some(63),
+        _ => None,
+    };
+    let mut out = Vec::new();
+    let (mut bits, mut held, mut begun) = (0u32, 0, false);
+    for &b in text.iter().filter(|b| !b.is_ascii_whitespace()) {
+        if b == b'=' {
+            // The end of a run of its own.
+            (bits, held, begun) = (0, 0, true);
+            continue;
+        }
+        let Some(d) = digit(b) else {
+            if begun || !out.is_empty() {
+                break;
+            }
+            return Err(fault(format!("{} is not base64", shown(&[b]))));
+        };
+        bits = bits << 6 | u32::from(d);
+        held += 6;
+        if held >= 8 {
+            held -= 8;
+            out.push((bits >> held) as u8);
+            bits &= (1 << held) - 1;
+        }
+        // More than one array may follow in appended data.
+        if layout.appended.is_some() && out.len() > text.len() {
+            break;
+        }
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const HEX: &str = r#"<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">
+<UnstructuredGrid><Piece NumberOfPoints="8" NumberOfCells="1">
+<PointData><DataArray type="Float32" Name="T" format="ascii">0 1 2 3 4 5 6 7</DataArray></PointData>
+<CellData><DataArray type="Float64" Name="S" NumberOfComponents="6" format="ascii">1 2 3 4 5 6</DataArray></CellData>
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1</DataArray></Points>
+<Cells><DataArray type="Int32" Name="connectivity" format="ascii">0 1 2 3 4 5 6 7</DataArray>
+<DataArray type="Int32" Name="offsets" format="ascii">8</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">12</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>"#;
+
+    #[test]
+    fn a_hexahedron_is_cut_into_its_whole_volume() {
+        let data = read_vtk(HEX.as_bytes()).unwrap();
+        let Shape::Mesh(elements) = &data.shape else { panic!("mesh") };
+        let (points, (tets, of)) = (&elements.points, elements.tets());
+        let volume: f64 = tets
+            .iter()
+            .map(|t| {
+                let p = t.map(|i| points[i as usize]);
+                let e = [1, 2, 3].map(|i| crate::math::sub(p[i], p[0]));
+                crate::math::determinant(&e) / 6.0
+            })
+            .sum();
+        assert!((volume - 1.0).abs() < 1e-15 && of.iter().all(|c| *c == 0));
+        assert_eq!(data.arrays[0].values, (0..8).map(f64::from).collect::<Vec<_>>());
+        assert_eq!((data.arrays[1].of_cells, data.arrays[1].components), (true, 6));
+    }
+
+    #[test]
+    fn encodings_agree_and_damage_is_refused() {
+        let base64 = |b: &[u8]| {
+            const D: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+            let mut out = String::new();
+            for c in b.chunks(3) {
+                let v = u32::from(c[0]) << 16
+                    | u32::from(*c.get(1).unwrap_or(&0)) << 8
+                    | u32::from(*c.get(2).unwrap_or(&0));
+                for i in 0..4 {
+                    out.push(if i <= c.len() { D[(v >> (18 - 6 * i) & 63) as usize] as char } else { '=' });
+                }
+            }
+            out
+        };
+        let values: Vec<u8> = (0..8).flat_map(|v| (v as f32).to_le_bytes()).collect();
+        let plain = base64(&[&32u32.to_le_bytes()[..], &values].concat());
+        let inline = HEX.replace(
+            "format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>",
+            &format!("format=\"binary\">{plain}</DataArray></PointData>"),
+        );
+        assert_eq!(read_vtk(inline.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
+        let mut packed = Vec::new();
+        flate2::read::ZlibEncoder::new(&values[..], flate2::Compression::default()).read_to_end(&mut packed).unwrap();
+        let heads: Vec<u8> = [1u32, 32, 0, packed.len() as u32].iter().flat_map(|v| v.to_le_bytes()).collect();
+        // Other arrays are ASCII still; the compressor is named for the file.
+        let text = format!("{}{}", base64(&heads), base64(&packed));
+        let zlib = inline
+            .replace(&plain, &text)
+            .replace("version=\"0.1\"", "version=\"0.1\" compressor=\"vtkZLibDataCompressor\"");
+        assert_eq!(read_vtk(zlib.as_bytes()).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
+        let raw = HEX.replace(
+            "format=\"ascii\">0 1 2 3 4 5 6 7</DataArray></PointData>",
+            "format=\"appended\" offset=\"0\"/></PointData>",
+        );
+        let raw = raw.replace("</VTKFile>", "<AppendedData encoding=\"raw\">_");
+        let raw = [raw.as_bytes(), &32u32.to_le_bytes(), &values, b"</AppendedData></VTKFile>"].concat();
+        assert_eq!(read_vtk(&raw).unwrap(), read_vtk(HEX.as_bytes()).unwrap());
+        for bytes in [inline.as_bytes(), &raw] {
+            for n in (0..bytes.len() - 40).step_by(7) {
+                assert!(read_vtk(&bytes[..n]).is_err(), "{n}");
+            }
+        }
+    }
+}

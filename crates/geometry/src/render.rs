@@ -1,0 +1,163 @@
+//! Pictures of meshes, drawn on the processor.
+
+use rayon::prelude::*;
+
+use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::surface_mesh::SurfaceMesh;
+
+mod chart;
+mod font;
+mod paper;
+mod png;
+mod raster;
+mod shade;
+mod tint;
+
+pub use chart::{Chart, charts};
+use paper::Paper;
+pub use png::png;
+use raster::Raster;
+pub use tint::Tint;
+
+/// How to draw.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Pixels across and down.
+    pub size: [usize; 2],
+    /// Direction from which the camera looks: azimuth about +Z (degrees from +X towards +Y).
+    pub azimuth: f64,
+    /// Elevation above the XY plane, degrees.
+    pub elevation: f64,
+}
+
+/// The largest picture, in pixels.
+const LARGEST: usize = 1 << 26;
+/// Samples along each side of a pixel.
+const OVER: usize = 3;
+/// Samples drawn at once, more or less; larger pictures get fewer samples a pixel.
+const SAMPLES: usize = 6_000_000;
+
+/// Where the eye is and how it sees: right, up, and from the scene to the eye.
+struct Camera {
+    center: Vec3,
+    axes: [Vec3; 3],
+    /// Distance from the centre (mm).
+    distance: f64,
+    /// Samples per unit of slope.
+    focal: f64,
+    middle: [f64; 2],
+}
+
+impl Camera {
+    /// A camera with a narrow lens, such that the points fill the picture but for a margin.
+    fn new(bounds: &Aabb, points: &[Vec3], view: &View, size: [usize; 2]) -> Camera {
+        let (az, el) = (view.azimuth.to_radians(), view.elevation.clamp(-90.0, 90.0).to_radians());
+        let out = [az.cos() * el.cos(), az.sin() * el.cos(), el.sin()];
+        let right = [-az.sin(), az.cos(), 0.0];
+        let axes = [right, cross(out, right), out];
+        let radius = (norm(bounds.size()) / 2.0).max(1e-9);
+        let distance = radius * 6.0;
+        let mut camera =
+            Camera { center: bounds.center(), axes, distance, focal: 1.0, middle: size.map(|n| n as f64 / 2.0) };
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for p in points {
+            let [x, y, _] = camera.project(*p);
+            for (a, v) in [x, y].into_iter().enumerate() {
+                low[a] = low[a].min(v - camera.middle[a]);
+                high[a] = high[a].max(v - camera.middle[a]);
+            }
+        }
+        let room = [0, 1].map(|a| 0.92 * size[a] as f64 / (high[a] - low[a]).max(1e-12));
+        camera.focal = room[0].min(room[1]);
+        for a in 0..2 {
+            camera.middle[a] -= camera.focal * (low[a] + high[a]) / 2.0;
+        }
+        camera
+    }
+
+    /// Column, row (samples) and depth: the inverse distance along the view, greater when nearer.
+    fn project(&self, p: Vec3) -> [f64; 3] {
+        let d = sub(p, self.center);
+        let near = 1.0 / (self.distance - dot(d, self.axes[2]));
+        let k = self.focal * near;
+        [self.middle[0] + k * dot(d, self.axes[0]), self.middle[1] - k * dot(d, self.axes[1]), near]
+    }
+
+    /// The point of the scene behind a sample.
+    fn unproject(&self, x: f64, y: f64, near: f64) -> Vec3 {
+        let k = 1.0 / (self.focal * near);
+        let right = (x - self.middle[0]) * k;
+        let up = (self.middle[1] - y) * k;
+        let out = self.distance - 1.0 / near;
+        let axes = self.axes;
+        add(self.center, add(scale(axes[0], right), add(scale(axes[1], up), scale(axes[2], out))))
+    }
+
+    /// The direction from a point to the eye.
+    fn towards(&self, p: Vec3) -> Vec3 {
+        unit(sub(add(self.center, scale(self.axes[2], self.distance)), p))
+    }
+}
+
+/// Draws the surface; returns RGB rows from the top.
+///
+/// Perspective with a narrow lens, fitted to the bounds, +Z up. The lattice is smooth and warm, cuts by the region's
+/// boundary are flat and cool; with a tint, both have its colours. The picture is the same for any number of threads. A side of 0 pixels gives no
+/// rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
+pub fn render(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>) -> Vec<u8> {
+    let [w, h] = view.size;
+    let pixels = w.saturating_mul(h);
+    if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
+        return Vec::new();
+    }
+    let over = (1..=OVER).rev().find(|k| pixels * k * k <= SAMPLES).unwrap_or(1);
+    let size = [w * over, h * over];
+    let bounds = surface.mesh.bounds();
+    let drawn = !bounds.is_empty() && bounds.is_finite();
+    let angles = view.azimuth.is_finite() && view.elevation.is_finite();
+    let picture = if drawn && angles {
+        let camera = Camera::new(&bounds, &surface.mesh.vertices, view, size);
+        let raster = Raster::draw(surface, &camera, size);
+        shade::shade(surface, &camera, &raster, tint)
+    } else {
+        vec![[0.0; 4]; size[0] * size[1]]
+    };
+    let rgb = resolve(&picture, [w, h], over);
+    let Some(tint) = tint else { return rgb };
+    let mut paper = Paper { size: [w, h], rgb };
+    tint.legend(&mut paper);
+    paper.rgb
+}
+
+/// Averages the samples of each pixel over the background and encodes them as sRGB.
+fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], over: usize) -> Vec<u8> {
+    let mut rgb = vec![0u8; w * h * 3];
+    rgb.par_chunks_mut(w * 3).enumerate().for_each(|(y, row)| {
+        for x in 0..w {
+            let mut sum = [0.0f32; 4];
+            for j in 0..over {
+                let first = (y * over + j) * w * over + x * over;
+                for s in &picture[first..first + over] {
+                    (0..4).for_each(|k| sum[k] += s[k]);
+                }
+            }
+            let n = (over * over) as f32;
+            let back = shade::background((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32);
+            for k in 0..3 {
+                let v = (sum[k] + (n - sum[3]) * back[k]) / n;
+                row[3 * x + k] = encode(v);
+            }
+        }
+    });
+    rgb
+}
+
+/// Linear light to an sRGB byte.
+fn encode(v: f32) -> u8 {
+    let v = v.clamp(0.0, 1.0);
+    let s = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (s * 255.0 + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests;

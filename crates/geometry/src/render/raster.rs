@@ -1,0 +1,118 @@
+//! Which triangle each sample sees.
+
+use rayon::prelude::*;
+
+use super::Camera;
+use crate::math::sub;
+use crate::surface_mesh::SurfaceMesh;
+
+/// No triangle.
+pub(super) const NONE: u32 = u32::MAX;
+/// Rows drawn by one thread at a time.
+const BAND: usize = 48;
+
+/// Depth and triangle of each sample.
+pub(super) struct Raster {
+    /// Samples across and down.
+    pub size: [usize; 2],
+    /// Inverse distance, 0 where nothing is seen.
+    pub near: Vec<f32>,
+    /// The triangle seen.
+    pub triangle: Vec<u32>,
+}
+
+impl Raster {
+    /// Draws all triangles. Bands of rows are independent, and within one the triangles come in their own order, so
+    /// the result does not depend on the number of threads.
+    pub(super) fn draw(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Raster {
+        let mesh = &surface.mesh;
+        let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();
+        let rows = size[1].div_ceil(BAND);
+        // Triangles by the bands they touch, chunk by chunk so that their order is kept.
+        const CHUNK: usize = 1 << 16;
+        let binned: Vec<Vec<Vec<u32>>> = mesh
+            .triangles
+            .par_chunks(CHUNK)
+            .enumerate()
+            .map(|(c, part)| {
+                let mut bins = vec![Vec::new(); rows];
+                for (i, t) in part.iter().enumerate() {
+                    let y = t.map(|v| points[v as usize][1]);
+                    let (low, high) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
+                    if !(high >= 0.0 && low < size[1] as f32) {
+                        continue;
+                    }
+                    let first = (low.max(0.0) as usize / BAND).min(rows - 1);
+                    let last = (high as usize / BAND).min(rows - 1);
+                    for bin in &mut bins[first..=last] {
+                        bin.push((c * CHUNK + i) as u32);
+                    }
+                }
+                bins
+            })
+            .collect();
+        let mut near = vec![0.0f32; size[0] * size[1]];
+        let mut triangle = vec![NONE; size[0] * size[1]];
+        near.par_chunks_mut(BAND * size[0]).zip(triangle.par_chunks_mut(BAND * size[0])).enumerate().for_each(
+            |(band, (near, triangle))| {
+                for i in binned.iter().flat_map(|bins| &bins[band]) {
+                    let corners = mesh.triangles[*i as usize].map(|v| points[v as usize]);
+                    fill(corners, *i, size[0], band * BAND, near, triangle);
+                }
+            },
+        );
+        Raster { size, near, triangle }
+    }
+}
+
+/// Draws one triangle into rows that begin at `first`.
+fn fill(p: [[f32; 3]; 3], id: u32, width: usize, first: usize, near: &mut [f32], triangle: &mut [u32]) {
+    let p = p.map(|c| [c[0], c[1] - first as f32, c[2]]);
+    let [a, b, c] = p;
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    if area == 0.0 || !area.is_finite() {
+        return;
+    }
+    let rows = near.len() / width;
+    let span = |k: usize, end: usize| {
+        let low = a[k].min(b[k]).min(c[k]) - 0.5;
+        let high = a[k].max(b[k]).max(c[k]) - 0.5;
+        (low.ceil().max(0.0) as usize, ((high.floor() + 1.0).max(0.0) as usize).min(end))
+    };
+    let (x0, x1) = span(0, width);
+    let (y0, y1) = span(1, rows);
+    let inverse = 1.0 / area;
+    for y in y0..y1 {
+        let fy = y as f32 + 0.5;
+        for x in x0..x1 {
+            let fx = x as f32 + 0.5;
+            let u = ((b[0] - fx) * (c[1] - fy) - (b[1] - fy) * (c[0] - fx)) * inverse;
+            let v = ((c[0] - fx) * (a[1] - fy) - (c[1] - fy) * (a[0] - fx)) * inverse;
+            let w = 1.0 - u - v;
+            if u < 0.0 || v < 0.0 || w < 0.0 {
+                continue;
+            }
+            // The inverse distance is linear over the screen.
+            let z = u * a[2] + v * b[2] + w * c[2];
+            let at = y * width + x;
+            if z > near[at] {
+                near[at] = z;
+                triangle[at] = id;
+            }
+        }
+    }
+}
+
+/// Barycentric coordinates in space of the point `p` of triangle `i`.
+pub(super) fn weights(surface: &SurfaceMesh, i: u32, p: crate::math::Vec3) -> [f64; 3] {
+    use crate::math::{cross, dot};
+    let [a, b, c] = surface.mesh.corners(i as usize);
+    let n = cross(sub(b, a), sub(c, a));
+    let whole = dot(n, n);
+    if whole == 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let u = dot(n, cross(sub(b, p), sub(c, p))) / whole;
+    let v = dot(n, cross(sub(c, p), sub(a, p))) / whole;
+    [u, v, 1.0 - u - v].map(|w| w.clamp(0.0, 1.0))
+}

@@ -1,0 +1,141 @@
+use super::*;
+use crate::mesh::Mesh;
+
+/// A surface of a function on a cube by cutting the six tetrahedra of each grid cell, closed at the cube's faces.
+fn contour(n: usize, f: impl Fn(Vec3) -> f64) -> SurfaceMesh {
+    let mut s = SurfaceMesh::default();
+    let corner = |i: usize, k: usize| (i >> k) & 1;
+    let mut ids = std::collections::HashMap::new();
+    let point = |g: [usize; 3]| g.map(|c| c as f64 / n as f64);
+    // Nodes on the outermost planes are outside; a cut face is a triangle with all corners near such a plane.
+    let value = |g: [usize; 3]| {
+        if g.iter().any(|c| *c == 0 || *c == n) { 1e-3 + f(point(g)).max(0.0) } else { f(point(g)) }
+    };
+    for cell in 0..n * n * n {
+        let base = [cell % n, cell / n % n, cell / (n * n)];
+        for path in [[1, 2, 4], [1, 4, 2], [2, 1, 4], [2, 4, 1], [4, 1, 2], [4, 2, 1]] {
+            let ks = [0, path[0], path[0] + path[1], 7];
+            let nodes = ks.map(|k| [0, 1, 2].map(|a| base[a] + corner(k, a)));
+            let values = nodes.map(value);
+            let (inside, outside): (Vec<usize>, Vec<usize>) = (0..4).partition(|i| values[*i] < 0.0);
+            if inside.is_empty() || outside.is_empty() {
+                continue;
+            }
+            let mut vertex = |i: usize, j: usize| {
+                let (a, b) = (nodes[i].min(nodes[j]), nodes[i].max(nodes[j]));
+                *ids.entry((a, b)).or_insert_with(|| {
+                    let t = values[i] / (values[i] - values[j]);
+                    let (p, q) = (point(nodes[i]), point(nodes[j]));
+                    s.mesh.vertices.push(add(p, scale(sub(q, p), t)));
+                    s.mesh.vertices.len() as u32 - 1
+                })
+            };
+            let ring: Vec<u32> = match (inside.len(), outside.len()) {
+                (2, 2) => {
+                    [(0, 0), (0, 1), (1, 1), (1, 0)].iter().map(|&(i, j)| vertex(inside[i], outside[j])).collect()
+                }
+                _ => inside.iter().flat_map(|i| outside.iter().map(|j| (*i, *j))).map(|(i, j)| vertex(i, j)).collect(),
+            };
+            let out = sub(point(nodes[outside[0]]), point(nodes[inside[0]]));
+            for k in 1..ring.len() - 1 {
+                let mut t = [ring[0], ring[k], ring[k + 1]];
+                let [a, b, c] = t.map(|v| s.mesh.vertices[v as usize]);
+                if dot(cross(sub(b, a), sub(c, a)), out) < 0.0 {
+                    t.swap(1, 2);
+                }
+                let edge = 1.5 / n as f64;
+                let flat = (0..3)
+                    .any(|k| [a, b, c].iter().all(|p| p[k] < edge) || [a, b, c].iter().all(|p| p[k] > 1.0 - edge));
+                s.mesh.triangles.push(t);
+                s.cut.push(flat);
+            }
+        }
+    }
+    s
+}
+
+fn gyroid(cells: f64) -> impl Fn(Vec3) -> f64 {
+    move |p| {
+        let [(sx, cx), (sy, cy), (sz, cz)] = p.map(|v| (v * cells * core::f64::consts::TAU).sin_cos());
+        sx * cy + sy * cz + sz * cx
+    }
+}
+
+const VIEW: View = View { size: [160, 120], azimuth: 35.0, elevation: 25.0 };
+
+#[test]
+fn nothing_gives_the_background() {
+    let rgb = render(&SurfaceMesh::default(), &VIEW, None);
+    assert_eq!(rgb.len(), 160 * 120 * 3);
+    assert!(rgb.iter().all(|v| *v > 200));
+    assert!(render(&SurfaceMesh::default(), &View { size: [0, 9], ..VIEW }, None).is_empty());
+    assert!(render(&SurfaceMesh::default(), &View { size: [usize::MAX, 2], ..VIEW }, None).is_empty());
+}
+
+#[test]
+fn one_triangle_fills_what_it_should() {
+    let mesh =
+        Mesh { vertices: vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 1.0, 1.0]], triangles: vec![[0, 1, 2]] };
+    // Seen along −x it is half of a square that fills 92 % of the height.
+    let s = SurfaceMesh { mesh, cut: vec![false] };
+    let view = View { azimuth: 0.0, elevation: 0.0, size: [200, 200] };
+    let (with, without) = (render(&s, &view, None), render(&SurfaceMesh::default(), &view, None));
+    let pixels = with.chunks(3).zip(without.chunks(3)).filter(|(a, b)| a != b).count() as f64;
+    let want = 0.5 * (0.92f64 * 200.0).powi(2);
+    assert!((pixels / want - 1.0).abs() < 0.02, "{pixels} {want}");
+    // Every side sees something, even the back of an open mesh, a point, and a number that is none.
+    for azimuth in [90.0, 180.0, f64::NAN] {
+        assert_eq!(render(&s, &View { azimuth, ..view }, None).len(), 200 * 200 * 3);
+    }
+    let point = SurfaceMesh { mesh: Mesh { vertices: vec![[1.0; 3]], triangles: vec![[0, 0, 0]] }, cut: vec![] };
+    assert_eq!(render(&point, &view, None), without);
+}
+
+#[test]
+fn nearer_hides_farther_and_cut_differs_from_lattice() {
+    let square = |x: f64| [[x, -1.0, -1.0], [x, 1.0, -1.0], [x, 1.0, 1.0], [x, -1.0, 1.0]];
+    let mesh = Mesh {
+        vertices: [square(0.0), square(0.1)].concat(),
+        triangles: vec![[4, 5, 6], [4, 6, 7], [0, 1, 2], [0, 2, 3]],
+    };
+    let s = SurfaceMesh { mesh, cut: vec![true, true, false, false] };
+    let view = View { azimuth: 0.0, elevation: 0.0, size: [60, 60] };
+    let middle = |rgb: Vec<u8>| [0, 1, 2].map(|k| rgb[(30 * 60 + 30) * 3 + k]);
+    let front = middle(render(&s, &view, None));
+    let back = middle(render(&s, &View { azimuth: 180.0, ..view }, None));
+    assert!(front[2] > front[0], "the cut is bluish: {front:?}");
+    assert!(back[0] > back[2], "the lattice is warm: {back:?}");
+}
+
+#[test]
+fn the_number_of_threads_does_not_show() {
+    let s = contour(24, gyroid(2.0));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let many = rayon::ThreadPoolBuilder::new().num_threads(5).build();
+    let (Ok(one), Ok(many)) = (one, many) else {
+        return;
+    };
+    assert_eq!(one.install(|| render(&s, &VIEW, None)), many.install(|| render(&s, &VIEW, None)));
+}
+
+#[test]
+#[ignore = "writes pictures to look at"]
+fn gallery() {
+    let dir = std::env::temp_dir();
+    for (name, s) in
+        [("network", contour(160, |p| gyroid(3.0)(p) + 0.25)), ("sheet", contour(160, |p| gyroid(3.0)(p).abs() - 0.3))]
+    {
+        let view = View { size: [1200, 900], azimuth: 35.0, elevation: 28.0 };
+        let t = std::time::Instant::now();
+        let rgb = render(&s, &view, None);
+        let drawn = t.elapsed();
+        let file = png(&rgb, view.size);
+        println!(
+            "{name}: {} triangles, {drawn:?}, {:?}, {} bytes",
+            s.mesh.triangles.len(),
+            t.elapsed() - drawn,
+            file.len()
+        );
+        assert!(std::fs::write(dir.join(format!("trabecula-{name}.png")), file).is_ok());
+    }
+}

@@ -1,0 +1,255 @@
+//! Lighter meshes: fewer triangles, within a stated distance, every guarantee kept.
+//!
+//! Edges are taken away one by one, in the order of what it costs by quadrics, each replaced by the vertex of least cost
+//! that keeps the volume. A collapse is done only if
+//!
+//! - the mesh stays closed and manifold: the ends have no common neighbours but the two corners beside the edge;
+//! - no new triangle is a needle, or folds;
+//! - sharp edges and borders of cuts stay: they are shortened along themselves, and where they meet nothing moves;
+//! - no point of the surface has moved farther than the tolerance from where it started (see `drift`: a proof, and so
+//!   a bound of the distance in both directions);
+//! - the new triangles meet no others, decided exactly for positions rounded to single precision.
+//!
+//! All positions are rounded to single precision first, so that a file of either precision holds what was tested. The
+//! work is done in one order, whatever the number of threads.
+
+use std::collections::HashSet;
+
+use crate::fault::{Fault, counted, number};
+use crate::math::Vec3;
+use crate::measure;
+use crate::mesh::Mesh;
+use crate::progress::{Progress, Stopped};
+use crate::surface_mesh::SurfaceMesh;
+
+mod drift;
+mod edges;
+mod links;
+mod near;
+mod quadric;
+mod queue;
+mod work;
+
+use links::{Links, NONE};
+use work::Work;
+
+/// Candidates between two looks at the progress.
+const STRIDE: u64 = 4096;
+
+/// How far a mesh is to be simplified. With both, whichever is reached first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Goal {
+    /// The most that any point of the surface may move, mm.
+    pub tolerance: Option<f64>,
+    /// The number of triangles to come down to.
+    pub triangles: Option<usize>,
+}
+
+/// What was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Triangles before and after.
+    pub triangles: [usize; 2],
+    /// A proven bound of the distance between the two surfaces, in both directions, mm.
+    pub deviation: f64,
+    /// Volume before and after, mm³.
+    pub volume: [f64; 2],
+    /// Area before and after, mm².
+    pub area: [f64; 2],
+}
+
+/// The surface with fewer triangles.
+///
+/// A mesh that has no more triangles than asked for comes back as it is.
+///
+/// # Errors
+/// A goal that is none; a mesh that is not closed, manifold and free of self-intersection after rounding to single
+/// precision; an interruption.
+pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> Result<(SurfaceMesh, Report), Stopped> {
+    let (tolerance, target) = checked(goal).map_err(Stopped::Refused)?;
+    let mesh = &surface.mesh;
+    let size = |m: &Mesh| (m.triangles.len(), m.volume(), m.area());
+    let before = size(mesh);
+    let report = |after: (usize, f64, f64), deviation| Report {
+        triangles: [before.0, after.0],
+        deviation,
+        volume: [before.1, after.1],
+        area: [before.2, after.2],
+    };
+    if before.0 <= target {
+        return Ok((surface.clone(), report(before, 0.0)));
+    }
+    let rounding = mesh.single_rounding();
+    if tolerance < 2.0 * rounding {
+        return Err(Stopped::Refused(Fault::new(
+            "tolerance",
+            format!(
+                "{} mm is less than single precision resolves in a mesh of this size; use {} mm or more",
+                number(tolerance),
+                number(4.0 * rounding)
+            ),
+        )));
+    }
+    let ordered = in_order(surface);
+    let exact = &ordered.mesh.vertices;
+    let places: Vec<Vec3> = exact.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
+    let rounded = Mesh { vertices: places, triangles: ordered.mesh.triangles.clone() };
+    let links = sound(&rounded).map_err(Stopped::Refused)?;
+    let mut work = Work::new(links, rounded.vertices, exact, &ordered.cut, tolerance);
+    // Three candidates a vertex, and six more for each one that goes.
+    let likely = 9 * before.0 as u64 / 2;
+    let mut looked = 0u64;
+    while work.count > target && work.step().is_some() {
+        looked += 1;
+        if looked.is_multiple_of(STRIDE) {
+            let (done, total) = if target > 0 {
+                ((before.0 - work.count) as u64, (before.0 - target) as u64)
+            } else {
+                (looked, likely.max(looked))
+            };
+            if !progress.step(done, total) {
+                return Err(Stopped::Interrupted);
+            }
+        }
+    }
+    let deviation = work.deviation();
+    let made = gathered(work, &ordered.cut);
+    let report = report(size(&made.mesh), deviation);
+    Ok((made, report))
+}
+
+/// The tolerance and the number of triangles of a goal.
+fn checked(goal: &Goal) -> Result<(f64, usize), Fault> {
+    if goal.tolerance.is_none() && goal.triangles.is_none() {
+        return Err(Fault::new("", "give a tolerance, a number of triangles, or both"));
+    }
+    let tolerance = goal.tolerance.unwrap_or(f64::INFINITY);
+    if goal.tolerance.is_some_and(|t| !(t.is_finite() && t > 0.0)) {
+        return Err(Fault::new(
+            "tolerance",
+            format!("is {}; it must be a finite length greater than 0, mm", number(tolerance)),
+        ));
+    }
+    let target = goal.triangles.unwrap_or(0);
+    if goal.triangles.is_some() && target < 4 {
+        return Err(Fault::new("triangles", format!("is {target}; a closed mesh has at least 4")));
+    }
+    Ok((tolerance, target))
+}
+
+/// The links of a mesh that keeps every promise; otherwise what is wrong with it.
+fn sound(mesh: &Mesh) -> Result<Links, Fault> {
+    let refuse = |what: String| {
+        Err(Fault::new(
+            "",
+            format!(
+                "a mesh must be closed, manifold and free of self-intersection, after rounding to single precision; this one has {what}"
+            ),
+        ))
+    };
+    if mesh.triangles.len() as u64 * 3 >= u64::from(u32::MAX) {
+        return refuse("more than 1.4e9 triangles, too many".into());
+    }
+    let mut used = vec![false; mesh.vertices.len()];
+    for &v in mesh.triangles.iter().flatten() {
+        used[v as usize] = true;
+    }
+    let places: HashSet<[u64; 3]> =
+        (0..used.len()).filter(|v| used[*v]).map(|v| mesh.vertices[v].map(f64::to_bits)).collect();
+    let n = used.iter().filter(|u| **u).count();
+    if places.len() < n {
+        return refuse(format!("{} that another vertex has too", counted(n - places.len(), "place")));
+    }
+    let links = Links::new(mesh.triangles.clone(), mesh.vertices.len());
+    let pinched = measure::non_manifold_vertices(mesh);
+    let (Some(links), 0) = (links, pinched) else {
+        let d = measure::defects(mesh);
+        return refuse(format!(
+            "{} with one triangle, {} with more than two, {} with two of the same direction, {} where surfaces touch",
+            counted(d.open_edges, "edge"),
+            d.crowded_edges,
+            d.flipped_edges,
+            counted(pinched, "place")
+        ));
+    };
+    const SHOWN: usize = 1000;
+    let crossings = measure::self_intersections(mesh, SHOWN);
+    let flat = measure::defects(mesh).degenerate_triangles;
+    if crossings > 0 || flat > 0 {
+        let or_more = if crossings == SHOWN { " or more" } else { "" };
+        return refuse(format!("{crossings}{or_more} pairs of triangles that meet and {flat} triangles without area"));
+    }
+    Ok(links)
+}
+
+/// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use, so that
+/// what is near in space is near in memory.
+fn in_order(surface: &SurfaceMesh) -> SurfaceMesh {
+    let mesh = &surface.mesh;
+    let b = mesh.bounds();
+    let longest = b.size().iter().fold(0.0f64, |m, s| m.max(*s));
+    let scale = if longest > 0.0 { 2_097_151.0 / longest } else { 0.0 };
+    let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len())
+        .map(|t| {
+            let [p, q, r] = mesh.corners(t);
+            let key = (0..3).fold(0, |key, k| {
+                let middle = (p[k] + q[k] + r[k]) / 3.0 - b.min[k];
+                key | spread((middle * scale) as u64) << k
+            });
+            (key, t as u32)
+        })
+        .collect();
+    keys.sort_unstable();
+    let mut names = vec![NONE; mesh.vertices.len()];
+    let mut out = SurfaceMesh::default();
+    for (_, t) in keys {
+        let triangle = mesh.triangles[t as usize].map(|v| {
+            let name = &mut names[v as usize];
+            if *name == NONE {
+                *name = out.mesh.vertices.len() as u32;
+                out.mesh.vertices.push(mesh.vertices[v as usize]);
+            }
+            *name
+        });
+        out.mesh.triangles.push(triangle);
+        out.cut.push(surface.cut[t as usize]);
+    }
+    out
+}
+
+/// The lowest 21 bits of a number, three apart.
+fn spread(x: u64) -> u64 {
+    let mut x = x & 0x1f_ffff;
+    for (shift, mask) in [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
+/// The triangles that are left.
+fn gathered(work: Work, cut: &[bool]) -> SurfaceMesh {
+    let mut names = vec![NONE; work.places.len()];
+    let mut out = SurfaceMesh::default();
+    for (t, corners) in work.links.triangles.iter().enumerate() {
+        if corners[0] == NONE {
+            continue;
+        }
+        let triangle = corners.map(|v| {
+            let name = &mut names[v as usize];
+            if *name == NONE {
+                *name = out.mesh.vertices.len() as u32;
+                out.mesh.vertices.push(work.places[v as usize]);
+            }
+            *name
+        });
+        out.mesh.triangles.push(triangle);
+        out.cut.push(cut[t]);
+    }
+    out
+}
