@@ -23,6 +23,7 @@ mod weights;
 use std::sync::Arc;
 
 use crate::field::{Block, Field};
+use crate::implicit::Implicit;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, scale, sub};
 
@@ -68,7 +69,7 @@ pub struct Blend {
     two_sided: bool,
     /// Set for one side alone.
     side: Option<Side>,
-    slope: f64,
+    lipschitz: f64,
 }
 
 /// Places at which the root mean square of a core is found.
@@ -94,8 +95,8 @@ impl Blend {
         let strands: Arc<[Strand]> = looked(of, unit, &joint, bounds).into();
         let levels = unit.then(|| Arc::new(Levels::new(&strands, joint, &weights)));
         // Shares move no faster than a cell is long, or the blend is no blend: half as much again for them.
-        let slope = strands.iter().map(Strand::slope).fold(0.0, f64::max) * 1.5;
-        Ok(Blend { two_sided: strands.iter().any(Strand::is_sheet), strands, weights, levels, side: None, slope })
+        let lipschitz = strands.iter().map(Strand::lipschitz).fold(0.0, f64::max) * 1.5;
+        Ok(Blend { two_sided: strands.iter().any(Strand::is_sheet), strands, weights, levels, side: None, lipschitz })
     }
 
     /// The shares.
@@ -381,23 +382,25 @@ impl Field for Blend {
         join(f, lo, hi)
     }
 
-    fn parts(&self) -> Vec<Arc<dyn Field>> {
-        if !self.two_sided || self.side.is_some() {
-            return Vec::new();
-        }
-        let side = |side| Arc::new(Blend { side: Some(side), ..self.clone() }) as Arc<dyn Field>;
-        vec![side(Side::High), side(Side::Low)]
-    }
-
-    fn slope(&self) -> f64 {
-        self.slope
-    }
-
     fn fill(&self, block: &Block, out: &mut [f32]) {
         self.fill_rows(block, None, out);
     }
 
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
         self.fill_rows(block, Some(wanted), out);
+    }
+}
+
+impl Implicit for Blend {
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
+        if !self.two_sided || self.side.is_some() {
+            return Vec::new();
+        }
+        let side = |side| Arc::new(Blend { side: Some(side), ..self.clone() }) as Arc<dyn Implicit>;
+        vec![side(Side::High), side(Side::Low)]
+    }
+
+    fn lipschitz(&self) -> f64 {
+        self.lipschitz
     }
 }

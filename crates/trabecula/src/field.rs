@@ -1,6 +1,4 @@
-//! The one trait the extractor sees: value, gradient and bound. Negative is solid.
-
-use std::sync::Arc;
+//! Scalar fields: value, gradient and proven bounds. Negative is solid.
 
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -72,21 +70,6 @@ pub trait Field: Send + Sync {
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
         let _ = wanted;
         self.fill(block, out);
-    }
-
-    /// The smooth functions whose greatest this is; none if it is smooth itself.
-    fn parts(&self) -> Vec<Arc<dyn Field>> {
-        Vec::new()
-    }
-
-    /// A bound of the length of the gradient, per mm, if one is known.
-    fn slope(&self) -> f64 {
-        1.0
-    }
-
-    /// Whether the zero set may have edges, as those of unions and distances have: they are no curvature.
-    fn edged(&self) -> bool {
-        false
     }
 
     /// The value at one point (mm).

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::cell::{Cell, Cut, Distance, Part};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
+use crate::implicit::Implicit;
 use crate::map::Map;
 use geometry::math::{
     Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm, transpose,
@@ -316,23 +317,25 @@ impl Field for Lattice {
         self.cut.bound(self.core_bound(b), self.iso_bound(b))
     }
 
-    fn parts(&self) -> Vec<Arc<dyn Field>> {
-        self.cut.sides(|cut| Lattice { cut, ..self.clone() })
-    }
-
-    fn slope(&self) -> f64 {
-        match self.map.affine() {
-            Some(_) => self.steepness,
-            None => self.steepness * self.map.steepest(),
-        }
-    }
-
     fn fill(&self, block: &Block, out: &mut [f32]) {
         self.fill_rows(block, None, out);
     }
 
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
         self.fill_rows(block, Some(wanted), out);
+    }
+}
+
+impl Implicit for Lattice {
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
+        self.cut.sides(|cut| Lattice { cut, ..self.clone() })
+    }
+
+    fn lipschitz(&self) -> f64 {
+        match self.map.affine() {
+            Some(_) => self.steepness,
+            None => self.steepness * self.map.steepest(),
+        }
     }
 }
 

@@ -7,13 +7,14 @@
 pub mod analysis;
 pub mod blend;
 pub mod cell;
+mod coincident;
+pub mod csg_tree;
 pub mod design;
 pub mod extract;
-pub mod face;
 pub mod field;
-mod flush;
 pub mod grade;
 pub mod graph;
+pub mod implicit;
 pub mod lattice;
 pub mod map;
 pub mod mesher;

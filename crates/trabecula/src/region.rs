@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::face::{Face, Tree};
+use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
+use crate::implicit::Surface;
 use geometry::math::Aabb;
 
 mod csg;
@@ -53,9 +54,9 @@ pub trait Shape: Field {
         }
     }
 
-    /// Adds to `out` the smooth faces of the solid within distance `by` (mm) of the shape, or deeper than −`by` in it;
-    /// returns how they make it. The faces' numbers are their places in `out`.
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree;
+    /// Adds to `out` the implicit surfaces of the shape offset outwards by `by` (mm; inwards if negative) and returns how
+    /// they are combined. Surfaces are numbered by their index in `out`.
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree;
 
     /// The mesh that the shape is, if it is one: meshes that are combined make one.
     fn as_mesh(&self) -> Option<&MeshRegion> {
@@ -64,7 +65,7 @@ pub trait Shape: Field {
 
     /// The same region seen without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;
-    /// `None` if at none. (Faces that are planes by themselves stay: whoever asks for `faces` can drop them.)
+    /// `None` if at none. (Faces that are planes by themselves stay: a caller of `surfaces` can drop them.)
     fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
         let _ = (cuts, found);
         None
@@ -74,10 +75,10 @@ pub trait Shape: Field {
     fn volume(&self) -> Option<f64>;
 }
 
-/// A solid of one face that is smooth as far as its signed distance is.
-fn one_face(field: Arc<dyn Field>, out: &mut Vec<Face>) -> Tree {
-    out.push(Face::distance(field));
-    Tree::Face(out.len() - 1)
+/// A solid bounded by one implicit surface, its own signed distance.
+fn one_surface(field: Arc<dyn Field>, out: &mut Vec<Surface>) -> CsgTree {
+    out.push(Surface::distance(field));
+    CsgTree::Leaf(out.len() - 1)
 }
 
 /// A shared region.

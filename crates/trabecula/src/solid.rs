@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::face::{Body, Face, Tree};
+use crate::coincident;
+use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::field::{Block, Field};
-use crate::flush;
+use crate::implicit::{Implicit, Surface};
 use crate::region::Region;
 use crate::tiling::Tiling;
 use geometry::math::{Aabb, Interval, Vec3};
@@ -15,9 +16,9 @@ pub struct Solid {
     /// Where the part may be.
     pub region: Region,
     /// The lattice; `None` leaves the region full.
-    pub field: Option<Arc<dyn Field>>,
+    pub field: Option<Arc<dyn Implicit>>,
     /// What is solid whatever the lattice says, as far as the region goes: skin and keep zones.
-    pub filled: Vec<Body>,
+    pub filled: Vec<CsgSolid>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
     /// The lattice over a tetrahedral mesh that all of this is, if its surface is to be made without a grid.
@@ -28,7 +29,7 @@ pub struct Solid {
 
 impl Solid {
     /// A region and the lattice in it.
-    pub fn new(region: Region, field: Option<Arc<dyn Field>>, wavelength: f64) -> Solid {
+    pub fn new(region: Region, field: Option<Arc<dyn Implicit>>, wavelength: f64) -> Solid {
         Solid { region, field, filled: Vec::new(), wavelength, tiling: None, transition: None }
     }
 
@@ -38,33 +39,33 @@ impl Solid {
     }
 
     /// The same solid with one more body that is solid whatever the lattice says.
-    pub fn with(mut self, mut body: Body) -> Solid {
-        let mut others = self.boundary().faces;
-        others.extend(self.filled.iter().flat_map(|b| b.faces.iter().cloned()));
+    pub fn with(mut self, mut body: CsgSolid) -> Solid {
+        let mut others = self.boundary().surfaces;
+        others.extend(self.filled.iter().flat_map(|b| b.surfaces.iter().cloned()));
         let mut moved = others.len();
-        flush::apart(&mut body, &others, &self.region.bounds(), &mut moved);
+        coincident::separate_from(&mut body, &others, &self.region.bounds(), &mut moved);
         self.filled.push(body);
         self
     }
 
-    /// The region by its faces, none of which coincide.
-    fn boundary(&self) -> Body {
-        let mut faces = Vec::new();
-        let tree = self.region.clone().faces(0.0, &mut faces);
-        let mut body = Body { faces, tree };
-        flush::parted(&mut body, &self.region.bounds(), &mut 0);
+    /// The region as a CSG solid, none of whose surfaces coincide.
+    fn boundary(&self) -> CsgSolid {
+        let mut surfaces = Vec::new();
+        let tree = self.region.clone().surfaces(0.0, &mut surfaces);
+        let mut body = CsgSolid { surfaces, tree };
+        coincident::separate(&mut body, &self.region.bounds(), &mut 0);
         body
     }
 
-    /// The smooth faces of the solid and how they make it. The region's come first.
-    pub fn faces(&self) -> (Vec<Face>, Tree) {
-        let Body { mut faces, tree } = self.boundary();
+    /// The solid as a combination of smooth implicit surfaces. The region's come first.
+    pub fn surfaces(&self) -> (Vec<Surface>, CsgTree) {
+        let CsgSolid { mut surfaces, tree } = self.boundary();
         let mut all = vec![tree];
         if let Some(field) = &self.field {
             let mut any = Vec::new();
             for body in &self.filled {
-                any.push(body.tree.clone().from(faces.len()));
-                faces.extend(body.faces.iter().cloned().map(|f| Face { cut: false, ..f }));
+                any.push(body.tree.clone().renumbered(surfaces.len()));
+                surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
             }
             let mut parts = field.parts();
             if parts.is_empty() {
@@ -72,31 +73,23 @@ impl Solid {
             }
             let mut lattice = Vec::new();
             for part in parts {
-                lattice.push(Tree::Face(faces.len()));
-                faces.push(Face {
-                    slope: part.slope(),
-                    edged: part.edged(),
-                    field: part,
-                    plane: None,
-                    cut: false,
-                    creases: Arc::default(),
-                    flush: false,
-                });
+                lattice.push(CsgTree::Leaf(surfaces.len()));
+                surfaces.push(Surface::smooth(part));
             }
             if any.is_empty() {
                 all.extend(lattice);
             } else {
-                any.push(Tree::All(lattice));
-                all.push(Tree::Any(any));
+                any.push(CsgTree::Intersection(lattice));
+                all.push(CsgTree::Union(any));
             }
         }
-        (faces, Tree::All(all))
+        (surfaces, CsgTree::Intersection(all))
     }
 
     /// All that may be solid in the region: the lattice first.
     fn inner(&self) -> Option<(&dyn Field, impl Iterator<Item = &dyn Field>)> {
         let filled = self.filled.iter().map(|b| b as &dyn Field);
-        self.field.as_deref().map(|f| (f, filled))
+        self.field.as_deref().map(|f| (f as &dyn Field, filled))
     }
 }
 

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use crate::cell::tet::{Bary, Stencil};
 use crate::cell::{Cut, Part};
 use crate::field::Field;
+use crate::implicit::Implicit;
 use crate::map::Tets;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
@@ -352,12 +353,14 @@ impl Field for Tiling {
         };
         self.cut.bound(f, t)
     }
+}
 
-    fn parts(&self) -> Vec<Arc<dyn Field>> {
+impl Implicit for Tiling {
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
         self.cut.sides(|cut| Tiling { cut, ..self.clone() })
     }
 
-    fn slope(&self) -> f64 {
+    fn lipschitz(&self) -> f64 {
         self.steep.iter().copied().fold(0.0, f64::max)
     }
 }

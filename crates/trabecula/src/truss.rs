@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::field::Field;
 use crate::graph::{Cleaned, Facts, Graph, Trimmed};
+use crate::implicit::Implicit;
 use crate::pattern::Laid;
 use crate::quador::Quadors;
 use crate::quador::collide::Collision;
@@ -19,7 +19,7 @@ pub enum Beams {
 
 impl Beams {
     /// The solid.
-    pub fn field(&self) -> Arc<dyn Field> {
+    pub fn field(&self) -> Arc<dyn Implicit> {
         match self {
             Beams::Truss(t) => t.quadors.clone(),
             Beams::Pattern(p) => p.clone(),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::field::Field;
+use crate::implicit::Implicit;
 use crate::lattice::Lattice;
 use geometry::math::{Vec3, add, scale};
 
@@ -14,14 +14,14 @@ pub enum Constituent {
     /// Any other field: solid where it is negative, and its fraction is found by looking.
     Field {
         /// The field.
-        field: Arc<dyn Field>,
+        field: Arc<dyn Implicit>,
         /// How long its cells are, mm.
         wavelength: f64,
     },
     /// A wall that is no lattice: the greater of its sides f − t and −f − t, by its core f.
     Wall {
         /// Both sides.
-        sides: [Arc<dyn Field>; 2],
+        sides: [Arc<dyn Implicit>; 2],
         /// t, where it does not vary.
         half: Option<f64>,
         /// How long its cells are, mm.
@@ -59,7 +59,12 @@ impl Constituent {
 }
 
 /// Fills what two fields make together.
-pub(super) fn values_of(sides: &[Arc<dyn Field>; 2], points: &[Vec3], out: &mut [f64], made: impl Fn([f64; 2]) -> f64) {
+pub(super) fn values_of(
+    sides: &[Arc<dyn Implicit>; 2],
+    points: &[Vec3],
+    out: &mut [f64],
+    made: impl Fn([f64; 2]) -> f64,
+) {
     let mut other = vec![0.0; points.len()];
     sides[0].values(points, out);
     sides[1].values(points, &mut other);
@@ -68,7 +73,7 @@ pub(super) fn values_of(sides: &[Arc<dyn Field>; 2], points: &[Vec3], out: &mut 
 
 /// Fills so many times the first field and the second together, and the gradient of that.
 pub(super) fn gradients_of(
-    sides: &[Arc<dyn Field>; 2],
+    sides: &[Arc<dyn Implicit>; 2],
     [first, second]: [f64; 2],
     points: &[Vec3],
     values: &mut [f64],

@@ -4,6 +4,7 @@ use super::added::{End, HIGH, LOW};
 use super::constituent::{Constituent, gradients_of, values_of};
 use crate::cell::Part;
 use crate::field::{Block, Field};
+use crate::implicit::Implicit;
 use crate::lattice::{self, Lattice, Level};
 use geometry::math::{Aabb, Interval, Vec3, add, scale};
 
@@ -77,12 +78,12 @@ impl Strand {
         self.of.longest()
     }
 
-    /// A bound of the steepness of g, per mm.
-    pub fn slope(&self) -> f64 {
+    /// A Lipschitz bound of g, per mm.
+    pub fn lipschitz(&self) -> f64 {
         let own = match &self.of {
-            Constituent::Lattice(l) => l.slope(),
-            Constituent::Field { field, .. } => field.slope(),
-            Constituent::Wall { sides, .. } => sides[0].slope().max(sides[1].slope()),
+            Constituent::Lattice(l) => l.lipschitz(),
+            Constituent::Field { field, .. } => field.lipschitz(),
+            Constituent::Wall { sides, .. } => sides[0].lipschitz().max(sides[1].lipschitz()),
         };
         own * self.factor.abs()
     }

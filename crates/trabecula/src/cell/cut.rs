@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Part;
-use crate::field::Field;
+use crate::implicit::Implicit;
 use geometry::math::{Interval, Vec3, add, scale};
 
 /// A part, or one side of a sheet alone: the sheet |f| − t is the greater of f − t and −f − t, each of which is smooth.
@@ -53,13 +53,13 @@ impl Cut {
     }
 
     /// The two sides of a sheet, each as the field that `of` makes of it; none of anything smooth.
-    pub fn sides<F: Field + 'static>(self, of: impl Fn(Cut) -> F) -> Vec<Arc<dyn Field>> {
+    pub fn sides<F: Implicit + 'static>(self, of: impl Fn(Cut) -> F) -> Vec<Arc<dyn Implicit>> {
         if self.part != Part::Sheet || self.side.is_some() {
             return Vec::new();
         }
         let side = |part| {
             let side = Some(part);
-            Arc::new(of(Cut { side, ..self })) as Arc<dyn Field>
+            Arc::new(of(Cut { side, ..self })) as Arc<dyn Implicit>
         };
         vec![side(Part::Lower), side(Part::Upper)]
     }

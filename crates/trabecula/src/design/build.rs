@@ -11,7 +11,7 @@ use super::{
 };
 use crate::blend::Constituent;
 use crate::cell::Part;
-use crate::field::Field;
+use crate::implicit::Implicit;
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::solid::Solid;
@@ -150,7 +150,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let wavelengths = wavelengths.chain(tilings.iter().map(|t| t.tiling.wavelength()));
     let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
     let mut blended = None;
-    let field: Arc<dyn Field> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
+    let field: Arc<dyn Implicit> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
         (Some(spec), ..) => {
             let place = Place { path: "blend".into(), region: &space, points: &points, filled: &filled, loader };
             let made = blend::blend(spec, &members(&lattices, &tilings, &graphs), &place, &mut warnings)?;

@@ -2,7 +2,7 @@
 
 use super::Loader;
 use super::error::DesignError;
-use crate::face::Body;
+use crate::csg_tree::CsgSolid;
 use crate::region::Region;
 use geometry::fault::number;
 
@@ -16,7 +16,7 @@ pub(super) struct Place<'a> {
     /// Points inside the region.
     pub points: &'a [[f64; 3]],
     /// What is solid in the region whatever the lattice says.
-    pub filled: &'a [Body],
+    pub filled: &'a [CsgSolid],
     /// Hands over files.
     pub loader: &'a dyn Loader,
 }

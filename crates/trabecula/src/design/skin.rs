@@ -9,7 +9,7 @@ use super::level::check_varied;
 use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Design, Loader, region, sample};
-use crate::face::Body;
+use crate::csg_tree::CsgSolid;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::region::{HalfSpace, Intersection, Region};
@@ -24,7 +24,7 @@ pub(super) fn filled(
     points: &[Vec3],
     loader: &dyn Loader,
     notes: &mut region::Notes,
-) -> Result<(Vec<Body>, Option<f64>), DesignError> {
+) -> Result<(Vec<CsgSolid>, Option<f64>), DesignError> {
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
@@ -37,9 +37,9 @@ pub(super) fn filled(
         let path = format!("keep.{name}");
         let zone = region::region(spec, &path, loader, notes)?;
         check_zone(&zone, space, points, &path)?;
-        let mut faces = Vec::new();
-        let tree = zone.faces(0.0, &mut faces);
-        filled.push(Body { faces, tree });
+        let mut surfaces = Vec::new();
+        let tree = zone.surfaces(0.0, &mut surfaces);
+        filled.push(CsgSolid { surfaces, tree });
     }
     if filled.len() > 1 && !is_open(&filled, space, points) {
         let (path, what) = if d.skin.is_some() {
@@ -54,7 +54,7 @@ pub(super) fn filled(
 }
 
 /// Whether any of many points in the region is left to the lattice.
-fn is_open(filled: &[Body], space: &Region, points: &[Vec3]) -> bool {
+fn is_open(filled: &[CsgSolid], space: &Region, points: &[Vec3]) -> bool {
     let open = |points: &[Vec3]| {
         let (mut least, mut v) = (vec![f64::INFINITY; points.len()], vec![0.0; points.len()]);
         for body in filled {
@@ -68,7 +68,7 @@ fn is_open(filled: &[Body], space: &Region, points: &[Vec3]) -> bool {
 }
 
 /// The skin and its least thickness.
-fn grown(spec: &SkinSpec, place: &Place) -> Result<(Body, f64), DesignError> {
+fn grown(spec: &SkinSpec, place: &Place) -> Result<(CsgSolid, f64), DesignError> {
     let Place { region: space, points, .. } = *place;
     let path = "skin.thickness";
     let allowed = Allowed::Positive("thickness");

@@ -3,8 +3,9 @@
 
 use std::collections::HashMap;
 
-use crate::face::{Face, Sign, Tree};
+use crate::csg_tree::{CsgTree, Sign};
 use crate::field::Block;
+use crate::implicit::Surface;
 use crate::solid::Solid;
 use geometry::fault::{Fault, number};
 use geometry::math::Aabb;
@@ -26,9 +27,9 @@ pub(super) struct Grid {
     /// The step asked for, mm.
     pub step: f64,
     /// The smooth faces of the solid.
-    pub faces: Vec<Face>,
+    pub faces: Vec<Surface>,
     /// How they make it.
-    tree: Tree,
+    tree: CsgTree,
     /// For each face, the number of the node plane that it is, if it is one: then it needs no samples.
     laid: Vec<Option<usize>>,
     /// For each face, the edges that it has of its own in each tile.
@@ -40,7 +41,7 @@ pub(super) struct Grid {
 /// What is known of the solid in a block without sampling it.
 pub(super) struct Local {
     /// The solid, by the numbers of faces here: those in `live`, then those in `flat`.
-    pub tree: Tree,
+    pub tree: CsgTree,
     /// Faces that may change sign at the block's nodes.
     pub live: Vec<usize>,
     /// Faces that are node planes within the block.
@@ -78,14 +79,14 @@ impl Grid {
             );
             return Err(Fault::new("edge", message));
         }
-        let (faces, tree) = solid.faces();
+        let (faces, tree) = solid.surfaces();
         // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
-        tree.each_required(&mut |f| required.push(f));
+        tree.for_each_bounding(&mut |f| required.push(f));
         let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, faces[f].plane?))).collect();
         // What is kept apart by a hair is too near for cells that are fitted to edges.
-        let fits = faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.flush);
+        let fits = faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.perturbed);
         // Caps on planes of the grid know of knots alone, not of such cells.
         if fits {
             planes.clear();
@@ -300,8 +301,8 @@ impl Grid {
             });
         }
         // A face may still not matter here; but a neighbouring tile may see it matter in a cell that both have.
-        let tree = self.tree.given(&|f| signs[f].unwrap_or(Sign::Varies(f)));
-        if matches!(&tree, Tree::All(of) | Tree::Any(of) if of.is_empty()) {
+        let tree = self.tree.simplified(&|f| signs[f].unwrap_or(Sign::Varies(f)));
+        if matches!(&tree, CsgTree::Intersection(of) | CsgTree::Union(of) if of.is_empty()) {
             return None;
         }
         live.extend((0..self.faces.len()).filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)));
@@ -309,7 +310,7 @@ impl Grid {
             let at = live.iter().position(|&g| g == f);
             at.or_else(|| Some(live.len() + flat.iter().position(|(g, _)| *g == f)?))
         };
-        let tree = tree.given(&|f| place(f).map_or(Sign::Negative, Sign::Varies));
+        let tree = tree.simplified(&|f| place(f).map_or(Sign::Negative, Sign::Varies));
         Some(Local { tree, live, flat: flat.into_iter().map(|(_, p)| p).collect() })
     }
 }

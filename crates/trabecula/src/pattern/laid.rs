@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{MOST, Pattern, Similarity, Strut};
 use crate::field::Field;
 use crate::graph::Graph;
+use crate::implicit::Implicit;
 use crate::quador::{Fillet, Quadors};
 use classes::Classes;
 use geometry::fault::{Fault, number};
@@ -441,13 +442,15 @@ impl Field for Laid {
         }
         range
     }
+}
 
-    fn slope(&self) -> f64 {
-        self.quadors.slope()
+impl Implicit for Laid {
+    fn lipschitz(&self) -> f64 {
+        self.quadors.lipschitz()
     }
 
-    fn edged(&self) -> bool {
-        self.quadors.edged()
+    fn has_creases(&self) -> bool {
+        self.quadors.has_creases()
     }
 }
 

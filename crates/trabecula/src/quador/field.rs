@@ -5,6 +5,7 @@
 
 use super::Quadors;
 use crate::field::Field;
+use crate::implicit::Implicit;
 use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Hubs that the bound of a box looks at one by one.
@@ -161,12 +162,14 @@ impl Field for Quadors {
         let cap = Interval::new(self.cap, self.cap);
         near.into_iter().fold(cap, |least, i| least.min(self.hub_bound(i as usize, b)))
     }
+}
 
-    fn edged(&self) -> bool {
+impl Implicit for Quadors {
+    fn has_creases(&self) -> bool {
         self.sharp
     }
 
-    fn slope(&self) -> f64 {
+    fn lipschitz(&self) -> f64 {
         let thick = self.balls.iter().map(|b| b.radius).fold(self.scale, f64::max);
         2.0 * thick / self.scale
     }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use super::meshes::{List, Meshes};
 use super::{HalfSpace, MeshRegion, Region, Shape};
-use crate::face::{Face, Tree};
+use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
+use crate::implicit::Surface;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -222,7 +223,7 @@ macro_rules! joined {
                 }
             }
 
-            fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+            fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
                 let meshes = self.meshes();
                 let regions = self.regions().iter().enumerate().filter_map(|(i, r)| match meshes {
                     Some(m) if m.which[0] == i => Some((i, m.one.clone() as Region)),
@@ -231,18 +232,18 @@ macro_rules! joined {
                 });
                 let each = regions.map(|(i, r)| {
                     if !self.negated(i) {
-                        return r.faces(by, out);
+                        return r.surfaces(by, out);
                     }
                     let first = out.len();
-                    let tree = r.faces(-by, out).complement();
+                    let tree = r.surfaces(-by, out).complement();
                     let turned = out.split_off(first);
-                    out.extend(turned.into_iter().map(Face::turned));
+                    out.extend(turned.into_iter().map(Surface::complement));
                     tree
                 });
                 if Self::ALL {
-                    Tree::All(each.collect())
+                    CsgTree::Intersection(each.collect())
                 } else {
-                    Tree::Any(each.collect())
+                    CsgTree::Union(each.collect())
                 }
             }
 
@@ -313,8 +314,8 @@ impl Shape for Offset {
         out.iter_mut().filter(|v| v.abs() <= snap).for_each(|v| *v = 0.0);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
-        self.of.clone().faces(self.by + by, out)
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
+        self.of.clone().surfaces(self.by + by, out)
     }
 
     fn volume(&self) -> Option<f64> {

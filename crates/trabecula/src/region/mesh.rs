@@ -2,8 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{HalfSpace, Offset, Region, Shape, one_face};
-use crate::face;
+use super::{HalfSpace, Offset, Region, Shape, one_surface};
 use crate::field::{Block, Field};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
@@ -51,7 +50,7 @@ pub struct MeshRegion {
     mesh: Mesh,
     repaired: Repaired,
     /// Found when they are first asked for.
-    creases: OnceLock<Arc<face::Creases>>,
+    creases: OnceLock<Arc<crate::implicit::Creases>>,
 }
 
 impl MeshRegion {
@@ -218,13 +217,16 @@ impl Shape for MeshRegion {
         fill.part([0; 3], shape, 0, NOTHING);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<crate::implicit::Surface>) -> crate::csg_tree::CsgTree {
         match Offset::new(self.clone(), by) {
-            Ok(moved) if by != 0.0 => one_face(Arc::new(moved), out),
+            Ok(moved) if by != 0.0 => one_surface(Arc::new(moved), out),
             _ => {
                 let creases = self.creases.get_or_init(|| Arc::new(crease::creases(&self.mesh)));
-                out.push(face::Face { creases: creases.clone(), ..face::Face::distance(self.clone()) });
-                face::Tree::Face(out.len() - 1)
+                out.push(crate::implicit::Surface {
+                    creases: creases.clone(),
+                    ..crate::implicit::Surface::distance(self.clone())
+                });
+                crate::csg_tree::CsgTree::Leaf(out.len() - 1)
             }
         }
     }

@@ -6,9 +6,10 @@ mod tetrahedron;
 use core::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{Offset, Shape, one_face};
-use crate::face::{Face, Plane, Tree};
+use super::{Offset, Shape, one_surface};
+use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
+use crate::implicit::{Plane, Surface};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
 
@@ -178,12 +179,12 @@ impl Shape for Cuboid {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         if by > 0.0 {
             return rounded(self, by, out);
         }
         let sides = (0..3).flat_map(|axis| [(axis, self.min[axis] - by, false), (axis, self.max[axis] + by, true)]);
-        Tree::All(sides.map(|s| flat(s, out)).collect())
+        CsgTree::Intersection(sides.map(|s| flat(s, out)).collect())
     }
 
     fn volume(&self) -> Option<f64> {
@@ -225,12 +226,12 @@ impl Shape for Sphere {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         if self.radius + by <= 0.0 {
-            return Tree::EMPTY;
+            return CsgTree::EMPTY;
         }
         let radius = self.radius + by;
-        one_face(Arc::new(Sphere { radius, ..*self }), out)
+        one_surface(Arc::new(Sphere { radius, ..*self }), out)
     }
 
     fn volume(&self) -> Option<f64> {
@@ -288,11 +289,11 @@ impl Shape for HalfSpace {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         let point = add(self.point, scale(self.normal, by));
         match coordinate_axis(self.normal) {
             Some(a) => flat((a, point[a], self.normal[a] > 0.0), out),
-            None => one_face(Arc::new(HalfSpace { point, ..*self }), out),
+            None => one_surface(Arc::new(HalfSpace { point, ..*self }), out),
         }
     }
 
@@ -302,20 +303,20 @@ impl Shape for HalfSpace {
 }
 
 /// The solid below (or above) a coordinate of an axis.
-fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Face>) -> Tree {
+fn flat((axis, at, below): (usize, f64, bool), out: &mut Vec<Surface>) -> CsgTree {
     let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
     (point[axis], normal[axis]) = (at, if below { 1.0 } else { -1.0 });
-    let mut face = Face::distance(Arc::new(HalfSpace { point, normal }));
+    let mut face = Surface::distance(Arc::new(HalfSpace { point, normal }));
     face.plane = Some(Plane { axis, at, below });
     out.push(face);
-    Tree::Face(out.len() - 1)
+    CsgTree::Leaf(out.len() - 1)
 }
 
 /// A convex shape grown by `by`: its edges become round, so it has one face.
-fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Face>) -> Tree {
+fn rounded(of: Arc<dyn Shape>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
     match Offset::new(of, by) {
-        Ok(grown) => one_face(Arc::new(grown), out),
-        Err(_) => Tree::FULL,
+        Ok(grown) => one_surface(Arc::new(grown), out),
+        Err(_) => CsgTree::FULL,
     }
 }
 

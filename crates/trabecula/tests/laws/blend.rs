@@ -10,6 +10,7 @@ use trabecula::design::{Design, Loader};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Sigmoid};
+use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::solid::Solid;
@@ -140,6 +141,11 @@ fn by_value_material_is_lost_half_way() {
 #[test]
 fn any_number_of_fields_takes_part() {
     struct Balls;
+    impl Implicit for Balls {
+        fn lipschitz(&self) -> f64 {
+            1.0
+        }
+    }
     impl Field for Balls {
         fn values(&self, points: &[Vec3], out: &mut [f64]) {
             for (o, p) in out.iter_mut().zip(points) {
@@ -275,7 +281,7 @@ fn gradients_blocks_and_bounds_agree_with_values() {
     for (what, of, _) in pairs() {
         for by in [By::Fraction, By::Value] {
             let whole = blend(&of, step(7.0), by);
-            let mut sides: Vec<Arc<dyn Field>> = whole.parts();
+            let mut sides: Vec<Arc<dyn Implicit>> = whole.parts();
             sides.push(Arc::new(whole));
             for field in sides {
                 let axis: Vec<f64> = (0..25).map(|i| 0.37 * f64::from(i) - 4.1).collect();
@@ -327,8 +333,8 @@ fn bounds_tell_empty_places_within_transitions() {
                 assert!(r.lo <= v && v <= r.hi, "{what} {by:?}: {r:?} {v}");
                 told += usize::from(r.lo > 0.0 || r.hi < 0.0);
                 // No face of any kind within some steps of the box.
-                let slope = Field::slope(&field);
-                clear += usize::from(v.abs() > 0.35 * slope);
+                let lipschitz = field.lipschitz();
+                clear += usize::from(v.abs() > 0.35 * lipschitz);
             }
             assert!(told > 20 && 4 * told > clear, "{what} {by:?}: {told} of {clear}");
         }

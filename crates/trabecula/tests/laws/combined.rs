@@ -7,10 +7,11 @@ use std::sync::Arc;
 use geometry::math::{Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use geometry::progress::Silent;
 use trabecula::cell::Part;
+use trabecula::csg_tree::CsgSolid;
 use trabecula::extract::{Islands, surface};
-use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
+use trabecula::implicit::Implicit;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
@@ -81,7 +82,7 @@ struct Design {
     kind: &'static str,
     way: usize,
     region: Region,
-    field: Option<Arc<dyn Field>>,
+    field: Option<Arc<dyn Implicit>>,
     skinned: bool,
     solid: Solid,
     edge: f64,
@@ -118,9 +119,9 @@ fn design(case: u64) -> Option<Design> {
         solid = solid.with(skin);
     }
     if way == 4 {
-        let mut faces = Vec::new();
-        let tree = beside.clone().faces(0.0, &mut faces);
-        solid = solid.with(Body { faces, tree });
+        let mut surfaces = Vec::new();
+        let tree = beside.clone().surfaces(0.0, &mut surfaces);
+        solid = solid.with(CsgSolid { surfaces, tree });
     }
     Some(Design { mesh, beside, kind, way, region, field, skinned: inside == 3, solid, edge })
 }

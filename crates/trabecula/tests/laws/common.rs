@@ -12,8 +12,8 @@ use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
 use trabecula::extract::{Islands, Summary, stream_stl};
-use trabecula::field::Field;
 use trabecula::grade::Grade;
+use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
@@ -47,13 +47,13 @@ pub fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
 }
 
 /// A named cell at a fraction, through a rigid map.
-pub fn lattice(name: &str, part: Part, fraction: f64, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Field> {
+pub fn lattice(name: &str, part: Part, fraction: f64, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Implicit> {
     let level = Level::Fraction(Grade::Constant(fraction));
     lattice_at(name, part, level, wavelength, rotate)
 }
 
 /// The same at any level.
-pub fn lattice_at(name: &str, part: Part, level: Level, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Field> {
+pub fn lattice_at(name: &str, part: Part, level: Level, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Implicit> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
     Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
@@ -70,7 +70,7 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    pub fn lattice(&self) -> Arc<dyn Field> {
+    pub fn lattice(&self) -> Arc<dyn Implicit> {
         lattice(self.name, self.part, self.fraction, self.wavelength, self.rotate)
     }
 }
@@ -88,7 +88,7 @@ prop_compose! {
     }
 }
 
-pub fn solid(region: Region, field: Option<Arc<dyn Field>>) -> Solid {
+pub fn solid(region: Region, field: Option<Arc<dyn Implicit>>) -> Solid {
     Solid::new(region, field, 1.0)
 }
 

@@ -9,10 +9,11 @@ use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use geometry::surface_mesh::SurfaceMesh;
 use trabecula::cell::Part;
+use trabecula::csg_tree::CsgTree;
 use trabecula::extract::surface;
-use trabecula::face::{Face, Tree};
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
+use trabecula::implicit::Surface;
 use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
@@ -171,9 +172,9 @@ impl Shape for Rounded {
         self.0.level_planes(axis, level, out);
     }
 
-    fn faces(self: Arc<Self>, _: f64, out: &mut Vec<Face>) -> Tree {
-        out.push(Face::distance(self));
-        Tree::Face(out.len() - 1)
+    fn surfaces(self: Arc<Self>, _: f64, out: &mut Vec<Surface>) -> CsgTree {
+        out.push(Surface::distance(self));
+        CsgTree::Leaf(out.len() - 1)
     }
 
     fn volume(&self) -> Option<f64> {

@@ -9,6 +9,7 @@ use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
+use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Map, Orientation, Phase, Settings, Wanted};
 use trabecula::region::{Cuboid, Region};
@@ -66,7 +67,7 @@ fn blocks_equal_points_and_bounds_hold() {
         };
         for &part in parts {
             let whole = Lattice::new(cell("gyroid"), map.clone(), part, level.clone());
-            let mut fields: Vec<Arc<dyn Field>> = whole.parts();
+            let mut fields: Vec<Arc<dyn Implicit>> = whole.parts();
             fields.push(Arc::new(whole));
             for l in fields {
                 // Reaching out of the box on all sides.
@@ -143,7 +144,7 @@ fn a_tube_closes_over_its_seam() {
     let map = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [1.0, 2.0], 20.0, [5.0, 6.5, 8.0]).expect("map");
     for level in [Level::Fraction(Grade::Constant(0.35)), Level::Thickness(Grade::Constant(0.25))] {
         let exact = matches!(level, Level::Fraction(_));
-        let l: Arc<dyn Field> = Arc::new(Lattice::new(cell("gyroid"), Map::Round(map), Part::Sheet, level));
+        let l: Arc<dyn Implicit> = Arc::new(Lattice::new(cell("gyroid"), Map::Round(map), Part::Sheet, level));
         let solid = Solid::new(region.clone(), Some(l), 1.0);
         let m = size(&surface(&solid, 0.12, &Silent).expect("surface").mesh);
         let share = m.volume / (std::f64::consts::PI * 39.0 * 8.0);
@@ -252,7 +253,7 @@ fn surfaces_are_closed_and_hold_the_solid() {
         (Part::Upper, Level::Fraction(formula("0.3 + 0.02*y"))),
         (Part::Sheet, Level::Thickness(Grade::Constant(0.35))),
     ] {
-        let l: Arc<dyn Field> = Arc::new(Lattice::new(cell("gyroid"), bent(&b), part, level));
+        let l: Arc<dyn Implicit> = Arc::new(Lattice::new(cell("gyroid"), bent(&b), part, level));
         let region: Region = Arc::new(Cuboid::new([0.0; 3], edges).expect("box"));
         let solid = Solid::new(region, Some(l.clone()), 3.0);
         let found = surface(&solid, 0.15, &Silent).expect("surface");

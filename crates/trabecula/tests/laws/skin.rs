@@ -8,10 +8,11 @@ use geometry::mesh::Mesh;
 use geometry::progress::Silent;
 use proptest::prelude::*;
 use trabecula::cell::Part;
+use trabecula::csg_tree::CsgSolid;
 use trabecula::extract::{surface, voxels};
-use trabecula::face::Body;
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
+use trabecula::implicit::Implicit;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
@@ -20,6 +21,12 @@ use crate::common::{ball, check, check_both, cuboid, drawn, lattice};
 
 /// A lattice with nothing solid.
 struct Nothing;
+
+impl Implicit for Nothing {
+    fn lipschitz(&self) -> f64 {
+        1.0
+    }
+}
 
 impl Field for Nothing {
     fn values(&self, _: &[Vec3], out: &mut [f64]) {
@@ -34,7 +41,7 @@ impl Field for Nothing {
     }
 }
 
-fn gyroid(fraction: f64, wavelength: f64) -> Arc<dyn Field> {
+fn gyroid(fraction: f64, wavelength: f64) -> Arc<dyn Implicit> {
     lattice("gyroid", Part::Sheet, fraction, [wavelength; 3], [0.0; 3])
 }
 
@@ -50,13 +57,13 @@ fn half(point: Vec3, normal: Vec3) -> HalfSpace {
     HalfSpace::new(point, normal).expect("half-space")
 }
 
-fn zone(region: &Region) -> Body {
-    let mut faces = Vec::new();
-    let tree = region.clone().faces(0.0, &mut faces);
-    Body { faces, tree }
+fn zone(region: &Region) -> CsgSolid {
+    let mut surfaces = Vec::new();
+    let tree = region.clone().surfaces(0.0, &mut surfaces);
+    CsgSolid { surfaces, tree }
 }
 
-fn filled(region: &Region, field: Arc<dyn Field>, filled: Vec<Body>) -> Solid {
+fn filled(region: &Region, field: Arc<dyn Implicit>, filled: Vec<CsgSolid>) -> Solid {
     let solid = Solid::new(region.clone(), Some(field), 1.0);
     filled.into_iter().fold(solid, Solid::with)
 }

@@ -11,6 +11,7 @@ use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
+use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::region::Cuboid;
@@ -95,7 +96,7 @@ impl Search {
 fn judged(series: &Series, map: Affine, thickness: Grade, edge: f64) -> [f64; 2] {
     let lattice = wall(series.clone(), Level::Thickness(thickness), map);
     let longest = map.wavelength.into_iter().fold(0.0, f64::max);
-    let field: Arc<dyn Field> = Arc::new(lattice.clone());
+    let field: Arc<dyn Implicit> = Arc::new(lattice.clone());
     let region = Arc::new(Cuboid::new([0.0; 3], map.wavelength).expect("box"));
     let solid = Solid::new(region, Some(field), 1.0);
     let s = surface(&solid, edge, &Silent).expect("surface");

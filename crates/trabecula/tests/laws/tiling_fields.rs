@@ -7,6 +7,7 @@ use super::tiling::{cell, made, map, shaken};
 use geometry::math::{Aabb, dot, norm, sub};
 use trabecula::cell::tet::{Grid, Nodes, ready_cells};
 use trabecula::field::Field;
+use trabecula::implicit::Implicit;
 use trabecula::map::Tets;
 use trabecula::tiling::{Level, Tiling};
 
@@ -55,7 +56,7 @@ fn bounds_hold_and_gradients_are_those_of_the_values() {
         let (s, part, t) = cell(name);
         let each = (0..mesh.nodes.len()).map(|_| t * some.between(0.8, 1.2));
         let tiling = Tiling::new(map, s, part, Level::Nodes(Arc::new(each.collect())));
-        let mut fields: Vec<Arc<dyn Field>> = tiling.parts();
+        let mut fields: Vec<Arc<dyn Implicit>> = tiling.parts();
         fields.push(Arc::new(tiling.clone()));
         for _ in 0..600 {
             let (low, h) = (some.point(5.0).map(|v| v + 4.0), some.share().powi(3));

@@ -10,6 +10,7 @@ use trabecula::design::{Design, Loader};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
+use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 

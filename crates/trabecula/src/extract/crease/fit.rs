@@ -128,7 +128,7 @@ impl Knots<'_> {
     /// A value kept away from zero, as those at nodes are.
     pub(super) fn kept(&self, face: usize, v: f64) -> f64 {
         let id = self.local.live[face];
-        let least = self.grid.margin * self.grid.faces[id].slope * self.grid.step;
+        let least = self.grid.margin * self.grid.faces[id].lipschitz * self.grid.step;
         if v <= 0.0 { v.min(-least) } else { v.max(least) }
     }
 

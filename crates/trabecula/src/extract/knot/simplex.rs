@@ -80,7 +80,7 @@ impl Knots<'_> {
             return self.fits.value(point, face);
         }
         let id = self.local.live[face];
-        let scale = self.grid.faces[id].slope * self.grid.step;
+        let scale = self.grid.faces[id].lipschitz * self.grid.step;
         let (v, least) = (f64::from(self.samples[face][node]), self.grid.margin * scale);
         let v = if self.moved.contains(&node) { v + SHIFT * scale * self.chance(id, node) } else { v };
         if self.signs.is_negative(face, node) { v.min(-least) } else { v.max(least) }

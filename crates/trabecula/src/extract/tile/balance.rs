@@ -32,7 +32,7 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes
         let id = local.live[face];
         let least = if grid.has_creases(id) {
             CREASE
-        } else if grid.faces[id].edged {
+        } else if grid.faces[id].has_creases {
             EDGE
         } else {
             f32::NEG_INFINITY

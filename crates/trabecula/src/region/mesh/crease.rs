@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::edges::{ends, halves};
 use super::tree::normal;
-use crate::face::{Creases, Segment};
+use crate::implicit::{Creases, Segment};
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::mesh::Mesh;
 use geometry::union_find;

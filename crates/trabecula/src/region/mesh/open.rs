@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::tree::{Face, Hit, Tree};
-use super::{MeshRegion, NOTHING, one_face};
-use crate::face;
+use super::{MeshRegion, NOTHING, one_surface};
 use crate::field::{Block, Field};
 use crate::region::{HalfSpace, Offset, Region, Shape};
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
@@ -123,10 +122,10 @@ impl Shape for OpenMesh {
         }
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<face::Face>) -> face::Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<crate::implicit::Surface>) -> crate::csg_tree::CsgTree {
         match Offset::new(self.clone(), by) {
-            Ok(moved) => one_face(Arc::new(moved), out),
-            Err(_) => one_face(self, out),
+            Ok(moved) => one_surface(Arc::new(moved), out),
+            Err(_) => one_surface(self, out),
         }
     }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use super::{
     HalfSpace, Shape, along, apart, coordinate_axis, direction, fill_rows, finite, flat, joined, joined_gradient,
-    length, one_face, rounded,
+    length, one_surface, rounded,
 };
-use crate::face::{Face, Tree};
+use crate::csg_tree::CsgTree;
 use crate::field::Block;
+use crate::implicit::Surface;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
@@ -137,12 +138,12 @@ impl Shape for Cylinder {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         if by > 0.0 {
             return rounded(self, by, out);
         }
         if self.radius + by <= 0.0 {
-            return Tree::EMPTY;
+            return CsgTree::EMPTY;
         }
         let ends = [false, true].map(|top| match self.aligned {
             Some((a, ends)) => flat((a, [ends[0] - by, ends[1] + by][usize::from(top)], top), out),
@@ -150,13 +151,13 @@ impl Shape for Cylinder {
                 let normal = scale(self.axis, if top { 1.0 } else { -1.0 });
                 let height = if top { self.height + by } else { -by };
                 let point = add(self.base, scale(self.axis, height));
-                one_face(Arc::new(HalfSpace { point, normal }), out)
+                one_surface(Arc::new(HalfSpace { point, normal }), out)
             }
         });
         let [bottom, top] = ends;
         let mut barrel = *self;
         barrel.radius += by;
-        Tree::All(vec![bottom, top, one_face(Arc::new(Barrel(barrel)), out)])
+        CsgTree::Intersection(vec![bottom, top, one_surface(Arc::new(Barrel(barrel)), out)])
     }
 
     fn volume(&self) -> Option<f64> {

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{HalfSpace, Shape, along, finite, one_face, rounded};
-use crate::face::{Face, Tree};
+use super::{HalfSpace, Shape, along, finite, one_surface, rounded};
+use crate::csg_tree::CsgTree;
+use crate::implicit::Surface;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 
@@ -116,11 +117,11 @@ impl Shape for Tetrahedron {
         }
     }
 
-    fn faces(self: Arc<Self>, by: f64, out: &mut Vec<Face>) -> Tree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         if self.sharpness.is_none() {
-            return Tree::All(self.planes.map(|h| Arc::new(h).faces(by, out)).to_vec());
+            return CsgTree::Intersection(self.planes.map(|h| Arc::new(h).surfaces(by, out)).to_vec());
         }
-        if by == 0.0 { one_face(self, out) } else { rounded(self, by, out) }
+        if by == 0.0 { one_surface(self, out) } else { rounded(self, by, out) }
     }
 
     fn volume(&self) -> Option<f64> {

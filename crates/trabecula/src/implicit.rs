@@ -1,0 +1,170 @@
+//! Implicit surfaces: smooth functions that are negative towards the solid.
+//!
+//! A solid with edges is not the zero set of one smooth function, but a CSG combination of several (`csg_tree.rs`). The
+//! extractor evaluates these functions one by one, so that an edge is where two of them intersect rather than a bend that
+//! a grid cannot resolve.
+
+use std::sync::Arc;
+
+use crate::field::{Block, Field};
+use geometry::math::{Aabb, Interval, Vec3};
+
+/// A field that states what meshing it by its zero set requires.
+pub trait Implicit: Field {
+    /// A Lipschitz bound: an upper bound of the length of the gradient, per mm.
+    fn lipschitz(&self) -> f64;
+
+    /// Whether the zero set may have creases, as unions and distances have. A crease is not curvature.
+    fn has_creases(&self) -> bool {
+        false
+    }
+
+    /// The smooth fields whose maximum this is (their intersection); empty if it is smooth itself.
+    fn parts(&self) -> Vec<Arc<dyn Implicit>> {
+        Vec::new()
+    }
+}
+
+/// An implicit surface: the zero set of a smooth function that is negative towards the solid.
+#[derive(Clone)]
+pub struct Surface {
+    /// The function.
+    pub field: Arc<dyn Field>,
+    /// A Lipschitz bound of the function, per mm.
+    pub lipschitz: f64,
+    /// Set if the zero set is a plane normal to a coordinate axis.
+    pub plane: Option<Plane>,
+    /// Whether it belongs to the region: triangles on it are cuts, all others are surface of the lattice.
+    pub cut: bool,
+    /// Whether its zero set may have creases, as those of distances have. A crease is not curvature.
+    pub has_creases: bool,
+    /// Its creases, where they are known.
+    pub creases: Arc<Creases>,
+    /// Whether it was offset because it coincided with another surface of the solid (`coincident.rs`).
+    pub perturbed: bool,
+}
+
+/// A straight piece of a crease.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Its ends, mm.
+    pub ends: [Vec3; 2],
+    /// The angle by which the normal turns across it, radians.
+    pub turn: f64,
+    /// Length of the straight line that it makes together with its neighbours, mm.
+    pub run: f64,
+}
+
+/// The creases of a surface: curves across which its normal is discontinuous.
+#[derive(Debug, Default)]
+pub struct Creases {
+    /// Straight pieces.
+    pub segments: Vec<Segment>,
+    /// Points where creases end, meet or bend (mm), and the number of pieces there.
+    pub corners: Vec<(Vec3, usize)>,
+}
+
+/// A plane normal to a coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// The axis: 0, 1, 2.
+    pub axis: usize,
+    /// Its coordinate, mm.
+    pub at: f64,
+    /// Whether the solid lies below.
+    pub below: bool,
+}
+
+impl Surface {
+    /// A smooth implicit surface of a lattice.
+    pub fn smooth(field: Arc<dyn Implicit>) -> Surface {
+        Surface {
+            lipschitz: field.lipschitz(),
+            has_creases: field.has_creases(),
+            field,
+            plane: None,
+            cut: false,
+            creases: Arc::default(),
+            perturbed: false,
+        }
+    }
+
+    /// A curved or slanted surface of a region, by its signed distance.
+    pub fn distance(field: Arc<dyn Field>) -> Surface {
+        Surface {
+            field,
+            lipschitz: 1.0,
+            plane: None,
+            cut: true,
+            has_creases: true,
+            creases: Arc::default(),
+            perturbed: false,
+        }
+    }
+
+    /// The same surface with the solid on its other side.
+    pub fn complement(self) -> Surface {
+        let plane = self.plane.map(|p| Plane { below: !p.below, ..p });
+        Surface { field: Arc::new(Negated(self.field)), plane, ..self }
+    }
+
+    /// The surface where the function is `by`: the solid grows by that distance (mm) if the function is a distance.
+    pub fn offset(self, by: f64) -> Surface {
+        let plane = self.plane.map(|p| Plane { at: p.at + if p.below { by } else { -by }, ..p });
+        Surface { field: Arc::new(Shifted(self.field, by)), plane, ..self }
+    }
+}
+
+/// The negative of a field.
+struct Negated(Arc<dyn Field>);
+
+impl Field for Negated {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v = -*v);
+        gradients.iter_mut().flatten().for_each(|x| *x = -*x);
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        -self.0.bound(b)
+    }
+
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.0.fill(block, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
+
+    fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        self.0.fill_where(block, wanted, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
+}
+
+/// A field minus a constant.
+struct Shifted(Arc<dyn Field>, f64);
+
+impl Field for Shifted {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+        out.iter_mut().for_each(|v| *v -= self.1);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v -= self.1);
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        self.0.bound(b) - Interval::new(self.1, self.1)
+    }
+
+    fn fill(&self, block: &Block, out: &mut [f32]) {
+        self.0.fill(block, out);
+        out.iter_mut().for_each(|v| *v -= self.1 as f32);
+    }
+}
