@@ -2,13 +2,17 @@
 //!
 //! Lengths are mm; triangles are counter-clockwise seen from outside.
 
+pub mod distance;
 pub mod fault;
+pub mod feature_edges;
 pub mod formats;
 pub mod math;
 pub mod measure;
 pub mod mesh;
 pub mod progress;
+pub mod random;
 pub mod render;
+pub mod repair;
 pub mod simplify;
 pub mod surface_mesh;
 pub mod symmetry;

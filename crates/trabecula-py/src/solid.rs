@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use geometry::formats;
 use geometry::progress::Stopped;
+use geometry::repair::Repaired;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -15,7 +16,6 @@ use trabecula::design::{self, Built, Node};
 use trabecula::extract;
 use trabecula::field::Field;
 use trabecula::map::{Map, Misfit};
-use trabecula::region::Repaired;
 use trabecula::truss::Beams;
 
 use crate::design::Folder;

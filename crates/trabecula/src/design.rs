@@ -41,13 +41,14 @@ use serde_json::Value as Json;
 use crate::cell::Cell;
 use crate::lattice::Lattice;
 use crate::quador::Quadors;
-use crate::region::{Region, Repaired};
+use crate::region::Region;
 use crate::solid::Solid;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
 use geometry::fault::Fault;
 use geometry::formats::Elements;
 use geometry::mesh::Mesh;
+use geometry::repair::Repaired;
 use geometry::tetmesh::TetMesh;
 use read::RegionIn;
 

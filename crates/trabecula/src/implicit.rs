@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use crate::field::{Block, Field};
+use geometry::feature_edges::Creases;
 use geometry::math::{Aabb, Interval, Vec3};
 
 /// A field that states what meshing it by its zero set requires.
@@ -42,26 +43,6 @@ pub struct Surface {
     pub creases: Arc<Creases>,
     /// Whether it was offset because it coincided with another surface of the solid (`coincident.rs`).
     pub perturbed: bool,
-}
-
-/// A straight piece of a crease.
-#[derive(Clone, Copy, Debug)]
-pub struct Segment {
-    /// Its ends, mm.
-    pub ends: [Vec3; 2],
-    /// The angle by which the normal turns across it, radians.
-    pub turn: f64,
-    /// Length of the straight line that it makes together with its neighbours, mm.
-    pub run: f64,
-}
-
-/// The creases of a surface: curves across which its normal is discontinuous.
-#[derive(Debug, Default)]
-pub struct Creases {
-    /// Straight pieces.
-    pub segments: Vec<Segment>,
-    /// Points where creases end, meet or bend (mm), and the number of pieces there.
-    pub corners: Vec<(Vec3, usize)>,
 }
 
 /// A plane normal to a coordinate axis.

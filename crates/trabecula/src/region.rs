@@ -13,7 +13,7 @@ mod meshes;
 mod primitive;
 
 pub use csg::{Difference, Intersection, Offset, Union};
-pub use mesh::{CAPPED, MeshRegion, Repair, Repaired};
+pub use mesh::MeshRegion;
 pub use primitive::{Cuboid, Cylinder, HalfSpace, Sphere, Tetrahedron};
 
 /// A signed distance function (1-Lipschitz; exact for primitives and meshes, a lower bound of the

@@ -7,12 +7,13 @@ use super::error::DesignError;
 use super::place::finite;
 use super::{Loader, Warning};
 use crate::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Repaired, Shape, Sphere,
-    Tetrahedron, Union,
+    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Shape, Sphere, Tetrahedron,
+    Union,
 };
 use geometry::fault::{Fault, number};
 use geometry::formats;
 use geometry::math::{add, scale, sub};
+use geometry::repair::{Repair, Repaired};
 
 /// A mesh without a unit that is smaller than this (mm) is asked about: no part with a lattice in it is.
 const SMALL: f64 = 1.0;

@@ -13,11 +13,12 @@ use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
 use crate::field::Field;
 use crate::grade::{Grade, Samples};
-use crate::region::{MeshRegion, Repair, Shape as _};
+use crate::region::{MeshRegion, Shape as _};
 pub(super) use field::{field, several};
 use geometry::fault::{Fault, counted, number};
 use geometry::formats;
 use geometry::math::{Aabb, Vec3};
+use geometry::repair::Repair;
 pub(super) use grid::grid;
 
 pub(super) fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, DesignError> {

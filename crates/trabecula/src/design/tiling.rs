@@ -17,10 +17,11 @@ use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series, named};
 use crate::grade::Grade;
 use crate::map::Tets;
-use crate::region::{MeshRegion, Region, Repair};
+use crate::region::{MeshRegion, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
 use geometry::fault::{Fault, number};
 use geometry::mesh::Mesh;
+use geometry::repair::Repair;
 use geometry::symmetry::Group;
 
 /// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.

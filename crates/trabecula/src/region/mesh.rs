@@ -3,139 +3,65 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{HalfSpace, Offset, Region, Shape, one_surface};
+use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
+use crate::implicit::Surface;
+use geometry::distance::tree::Face;
+use geometry::distance::{MeshDistance, UNKNOWN};
 use geometry::fault::Fault;
-use geometry::math::{Aabb, Interval, Vec3, cross, dot, norm, scale, sub, unit};
+use geometry::feature_edges::{Creases, creases};
+use geometry::math::{Aabb, Interval, Vec3, cross, norm, sub};
 use geometry::mesh::Mesh;
+use geometry::repair::{Repair, Repaired};
 
-mod cap;
-mod check;
-mod clean;
-mod crease;
-mod cut;
-mod edges;
-mod fair;
-mod normals;
 mod open;
-mod orient;
-mod repair;
-mod tree;
-mod winding;
 
-use normals::Normals;
-use repair::Boundary;
-pub use repair::{CAPPED, Repair, Repaired};
-use tree::{Face, Feature, Hit, Tree};
-use winding::Winding;
-
-/// A place and its signed distance, where none is known: no comparison with it holds.
-const NOTHING: (Vec3, f64) = ([0.0; 3], f64::NAN);
-/// Sets of triangles farther off than so many radii are taken as a whole where inside is told from outside: the winding
-/// number of a closed surface is then within a few hundredths of zero or one.
-const REACH: f64 = 1.4;
-
-/// The solid inside a triangle mesh, which is repaired if it is not clean: bodies, perhaps with cavities.
+/// The solid inside a triangle mesh, which is repaired if it is not clean.
 ///
-/// Distances to the (repaired) boundary are exact to rounding. Their sign comes from the normals of the nearest face,
-/// edge or vertex where the boundary is one clean surface, else from that of the face or the winding number.
+/// Distances to the (repaired) boundary are exact to rounding: see [`MeshDistance`].
 #[derive(Debug)]
 pub struct MeshRegion {
-    tree: Tree,
-    normals: Normals,
-    /// Asked where the boundary is not one clean sheet; none where it is everywhere.
-    winding: Option<Winding>,
+    distance: MeshDistance,
     bounds: Aabb,
     volume: f64,
     planes: [Vec<f64>; 3],
-    mesh: Mesh,
-    repaired: Repaired,
     /// Found when they are first asked for.
-    creases: OnceLock<Arc<crate::implicit::Creases>>,
+    creases: OnceLock<Arc<Creases>>,
 }
 
 impl MeshRegion {
     /// The solid inside `mesh` (mm), repaired if need be.
     ///
-    /// A clean mesh is taken as it is, but for this: if edges are open, vertices that single precision cannot tell
-    /// apart at the mesh's size are joined first, as files often write one corner with two roundings.
-    ///
-    /// **Errors**: numbers that are not finite; no volume; holes whose caps would be a tenth of the surface or more
-    /// ([`CAPPED`]); with [`Repair::Refuse`] all that [`Repaired`] counts, in numbers.
+    /// **Errors**: those of [`MeshDistance::new`].
     pub fn new(mesh: Mesh, repair: Repair) -> Result<Self, Fault> {
-        repair::boundary(mesh, repair).map(MeshRegion::within)
+        MeshDistance::new(mesh, repair).map(MeshRegion::of)
     }
 
-    /// What is in all of some regions, or in any; less what is in the others.
-    ///
-    /// None where that holds nothing.
+    /// The intersection of the solids `of`, or their union if `any`, less the solids `less`. `None` if it is empty.
     pub(super) fn combined(of: &[&MeshRegion], any: bool, less: &[&MeshRegion]) -> Option<Self> {
-        let least = if any { 1 } else { of.len() };
-        let [of, less] = [of, less].map(|all| all.iter().map(|r| &r.mesh).collect::<Vec<_>>());
-        repair::combined(&of, &less, least).map(MeshRegion::within)
+        let [of, less] = [of, less].map(|all| all.iter().map(|r| &r.distance).collect::<Vec<_>>());
+        MeshDistance::combined(&of, any, &less).map(MeshRegion::of)
     }
 
-    fn within(Boundary { mesh, pairs, done }: Boundary) -> Self {
-        let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
-        let (tree, order) = Tree::new(&faces);
-        let (normals, winding) = match pairs {
-            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
-            None => (Normals::of_pieces(&faces, &order), Some(Winding::new(&tree))),
-        };
+    fn of(distance: MeshDistance) -> Self {
+        let bounds = distance.mesh().bounds();
         MeshRegion {
-            normals,
-            winding,
-            bounds: mesh.bounds(),
-            volume: mesh.volume(),
-            planes: [0, 1, 2].map(|axis| planes(&faces, &mesh.bounds(), axis)),
-            tree,
-            mesh,
-            repaired: done,
+            bounds,
+            volume: distance.mesh().volume(),
+            planes: [0, 1, 2].map(|axis| planes(distance.faces(), &bounds, axis)),
+            distance,
             creases: OnceLock::new(),
         }
     }
 
     /// The boundary that everything is taken from: the mesh given if it was clean, else the repaired one.
     pub fn mesh(&self) -> &Mesh {
-        &self.mesh
+        self.distance.mesh()
     }
 
     /// What was repaired.
     pub fn repaired(&self) -> &Repaired {
-        &self.repaired
-    }
-
-    /// Signed distance; zero where rounding hides it, so that points of flat faces are exactly on them.
-    ///
-    /// `known` is a place and its signed distance: where the two balls that hold no surface overlap, the sign is the
-    /// same, and winding numbers need not be asked for.
-    fn signed(&self, hit: &Hit, p: Vec3, known: (Vec3, f64)) -> f64 {
-        let d = hit.square.sqrt();
-        let rounding = self.tree.rounding();
-        if d <= rounding {
-            return 0.0;
-        }
-        let height = dot(hit.away, self.normals.outward(&self.tree, hit));
-        let inside = match &self.winding {
-            Some(winding) if height.is_nan() => {
-                if (d + known.1.abs()) * (1.0 - 1e-9) > norm(sub(p, known.0)) + rounding {
-                    known.1 < 0.0
-                } else {
-                    winding.at(&self.tree, p, REACH, |_| false) > 0.5
-                }
-            }
-            _ => height < 0.0,
-        };
-        if inside { -d } else { d }
-    }
-
-    fn gradient(&self, hit: &Hit, d: f64) -> Vec3 {
-        let outward = self.normals.outward(&self.tree, hit);
-        match hit.feature {
-            Feature::Face if !outward[0].is_nan() => outward,
-            _ if d == 0.0 && outward[0].is_nan() => self.tree.faces()[hit.triangle as usize].normal,
-            _ if d == 0.0 => unit(outward),
-            _ => scale(hit.away, 1.0 / d),
-        }
+        self.distance.repaired()
     }
 }
 
@@ -159,24 +85,11 @@ fn planes(faces: &[Face], bounds: &Aabb, axis: usize) -> Vec<f64> {
 
 impl Field for MeshRegion {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let (mut seed, mut known) = (0, NOTHING);
-        for (o, p) in out.iter_mut().zip(points) {
-            let hit = self.tree.nearest(*p, seed);
-            seed = hit.triangle;
-            *o = self.signed(&hit, *p, known);
-            known = (*p, *o);
-        }
+        self.distance.values(points, out);
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let (mut seed, mut known) = (0, NOTHING);
-        for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-            let hit = self.tree.nearest(*p, seed);
-            seed = hit.triangle;
-            *v = self.signed(&hit, *p, known);
-            *g = self.gradient(&hit, *v);
-            known = (*p, *v);
-        }
+        self.distance.gradients(points, values, gradients);
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
@@ -185,7 +98,7 @@ impl Field for MeshRegion {
         }
         let d = self.value(b.center());
         let reach = norm(b.size()) / 2.0;
-        let reach = reach * (1.0 + 1e-12) + 2.0 * self.tree.rounding() + 1e-14 * d.abs();
+        let reach = reach * (1.0 + 1e-12) + 2.0 * self.distance.rounding() + 1e-14 * d.abs();
         Interval::new(d - reach, d + reach)
     }
 
@@ -214,19 +127,16 @@ impl Shape for MeshRegion {
         let cell = norm(block.axes.map(widest));
         let shape = block.shape();
         let mut fill = Fill { region: self, block, level, cell, out };
-        fill.part([0; 3], shape, 0, NOTHING);
+        fill.part([0; 3], shape, 0, UNKNOWN);
     }
 
-    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<crate::implicit::Surface>) -> crate::csg_tree::CsgTree {
+    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         match Offset::new(self.clone(), by) {
             Ok(moved) if by != 0.0 => one_surface(Arc::new(moved), out),
             _ => {
-                let creases = self.creases.get_or_init(|| Arc::new(crease::creases(&self.mesh)));
-                out.push(crate::implicit::Surface {
-                    creases: creases.clone(),
-                    ..crate::implicit::Surface::distance(self.clone())
-                });
-                crate::csg_tree::CsgTree::Leaf(out.len() - 1)
+                let creases = self.creases.get_or_init(|| Arc::new(creases(self.distance.mesh())));
+                out.push(Surface { creases: creases.clone(), ..Surface::distance(self.clone()) });
+                CsgTree::Leaf(out.len() - 1)
             }
         }
     }
@@ -259,8 +169,8 @@ impl Fill<'_> {
         let ends = [0, 1, 2].map(|a| [self.block.axes[a][lo[a]], self.block.axes[a][hi[a] - 1]]);
         let center = ends.map(|[a, b]| a + (b - a) / 2.0);
         let size = ends.map(|[a, b]| b - a);
-        let hit = self.region.tree.nearest(center, seed);
-        let known = (center, self.region.signed(&hit, center, known));
+        let hit = self.region.distance.nearest(center, seed);
+        let known = (center, self.region.distance.signed(&hit, center, known));
         let d = known.1 - self.level;
         if d.abs() > (norm(size) / 2.0 + self.cell) * (1.0 + 1e-9) {
             self.each(lo, hi, |_, p| (d.abs() - norm(sub(p, center))).copysign(d));
@@ -270,9 +180,9 @@ impl Fill<'_> {
         if (0..3).map(|a| hi[a] - lo[a]).product::<usize>() <= 8 || hi[longest] - lo[longest] < 2 {
             let (mut seed, mut known) = (hit.triangle, known);
             self.each(lo, hi, |fill, p| {
-                let hit = fill.region.tree.nearest(p, seed);
+                let hit = fill.region.distance.nearest(p, seed);
                 seed = hit.triangle;
-                known = (p, fill.region.signed(&hit, p, known));
+                known = (p, fill.region.distance.signed(&hit, p, known));
                 known.1 - fill.level
             });
             return;

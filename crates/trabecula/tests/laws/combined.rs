@@ -6,13 +6,14 @@ use std::sync::Arc;
 
 use geometry::math::{Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use geometry::progress::Silent;
+use geometry::repair::Repair;
 use trabecula::cell::Part;
 use trabecula::csg_tree::CsgSolid;
 use trabecula::extract::{Islands, surface};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::implicit::Implicit;
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 

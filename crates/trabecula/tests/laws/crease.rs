@@ -7,6 +7,7 @@ use std::sync::Arc;
 use geometry::math::{Aabb, Interval, Vec3, add, apply, cross, dot, norm, rotation, scale, sub, unit};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
+use geometry::repair::Repair;
 use geometry::surface_mesh::SurfaceMesh;
 use trabecula::cell::Part;
 use trabecula::csg_tree::CsgTree;
@@ -14,7 +15,7 @@ use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::Grade;
 use trabecula::implicit::Surface;
-use trabecula::region::{MeshRegion, Region, Repair, Shape, Union};
+use trabecula::region::{MeshRegion, Region, Shape, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 

@@ -8,11 +8,12 @@ use crate::common::{Random, cases, fault_of, lattice};
 use geometry::math::{Vec3, add, apply, cross, norm, rotation, scale, sub, unit};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
+use geometry::repair::{CAPPED, Repair};
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
 use trabecula::field::Field;
-use trabecula::region::{CAPPED, MeshRegion, Repair, Shape};
+use trabecula::region::{MeshRegion, Shape};
 use trabecula::solid::Solid;
 
 /// A cube [−1, 1]³ of n² squares a side, in triangles.

@@ -6,12 +6,11 @@ use crate::common::{Random, cases, fault_of, lattice};
 use geometry::math::{Mat3, Vec3, add, apply, rotation, scale};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
+use geometry::repair::Repair;
 use rayon::prelude::*;
 use trabecula::cell::Part;
 use trabecula::extract::surface;
-use trabecula::region::{
-    Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere, Union,
-};
+use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere, Union};
 use trabecula::solid::Solid;
 
 /// Where bodies with corners on whole numbers are put.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use geometry::math::{Aabb, Interval, Vec3, norm, sub};
 use geometry::mesh::Mesh;
 use geometry::progress::Silent;
+use geometry::repair::Repair;
 use proptest::prelude::*;
 use trabecula::cell::Part;
 use trabecula::csg_tree::CsgSolid;
@@ -13,7 +14,7 @@ use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade};
 use trabecula::implicit::Implicit;
-use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Repair, Union};
+use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 

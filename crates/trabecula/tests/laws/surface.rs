@@ -7,13 +7,14 @@ use std::sync::Arc;
 use geometry::measure::size;
 use geometry::mesh::Mesh;
 use geometry::progress::{Silent, Stopped};
+use geometry::repair::Repair;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{Islands, stream_stl, surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
-use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Repair, Sphere};
+use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere};
 
 use crate::common::{ball, cases, check, check_both, drawn, lattice_at, region, solid};
 

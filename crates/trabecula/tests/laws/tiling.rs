@@ -8,6 +8,7 @@ use crate::common::{Random, ball, cases, check, fault};
 use geometry::math::norm;
 use geometry::measure::size;
 use geometry::progress::{Silent, Stopped};
+use geometry::repair::Repair;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::symmetry::{Group, Side};
 use geometry::tetmesh::TetMesh;
@@ -18,7 +19,7 @@ use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
 use trabecula::mesher::background;
-use trabecula::region::{MeshRegion, Repair};
+use trabecula::region::MeshRegion;
 use trabecula::solid::Solid;
 use trabecula::tiling::{Amount, Level, Share, Tiling};
 

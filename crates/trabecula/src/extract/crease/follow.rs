@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::Edges;
 use crate::extract::grid::{Grid, TILE};
 use crate::extract::tile::Nodes;
-use crate::implicit::Creases;
+use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, scale, sub};
 
 /// Straight edges that are this many steps long or more are shown, however little the face turns there.

@@ -2,11 +2,11 @@
 
 use proptest::prelude::*;
 
-use super::tests::{ball, with};
 use super::*;
 use crate::region::tests::random;
 use crate::region::{Cuboid, Cylinder, Sphere, Union};
 use geometry::math::{Mat3, add, apply, rotation};
+use geometry::mesh::samples::{icosphere, with};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ fn continuous(name: &str, region: &MeshRegion, center: Vec3, reach: f64) {
 
 #[test]
 fn holes_are_closed_and_nothing_jumps_across() {
-    let whole = ball(3, 1.0, 0.0);
+    let whole = icosphere(3, 1.0, 0.0);
     let volume = whole.volume();
     let mut mesh = whole.clone();
     // Everything about the x axis within 15 degrees, and two lone triangles that touch in a corner.
@@ -172,7 +172,7 @@ fn turned_and_doubled_triangles_leave_the_mesh_as_it_was() {
 
 #[test]
 fn cavities_are_kept_and_bodies_within_bodies_are_not() {
-    let (big, small) = (|| ball(2, 2.0, 0.0), || ball(2, 1.0, 0.1));
+    let (big, small) = (|| icosphere(2, 2.0, 0.0), || icosphere(2, 1.0, 0.1));
     let hollow = with(big(), small(), true);
     let region = auto(hollow.clone());
     assert!(region.repaired().is_clean());
@@ -187,8 +187,8 @@ fn cavities_are_kept_and_bodies_within_bodies_are_not() {
     assert_eq!(nested.repaired().inner, 320);
     // A ball in the cavity, turned as it likes.
     for out in [false, true] {
-        let three = with(hollow.clone(), ball(1, 0.5, 0.0), out);
-        let volume = hollow.volume() + ball(1, 0.5, 0.0).volume();
+        let three = with(hollow.clone(), icosphere(1, 0.5, 0.0), out);
+        let volume = hollow.volume() + icosphere(1, 0.5, 0.0).volume();
         let region = auto(three);
         assert!((region.volume().unwrap() - volume).abs() < 1e-12);
         assert!(region.value([0.0; 3]) < 0.0 && region.value([0.7, 0.0, 0.0]) > 0.0);
@@ -199,8 +199,8 @@ fn cavities_are_kept_and_bodies_within_bodies_are_not() {
 fn overlapping_balls_are_united() {
     for n in [2, 4] {
         let turn = rotation([12.0, 34.0, 56.0]);
-        let a = ball(n, 1.0, 0.0);
-        let b = moved(ball(n, 1.0, 0.0), &turn, [1.1, 0.13, -0.2]);
+        let a = icosphere(n, 1.0, 0.0);
+        let b = moved(icosphere(n, 1.0, 0.0), &turn, [1.1, 0.13, -0.2]);
         let (one, two) = (auto(a.clone()), auto(b.clone()));
         let region = auto(with(a, b, false));
         assert!(region.repaired().crossings > 20);
@@ -219,7 +219,7 @@ fn overlapping_balls_are_united() {
         let d = norm([1.1, 0.13, -0.2]);
         let lens = PI * (4.0 + d) * (2.0 - d).powi(2) / 12.0;
         let ideal = 8.0 / 3.0 * PI - lens;
-        let lacking = ball(n, 1.0, 0.0).volume() / (4.0 / 3.0 * PI);
+        let lacking = icosphere(n, 1.0, 0.0).volume() / (4.0 / 3.0 * PI);
         let got = region.volume().unwrap() / (ideal * lacking);
         assert!((got - 1.0).abs() < 0.12 / 4f64.powi(n as i32), "{got}");
     }
@@ -323,7 +323,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     mesh.triangles.push([8, 2, 3]);
     let region = auto(mesh);
     assert_eq!((region.volume(), region.repaired().split), (Some(1.0), 1));
-    assert!(region.winding.is_none());
+    assert!(region.distance.signed_by_normals());
 
     // The same a hair off: a hole as thin as the hair.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
@@ -338,7 +338,7 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
 
 #[test]
 fn noise_that_folds_the_surface_is_cut_out() {
-    let mut mesh = ball(4, 1.0, 0.0);
+    let mut mesh = icosphere(4, 1.0, 0.0);
     let mut seed = 31;
     // The edges are about 0.07 long.
     for v in &mut mesh.vertices {
@@ -357,8 +357,11 @@ fn noise_that_folds_the_surface_is_cut_out() {
 #[test]
 fn neither_order_nor_place_matters() {
     let damaged = || {
-        let mut m =
-            with(ball(3, 1.0, 0.0), moved(ball(3, 0.8, 0.1), &rotation([5.0, 8.0, 3.0]), [0.9, 0.2, 0.1]), false);
+        let mut m = with(
+            icosphere(3, 1.0, 0.0),
+            moved(icosphere(3, 0.8, 0.1), &rotation([5.0, 8.0, 3.0]), [0.9, 0.2, 0.1]),
+            false,
+        );
         for i in 0..30 {
             m.triangles[40 * i].swap(0, 1);
         }
@@ -387,35 +390,6 @@ fn neither_order_nor_place_matters() {
         let d = one.value(p);
         assert!((other.value(p) - d).abs() < 1e-9, "{p:?}");
         assert!((turned.value(add(apply(&turn, p), by)) - d).abs() < 1e-9, "{p:?}");
-    }
-}
-
-#[test]
-fn winding_numbers_are_whole_and_the_tree_is_near_them() {
-    let mesh = with(ball(3, 2.0, 0.2), ball(2, 0.8, 0.0), true);
-    let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
-    let (tree, _) = Tree::new(&faces);
-    let winding = Winding::new(&tree);
-    let mut seed = 6;
-    let mut worst = [0.0f64; 3];
-    for _ in 0..2000 {
-        let p = [0; 3].map(|_| random(&mut seed) * 2.6);
-        let plain: f64 = faces.iter().map(|f| winding::turn(f.corners, p)).sum();
-        assert!((plain - plain.round()).abs() < 1e-11, "{plain}");
-        for (w, reach) in worst.iter_mut().zip([2.0, 4.0, 8.0]) {
-            *w = w.max((winding.at(&tree, p, reach, |_| false) - plain).abs());
-        }
-    }
-    // Moments up to the second leave an error of the third: an eighth at twice the reach, at least.
-    assert!(worst[0] < 0.02 && worst[1] < worst[0] / 8.0 && worst[2] < worst[1] / 8.0, "{worst:?}");
-    // An open surface: the number is that of the plain sum there too.
-    let open: Vec<Face> = faces[..500].to_vec();
-    let (tree, _) = Tree::new(&open);
-    let winding = Winding::new(&tree);
-    for _ in 0..500 {
-        let p = [0; 3].map(|_| random(&mut seed) * 2.6);
-        let plain: f64 = open.iter().map(|f| winding::turn(f.corners, p)).sum();
-        assert!((winding.at(&tree, p, 2.0, |_| false) - plain).abs() < 0.02);
     }
 }
 

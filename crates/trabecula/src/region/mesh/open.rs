@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::tree::{Face, Hit, Tree};
-use super::{MeshRegion, NOTHING, one_surface};
+use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
 use crate::region::{HalfSpace, Offset, Region, Shape};
+use geometry::distance::UNKNOWN;
+use geometry::distance::tree::{Face, Hit, Tree};
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
 
 /// Corners of a triangle on a plane may stand this far off it, as a share of the mesh's size: files hold coordinates in
@@ -29,9 +30,9 @@ pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bo
     let on = |f: &Face, c: &HalfSpace| {
         dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off)
     };
-    let mut rest = Vec::with_capacity(whole.tree.faces().len());
+    let mut rest = Vec::with_capacity(whole.distance.faces().len());
     let mut used = vec![false; cuts.len()];
-    for f in whole.tree.faces() {
+    for f in whole.distance.faces() {
         match cuts.iter().position(|c| on(f, c)) {
             Some(i) => used[i] = true,
             None => rest.push(*f),
@@ -55,9 +56,9 @@ impl OpenMesh {
         if self.cuts.iter().any(|c| c.value(p) >= 0.0) {
             return (hit, -1.0);
         }
-        let whole = self.whole.tree.nearest(p, seeds[1]);
+        let whole = self.whole.distance.nearest(p, seeds[1]);
         seeds[1] = whole.triangle;
-        let inside = self.whole.signed(&whole, p, NOTHING) <= 0.0;
+        let inside = self.whole.distance.signed(&whole, p, UNKNOWN) <= 0.0;
         (hit, if inside { -1.0 } else { 1.0 })
     }
 }

@@ -1,63 +1,10 @@
-use super::tree::normal;
 use super::*;
 use crate::region::tests::{check_shape, random};
-use geometry::math::add;
-use std::collections::HashMap;
-
-/// An icosphere of 20·4ⁿ triangles, its radius waved by `wave`.
-pub(super) fn ball(n: usize, radius: f64, wave: f64) -> Mesh {
-    let g = (1.0 + 5f64.sqrt()) / 2.0;
-    let mut vertices = Vec::new();
-    for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
-        vertices.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
-    }
-    let near = |i: usize, j: usize, v: &[Vec3]| (norm(sub(v[i], v[j])) - 2.0).abs() < 1e-9;
-    let mut triangles = Vec::new();
-    for i in 0..12 {
-        for j in i + 1..12 {
-            for k in j + 1..12 {
-                if near(i, j, &vertices) && near(j, k, &vertices) && near(i, k, &vertices) {
-                    let [a, b, c] = [i, j, k].map(|v| vertices[v]);
-                    let out = dot(a, cross(b, c)) > 0.0;
-                    let t = if out { [i, j, k] } else { [i, k, j] };
-                    triangles.push(t.map(|v| v as u32));
-                }
-            }
-        }
-    }
-    for _ in 0..n {
-        let mut halves = HashMap::new();
-        let mut next = Vec::new();
-        for t in &triangles {
-            let m = [0, 1, 2].map(|k| {
-                let (a, b): (u32, u32) = (t[k], t[(k + 1) % 3]);
-                *halves.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                    vertices.push(scale(add(vertices[a as usize], vertices[b as usize]), 0.5));
-                    vertices.len() as u32 - 1
-                })
-            });
-            next.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
-        }
-        triangles = next;
-    }
-    for v in &mut vertices {
-        let u = unit(*v);
-        let r = radius * (1.0 + wave * (7.0 * u[0]).sin() * (6.0 * u[1]).sin() * (5.0 * u[2]).cos());
-        *v = scale(u, r);
-    }
-    Mesh { vertices, triangles }
-}
-
-/// Both meshes as one, the second turned inside out if asked.
-pub(super) fn with(mut a: Mesh, b: Mesh, inside_out: bool) -> Mesh {
-    let n = a.vertices.len() as u32;
-    a.vertices.extend(b.vertices);
-    a.triangles.extend(b.triangles.iter().map(|t| {
-        let [x, y, z] = t.map(|v| v + n);
-        if inside_out { [x, z, y] } else { [x, y, z] }
-    }));
-    a
-}
+use geometry::distance::REACH;
+use geometry::distance::tree::{Tree, normal};
+use geometry::distance::winding::Winding;
+use geometry::math::{add, dot};
+use geometry::mesh::samples::{icosphere, with};
 
 #[test]
 fn a_box_of_triangles_is_the_box() {
@@ -105,7 +52,7 @@ fn flat_faces_are_exactly_zero() {
 
 #[test]
 fn distances_and_signs_agree_with_a_plain_search() {
-    let hollow = with(ball(3, 2.0, 0.2), ball(1, 0.8, 0.0), true);
+    let hollow = with(icosphere(3, 2.0, 0.2), icosphere(1, 0.8, 0.0), true);
     let volume = hollow.volume();
     let corners: Vec<[Vec3; 3]> = (0..hollow.triangles.len()).map(|i| hollow.corners(i)).collect();
     let region = MeshRegion::new(hollow, Repair::Auto).unwrap();
@@ -126,46 +73,6 @@ fn distances_and_signs_agree_with_a_plain_search() {
         let d = region.value(p);
         assert_eq!(d.abs(), near, "{p:?}");
         assert_eq!(d < 0.0, inside, "{p:?}");
-    }
-}
-
-#[test]
-fn the_seed_never_matters() {
-    let region = MeshRegion::new(ball(3, 1.0, 0.3), Repair::Auto).unwrap();
-    let mut seed = 3;
-    for _ in 0..500 {
-        let p = [0; 3].map(|_| random(&mut seed) * 1.5);
-        let any = ((random(&mut seed) + 1.0) * 640.0) as u32;
-        let (a, b) = (region.tree.nearest(p, 0), region.tree.nearest(p, any));
-        assert_eq!((a.square, a.triangle), (b.square, b.triangle));
-    }
-    // The centre of a regular body is equally far from every face.
-    let cube = MeshRegion::new(Mesh::cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
-    for s in 0..12 {
-        assert_eq!(cube.tree.nearest([0.0; 3], s).triangle, cube.tree.nearest([0.0; 3], 0).triangle);
-    }
-}
-
-#[test]
-fn nearest_points_of_a_triangle_by_sampling() {
-    let mut seed = 21;
-    for _ in 0..300 {
-        let corners = [0; 3].map(|_| [0; 3].map(|_| random(&mut seed)));
-        let face = Face { corners, normal: normal(corners) };
-        let p = [0; 3].map(|_| 2.0 * random(&mut seed));
-        let (square, away, _) = face.nearest(p);
-        assert!((square - dot(away, away)).abs() < 1e-14);
-        let n = 60;
-        let mut least = f64::INFINITY;
-        for i in 0..=n {
-            for j in 0..=n - i {
-                let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                let q = [0, 1, 2].map(|a| (1.0 - u - v) * corners[0][a] + u * corners[1][a] + v * corners[2][a]);
-                least = least.min(norm(sub(p, q)));
-            }
-        }
-        // The samples are never nearer, and one of them lies within a step of the nearest point.
-        assert!(least >= square.sqrt() - 1e-12 && least <= square.sqrt() + 2.0 * 3f64.sqrt() * 2.0 / f64::from(n));
     }
 }
 
@@ -220,8 +127,8 @@ fn corners_written_with_two_roundings_are_one() {
 fn rates() {
     use rayon::prelude::*;
     use std::time::Instant;
-    let clean = ball(6, 100.0, 0.1);
-    let mut other = ball(6, 70.0, 0.1);
+    let clean = icosphere(6, 100.0, 0.1);
+    let mut other = icosphere(6, 70.0, 0.1);
     for v in &mut other.vertices {
         *v = add(*v, [60.0, 10.0, 5.0]);
     }
@@ -250,10 +157,11 @@ fn rates() {
         region.values(&points, &mut out);
         println!("  {:.0} ns per random query near the surface", t.elapsed().as_nanos() as f64 / points.len() as f64);
         let t = Instant::now();
-        let winding = Winding::new(&region.tree);
+        let (tree, _) = Tree::new(region.distance.faces());
+        let winding = Winding::new(&tree);
         let made = t.elapsed();
         let t = Instant::now();
-        let inside = points.iter().filter(|p| winding.at(&region.tree, **p, REACH, |_| false) > 0.5).count();
+        let inside = points.iter().filter(|p| winding.at(&tree, **p, REACH, |_| false) > 0.5).count();
         println!(
             "  moments in {made:?}, {:.0} ns per winding number, {inside} inside",
             t.elapsed().as_nanos() as f64 / points.len() as f64

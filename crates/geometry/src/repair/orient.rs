@@ -1,10 +1,10 @@
 //! Which way triangles face: neighbours alike, bodies outwards, cavities kept.
 
-use super::edges::{components, halves, rises};
-use super::tree::{Face, Tree};
-use super::winding::{Winding, turn};
-use geometry::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
-use geometry::mesh::Mesh;
+use super::half_edges::{components, halves, rises};
+use crate::distance::tree::{Face, Tree};
+use crate::distance::winding::{Winding, turn};
+use crate::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
+use crate::mesh::Mesh;
 
 /// Corners of a body at which it is asked whether another one holds it.
 const LOOKS: usize = 32;

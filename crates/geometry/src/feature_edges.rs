@@ -2,12 +2,31 @@
 
 use std::collections::HashMap;
 
-use super::edges::{ends, halves};
-use super::tree::normal;
-use crate::implicit::{Creases, Segment};
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
-use geometry::mesh::Mesh;
-use geometry::union_find;
+use crate::distance::tree::normal;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::mesh::Mesh;
+use crate::repair::half_edges::{ends, halves};
+use crate::union_find;
+
+/// A straight piece of a crease.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Its ends, mm.
+    pub ends: [Vec3; 2],
+    /// The angle by which the normal turns across it, radians.
+    pub turn: f64,
+    /// Length of the straight line that it makes together with its neighbours, mm.
+    pub run: f64,
+}
+
+/// The creases of a surface: curves across which its normal is discontinuous.
+#[derive(Debug, Default)]
+pub struct Creases {
+    /// Straight pieces.
+    pub segments: Vec<Segment>,
+    /// Points where creases end, meet or bend (mm), and the number of pieces there.
+    pub corners: Vec<(Vec3, usize)>,
+}
 
 /// The least turn of the normal across a crease, radians (10°): below it a rounded edge is off by a twentieth of a step.
 const TURN: f64 = 0.175;

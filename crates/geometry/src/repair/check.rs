@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::clean::flat;
-use super::edges::{Sets, components, halves, rises};
-use super::winding::turn;
-use geometry::fault::Fault;
-use geometry::math::{cross, dot, norm, sub};
-use geometry::mesh::Mesh;
+use super::half_edges::{Sets, components, halves, rises};
+use crate::distance::winding::turn;
+use crate::fault::Fault;
+use crate::math::{cross, dot, norm, sub};
+use crate::mesh::Mesh;
 
 /// Pairs of half-edges (3 · triangle + corner where the edge begins) that are one edge.
 pub type Pairs = Vec<[u32; 2]>;

@@ -4,10 +4,10 @@
 //! Comput. Graph. 11 (2005) 243. The proof looks at nothing but the surface about the nearest point, so within a
 //! triangle it holds however the surface is elsewhere.
 
-use super::check::Pairs;
 use super::tree::{Face, Feature, Hit, Tree};
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
-use geometry::mesh::Mesh;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::mesh::Mesh;
+use crate::repair::check::Pairs;
 
 /// No normal: comparisons with it do not hold.
 const NONE: Vec3 = [f64::NAN; 3];

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::edges::{Sets, ends, halves, open};
-use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use geometry::mesh::{BoxTree, Mesh};
+use super::half_edges::{Sets, ends, halves, open};
+use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
+use crate::mesh::{BoxTree, Mesh};
 
 /// Corners of open edges join over at most this share of the mesh's diagonal: seams that exporters leave are far
 /// narrower, and holes that matter are wider.

@@ -13,12 +13,12 @@
 
 use rayon::prelude::*;
 
-use super::edges::{Sets, halves, rises};
-use super::tree::{Face, Tree};
-use super::winding::Winding;
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
-use geometry::mesh::exact::{drop_axis, orient2d, orient3d};
-use geometry::mesh::{Mesh, near_pairs};
+use super::half_edges::{Sets, halves, rises};
+use crate::distance::tree::{Face, Tree};
+use crate::distance::winding::Winding;
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::mesh::exact::{drop_axis, orient2d, orient3d};
+use crate::mesh::{Mesh, near_pairs};
 
 /// How two triangles meet.
 enum Meeting {

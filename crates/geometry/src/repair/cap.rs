@@ -8,10 +8,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::edges::{halves, rises};
 use super::fair;
-use geometry::math::{Vec3, cross, dot, norm, sub, unit};
-use geometry::mesh::Mesh;
+use super::half_edges::{halves, rises};
+use crate::math::{Vec3, cross, dot, norm, sub, unit};
+use crate::mesh::Mesh;
 
 /// Loops of more corners are parted by chords first: the search takes the cube of their number.
 const LONG: usize = 160;
@@ -123,7 +123,7 @@ impl Rims {
                 }
                 if corners.contains(&a) && corners.contains(&b) {
                     rims.edges.insert((a.min(b), a.max(b)));
-                    rims.beyond.insert((b, a), super::tree::normal(mesh.corners(i)));
+                    rims.beyond.insert((b, a), crate::distance::tree::normal(mesh.corners(i)));
                 }
             }
         }

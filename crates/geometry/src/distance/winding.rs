@@ -11,7 +11,7 @@ use core::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::tree::{Face, Tree};
-use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Solid angle of a triangle seen from `p`, over 4π: positive where the normal points away from `p`.
 pub fn turn(corners: [Vec3; 3], p: Vec3) -> f64 {
@@ -89,7 +89,7 @@ struct Moments {
 }
 
 impl Moments {
-    fn of(faces: &[Face], bounds: &geometry::math::Aabb) -> Moments {
+    fn of(faces: &[Face], bounds: &crate::math::Aabb) -> Moments {
         let mut area = 0.0;
         let mut middle = [0.0; 3];
         for f in faces {
@@ -344,7 +344,7 @@ impl Winding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::region::tests::random;
+    use crate::random::random;
 
     fn plain(faces: &[Face], p: Vec3) -> f64 {
         faces.iter().map(|f| turn(f.corners, p)).sum()
@@ -378,7 +378,7 @@ mod tests {
                 })
                 .sum();
             for _ in 0..20 {
-                let way = geometry::math::unit([0; 3].map(|_| random(&mut seed)));
+                let way = crate::math::unit([0; 3].map(|_| random(&mut seed)));
                 let beta = 1.05 + 6.0 * random(&mut seed).powi(4);
                 let r = beta / node.per[0];
                 let p = add(center, scale(way, r));
@@ -412,7 +412,7 @@ mod tests {
             }
         }
         // Twelve times about: whole turns are counted.
-        let ball = super::super::tests::ball(1, 1.0, 0.0);
+        let ball = crate::mesh::samples::icosphere(1, 1.0, 0.0);
         let faces: Vec<Face> =
             (0..12 * ball.triangles.len()).map(|i| Face::new(ball.corners(i % ball.triangles.len()))).collect();
         let (tree, _) = Tree::new(&faces);

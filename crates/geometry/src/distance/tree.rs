@@ -1,6 +1,6 @@
 //! A tree of boxes over triangles, and the nearest triangle to a point.
 
-use geometry::math::{Aabb, Vec3, add, cross, dot, scale, sub, unit};
+use crate::math::{Aabb, Vec3, add, cross, dot, scale, sub, unit};
 
 /// The part of a triangle that is nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

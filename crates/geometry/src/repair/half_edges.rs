@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use geometry::mesh::Mesh;
+use crate::mesh::Mesh;
 
 /// Half-edges (the edge's vertices, 3 · triangle + corner where it begins) in the order of their edges.
 pub fn halves(mesh: &Mesh) -> Vec<(u64, u32)> {

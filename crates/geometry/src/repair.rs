@@ -1,10 +1,18 @@
 //! From any triangles to one boundary: the order of the repairs, what they did, and when they are refused.
 
-use super::check::{self, Pairs};
-use super::{cap, clean, cut, orient};
-use geometry::fault::Fault;
-use geometry::math::{add, cross, norm, scale, sub};
-use geometry::mesh::{Mesh, self_intersections};
+use crate::fault::Fault;
+use crate::math::{add, cross, norm, scale, sub};
+use crate::mesh::{Mesh, self_intersections};
+
+mod arrangement;
+mod cap;
+pub(crate) mod check;
+mod clean;
+mod fair;
+pub(crate) mod half_edges;
+mod orient;
+
+use check::Pairs;
 
 /// Caps may make up this share of the repaired surface. A cap is a guess: at a tenth of the surface, over a hole a
 /// fifth of the part wide, it can be wrong by a tenth of that width, which is the size of a cell of most lattices.
@@ -182,9 +190,9 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     let crosses = clean.is_none() || found.is_some() && self_intersections(&mesh, 1) > 0;
     let mut pairs = clean.filter(|_| !crosses);
     let plain = pairs.as_ref().is_some_and(|p| check::plain(&mesh, p));
-    let cut = (!plain).then(|| cut::boundary(&mesh, 1));
+    let cut = (!plain).then(|| arrangement::boundary(&mesh, 1));
     if let Some(cut) = cut.filter(|c| !c.untouched) {
-        let eta = cut::tolerance(&mesh);
+        let eta = arrangement::tolerance(&mesh);
         done.crossings = cut.pairs;
         done.inner = cut.inner;
         mesh = settled(cut.mesh, eta)?;
@@ -236,8 +244,8 @@ pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary
         all.triangles.extend(moved);
     }
     check::numbers(&all).ok()?;
-    let eta = cut::tolerance(&all);
-    let cut = cut::boundary(&all, least);
+    let eta = arrangement::tolerance(&all);
+    let cut = arrangement::boundary(&all, least);
     let mesh = if cut.untouched { cut.mesh } else { settled(cut.mesh, eta).ok()? };
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
         return None;
