@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
+use beams::quador::Quadors as Core;
+use beams::quador::bezier::Bezier;
+use beams::quador::patch::matrix;
+use beams::quador::slice::{Plane, Slice as Cut};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use rayon::prelude::*;
-use trabecula::quador::Quadors as Core;
-use trabecula::quador::bezier::Bezier;
-use trabecula::quador::patch::matrix;
-use trabecula::quador::slice::{Plane, Slice as Cut};
 
 use crate::error;
 use crate::run::run;
@@ -254,7 +254,7 @@ impl Slice {
 
     /// For each loop: control points (n, 3, 2), weights (n,), hubs (n,), conics (n, 6) and where their (u, v) start (n, 2).
     fn loops<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let one = |arcs: &Vec<trabecula::quador::slice::Arc>| {
+        let one = |arcs: &Vec<beams::quador::slice::Arc>| {
             let all: Vec<Bezier<2>> = arcs.iter().flat_map(|a| a.curves.iter().copied()).collect();
             let each = || arcs.iter().flat_map(|a| a.curves.iter().map(move |_| a));
             let d = PyDict::new(py);

@@ -40,11 +40,11 @@ use serde_json::Value as Json;
 
 use crate::cell::Cell;
 use crate::lattice::Lattice;
-use crate::quador::Quadors;
 use crate::region::Region;
 use crate::solid::Solid;
 use crate::tiling::Tiling;
 use crate::truss::Beams;
+use ::beams::quador::Quadors;
 use geometry::fault::Fault;
 use geometry::formats::Elements;
 use geometry::mesh::Mesh;

@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 
-use crate::graph::{Cleaned, Facts, Graph, Trimmed};
+mod field;
+mod fill;
+
+pub use fill::{expected, fill};
+
 use crate::implicit::Implicit;
-use crate::pattern::Laid;
-use crate::quador::Quadors;
-use crate::quador::collide::Collision;
+use beams::graph::{Cleaned, Facts, Graph, Trimmed};
+use beams::pattern::Laid;
+use beams::quador::Quadors;
+use beams::quador::collide::Collision;
 
 /// Beams as they fill a region.
 #[derive(Clone)]

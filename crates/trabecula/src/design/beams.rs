@@ -14,9 +14,10 @@ use super::place::{LOOKS, Place};
 use super::{Built, Warning};
 use super::{map, sample};
 use crate::field::Field;
-use crate::graph::{self, Radii, Trim, Wire, sized};
-use crate::quador::{Fillet, Quadors};
-use crate::truss::{Beams, Truss};
+use crate::grade::Grade;
+use crate::truss::{Beams, Truss, fill};
+use ::beams::graph::{self, Radii, Trim, Wire, sized};
+use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
 
@@ -49,14 +50,14 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
     };
     let space: &dyn Field = &**place.region;
     let slack = ON * norm(place.region.bounds().size());
-    let trimmed = trim.apply(&mut wire, space, reach, slack, &mut own);
+    let trimmed = trim.apply(&mut wire, &|p, out| space.values(p, out), reach, slack, &mut own);
     check_left(&wire, "trim", place)?;
     let held = |p: Vec3| space.value(p) >= -slack;
     if spec.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", place)?;
     }
-    let graph = sized(&wire, &own, &radii).map_err(fault)?;
+    let graph = sized(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
     let inside = |p: Vec3| space.value(p) <= slack;
@@ -144,7 +145,12 @@ struct Frame {
     reach: f64,
 }
 
-fn frame(spec: &BeamsSpec, radii: &Radii, place: &Place, warnings: &mut Vec<Warning>) -> Result<Frame, DesignError> {
+fn frame(
+    spec: &BeamsSpec,
+    radii: &Radii<Grade>,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<Frame, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let bounds = place.region.bounds();
     let thick = thickest(radii, &bounds, place);
@@ -180,7 +186,7 @@ fn frame(spec: &BeamsSpec, radii: &Radii, place: &Place, warnings: &mut Vec<Warn
     }
     let longest = net.lengths([made.longest(); 3]).into_iter().fold(0.0, f64::max);
     let reach = reach(longest);
-    let wire = graph::fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
+    let wire = fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
     Ok(Frame { wire, own: Vec::new(), wavelength: made.wavelength(), reach })
 }
 

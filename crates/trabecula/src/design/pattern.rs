@@ -8,8 +8,8 @@ use super::error::DesignError;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use super::{Built, Warning};
-use crate::graph::{Hub, Profile};
-use crate::pattern::{Laid, Pattern, Similarity, Strut};
+use ::beams::graph::{Hub, Profile};
+use ::beams::pattern::{Laid, Pattern, Similarity, Strut};
 use geometry::fault::{counted, number};
 
 /// Most repeats of a step: every one is kept as a turn, a scale and a shift.
@@ -104,7 +104,7 @@ pub(super) fn laid(
             "{} of beams run into each other without a common node, as many about one hub of each kind, the first at {}: they are \
              joined there, but not filleted, and no exact volume is told; make them thinner, or put nodes there",
             counted(c.count, "pair"),
-            crate::graph::place(p)
+            beams::graph::place(p)
         );
         warnings.push(Warning { path: at, message });
     }

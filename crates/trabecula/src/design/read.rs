@@ -352,7 +352,7 @@ fn cell(at: &At) -> Read<CellSpec> {
     if at.is_text() {
         let names: Vec<(&str, &str)> = catalogue().iter().map(|n| (n.name, n.name)).collect();
         let word = at.text("a name")?;
-        if crate::graph::named(word).is_some() && crate::cell::named(word).is_none() {
+        if ::beams::graph::named(word).is_some() && crate::cell::named(word).is_none() {
             let message =
                 format!("{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\"");
             return Err(at.error(message));

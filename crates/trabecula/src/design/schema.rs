@@ -35,7 +35,7 @@ pub(super) fn pattern_struts(_: &mut SchemaGenerator) -> Schema {
 
 /// The names of the ready cells of beams.
 pub(super) fn beam_cell(_: &mut SchemaGenerator) -> Schema {
-    let names: Vec<&str> = crate::graph::catalogue().iter().map(|u| u.name).collect();
+    let names: Vec<&str> = beams::graph::catalogue().iter().map(|u| u.name).collect();
     json_schema!({ "type": "string", "enum": names })
 }
 

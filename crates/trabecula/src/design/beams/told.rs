@@ -6,9 +6,9 @@ use super::whole;
 use crate::design::data::*;
 use crate::design::place::Place;
 use crate::design::{Built, Warning, pattern};
-use crate::graph::Cleaned;
-use crate::pattern::Laid;
 use crate::truss::{Beams, Truss};
+use ::beams::graph::Cleaned;
+use ::beams::pattern::Laid;
 use geometry::fault::{counted, number};
 use geometry::math::Vec3;
 

@@ -9,8 +9,8 @@ use crate::design::level::check_varied;
 use crate::design::place::{Place, finite};
 use crate::design::samples;
 use crate::grade::Grade;
-use crate::graph::{self, Graph, Nodes, Profile, Radii, Wire};
-use crate::quador::pencil::Pencil;
+use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wire};
+use ::beams::quador::pencil::Pencil;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
 
@@ -45,7 +45,7 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
     Err(Fault::new(key, message))
 }
 
-pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii, DesignError> {
+pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii<Grade>, DesignError> {
     let varied = |spec: &Option<GradeSpec>, key: &'static str| {
         let Some(spec) = spec else { return Ok(None) };
         let path = format!("{}.{key}", place.path);
@@ -78,7 +78,7 @@ pub(super) fn greatest(grade: &Grade, place: &Place) -> f64 {
 }
 
 /// A bound of the radius of balls in the region.
-pub(super) fn thickest(radii: &Radii, bounds: &Aabb, place: &Place) -> f64 {
+pub(super) fn thickest(radii: &Radii<Grade>, bounds: &Aabb, place: &Place) -> f64 {
     let most = |g: &Grade| match g.bound(bounds).hi {
         v if v.is_finite() => v,
         _ => 2.0 * greatest(g, place),

@@ -3,7 +3,7 @@
 use super::{Read, grade, map, three};
 use crate::design::data::*;
 use crate::design::node::At;
-use crate::graph::catalogue;
+use beams::graph::catalogue;
 use geometry::fault::{counted, number};
 
 const KEYS: [&str; 12] =
@@ -90,7 +90,7 @@ fn cell(at: &At) -> Read<String> {
     let names: Vec<(&str, &str)> = catalogue().iter().map(|u| (u.name, u.name)).collect();
     if at.is_text() {
         let word = at.text("a name")?;
-        if crate::cell::named(word).is_some() && crate::graph::named(word).is_none() {
+        if crate::cell::named(word).is_some() && beams::graph::named(word).is_none() {
             let message = format!("{word} is a surface, not a cell of beams; write it as a lattice");
             return Err(at.error(message));
         }

@@ -2,7 +2,6 @@ mod integrals;
 mod meshes;
 
 use super::*;
-use crate::field::Field;
 use crate::graph::{self, Beam, Profile};
 use geometry::math::{add, dot, norm, scale, unit};
 

@@ -3,7 +3,6 @@
 mod catalogue;
 mod check;
 mod clean;
-mod fill;
 mod radii;
 mod table;
 mod trim;
@@ -11,14 +10,16 @@ mod wire;
 
 pub use catalogue::{Link, Net, Unit, catalogue, named};
 pub use clean::Cleaned;
-pub use fill::{MOST, expected, fill};
-pub(crate) use radii::place;
+pub use radii::place;
 pub use radii::{Radii, sized};
 pub use table::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
 pub use wire::{Facts, Wire};
 
 use geometry::math::Vec3;
+
+/// Most struts of a frame: beyond it the memory goes into gigabytes.
+pub const MOST: f64 = 1e7;
 
 /// A hub: a ball that beams meet in.
 #[derive(Clone, Copy, Debug, PartialEq)]

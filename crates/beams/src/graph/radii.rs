@@ -2,35 +2,41 @@
 
 use super::wire::Wire;
 use super::{Beam, Graph, Hub, Profile};
-use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, add, scale};
 
-/// How thick beams are.
-#[derive(Clone, Default)]
-pub struct Radii {
+/// How thick beams are; `V` is a length that may vary.
+#[derive(Clone)]
+pub struct Radii<V> {
     /// Radius of a beam at mid length (mm), taken there; none if the hubs decide.
-    pub radius: Option<Grade>,
+    pub radius: Option<V>,
     /// Radius of hubs (mm), taken at their centres; none for the largest radius of the beams that meet there.
-    pub hub: Option<Grade>,
+    pub hub: Option<V>,
     /// What beams are; none for the quadric with the radius at mid length, or where there is none the cone.
     pub profile: Option<Profile>,
 }
 
-/// A graph of a frame, `own` the radii of its nodes (NaN where none is given, empty if none is), which come first.
+/// A graph of a frame: `values` fills a length that varies at points (mm), `own` are the radii of its
+/// nodes (NaN where none is given, empty if none is), which come first.
 ///
 /// # Errors
 /// A node without a radius of its own where no radius is given; a radius that is not positive, with its place.
-pub fn sized(wire: &Wire, own: &[f64], radii: &Radii) -> Result<Graph, Fault> {
+pub fn sized<V>(
+    wire: &Wire,
+    own: &[f64],
+    radii: &Radii<V>,
+    values: impl Fn(&V, &[Vec3], &mut [f64]),
+) -> Result<Graph, Fault> {
+    let lengths = |v: &V, points: &[Vec3], key| lengths(|out| values(v, points, out), points, key);
     let middles: Vec<Vec3> = (wire.struts.iter())
         .map(|s| {
             let [a, b] = s.map(|n| wire.nodes[n as usize]);
             scale(add(a, b), 0.5)
         })
         .collect();
-    let thick = radii.radius.as_ref().map(|g| values(g, &middles, "radius")).transpose()?;
+    let thick = radii.radius.as_ref().map(|v| lengths(v, &middles, "radius")).transpose()?;
     let mut sizes = match &radii.hub {
-        Some(g) => values(g, &wire.nodes, "hub")?,
+        Some(v) => lengths(v, &wire.nodes, "hub")?,
         None => {
             let mut most = vec![f64::NAN; wire.nodes.len()];
             for (s, r) in wire.struts.iter().zip(thick.iter().flatten()) {
@@ -69,15 +75,15 @@ pub fn sized(wire: &Wire, own: &[f64], radii: &Radii) -> Result<Graph, Fault> {
 }
 
 /// A place in a sentence.
-pub(crate) fn place(p: Vec3) -> String {
+pub fn place(p: Vec3) -> String {
     let [x, y, z] = p.map(number);
     format!("({x}, {y}, {z}) mm")
 }
 
 /// A length that varies, at the points.
-fn values(grade: &Grade, points: &[Vec3], key: &str) -> Result<Vec<f64>, Fault> {
+fn lengths(values: impl Fn(&mut [f64]), points: &[Vec3], key: &str) -> Result<Vec<f64>, Fault> {
     let mut out = vec![0.0; points.len()];
-    grade.values(points, &mut out);
+    values(&mut out);
     match out.iter().position(|r| !(*r > 0.0 && r.is_finite())) {
         Some(i) => Err(Fault::new(
             key,

@@ -107,7 +107,7 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
 
 impl Quadors {
     fn value_at(&self, p: Vec3) -> f64 {
-        crate::field::Field::value(self, p)
+        Quadors::value(self, p)
     }
 }
 

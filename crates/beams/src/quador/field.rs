@@ -4,8 +4,6 @@
 //! both balls), so the least of all has no seam there. Further on it is held up by how far a point lies beyond.
 
 use super::Quadors;
-use crate::field::Field;
-use crate::implicit::Implicit;
 use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Hubs that the bound of a box looks at one by one.
@@ -90,7 +88,7 @@ impl Quadors {
     }
 
     /// The box that holds a hub and its stubs up to their cuts.
-    pub(crate) fn hold(&self, i: usize) -> Aabb {
+    pub fn hold(&self, i: usize) -> Aabb {
         self.balls[i].bounds
     }
 
@@ -142,34 +140,42 @@ impl Quadors {
     }
 }
 
-impl Field for Quadors {
-    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+impl Quadors {
+    /// Fills the field at points (mm).
+    pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, &p) in out.iter_mut().zip(points) {
             *o = self.at(p);
         }
     }
 
-    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    /// Fills the field and its gradient (per mm) at points (mm).
+    pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         for ((v, g), &p) in values.iter_mut().zip(gradients).zip(points) {
             (*v, *g) = self.slope_at(p);
         }
     }
 
-    fn bound(&self, b: &Aabb) -> Interval {
+    /// An interval that contains the field over the box. Proven.
+    pub fn bound(&self, b: &Aabb) -> Interval {
         let Some(near) = self.index.touching(b, MOST) else {
             return Interval::new(f64::NEG_INFINITY, self.cap);
         };
         let cap = Interval::new(self.cap, self.cap);
         near.into_iter().fold(cap, |least, i| least.min(self.hub_bound(i as usize, b)))
     }
-}
 
-impl Implicit for Quadors {
-    fn has_creases(&self) -> bool {
+    /// The field at one point (mm).
+    pub fn value(&self, p: Vec3) -> f64 {
+        self.at(p)
+    }
+
+    /// Whether its zero set may have creases: hubs without fillets have.
+    pub fn has_creases(&self) -> bool {
         self.sharp
     }
 
-    fn lipschitz(&self) -> f64 {
+    /// A Lipschitz bound of the field, per mm.
+    pub fn lipschitz(&self) -> f64 {
         let thick = self.balls.iter().map(|b| b.radius).fold(self.scale, f64::max);
         2.0 * thick / self.scale
     }

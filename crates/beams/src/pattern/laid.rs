@@ -7,9 +7,7 @@ mod row;
 use rayon::prelude::*;
 
 use super::{MOST, Pattern, Similarity, Strut};
-use crate::field::Field;
 use crate::graph::Graph;
-use crate::implicit::Implicit;
 use crate::quador::{Fillet, Quadors};
 use classes::Classes;
 use geometry::fault::{Fault, number};
@@ -406,15 +404,17 @@ const EACH: f64 = 1000.0;
 /// Hubs that the bound of a box looks at one by one.
 const LOOKED: usize = 96;
 
-impl Field for Laid {
-    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+impl Laid {
+    /// Fills the field at points (mm).
+    pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         for (o, p) in out.iter_mut().zip(points) {
             *o = self.at(*p);
         }
     }
 
-    // By differences: hubs are met under many similarities, and the gradient only guides.
-    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    /// Fills the field and its gradient (per mm) at points, the gradient by differences: hubs are met under many
+    /// similarities, and it only guides.
+    pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let step = 1e-4 * self.cap * self.least;
         for (i, p) in points.iter().enumerate() {
             values[i] = self.at(*p);
@@ -427,7 +427,8 @@ impl Field for Laid {
         }
     }
 
-    fn bound(&self, b: &Aabb) -> Interval {
+    /// An interval that contains the field over the box. Proven.
+    pub fn bound(&self, b: &Aabb) -> Interval {
         let cap = self.cap * self.least;
         let mut range = Interval::new(cap, cap);
         let mut looked = 0;
@@ -442,14 +443,19 @@ impl Field for Laid {
         }
         range
     }
-}
 
-impl Implicit for Laid {
-    fn lipschitz(&self) -> f64 {
+    /// The field at one point (mm).
+    pub fn value(&self, p: Vec3) -> f64 {
+        self.at(p)
+    }
+
+    /// A Lipschitz bound of the field, per mm.
+    pub fn lipschitz(&self) -> f64 {
         self.quadors.lipschitz()
     }
 
-    fn has_creases(&self) -> bool {
+    /// Whether its zero set may have creases: hubs without fillets have.
+    pub fn has_creases(&self) -> bool {
         self.quadors.has_creases()
     }
 }

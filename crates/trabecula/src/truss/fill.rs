@@ -2,14 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::catalogue::Net;
-use super::wire::Wire;
 use crate::map::Map;
+use beams::graph::{MOST, Net, Wire};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, add, determinant};
-
-/// Most struts of a frame that is made: beyond it the memory goes into gigabytes.
-pub const MOST: f64 = 1e7;
 
 /// Steps of the grid along an axis on which a map is looked at to count cells.
 const LOOKS: usize = 9;
@@ -77,8 +73,8 @@ pub fn fill(net: &Net, map: &Map, bounds: &Aabb, reach: f64) -> Result<Wire, Fau
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{catalogue, named};
     use crate::map::{Affine, Round};
+    use beams::graph::{catalogue, named};
     use geometry::math::{norm, sub};
 
     fn affine(w: f64) -> Map {

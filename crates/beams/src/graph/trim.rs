@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::wire::Wire;
-use crate::field::Field;
+use crate::Values;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
 /// What becomes of struts that leave the region.
@@ -49,10 +49,10 @@ impl Trim {
     /// Trims a frame to a region, given by its signed distance (steeper nowhere than 1). Struts within `reach` (mm) of
     /// the region, a ball's radius, count as having a part in it. Ends within `slack` (mm) outside count as inside.
     /// `radii` of the nodes, if not empty, is kept in step.
-    pub fn apply(self, wire: &mut Wire, region: &dyn Field, reach: f64, slack: f64, radii: &mut Vec<f64>) -> Trimmed {
+    pub fn apply(self, wire: &mut Wire, region: Values, reach: f64, slack: f64, radii: &mut Vec<f64>) -> Trimmed {
         let mut depth = vec![0.0; wire.nodes.len()];
         let pieces = depth.par_chunks_mut(BATCH).zip(wire.nodes.par_chunks(BATCH));
-        pieces.for_each(|(d, p)| region.values(p, d));
+        pieces.for_each(|(d, p)| region(p, d));
         let inside = |n: u32| depth[n as usize] <= slack;
         let at = |s: &[u32; 2]| s.map(|n| wire.nodes[n as usize]);
         let fate = |s: &[u32; 2]| {
@@ -100,13 +100,19 @@ impl Trim {
     }
 }
 
+fn value_at(field: Values, p: Vec3) -> f64 {
+    let mut v = [0.0];
+    field(&[p], &mut v);
+    v[0]
+}
+
 /// The least distance along a segment, or some distance not above `enough`.
-fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
+fn least(region: Values, [a, b]: [Vec3; 2], enough: f64) -> f64 {
     let along = sub(b, a);
     let length = norm(along);
     let (mut t, mut least) = (0.0, f64::INFINITY);
     while t < 1.0 {
-        let d = region.value(add(a, scale(along, t)));
+        let d = value_at(region, add(a, scale(along, t)));
         least = least.min(d);
         if least <= enough {
             break;
@@ -118,10 +124,10 @@ fn least(region: &dyn Field, [a, b]: [Vec3; 2], enough: f64) -> f64 {
 }
 
 /// How far along a segment (0 to 1) that begins inside it first leaves the region, by more than `slack`.
-fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
+fn leaves(region: Values, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
     let along = sub(b, a);
     let length = norm(along);
-    let value = |t: f64| region.value(add(a, scale(along, t)));
+    let value = |t: f64| value_at(region, add(a, scale(along, t)));
     let mut t = 0.0;
     while t < 1.0 {
         let next = (t + (-value(t) / length).max(1.0 / STEPS)).min(1.0);
@@ -145,7 +151,6 @@ fn leaves(region: &dyn Field, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::region::Sphere;
 
     fn comb() -> Wire {
         let nodes = (-6..=6).map(|i| [f64::from(i), 0.5, 0.0]).collect();
@@ -154,15 +159,15 @@ mod tests {
 
     #[test]
     fn struts_are_cut_dropped_or_end_on_the_surface() {
-        let ball = Sphere::new([0.0; 3], 3.6).expect("ball");
+        let ball: Values = &|p, out| out.iter_mut().zip(p).for_each(|(o, p)| *o = norm(*p) - 3.6);
         let mut cut = comb();
-        let done = Trim::Cut.apply(&mut cut, &ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Cut.apply(&mut cut, ball, 0.3, 0.0, &mut Vec::new());
         assert_eq!((cut.struts.len(), done.outside), (8, 4));
         let mut dropped = comb();
-        let done = Trim::Drop.apply(&mut dropped, &ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Drop.apply(&mut dropped, ball, 0.3, 0.0, &mut Vec::new());
         assert_eq!((dropped.struts.len(), done.dropped), (6, 6));
         let mut snapped = comb();
-        let done = Trim::Snap.apply(&mut snapped, &ball, 0.3, 0.0, &mut Vec::new());
+        let done = Trim::Snap.apply(&mut snapped, ball, 0.3, 0.0, &mut Vec::new());
         assert_eq!((snapped.struts.len(), done.snapped, done.outside), (8, 2, 4));
         let on = snapped.nodes.iter().filter(|p| (norm(**p) - 3.6).abs() < 1e-9);
         assert_eq!(on.count(), 2);

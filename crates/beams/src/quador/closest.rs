@@ -7,7 +7,6 @@
 
 use std::sync::OnceLock;
 
-use crate::field::Field;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub, unit};
 
@@ -335,7 +334,6 @@ mod tests {
     use super::super::tests::{Random, cubic, random_star};
     use super::super::{Fillet, Quadors};
     use super::*;
-    use crate::field::Field;
 
     /// Places on the surface: rays from hubs' centres go out once.
     fn samples(q: &Quadors, random: &mut Random, n: usize) -> Vec<Vec3> {

@@ -1,0 +1,38 @@
+//! Beams as fields of the extractor: their own values, gradients and bounds.
+
+use beams::pattern::Laid;
+use beams::quador::Quadors;
+use geometry::math::{Aabb, Interval, Vec3};
+
+use crate::field::Field;
+use crate::implicit::Implicit;
+
+macro_rules! field_of {
+    ($($beams:ty),*) => {$(
+        impl Field for $beams {
+            fn values(&self, points: &[Vec3], out: &mut [f64]) {
+                <$beams>::values(self, points, out);
+            }
+
+            fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+                <$beams>::gradients(self, points, values, gradients);
+            }
+
+            fn bound(&self, b: &Aabb) -> Interval {
+                <$beams>::bound(self, b)
+            }
+        }
+
+        impl Implicit for $beams {
+            fn lipschitz(&self) -> f64 {
+                <$beams>::lipschitz(self)
+            }
+
+            fn has_creases(&self) -> bool {
+                <$beams>::has_creases(self)
+            }
+        }
+    )*};
+}
+
+field_of!(Quadors, Laid);
