@@ -1,56 +1,27 @@
-//! Orientation tests that are right for every f64 input: a floating-point filter, then exact expansions.
+//! Orientation of points, right for every f64 input whose products neither overflow nor underflow (crate `robust`).
 //!
 //! J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
 
-use core::cmp::Ordering;
+use robust::{Coord, Coord3D};
 
 use crate::math::Vec3;
 
-/// Half a unit in the last place of 1.
-const EPS: f64 = f64::EPSILON / 2.0;
-
-/// The sign of a number.
+/// The sign of a number; 0 for NaN, which coordinates near the limits of f64 give.
 fn sign(v: f64) -> i8 {
-    match v.partial_cmp(&0.0) {
-        Some(Ordering::Greater) => 1,
-        Some(Ordering::Less) => -1,
-        _ => 0,
-    }
+    i8::from(v > 0.0) - i8::from(v < 0.0)
 }
 
 /// The side of the plane through a, b, c on which d lies: 1 where a, b, c run clockwise seen from d (det[a−d, b−d,
 /// c−d] > 0), 0 on the plane.
 pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
-    let [p, q, r] = [a, b, c].map(|v| [v[0] - d[0], v[1] - d[1], v[2] - d[2]]);
-    let (qr, rq) = (q[0] * r[1], r[0] * q[1]);
-    let (rp, pr) = (r[0] * p[1], p[0] * r[1]);
-    let (pq, qp) = (p[0] * q[1], q[0] * p[1]);
-    let det = p[2] * (qr - rq) + q[2] * (rp - pr) + r[2] * (pq - qp);
-    let size =
-        (qr.abs() + rq.abs()) * p[2].abs() + (rp.abs() + pr.abs()) * q[2].abs() + (pq.abs() + qp.abs()) * r[2].abs();
-    if det.abs() > (7.0 + 56.0 * EPS) * EPS * size {
-        return sign(det);
-    }
-    exact3d(a, b, c, d)
-}
-
-#[cold]
-fn exact3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
-    let [p, q, r] = [a, b, c].map(|v| [0, 1, 2].map(|k| Expansion::difference(v[k], d[k])));
-    let minor = |u: &[Expansion; 3], v: &[Expansion; 3]| u[0].times(&v[1]).minus(&v[0].times(&u[1]));
-    p[2].times(&minor(&q, &r)).plus(&q[2].times(&minor(&r, &p))).plus(&r[2].times(&minor(&p, &q))).sign()
+    let [a, b, c, d] = [a, b, c, d].map(|[x, y, z]| Coord3D { x, y, z });
+    sign(robust::orient3d(a, b, c, d))
 }
 
 /// The turn a → b → c in the plane: 1 left, −1 right, 0 straight.
 pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
-    let left = (a[0] - c[0]) * (b[1] - c[1]);
-    let right = (a[1] - c[1]) * (b[0] - c[0]);
-    let det = left - right;
-    if det.abs() > (3.0 + 16.0 * EPS) * EPS * (left.abs() + right.abs()) {
-        return sign(det);
-    }
-    let [p, q] = [a, b].map(|v| [0, 1].map(|k| Expansion::difference(v[k], c[k])));
-    p[0].times(&q[1]).minus(&p[1].times(&q[0])).sign()
+    let [a, b, c] = [a, b, c].map(|[x, y]| Coord { x, y });
+    sign(robust::orient2d(a, b, c))
 }
 
 /// The point without its coordinate `axis`.
@@ -61,70 +32,6 @@ pub fn drop_axis(p: Vec3, axis: usize) -> [f64; 2] {
 /// An axis along which the triangle projects to one with area; `None` where it has none.
 pub fn plane_axis(a: Vec3, b: Vec3, c: Vec3) -> Option<usize> {
     (0..3).find(|&k| orient2d(drop_axis(a, k), drop_axis(b, k), drop_axis(c, k)) != 0)
-}
-
-/// An exact number: a sum of f64 that do not overlap, in growing order, without zeros.
-#[derive(Clone, Debug, Default)]
-struct Expansion(Vec<f64>);
-
-impl Expansion {
-    fn difference(a: f64, b: f64) -> Expansion {
-        let mut e = Expansion(Vec::with_capacity(2));
-        e.grow(a);
-        e.grow(-b);
-        e
-    }
-
-    /// Adds one number exactly (Shewchuk's grow-expansion with zeros left out).
-    fn grow(&mut self, b: f64) {
-        let mut sum = b;
-        let mut kept = 0;
-        for i in 0..self.0.len() {
-            let (high, low) = two_sum(sum, self.0[i]);
-            sum = high;
-            if low != 0.0 {
-                self.0[kept] = low;
-                kept += 1;
-            }
-        }
-        self.0.truncate(kept);
-        if sum != 0.0 {
-            self.0.push(sum);
-        }
-    }
-
-    fn plus(mut self, o: &Expansion) -> Expansion {
-        o.0.iter().for_each(|v| self.grow(*v));
-        self
-    }
-
-    fn minus(mut self, o: &Expansion) -> Expansion {
-        o.0.iter().for_each(|v| self.grow(-*v));
-        self
-    }
-
-    fn times(&self, o: &Expansion) -> Expansion {
-        let mut e = Expansion(Vec::with_capacity(2 * self.0.len() * o.0.len()));
-        for a in &self.0 {
-            for b in &o.0 {
-                let high = a * b;
-                e.grow(a.mul_add(*b, -high));
-                e.grow(high);
-            }
-        }
-        e
-    }
-
-    fn sign(&self) -> i8 {
-        self.0.last().map_or(0, |v| sign(*v))
-    }
-}
-
-/// a + b as a rounded sum and its error.
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
-    let sum = a + b;
-    let from_b = sum - a;
-    (sum, (a - (sum - from_b)) + (b - from_b))
 }
 
 #[cfg(test)]
@@ -147,7 +54,7 @@ mod tests {
         // Points on the diagonal of a grid of neighbouring floats about 0.5 (Kettner et al.'s classroom example).
         for i in 0..64i32 {
             for j in 0..64i32 {
-                let u = EPS;
+                let u = f64::EPSILON / 2.0;
                 let p = [0.5 + f64::from(i) * u, 0.5 + f64::from(j) * u];
                 let want = (j - i).signum() as i8;
                 assert_eq!(orient2d([12.0, 12.0], [24.0, 24.0], p), want, "{i} {j}");
@@ -175,7 +82,6 @@ mod tests {
             // A shift far from the origin keeps the numbers exact and makes the filter fail often.
             let f = p.map(|v| v.map(|c| c as f64 * 2f64.powi(-20) + 3.0));
             assert_eq!(orient3d(f[0], f[1], f[2], f[3]), det.signum() as i8);
-            assert_eq!(exact3d(f[0], f[1], f[2], f[3]), det.signum() as i8);
         }
     }
 }
