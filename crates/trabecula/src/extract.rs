@@ -10,6 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::Scope;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::field::{Block, Field};
 use crate::solid::Solid;
@@ -20,7 +21,6 @@ use geometry::surface_mesh::SurfaceMesh;
 use geometry::voxels::Voxels;
 
 mod bodies;
-mod by;
 mod cap;
 mod crease;
 mod grid;
@@ -34,7 +34,6 @@ mod tets;
 mod tile;
 
 use bodies::Bodies;
-use by::ByName;
 use grid::Grid;
 use islands::{Census, Found};
 pub use islands::{Island, Islands, Pieces};
@@ -273,7 +272,7 @@ pub fn surface_of(
     let mut out = SurfaceMesh::default();
     let mut census = Census::default();
     // Vertices on the borders of tiles, by name.
-    let mut border: ByName<u32> = ByName::default();
+    let mut border: FxHashMap<u128, u32> = FxHashMap::default();
     let cook = |view: View| view.patch(middle);
     each_tile(&grid, progress, cook, |(patch, bodies)| {
         let mut names = Vec::with_capacity(patch.vertices.len());

@@ -1,40 +1,16 @@
 //! Joining of vertices that have the same position, and gathering of triangles.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
+use rustc_hash::FxHashMap;
 
 use crate::fault::Fault;
 use crate::math::Vec3;
 use crate::mesh::Mesh;
 
-/// A multiplicative hasher: keys are coordinates, and a fast join matters more than resisting chosen keys.
-#[derive(Default)]
-struct Mix(u64);
-
-impl Hasher for Mix {
-    fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 32)
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
-    }
-
-    fn write_u64(&mut self, n: u64) {
-        let x = (self.0.rotate_left(23) ^ n).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        self.0 = x ^ (x >> 29);
-    }
-
-    fn write_usize(&mut self, n: usize) {
-        self.write_u64(n as u64);
-    }
-}
-
 /// Gathers triangles given by position into a mesh with one vertex per position.
 #[derive(Default)]
 pub struct Joiner {
     mesh: Mesh,
-    known: HashMap<[u64; 3], u32, BuildHasherDefault<Mix>>,
+    known: FxHashMap<[u64; 3], u32>,
 }
 
 impl Joiner {

@@ -26,10 +26,11 @@ mod web;
 
 use std::cmp::Ordering;
 
+use rustc_hash::FxHashMap;
+
 use crate::field::Field;
 use geometry::math::{Vec3, add, dot, scale, sub};
 
-use super::by::By;
 use super::grid::{Grid, Local};
 use super::key::Key;
 use super::signs::{Signs, bits};
@@ -52,21 +53,21 @@ pub(super) struct Edges {
     fitted: Vec<u64>,
     fitted_to: Option<usize>,
     /// The face that has the edges.
-    pub face: By<usize, usize>,
+    pub face: FxHashMap<usize, usize>,
     /// The chords of sides, by the lowest node of the side and the axis normal to it.
-    sides: By<(usize, usize), Vec<Chord>>,
+    sides: FxHashMap<(usize, usize), Vec<Chord>>,
     /// Grid edges that a face crosses twice, by the face, their lower nodes and axes: the lower point first.
-    twice: By<(usize, usize, usize), [Vec3; 2]>,
+    twice: FxHashMap<(usize, usize, usize), [Vec3; 2]>,
     /// The places of points that nothing else has.
-    points: By<Key, Vec3>,
+    points: FxHashMap<Key, Vec3>,
     /// Where edges of live faces pierce sides.
     pierced: Vec<(usize, (usize, usize), Vec3)>,
     /// Pieces of edges in cells, by the face and the cells' lowest nodes.
-    pieces: By<(usize, usize), Vec<[Vec3; 2]>>,
+    pieces: FxHashMap<(usize, usize), Vec<[Vec3; 2]>>,
     /// Places where edges end, meet or bend, and how many are there, likewise.
-    corners: By<(usize, usize), Vec<(Vec3, usize)>>,
+    corners: FxHashMap<(usize, usize), Vec<(Vec3, usize)>>,
     /// The corner that the patch of a cell has in a cell beside it, likewise.
-    beyond: By<usize, Vec3>,
+    beyond: FxHashMap<usize, Vec3>,
     /// For each row of nodes: those within two cells of a piece of an edge.
     near: Vec<u64>,
 }
@@ -152,7 +153,7 @@ impl Edges {
             self.find_twice(seen, cells);
         }
         // In the order of the segments where they pierce one side.
-        let mut at: By<(usize, usize), Vec<Vec3>> = By::default();
+        let mut at: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
         for (_, side, p) in self.pierced.iter().filter(|p| p.0 == seen.face) {
             at.entry(*side).or_default().push(seen.inside(*side, *p));
         }
@@ -206,10 +207,10 @@ impl Edges {
     fn beside<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         seen: &Seen<P>,
-        pierced: &By<(usize, usize), Vec<Vec3>>,
-    ) -> By<(usize, usize), Vec<Vec3>> {
+        pierced: &FxHashMap<(usize, usize), Vec<Vec3>>,
+    ) -> FxHashMap<(usize, usize), Vec<Vec3>> {
         let nodes = seen.nodes;
-        let mut found: By<(usize, usize), Vec<Vec3>> = By::default();
+        let mut found: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
         for (&side, places) in pierced {
             for line in lines_of(nodes, side) {
                 let (node, along) = line;
@@ -240,7 +241,7 @@ impl Edges {
     fn find_beyond<P: Fn(usize, usize) -> Option<Vec3>>(
         &mut self,
         seen: &Seen<P>,
-        pierced: &By<(usize, usize), Vec<Vec3>>,
+        pierced: &FxHashMap<(usize, usize), Vec<Vec3>>,
     ) {
         let nodes = seen.nodes;
         let mut found: Vec<(usize, Vec3)> = Vec::new();

@@ -14,9 +14,9 @@ use std::collections::HashMap;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::union_find::{find, unite};
+use rustc_hash::FxHashMap;
 
 use super::bodies::{Bodies, LINES, NONE, Sum};
-use super::by::ByName;
 
 /// What is to become of all pieces but the largest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -123,8 +123,8 @@ pub(super) struct Census {
     /// Bodies of one piece of solid.
     solid: Vec<u32>,
     /// Border vertices of the layer of tiles at work, and of the one below it, with a body.
-    here: ByName<u32>,
-    below: ByName<u32>,
+    here: FxHashMap<u128, u32>,
+    below: FxHashMap<u128, u32>,
     layer: usize,
     /// For each line of the row of tiles at work, the body that it entered the solid through, if it is inside.
     open: Vec<u32>,
@@ -160,7 +160,7 @@ impl Census {
         // A vertex is shared within a layer of tiles or with the layer below, so names need not be kept for longer.
         if tile.tile[2] != self.layer {
             let last = std::mem::take(&mut self.here);
-            self.below = if tile.tile[2] == self.layer + 1 { last } else { ByName::default() };
+            self.below = if tile.tile[2] == self.layer + 1 { last } else { FxHashMap::default() };
             self.layer = tile.tile[2];
         }
         for (name, body) in tile.border {

@@ -21,8 +21,8 @@ use std::ops::Range;
 
 use geometry::math::{Vec3, add, scale};
 use geometry::mesh::{Mesh, is_embedded};
+use rustc_hash::FxHashMap;
 
-use super::by::By;
 use super::crease::{Edges, Fits};
 use super::grid::{Grid, Local};
 use super::key::Key;
@@ -34,7 +34,7 @@ pub(super) use simplex::{Simplex, Spot};
 /// What is not on plain cells' edges.
 #[derive(Default)]
 pub(super) struct Extra {
-    names: By<Key, u32>,
+    names: FxHashMap<Key, u32>,
     /// The names of the extra vertices.
     pub keys: Vec<Key>,
     /// Triangles, and whether they lie on the region's surface.

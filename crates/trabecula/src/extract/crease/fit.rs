@@ -11,9 +11,10 @@
 use std::borrow::Cow;
 use std::rc::Rc;
 
+use rustc_hash::FxHashMap;
+
 use super::side::{Corner, Side};
 use super::{Edges, Others, Seen};
-use crate::extract::by::By;
 use crate::extract::grid::Local;
 use crate::extract::key::Key;
 use crate::extract::knot::Knots;
@@ -34,9 +35,9 @@ pub(in crate::extract) struct Fits {
     first: Vec<usize>,
     /// The grid edge that each lies on, if it does: by its lower node and its axis.
     lines: Vec<Option<(usize, usize)>>,
-    pub(super) numbers: By<Key, usize>,
+    pub(super) numbers: FxHashMap<Key, usize>,
     /// By the lowest node and the axis normal to the side.
-    pub sides: By<(usize, usize), Rc<Side>>,
+    pub sides: FxHashMap<(usize, usize), Rc<Side>>,
 }
 
 impl Fits {

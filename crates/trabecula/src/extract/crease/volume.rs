@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 
+use rustc_hash::FxHashMap;
+
 use super::fill::{Base, Tet};
 use super::patch::Patch;
-use crate::extract::by::By;
 use crate::extract::knot::{Knots, middle};
 use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
@@ -179,7 +180,7 @@ fn closed<'b>(mut half: Vec<Facet<'b>>, wall: &[[usize; 3]], line: [usize; 2]) -
 
 /// The parts that some lines divide a surface into.
 fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
-    let mut beside: By<Line, Vec<usize>> = By::default();
+    let mut beside: FxHashMap<Line, Vec<usize>> = FxHashMap::default();
     for (i, f) in facets.iter().enumerate() {
         for l in lines_of(f.ids) {
             beside.entry(l).or_default().push(i);
@@ -212,7 +213,7 @@ fn back(facets: &[Facet], way: &[usize]) -> Option<Vec<usize>> {
     let others = facets.iter().filter(|f| !is_side(f));
     let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
     let lines: Vec<Line> = (facets.iter().filter(is_side)).flat_map(|f| lines_of(f.ids)).collect();
-    let mut from: By<usize, usize> = By::default();
+    let mut from: FxHashMap<usize, usize> = FxHashMap::default();
     let mut open = VecDeque::from([start]);
     while let Some(at) = open.pop_front() {
         for l in lines.iter().filter(|l| l.contains(&at)) {
