@@ -168,7 +168,7 @@ mod _core {
     fn tet_cell_mesh(py: Python<'_>, name: &str, steps: usize) -> PyResult<Mesh> {
         let ready = trabecula::cell::tet::ready(name)
             .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}")))?;
-        let made = crate::run::run(py, None, None, |p| trabecula::extract::stencil(ready, steps, p))?;
+        let made = crate::run::run(py, None, None, |p| trabecula::tiling::stencil(ready, steps, p))?;
         let surface = made.map_err(crate::error::stopped)?;
         Ok(Mesh::new(surface, String::new()))
     }

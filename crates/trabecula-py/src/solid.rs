@@ -16,6 +16,7 @@ use trabecula::design::{self, Built, Node};
 use trabecula::extract;
 use trabecula::field::Field;
 use trabecula::map::{Map, Misfit};
+use trabecula::surface_maker::{Options, SurfaceMaker};
 use trabecula::truss::Beams;
 
 use crate::design::Folder;
@@ -242,7 +243,7 @@ impl Solid {
 
     /// What a spacing will take: cells along each axis, triangles, bytes in memory, bytes of a binary STL.
     fn estimate<'py>(&self, py: Python<'py>, edge: f64) -> PyResult<Bound<'py, PyDict>> {
-        let e = run(py, None, None, |_| extract::estimate(&self.built.solid, edge))?.map_err(error::fault)?;
+        let e = run(py, None, None, |_| self.built.surface().estimate(edge))?.map_err(error::fault)?;
         let d = PyDict::new(py);
         d.set_item("cells", e.cells)?;
         d.set_item("triangles", e.triangles)?;
@@ -262,18 +263,18 @@ impl Solid {
         islands: &str,
     ) -> PyResult<(Mesh, Bound<'py, PyDict>, String)> {
         let islands = islands::named(islands)?;
-        let made = run(py, threads, progress, |p| extract::surface_of(&self.built.solid, edge, islands, p))?;
-        let (surface, pieces) = made.map_err(error::stopped)?;
-        let mesh = Mesh::new(surface, self.design.clone());
-        let (told, words) = islands::told(py, &pieces)?;
+        let options = Options { resolution: edge, islands };
+        let made = run(py, threads, progress, |p| self.built.surface().mesh(&options, p))?.map_err(error::stopped)?;
+        let mesh = Mesh::new(made.surface, self.design.clone());
+        let (told, words) = islands::told(py, &made.components)?;
         Ok((mesh, told, words))
     }
 
     /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches, and of how many all others
     /// are copies.
     fn expected_beams(&self, py: Python<'_>, chord: f64) -> PyResult<[f64; 2]> {
-        let told = run(py, None, None, |_| self.built.lone_beams()?.expected(chord))?;
-        told.map_err(error::fault)
+        let e = run(py, None, None, |_| self.built.beam_surface()?.estimate(chord))?.map_err(error::fault)?;
+        Ok([e.triangles, e.held])
     }
 
     /// Streams the surface of beams alone to a binary STL at `path`, triangles within `chord` (mm) of their patches; gives what is
@@ -286,26 +287,23 @@ impl Solid {
         chord: f64,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let made = run(py, threads, None, |_| {
-            let beams = self.built.lone_beams().map_err(Stopped::Refused)?;
-            let drawn = beams.drawn(chord).map_err(Stopped::Refused)?;
+        let made = run(py, threads, None, |p| {
+            let beams = self.built.beam_surface().map_err(Stopped::Refused)?;
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
-            let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
-            formats::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out).map_err(Stopped::Io)?;
-            Ok((drawn.figures(), drawn.error()))
+            beams.stream_stl(&Options::new(chord), &mut out, p)
         })?;
-        let (f, error) = made.map_err(error::stopped)?;
+        let s = made.map_err(error::stopped)?;
         let d = PyDict::new(py);
-        d.set_item("triangles", f.triangles)?;
-        d.set_item("volume", f.volume)?;
-        d.set_item("area", f.area)?;
-        d.set_item("area_lattice", f.area)?;
+        d.set_item("triangles", s.triangles)?;
+        d.set_item("volume", s.volume)?;
+        d.set_item("area", s.area_lattice)?;
+        d.set_item("area_lattice", s.area_lattice)?;
         d.set_item("area_cut", 0.0)?;
-        d.set_item("euler", f.euler)?;
-        d.set_item("pieces", f.pieces)?;
+        d.set_item("euler", s.components.euler)?;
+        d.set_item("pieces", s.components.count)?;
         d.set_item("cavities", 0)?;
         d.set_item("islands", py.None())?;
-        d.set_item("chord_error", error)?;
+        d.set_item("chord_error", s.error)?;
         Ok(d)
     }
 
@@ -318,11 +316,11 @@ impl Solid {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Mesh, f64)> {
-        let made = run(py, threads, progress, |_| self.built.lone_beams()?.mesh(chord))?;
-        let (mesh, error) = made.map_err(error::fault)?;
-        let cut = vec![false; mesh.triangles.len()];
-        let surface = geometry::surface_mesh::SurfaceMesh { mesh, cut };
-        Ok((Mesh::new(surface, self.design.clone()), error))
+        let made = run(py, threads, progress, |p| {
+            self.built.beam_surface().map_err(Stopped::Refused)?.mesh(&Options::new(chord), p)
+        })?;
+        let made = made.map_err(error::stopped)?;
+        Ok((Mesh::new(made.surface, self.design.clone()), made.error.unwrap_or(0.0)))
     }
 
     /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives triangles, volume, areas and
@@ -341,7 +339,8 @@ impl Solid {
         let summary = run(py, threads, progress, |p| {
             // Whole tiles are written at once: a buffer would only copy them.
             let mut out = file::anew(&path).map_err(Stopped::Io)?;
-            extract::stream_stl(&self.built.solid, edge, islands, &mut out, p)
+            let options = Options { resolution: edge, islands };
+            self.built.surface().stream_stl(&options, &mut out, p)
         })?;
         let s = summary.map_err(error::stopped)?;
         let d = PyDict::new(py);
@@ -350,7 +349,7 @@ impl Solid {
         d.set_item("area", s.area_lattice + s.area_cut)?;
         d.set_item("area_lattice", s.area_lattice)?;
         d.set_item("area_cut", s.area_cut)?;
-        let (told, words) = islands::told(py, &s.pieces)?;
+        let (told, words) = islands::told(py, &s.components)?;
         d.update(told.as_mapping())?;
         Ok((d, words))
     }

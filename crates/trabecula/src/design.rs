@@ -38,13 +38,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
+use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
+use crate::extract::GridSurface;
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::solid::Solid;
-use crate::tiling::Tiling;
+use crate::surface_maker::SurfaceMaker;
+use crate::tiling::{Tiling, TilingSurface};
 use crate::truss::Beams;
-use ::beams::quador::Quadors;
 use geometry::fault::Fault;
 use geometry::formats::Elements;
 use geometry::mesh::Mesh;
@@ -264,12 +266,21 @@ impl Built {
         report::report(self)
     }
 
-    /// The beams that the whole design is, whose surface can be meshed without a grid.
+    /// The surface maker whose resolution is a grid spacing: cutting of tetrahedra for an explicit tiling, marching cubes for
+    /// all else.
+    pub fn surface(&self) -> Box<dyn SurfaceMaker + '_> {
+        match &self.tilings[..] {
+            [only] if only.explicit && self.blend.is_none() => Box::new(TilingSurface(&only.tiling)),
+            _ => Box::new(GridSurface(&self.solid)),
+        }
+    }
+
+    /// The surface maker whose resolution is a chord error, for designs of uncut beams alone.
     ///
     /// # Errors
-    /// What else there is: lattices, a blend, a skin or kept zones, a pattern, a region that cuts the beams.
-    pub fn lone_beams(&self) -> Result<Arc<Quadors>, Fault> {
-        beams::alone(self)
+    /// What else the design contains: lattices, a blend, a skin or kept zones, a region that cuts the beams.
+    pub fn beam_surface(&self) -> Result<BeamSurface, Fault> {
+        Ok(BeamSurface(beams::alone(self)?))
     }
 
     /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a large pattern, by a box

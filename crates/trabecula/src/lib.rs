@@ -5,6 +5,7 @@
 //! seen from outside.
 
 pub mod analysis;
+pub mod beam_surface;
 pub mod blend;
 pub mod cell;
 mod coincident;
@@ -20,5 +21,6 @@ pub mod mesher;
 pub mod region;
 pub mod skin;
 pub mod solid;
+pub mod surface_maker;
 pub mod tiling;
 pub mod truss;

@@ -7,7 +7,6 @@ use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::field::{Block, Field};
 use crate::implicit::{Implicit, Surface};
 use crate::region::Region;
-use crate::tiling::Tiling;
 use geometry::math::{Aabb, Interval, Vec3};
 
 /// What a design means: the part of the region in which the field is negative, or that is filled anyway.
@@ -21,8 +20,6 @@ pub struct Solid {
     pub filled: Vec<CsgSolid>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,
-    /// The lattice over a tetrahedral mesh that all of this is, if its surface is to be made without a grid.
-    pub tiling: Option<Arc<Tiling>>,
     /// The width of the narrowest transition between lattices (mm), if there is one: no grid may be coarser.
     pub transition: Option<f64>,
 }
@@ -30,12 +27,7 @@ pub struct Solid {
 impl Solid {
     /// A region and the lattice in it.
     pub fn new(region: Region, field: Option<Arc<dyn Implicit>>, wavelength: f64) -> Solid {
-        Solid { region, field, filled: Vec::new(), wavelength, tiling: None, transition: None }
-    }
-
-    /// The lattice whose surface is made without a grid: the region being its mesh, and nothing else in it.
-    pub fn explicit(&self) -> Option<&Tiling> {
-        self.tiling.as_deref().filter(|_| self.filled.is_empty())
+        Solid { region, field, filled: Vec::new(), wavelength, transition: None }
     }
 
     /// The same solid with one more body that is solid whatever the lattice says.

@@ -10,6 +10,7 @@
 mod crease;
 mod level;
 mod mixture;
+mod surface;
 
 use std::sync::Arc;
 
@@ -22,6 +23,7 @@ use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
 pub use level::{Amount, Spread};
+pub use surface::{Connectivity, TilingSurface, ZonePair, connectivity, stencil};
 
 /// A cell of a tiling.
 #[derive(Clone)]

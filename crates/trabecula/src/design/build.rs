@@ -111,8 +111,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
             joins,
         });
         if d.blend.is_none() {
-            let mut solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
-            solid.tiling = explicit.then_some(tiling);
+            let solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
             return Ok(Built {
                 solid: filled.into_iter().fold(solid, Solid::with),
                 lattices,

@@ -7,8 +7,7 @@ use serde_json::{Value as Json, json};
 use super::{Warning, tiling::Zoned};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Stencil};
-use crate::extract::{self, Foretold};
-use crate::tiling::Tiling;
+use crate::tiling::{self, Connectivity, Tiling, ZonePair};
 
 /// Steps along the edge of a face on which ports are looked at.
 const STEPS: usize = 96;
@@ -16,19 +15,19 @@ const STEPS: usize = 96;
 /// What hangs together, and for every two zones with faces in common the share of a face that is solid in both cells.
 #[derive(Clone, Debug)]
 pub struct Joins {
-    foretold: Foretold,
+    connectivity: Connectivity,
     shares: Vec<f64>,
 }
 
 /// What hangs together in a lattice of zones whose cells are made at this fraction.
 pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joins> {
-    let foretold = extract::foretold(tiling)?;
+    let connectivity = tiling::connectivity(tiling)?;
     let share = |zones: [u32; 2]| {
         let [a, b] = zones.map(|z| cells.get(&z));
         common(a?, b?, tiling.part, fraction)
     };
-    let shares = foretold.joins.iter().map(|j| share(j.zones).unwrap_or(0.0));
-    Some(Joins { shares: shares.collect(), foretold })
+    let shares = connectivity.pairs.iter().map(|j| share(j.zones).unwrap_or(0.0));
+    Some(Joins { shares: shares.collect(), connectivity })
 }
 
 /// The share of a face that is solid in both of two cells at the same fraction, by points evenly on it.
@@ -64,7 +63,7 @@ impl Joins {
             warnings.push(Warning { path: path.to_string(), message });
         };
         let name = |zone: u32| names.get(&zone.to_string()).map_or("", String::as_str);
-        let apart = self.foretold.joins.iter().zip(&self.shares).filter(|(j, _)| !j.joined);
+        let apart = self.connectivity.pairs.iter().zip(&self.shares).filter(|(j, _)| !j.joined);
         let mut any = false;
         for (join, share) in apart {
             any = true;
@@ -79,19 +78,19 @@ impl Joins {
                 100.0 * share
             ));
         }
-        if !any && self.foretold.pieces > 1 {
-            say(format!("the lattice is in {} pieces, told by its ports", self.foretold.pieces));
+        if !any && self.connectivity.components > 1 {
+            say(format!("the lattice is in {} pieces, told by its ports", self.connectivity.components));
         }
     }
 
     /// Pieces of the whole.
     pub(super) fn pieces(&self) -> usize {
-        self.foretold.pieces
+        self.connectivity.components
     }
 
     /// For the report.
     pub(super) fn json(&self) -> Json {
-        let one = |(j, share): (&extract::Join, &f64)| json!({ "zones": j.zones, "faces": j.faces, "open": j.open, "ports": share, "joined": j.joined });
-        self.foretold.joins.iter().zip(&self.shares).map(one).collect()
+        let one = |(j, share): (&ZonePair, &f64)| json!({ "zones": j.zones, "faces": j.faces, "open": j.open, "ports": share, "joined": j.joined });
+        self.connectivity.pairs.iter().zip(&self.shares).map(one).collect()
     }
 }

@@ -8,7 +8,6 @@ use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
 use crate::analysis;
 use crate::blend::Phases;
 use crate::cell::Part;
-use crate::extract;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
@@ -242,7 +241,7 @@ fn tiled(it: &Tiled) -> Json {
             "volume": volume,
             "solid_fraction": solid / volume,
             "zones": Json::Null,
-            "pieces": it.explicit.then(|| extract::foretold(tiling)).flatten().map(|f| f.pieces),
+            "pieces": it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
             "joins": Json::Null,
             "overlap": tiling.map.overlap(),
             "thickness": spread.map(|s| json!({ "min": s.min, "low": s.low, "mean": s.mean, "high": s.high, "max": s.max })),

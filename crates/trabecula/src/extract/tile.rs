@@ -26,13 +26,13 @@ use std::ops::Range;
 use crate::field::Block;
 use geometry::math::Vec3;
 
-use super::bodies::Bodies;
 use super::cap;
 use super::crease::{self, Edges, Fits, Seen};
 use super::grid::{Flat, Grid, Local, TILE};
 use super::key::Key;
 use super::knot::{Extra, Knots};
 use super::signs::{Signs, below, bits, negative};
+use super::tile_components::TileComponents;
 use balance::balance;
 use triangles::list_triangles;
 use vertices::{list_vertices, solve};
@@ -441,12 +441,12 @@ impl View<'_> {
     }
 
     /// The tile's surface by itself, body by body, with what stitching needs; and its bodies.
-    pub fn patch(&self, middle: Vec3) -> (Patch, Bodies) {
+    pub fn patch(&self, middle: Vec3) -> (Patch, TileComponents) {
         let mut patch = Patch::default();
         let mut renamed = vec![u32::MAX; self.s.places.len()];
         let mut shared = vec![false; self.s.places.len()];
         self.each_shared(&mut |v| shared[v as usize] = true);
-        let bodies = Bodies::each_triangle(self, middle, |t, cut| {
+        let bodies = TileComponents::each_triangle(self, middle, |t, cut| {
             patch.cut.push(cut);
             patch.triangles.push(t.map(|v| {
                 let slot = &mut renamed[v as usize];

@@ -9,13 +9,14 @@ use geometry::progress::Silent;
 use geometry::repair::Repair;
 use trabecula::cell::Part;
 use trabecula::csg_tree::CsgSolid;
-use trabecula::extract::{Islands, surface};
+use trabecula::extract::surface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::implicit::Implicit;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere, Union};
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
+use trabecula::surface_maker::Islands;
 
 use super::common::{Random, cases, check, cuboid, fault_of, lattice, stl, stream};
 use super::crease::{angle, ball, block, boxes, creases, cylinder, far, moved, notched, of, star};

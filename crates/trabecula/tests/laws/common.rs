@@ -11,13 +11,14 @@ use geometry::progress::{Silent, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::{Cell, Part, Series, catalogue, named};
-use trabecula::extract::{Islands, Summary, stream_stl};
+use trabecula::extract::GridSurface;
 use trabecula::grade::Grade;
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
+use trabecula::surface_maker::{Components, Islands, Options, Summary, SurfaceMaker};
 
 pub fn ball(center: Vec3, radius: f64) -> Region {
     Arc::new(Sphere::new(center, radius).expect("ball"))
@@ -148,8 +149,18 @@ pub fn check_both(what: &str, solid: &Solid, edge: f64, s: &SurfaceMesh) {
 /// A solid as a streamed STL.
 pub fn stream(solid: &Solid, edge: f64, islands: Islands) -> Result<(Vec<u8>, Summary), Stopped> {
     let mut stl = Cursor::new(Vec::new());
-    let summary = stream_stl(solid, edge, islands, &mut stl, &Silent)?;
+    let summary = GridSurface(solid).stream_stl(&Options { resolution: edge, islands }, &mut stl, &Silent)?;
     Ok((stl.into_inner(), summary))
+}
+
+/// The surface that a method makes, and its connected components.
+pub fn meshed(
+    maker: &dyn SurfaceMaker,
+    resolution: f64,
+    islands: Islands,
+) -> Result<(SurfaceMesh, Components), Stopped> {
+    let made = maker.mesh(&Options { resolution, islands }, &Silent)?;
+    Ok((made.surface, made.components))
 }
 
 /// The mesh as a file of its triangles in their order.

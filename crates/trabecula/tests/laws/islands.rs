@@ -9,11 +9,12 @@ use geometry::mesh::Mesh;
 use geometry::progress::{Progress, Silent, Stopped};
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{Islands, Pieces, stream_stl, surface, surface_of};
+use trabecula::extract::{GridSurface, surface};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
+use trabecula::surface_maker::{Components, Islands, Options, SurfaceMaker};
 
-use crate::common::{ball, check, lattice, solid, stl, stream};
+use crate::common::{ball, check, lattice, meshed, solid, stl, stream};
 
 const WAVELENGTH: [f64; 3] = [1.0, 1.1, 0.9];
 
@@ -82,21 +83,21 @@ fn largest(mesh: &Mesh) -> f64 {
 }
 
 /// All that is promised of pieces, for one solid.
-fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
-    let (all, found) = surface_of(solid, edge, Islands::Keep, &Silent).expect("surface");
+fn law(what: &str, solid: &Solid, edge: f64) -> Components {
+    let (all, found) = meshed(&GridSurface(solid), edge, Islands::Keep).expect("surface");
     let measured = size(&all.mesh);
-    let figures = |p: &Pieces| (p.pieces as usize, p.cavities as usize, p.euler);
+    let figures = |p: &Components| (p.count as usize, p.cavities as usize, p.euler);
     let of = |m: &geometry::measure::Size| (m.pieces, m.cavities, m.euler);
     assert_eq!(figures(&found), of(&measured), "{what}");
-    assert_eq!((found.others + 1, found.dropped), (found.pieces, 0), "{what}");
+    assert_eq!((found.others + 1, found.dropped), (found.count, 0), "{what}");
     let best = largest(&all.mesh);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * measured.volume;
     assert!(near(found.largest, best), "{what}: {} for {best}", found.largest);
     assert!(near(found.largest + found.volume, measured.volume), "{what}");
     let (_, told) = stream(solid, edge, Islands::Keep).expect("stl");
-    assert_eq!(told.pieces, found, "{what}");
+    assert_eq!(told.components, found, "{what}");
 
-    let (one, kept) = surface_of(solid, edge, Islands::Drop, &Silent).expect("surface");
+    let (one, kept) = meshed(&GridSurface(solid), edge, Islands::Drop).expect("surface");
     check(what, &one);
     let left = size(&one.mesh);
     assert_eq!(figures(&kept), of(&left), "{what}");
@@ -104,14 +105,14 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Pieces {
     assert!(near(left.volume, best), "{what}: {} for {best}", left.volume);
     assert_eq!(one.cut.len(), one.mesh.triangles.len());
     let (bytes, summary) = stream(solid, edge, Islands::Drop).expect("stl");
-    assert_eq!(summary.pieces, kept, "{what}");
+    assert_eq!(summary.components, kept, "{what}");
     assert_eq!(summary.triangles as usize, one.mesh.triangles.len());
     assert_eq!(bytes, stl(&one), "{what}: the two roads differ");
     assert!(near(summary.volume, left.volume), "{what}");
 
     match stream(solid, edge, Islands::Error) {
-        Ok(_) => assert_eq!(found.pieces, 1, "{what}"),
-        Err(Stopped::Refused(f)) => assert!(found.pieces > 1 && f.at == "islands", "{what}: {f}"),
+        Ok(_) => assert_eq!(found.count, 1, "{what}"),
+        Err(Stopped::Refused(f)) => assert!(found.count > 1 && f.at == "islands", "{what}: {f}"),
         Err(e) => panic!("{what}: {e:?}"),
     }
     found
@@ -135,7 +136,7 @@ fn a_cavity_stays_with_its_piece_and_a_ball_in_it_is_another() {
                 continue; // many tiles once are enough
             }
             let found = law(what, &solid(union(parts.clone()), None), edge);
-            assert_eq!((found.pieces, found.cavities), want, "{what}");
+            assert_eq!((found.count, found.cavities), want, "{what}");
             // A ball's volume at ten steps a radius.
             assert!((found.largest / volume - 1.0).abs() < 0.02, "{what}: {} for {volume}", found.largest);
         }
@@ -155,7 +156,7 @@ fn many_tiles_and_any_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("pool").install(|| {
                 let streamed = stream(&solid, 0.025, Islands::Drop).expect("stl");
-                (streamed, surface_of(&solid, 0.025, Islands::Drop, &Silent).expect("surface"))
+                (streamed, meshed(&GridSurface(&solid), 0.025, Islands::Drop).expect("surface"))
             })
         };
         assert!(run(1) == run(3));
@@ -169,9 +170,9 @@ fn crumbs_and_islands_are_told_apart() {
     let region = Arc::new(Cuboid::new([0.3, 0.3, 0.3], [3.7, 3.7, 3.2]).expect("box"));
     let found = law("balls", &solid(region.clone(), Some(field.clone())), 0.05);
     let s = surface(&solid(region, Some(field)), 0.05, &Silent).expect("surface");
-    assert_eq!(found.pieces as usize, size(&s.mesh).pieces);
+    assert_eq!(found.count as usize, size(&s.mesh).pieces);
     assert!(found.border > 0 && found.border < found.others, "{found:?}");
-    let island = found.island.expect("several");
+    let island = found.second.expect("several");
     assert!(island.volume > 0.0 && island.volume <= found.largest);
     assert!((0..3).all(|a| island.bounds[0][a] < island.bounds[1][a]));
 }
@@ -183,11 +184,8 @@ fn figures_are_those_of_the_file() {
     for islands in [Islands::Keep, Islands::Drop] {
         let (bytes, summary) = stream(&solid, 0.04, islands).expect("stl");
         let read = size(&read_mesh(&bytes, "stl").expect("file").mesh);
-        let told = summary.pieces;
-        assert_eq!(
-            (told.pieces as usize, told.cavities as usize, told.euler),
-            (read.pieces, read.cavities, read.euler)
-        );
+        let told = summary.components;
+        assert_eq!((told.count as usize, told.cavities as usize, told.euler), (read.pieces, read.cavities, read.euler));
         // Single precision.
         assert!((summary.volume / read.volume - 1.0).abs() < 1e-6);
         assert!(((summary.area_cut + summary.area_lattice) / read.area - 1.0).abs() < 1e-6);
@@ -216,7 +214,7 @@ fn progress_rises_to_the_end_and_stops_at_any_time() {
         for stop in [0.3, 0.97, 2.0] {
             let until = Until(stop, Default::default());
             let mut out = Cursor::new(Vec::new());
-            let done = stream_stl(&solid, 0.05, islands, &mut out, &until);
+            let done = GridSurface(&solid).stream_stl(&Options { resolution: 0.05, islands }, &mut out, &until);
             let last = *until.1.lock().expect("no other");
             match done {
                 Ok(_) => assert!(last == 1.0 && stop > 1.0),

@@ -1,7 +1,6 @@
 //! What an extracted surface guarantees, and the rates at which its errors fall.
 
 use std::f64::consts::PI;
-use std::io::Cursor;
 use std::sync::Arc;
 
 use geometry::measure::size;
@@ -10,13 +9,14 @@ use geometry::progress::{Silent, Stopped};
 use geometry::repair::Repair;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
-use trabecula::extract::{Islands, stream_stl, surface, voxels};
+use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::lattice::Level;
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere};
+use trabecula::surface_maker::Islands;
 
-use crate::common::{ball, cases, check, check_both, drawn, lattice_at, region, solid};
+use crate::common::{ball, cases, check, check_both, drawn, lattice_at, region, solid, stream};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
@@ -232,9 +232,8 @@ fn same_bytes_for_any_number_of_threads_and_both_roads_agree() {
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| {
-            let mut stl = Cursor::new(Vec::new());
-            let summary = stream_stl(&solid, 0.025, Islands::Keep, &mut stl, &Silent).expect("stl");
-            (surface(&solid, 0.025, &Silent).expect("surface"), stl.into_inner(), summary)
+            let (stl, summary) = stream(&solid, 0.025, Islands::Keep).expect("stl");
+            (surface(&solid, 0.025, &Silent).expect("surface"), stl, summary)
         })
     };
     let (one, stl, summary) = run(1);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::io::Cursor;
 use std::sync::Arc;
 
-use crate::common::{Random, ball, cases, check, fault};
+use crate::common::{Random, ball, cases, check, fault, meshed};
 use geometry::math::norm;
 use geometry::measure::size;
 use geometry::progress::{Silent, Stopped};
@@ -14,14 +14,15 @@ use geometry::symmetry::{Group, Side};
 use geometry::tetmesh::TetMesh;
 use trabecula::cell::tet::{Stencil, ready, ready_cells};
 use trabecula::cell::{Part, Series, Term};
-use trabecula::extract::{self, Islands};
+use trabecula::extract::GridSurface;
 use trabecula::field::Field;
 use trabecula::grade::Grade;
 use trabecula::map::Tets;
 use trabecula::mesher::background;
 use trabecula::region::MeshRegion;
 use trabecula::solid::Solid;
-use trabecula::tiling::{Amount, Level, Share, Tiling};
+use trabecula::surface_maker::{Components, Islands, Options, SurfaceMaker};
+use trabecula::tiling::{Amount, Level, Share, Tiling, TilingSurface, connectivity};
 
 /// n³ cubes of six tetrahedra each, nodes moved about and numbered at random.
 pub fn shaken(n: usize, by: f64, edge: f64, some: &mut Random) -> TetMesh {
@@ -60,20 +61,16 @@ pub fn map(mesh: &TetMesh) -> Arc<Tets> {
     Arc::new(Tets::new(mesh, 0.0).expect("mesh"))
 }
 
-/// The part as a solid, by the explicit road or the implicit one.
-fn solid(tiling: Tiling, explicit: bool) -> Solid {
+/// The surface of the whole mesh's lattice, by cutting tetrahedra or on a grid.
+pub fn made(tiling: Tiling, steps: f64, explicit: bool) -> (SurfaceMesh, Components) {
+    let edge = tiling.map.mean_edge() / steps;
+    if explicit {
+        return meshed(&TilingSurface(&tiling), edge, Islands::Keep).expect("surface");
+    }
     let region = MeshRegion::new(tiling.map.boundary(), Repair::Refuse).expect("boundary");
     let wavelength = tiling.wavelength();
-    let tiling = Arc::new(tiling);
-    let mut solid = Solid::new(Arc::new(region), Some(tiling.clone()), wavelength);
-    solid.tiling = explicit.then_some(tiling);
-    solid
-}
-
-pub fn made(tiling: Tiling, steps: f64, explicit: bool) -> (SurfaceMesh, extract::Pieces) {
-    let edge = tiling.map.mean_edge() / steps;
-    let solid = solid(tiling, explicit);
-    extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface")
+    let solid = Solid::new(Arc::new(region), Some(Arc::new(tiling)), wavelength);
+    meshed(&GridSurface(&solid), edge, Islands::Keep).expect("surface")
 }
 
 pub fn cell(name: &str) -> (Arc<Stencil>, Part, f64) {
@@ -103,7 +100,7 @@ fn ready_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
         let found = size(&surface.mesh);
         assert!(found.closed, "{}", r.name);
         // By ports and union-find, and by the surface itself.
-        let told = (told.pieces as usize, told.cavities as usize, told.euler);
+        let told = (told.count as usize, told.cavities as usize, told.euler);
         assert_eq!(told, (found.pieces, found.cavities, found.euler), "{}", r.name);
         assert_eq!(found.pieces, 1, "{}", r.name);
     }
@@ -122,16 +119,15 @@ fn cells_that_fall_apart_do_so_on_the_mesh() {
     ] {
         assert!(!s.connected(part).iter().any(|i| i[0] < t && t < i[1]));
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
-        let foretold = extract::foretold(&tiling).expect("few tetrahedra");
-        assert_eq!((foretold.pieces, foretold.joins.len()), (pieces, 0));
-        let solid = solid(tiling, true);
-        let edge = 0.75;
-        let (all, told) = extract::surface_of(&solid, edge, Islands::Keep, &Silent).expect("surface");
+        let predicted = connectivity(&tiling).expect("few tetrahedra");
+        assert_eq!((predicted.components, predicted.pairs.len()), (pieces, 0));
+        let (maker, edge) = (TilingSurface(&tiling), 0.75);
+        let (all, told) = meshed(&maker, edge, Islands::Keep).expect("surface");
         assert_eq!(size(&all.mesh).pieces, pieces);
-        assert_eq!((told.pieces as usize, told.others as usize), (pieces, pieces - 1));
-        let (one, told) = extract::surface_of(&solid, edge, Islands::Drop, &Silent).expect("surface");
-        assert_eq!((size(&one.mesh).pieces, told.pieces), (1, 1));
-        let refused = extract::surface_of(&solid, edge, Islands::Error, &Silent);
+        assert_eq!((told.count as usize, told.others as usize), (pieces, pieces - 1));
+        let (one, told) = meshed(&maker, edge, Islands::Drop).expect("surface");
+        assert_eq!((size(&one.mesh).pieces, told.count), (1, 1));
+        let refused = meshed(&maker, edge, Islands::Error);
         assert!(matches!(refused, Err(Stopped::Refused(_))));
     }
 }
@@ -151,7 +147,7 @@ fn surfaces_are_embedded_after_rounding_whatever_varies() {
             let (surface, told) = made(tiling, 5.0, true);
             check(name, &surface);
             let found = size(&surface.mesh);
-            assert_eq!(told.pieces as usize, found.pieces, "{name}");
+            assert_eq!(told.count as usize, found.pieces, "{name}");
             assert_eq!(told.euler, found.euler, "{name}");
         }
     }
@@ -236,21 +232,22 @@ fn parts_of_real_shape_stream_the_same_bytes_for_any_number_of_threads() {
     let size_mm = Grade::Constant(3.0);
     let (mesh, _) = background(&*region, &region.bounds(), &size_mm, &inside).expect("mesh");
     let (s, part, t) = cell("diamond");
-    let solid = solid(Tiling::new(map(&mesh), s, part, Level::Same(t)), true);
-    let (surface, pieces) = extract::surface_of(&solid, 0.5, Islands::Keep, &Silent).expect("surface");
+    let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
+    let maker = TilingSurface(&tiling);
+    let (surface, pieces) = meshed(&maker, 0.5, Islands::Keep).expect("surface");
     assert_eq!(fault(&surface.mesh), None);
-    assert_eq!(pieces.pieces, 1);
+    assert_eq!(pieces.count, 1);
     let streams = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
             let mut out = Cursor::new(Vec::new());
-            let told = extract::stream_stl(&solid, 0.5, Islands::Keep, &mut out, &Silent);
+            let told = maker.stream_stl(&Options::new(0.5), &mut out, &Silent);
             (told.expect("stream"), out.into_inner())
         })
     });
     assert!(streams[0].1 == streams[1].1, "bytes differ");
     let (told, bytes) = &streams[0];
-    assert_eq!(told.pieces, pieces);
+    assert_eq!(told.components, pieces);
     assert!((told.volume / surface.mesh.volume() - 1.0).abs() < 1e-12);
     let back = geometry::formats::read_mesh(bytes, "stl").expect("STL").mesh;
     assert_eq!(back.triangles.len(), surface.mesh.triangles.len());
@@ -292,12 +289,10 @@ fn meshes_that_are_none_are_refused() {
     pinched.tets[1] = *apart.expect("one on the other side");
     let (s, part, t) = cell("diamond");
     let map = map(&pinched);
-    let tiling = Arc::new(Tiling::new(map, s, part, Level::Same(t)));
-    let mut solid = Solid::new(ball([0.0; 3], 9.0), Some(tiling.clone()), 1.0);
-    solid.tiling = Some(tiling);
-    match extract::surface(&solid, 0.5, &Silent) {
+    let tiling = Tiling::new(map, s, part, Level::Same(t));
+    match TilingSurface(&tiling).mesh(&Options::new(0.5), &Silent) {
         Err(Stopped::Refused(f)) => assert!(f.message.contains("an edge alone"), "{}", f.message),
-        other => panic!("{:?}", other.map(|s| s.mesh.triangles.len())),
+        other => panic!("{:?}", other.map(|m| m.surface.mesh.triangles.len())),
     }
 }
 
@@ -321,7 +316,7 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
 }
 
 #[test]
-fn pieces_and_joins_are_foretold_without_a_surface() {
+fn connectivity_is_predicted_without_a_surface() {
     let mut some = Random(13);
     let mesh = shaken(3, 0.1, 6.0, &mut some);
     let lower: Vec<&str> = ready_cells().iter().filter(|r| r.part == Part::Lower).map(|r| r.name).collect();
@@ -332,8 +327,8 @@ fn pieces_and_joins_are_foretold_without_a_surface() {
     let known = [(["p43m", "f43m"], 0.3, Some(true)), (["pn3m", "diamond"], 0.3, Some(false))];
     for (names, fraction, joined) in known.into_iter().chain(drawn.collect::<Vec<_>>()) {
         let tiling = zoned(&mesh, names, Part::Lower, fraction);
-        let told = extract::foretold(&tiling).expect("few tetrahedra");
-        let [join] = &told.joins[..] else { panic!("{names:?}: {told:?}") };
+        let told = connectivity(&tiling).expect("few tetrahedra");
+        let [join] = &told.pairs[..] else { panic!("{names:?}: {told:?}") };
         let map = &tiling.map;
         let others = |t: usize| {
             let across = map.across(t).into_iter().filter(|o| (*o as usize) < map.len());
@@ -345,7 +340,7 @@ fn pieces_and_joins_are_foretold_without_a_surface() {
         let (surface, found) = made(tiling.clone(), 16.0, true);
         let pieces = size(&surface.mesh).pieces;
         println!("{names:?} {fraction:.2}: {pieces} pieces, {join:?}");
-        assert_eq!((told.pieces, found.pieces as usize), (pieces, pieces), "{names:?} {fraction}");
+        assert_eq!((told.components, found.count as usize), (pieces, pieces), "{names:?} {fraction}");
         assert!(pieces > 1 || join.joined, "{names:?}");
         if let Some(joined) = joined {
             assert_eq!(join.joined, joined, "{names:?}");

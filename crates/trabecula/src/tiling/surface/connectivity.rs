@@ -1,50 +1,50 @@
-//! What hangs together in a lattice over a tetrahedral mesh, told from ports alone: before, and without, its surface.
+//! Predicted connectivity of a lattice over a tetrahedral mesh, from its traces on faces alone, without making the surface.
 //!
-//! The solid in a tetrahedron follows from the values at its nodes; so does its trace on each face, which is the same from both
-//! sides. Pieces of tetrahedra are joined where they share some of a trace: that is all there is to it, and it needs neither
-//! places nor triangles. Tetrahedra with equal numbers at their nodes are looked at once.
+//! The solid in a tetrahedron follows from the values at its nodes, and so does its trace on each face, which is the same from
+//! both sides. Solid components of adjacent tetrahedra are joined where they share a part of a trace, which requires neither
+//! positions nor triangles. Tetrahedra with equal values at their nodes are evaluated once.
 
 use std::collections::{BTreeMap, HashMap};
 
 use rayon::prelude::*;
 
-use super::census::Links;
+use super::component_links::ComponentLinks;
 use super::piece::{Piece, Scratch};
 use super::{Of, Work};
-use crate::extract::bodies::Sum;
 use crate::map::tets::NONE;
+use crate::surface_maker::Totals;
 use crate::tiling::{Level, Tiling};
 
 /// Steps along the edge of a tetrahedron.
 const STEPS: usize = 16;
-/// More tetrahedra than this with numbers of their own are not looked at.
+/// Greatest number of tetrahedra with different values at their nodes.
 const MOST: usize = 20_000;
 
-/// What hangs together.
+/// Predicted connected components.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Foretold {
-    /// Pieces of the solid.
-    pub pieces: usize,
-    /// Every two zones that have faces in common, by their numbers.
-    pub joins: Vec<Join>,
+pub struct Connectivity {
+    /// Number of connected components of the solid.
+    pub components: usize,
+    /// All pairs of zones that have faces in common, by their numbers.
+    pub pairs: Vec<ZonePair>,
 }
 
 /// Two zones that have faces in common.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Join {
+pub struct ZonePair {
     /// The zones, the lower first.
     pub zones: [u32; 2],
-    /// Faces that have a tetrahedron of each on their sides.
+    /// Faces between a tetrahedron of one and a tetrahedron of the other.
     pub faces: usize,
-    /// Those of them that solid passes through.
+    /// How many of them the solid passes through.
     pub open: usize,
-    /// Whether the piece that is in most tetrahedra of one zone is also that of the other.
+    /// Whether the component present in most tetrahedra of one zone is also that of the other.
     pub joined: bool,
 }
 
-/// What hangs together in a lattice, on a subdivision of 16 steps; `None` if more than 20 000 tetrahedra differ in their
-/// levels or cells, or the mesh is one that no surface is made for.
-pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
+/// The connectivity of a lattice on a subdivision of 16 steps; `None` if more than 20 000 tetrahedra differ in their levels
+/// or cells, or the mesh is one that no surface is made for.
+pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
     let work = Work::in_steps(tiling, STEPS).ok()?;
     let map = &tiling.map;
     // The first tetrahedron of each kind, and the kind of each.
@@ -64,37 +64,37 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
             Of::Own(piece) => *piece,
             Of::Same(piece) => piece.clone(),
         };
-        // All but what is placed.
+        // Without positions.
         Piece { places: Vec::new(), triangles: Vec::new(), ..made }
     };
     let pieces: Vec<Piece> = firsts.par_iter().map_init(Scratch::default, piece).collect();
-    let mut links = Links::default();
+    let mut links = ComponentLinks::default();
     // For each piece of solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
     for (t, kind) in kinds.iter().enumerate() {
         let piece = &pieces[*kind];
         let first = links.next(piece.bounds.len());
-        let sums = vec![Sum::NONE; piece.bounds.len()];
-        links.add(map, t, work.mask(t), piece, &sums).ok()?;
+        let totals = vec![Totals::ZERO; piece.bounds.len()];
+        links.add(map, t, work.mask(t), piece, &totals).ok()?;
         for s in 0..piece.solids {
             of.push(t);
             solids.push(first + s);
         }
     }
-    let wholes = links.wholes(&solids);
-    let mut names = wholes.clone();
+    let roots = links.roots(&solids);
+    let mut names = roots.clone();
     names.sort_unstable();
     names.dedup();
     // For each zone, in how many of its tetrahedra each piece is.
     let mut about: BTreeMap<u32, HashMap<u32, usize>> = BTreeMap::new();
-    for (t, whole) in of.iter().zip(&wholes) {
-        *about.entry(map.zone(*t)).or_default().entry(*whole).or_default() += 1;
+    for (t, root) in of.iter().zip(&roots) {
+        *about.entry(map.zone(*t)).or_default().entry(*root).or_default() += 1;
     }
     let main = |zone: u32| {
         let of = about.get(&zone)?;
         of.iter().max_by_key(|(name, count)| (**count, u32::MAX - **name)).map(|(name, _)| *name)
     };
-    let mut joins: BTreeMap<[u32; 2], Join> = BTreeMap::new();
+    let mut pairs: BTreeMap<[u32; 2], ZonePair> = BTreeMap::new();
     for t in 0..map.len() {
         for (face, other) in map.across(t).into_iter().enumerate() {
             if other == NONE || other as usize <= t {
@@ -105,20 +105,20 @@ pub fn foretold(tiling: &Tiling) -> Option<Foretold> {
                 continue;
             }
             let zones = [a.min(b), a.max(b)];
-            let join = joins.entry(zones).or_insert_with(|| Join {
+            let pair = pairs.entry(zones).or_insert_with(|| ZonePair {
                 zones,
                 faces: 0,
                 open: 0,
                 joined: main(a).is_some() && main(a) == main(b),
             });
-            join.faces += 1;
-            join.open += usize::from(!pieces[kinds[t]].faces[face].is_empty());
+            pair.faces += 1;
+            pair.open += usize::from(!pieces[kinds[t]].faces[face].is_empty());
         }
     }
-    Some(Foretold { pieces: names.len(), joins: joins.into_values().collect() })
+    Some(Connectivity { components: names.len(), pairs: pairs.into_values().collect() })
 }
 
-/// All that a tetrahedron's piece follows from: levels and weights at its nodes.
+/// The values that determine the surface in a tetrahedron: levels and weights at its nodes.
 fn numbers(tiling: &Tiling, t: usize) -> Vec<u64> {
     let ids = tiling.map.tet(t);
     let at = |of: &[f64]| ids.map(|n| of[n as usize].to_bits());

@@ -1,21 +1,21 @@
-//! The explicit road: surfaces of lattices over tetrahedral meshes, without a grid.
+//! Direct surface extraction from a tiling: every tetrahedron of the mesh is cut by itself, without a grid.
 //!
-//! Every tetrahedron is cut into the same small steps, and the surface in it is that of `piece`. Where the level and the cell
-//! are the same everywhere, a piece is made once and placed in all tetrahedra.
+//! Every tetrahedron is divided into the same small ones, and `piece` finds the surface in it. Where the level and the cell
+//! are the same everywhere, that is done once and mapped to all tetrahedra.
 //!
 //! *Closed, oriented, manifold, embedded.* A tetrahedron takes its corners in the order of the mesh's nodes. On a common face
-//! two tetrahedra then have the same small triangles, values and slopes in all bits, hence the same corners of the surface;
-//! nothing is welded by comparing coordinates. The mesh's boundary is a manifold (`boundary` refuses others), and caps are
-//! polygons in its small triangles. Affine maps keep what is embedded.
+//! two tetrahedra then have the same small triangles, values and derivatives in all bits, hence the same vertices of the
+//! surface; nothing is welded by comparing coordinates. The mesh's boundary is a manifold (`component_links::manifold` refuses
+//! others), and caps are polygons in its small triangles. Affine maps keep embedded surfaces embedded.
 //!
-//! *After rounding to single precision.* Corners stay `MARGIN` of a step away from nodes, so parts of the surface that do not
-//! meet are apart by that much of a small tetrahedron's height. It is refused where rounding is not well below.
+//! *After rounding to single precision.* Vertices stay `MARGIN` of a step away from nodes, so parts of the surface that do not
+//! meet are separated by that share of a small tetrahedron's height. Designs where rounding is not well below are refused.
 
-mod census;
-mod foretold;
+mod component_links;
+mod connectivity;
 mod piece;
 mod root;
-mod shared;
+mod shared_vertices;
 mod template;
 
 use std::ops::Range;
@@ -23,15 +23,13 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::bodies::Sum;
-use super::islands::{Islands, Pieces};
-use super::{Estimate, Sifting, Store, Summary, finish, not_empty, sift};
+use super::{Level, Tiling};
 use crate::cell::tet::{Grid, Nodes, Ready};
 use crate::map::Tets;
 use crate::map::tets::NONE;
-use crate::tiling::{Level, Tiling};
-use census::Links;
-pub use foretold::{Foretold, Join, foretold};
+use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty};
+use component_links::ComponentLinks;
+pub use connectivity::{Connectivity, ZonePair, connectivity};
 use geometry::fault::{Fault, number};
 use geometry::formats::stl;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
@@ -39,15 +37,15 @@ use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh;
 use piece::{Core, Levels, MARGIN, Piece, Scratch};
-use shared::Shared;
+use shared_vertices::SharedVertices;
 use template::Template;
 
-/// Tetrahedra done at once by a thread.
+/// Tetrahedra that a thread takes at once.
 const CHUNK: usize = 128;
 /// The least and the most steps along the edges of tetrahedra.
 const STEPS: [usize; 2] = [4, 64];
 
-/// What all tetrahedra have in common.
+/// Data common to all tetrahedra.
 struct Work<'a> {
     tiling: &'a Tiling,
     template: Template,
@@ -75,13 +73,13 @@ impl std::ops::Deref for Of<'_> {
     }
 }
 
-/// What some tetrahedra came to.
+/// The surface in a range of tetrahedra.
 struct Chunk<'a> {
     pieces: Vec<Of<'a>>,
-    sums: Vec<Sum>,
-    /// Binary STL records, where those are wanted; else the vertices' places.
+    totals: Vec<Totals>,
+    /// Binary STL records if requested, otherwise the positions of the vertices.
     records: Vec<u8>,
-    places: Vec<Vec3>,
+    positions: Vec<Vec3>,
 }
 
 /// The number of steps along the edge of a tetrahedron for a spacing of `edge` (mm).
@@ -124,10 +122,10 @@ impl<'a> Work<'a> {
         Work::in_steps(tiling, steps(&tiling.map, edge)?)
     }
 
-    /// With so many steps along the edge of a tetrahedron.
+    /// With `n` steps along the edge of a tetrahedron.
     fn in_steps(tiling: &'a Tiling, n: usize) -> Result<Work<'a>, Fault> {
         let grid = Grid { n };
-        census::manifold(&tiling.map)?;
+        component_links::manifold(&tiling.map)?;
         let template = Template::new(grid);
         let cells = tiling.cells.iter().map(|c| {
             let mut nodes = Nodes::new(&c.stencil, grid);
@@ -149,7 +147,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// The faces on the boundary, a bit for each.
+    /// The faces on the boundary, one bit each.
     fn mask(&self, t: usize) -> u8 {
         let across = self.tiling.map.across(t);
         (0..4).fold(0, |m, i| m | u8::from(across[i] == NONE) << i)
@@ -208,13 +206,13 @@ impl<'a> Work<'a> {
         Of::Own(Box::new(cut(&core, scratch)))
     }
 
-    /// Cuts some tetrahedra, places what comes of it and adds it up.
+    /// Cuts a range of tetrahedra and sums up the totals of their surface components.
     fn chunk(&self, range: Range<usize>, scratch: &mut Scratch, stl: bool) -> Chunk<'_> {
         let mut out = Chunk {
             pieces: Vec::with_capacity(range.len()),
-            sums: Vec::new(),
+            totals: Vec::new(),
             records: Vec::new(),
-            places: Vec::new(),
+            positions: Vec::new(),
         };
         let mut places: Vec<Vec3> = Vec::new();
         for t in range {
@@ -225,25 +223,25 @@ impl<'a> Work<'a> {
                 let ab = add(scale(corners[0], l[0]), scale(corners[1], l[1]));
                 add(add(ab, scale(corners[2], l[2])), scale(corners[3], l[3]))
             }));
-            let first = out.sums.len();
-            out.sums.resize(first + piece.bounds.len(), Sum::NONE);
+            let first = out.totals.len();
+            out.totals.resize(first + piece.bounds.len(), Totals::ZERO);
             for (v, p) in places.iter().enumerate() {
-                let sum = &mut out.sums[first + piece.body[v] as usize];
-                sum.bounds = sum.bounds.with(*p);
+                let total = &mut out.totals[first + piece.body[v] as usize];
+                total.bounds = total.bounds.with(*p);
             }
             if stl {
                 out.records.reserve(piece.triangles.len() * stl::RECORD);
             }
             let flipped = self.tiling.map.flipped(t);
             let mut next = piece.triangles.iter();
-            for (body, count) in piece.bodies.iter().enumerate() {
-                let sum = &mut out.sums[first + body];
+            for (component, count) in piece.bodies.iter().enumerate() {
+                let total = &mut out.totals[first + component];
                 for (v, cap) in next.by_ref().take(*count as usize) {
                     let [a, b, c] = turned(*v, flipped).map(|v| places[v as usize]);
                     let n = cross(sub(b, a), sub(c, a));
-                    sum.triangles += 1;
-                    sum.volume += dot(sub(a, self.middle), n) / 6.0;
-                    sum.area[usize::from(*cap)] += norm(n) / 2.0;
+                    total.triangles += 1;
+                    total.volume += dot(sub(a, self.middle), n) / 6.0;
+                    total.area[usize::from(*cap)] += norm(n) / 2.0;
                     if stl {
                         let corners = [a, b, c].map(|p| p.map(|x| x as f32));
                         stl::push_record(&mut out.records, corners);
@@ -251,14 +249,14 @@ impl<'a> Work<'a> {
                 }
             }
             if !stl {
-                out.places.extend_from_slice(&places);
+                out.positions.extend_from_slice(&places);
             }
             out.pieces.push(piece);
         }
         out
     }
 
-    /// Hands over all tetrahedra in order.
+    /// Passes all tetrahedra to `take` in order.
     fn each<'s>(
         &'s self,
         progress: &dyn Progress,
@@ -279,7 +277,7 @@ impl<'a> Work<'a> {
         for first in (0..total).step_by(batch) {
             let end = total.min(first + batch);
             let mut next = Vec::new();
-            // While some are taken, the next are made.
+            // The next chunks are made while these are consumed.
             let taken = rayon::in_place_scope(|scope| {
                 if end < total {
                     scope.spawn(|_| next = make(end));
@@ -304,80 +302,91 @@ fn turned([a, b, c]: [u32; 3], flipped: bool) -> [u32; 3] {
     if flipped { [a, c, b] } else { [a, b, c] }
 }
 
-/// The surface of a tiling, held in memory, with steps of about `edge` (mm): as [`super::surface_of`].
-pub(super) fn surface(
-    tiling: &Tiling,
-    edge: f64,
-    islands: Islands,
-    progress: &dyn Progress,
-) -> Result<(SurfaceMesh, Pieces), Stopped> {
-    let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
-    let (mut out, mut links, mut shared) = (SurfaceMesh::default(), Links::default(), Shared::default());
-    work.each(progress, false, |start, chunk| {
-        let (mut sums, mut places) = (&chunk.sums[..], &chunk.places[..]);
-        for (t, piece) in (start..).zip(&chunk.pieces) {
-            let (mine, rest) = places.split_at(piece.places.len());
-            places = rest;
-            let ids = tiling.map.tet(t);
-            let names = shared.names(ids, piece, mine, &mut out.mesh.vertices)?;
-            let flipped = tiling.map.flipped(t);
-            for (v, cap) in &piece.triangles {
-                let named = turned(*v, flipped).map(|v| names[v as usize]);
-                out.mesh.triangles.push(named);
-                out.cut.push(*cap);
+/// Meshes a tiling, whose mesh is the whole region, by cutting its tetrahedra; the resolution is divided into their mean edge.
+pub struct TilingSurface<'a>(pub &'a Tiling);
+
+impl SurfaceMaker for TilingSurface<'_> {
+    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
+        let work = Work::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+        let (mut out, mut links, mut shared) =
+            (SurfaceMesh::default(), ComponentLinks::default(), SharedVertices::default());
+        work.each(progress, false, |start, chunk| {
+            let (mut totals, mut positions) = (&chunk.totals[..], &chunk.positions[..]);
+            for (t, piece) in (start..).zip(&chunk.pieces) {
+                let (mine, rest) = positions.split_at(piece.places.len());
+                positions = rest;
+                let ids = self.0.map.tet(t);
+                let numbers = shared.numbers(ids, piece, mine, &mut out.mesh.vertices)?;
+                let flipped = self.0.map.flipped(t);
+                for (v, cap) in &piece.triangles {
+                    out.mesh.triangles.push(turned(*v, flipped).map(|v| numbers[v as usize]));
+                    out.cut.push(*cap);
+                }
+                let (of, rest) = totals.split_at(piece.bounds.len());
+                totals = rest;
+                links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
             }
-            let (of, rest) = sums.split_at(piece.bounds.len());
-            sums = rest;
-            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
-        }
-        Ok(())
-    })?;
-    not_empty(out.mesh.triangles.len() as u64, edge)?;
-    let found = links.census().judge(islands).map_err(Stopped::Refused)?;
-    if found.pieces.dropped > 0 {
-        out = out.select(&sift::runs(&found.parts));
+            Ok(())
+        })?;
+        not_empty(out.mesh.triangles.len() as u64, options.resolution)?;
+        let found = links.graph().resolve(options.islands).map_err(Stopped::Refused)?;
+        Ok(Made { surface: surface_maker::kept(out, &found), components: found.components, error: None })
     }
-    Ok((out, found.pieces))
+
+    /// Memory is bounded by the tetrahedra in flight and a few numbers for each.
+    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
+        let work = Work::new(self.0, options.resolution).map_err(Stopped::Refused)?;
+        let mut links = ComponentLinks::default();
+        let mut triangles = 0u64;
+        let mut stream = StlStream::new(out, options.islands, progress)?;
+        let scaled = stream.progress();
+        work.each(&scaled, true, |start, chunk| {
+            triangles += (chunk.records.len() / stl::RECORD) as u64;
+            surface_maker::check_count(triangles)?;
+            let mut totals = &chunk.totals[..];
+            for (t, piece) in (start..).zip(&chunk.pieces) {
+                let (of, rest) = totals.split_at(piece.bounds.len());
+                totals = rest;
+                links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+            }
+            stream.write(&chunk.records)
+        })?;
+        not_empty(triangles, options.resolution)?;
+        let found = links.graph().resolve(options.islands).map_err(Stopped::Refused)?;
+        stream.finish(found, triangles)
+    }
+
+    /// Counted where the surface is the same in all tetrahedra, otherwise estimated from some of them.
+    fn estimate(&self, edge: f64) -> Result<Estimate, Fault> {
+        const SAMPLES: usize = 64;
+        let work = Work::new(self.0, edge)?;
+        let total = self.0.map.len();
+        let step = if self.0.varies() { total.div_ceil(SAMPLES) } else { 1 };
+        let mut scratch = Scratch::default();
+        let (mut count, mut sampled) = (0.0, 0.0);
+        for t in (step / 2..total).step_by(step) {
+            count += work.piece(t, &mut scratch).triangles.len() as f64;
+            sampled += 1.0;
+        }
+        let triangles = count * total as f64 / sampled;
+        let n = work.cells[0].0.grid.n as u64;
+        Ok(Estimate {
+            cells: [n * total as u64, n, n],
+            triangles,
+            held: 0.0,
+            // Half as many vertices as triangles, of three f64 each.
+            memory: triangles * (12.0 + 12.0 + 1.0),
+            stl: stl::HEADER as f64 + triangles * stl::RECORD as f64,
+        })
+    }
 }
 
-/// The surface of a tiling, streamed as binary STL: as [`super::stream_stl`]. Memory is bounded by the tetrahedra in flight and
-/// a few numbers for each.
-pub(super) fn stream_stl<W: Store>(
-    tiling: &Tiling,
-    edge: f64,
-    islands: Islands,
-    out: &mut W,
-    progress: &dyn Progress,
-) -> Result<Summary, Stopped> {
-    let work = Work::new(tiling, edge).map_err(Stopped::Refused)?;
-    let mut links = Links::default();
-    let mut bytes = 0u64;
-    out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
-    let sifting = Sifting(progress);
-    let sifts = islands == Islands::Drop;
-    let told: &dyn Progress = if sifts { &sifting } else { progress };
-    work.each(told, true, |start, chunk| {
-        bytes += chunk.records.len() as u64;
-        if bytes / stl::RECORD as u64 > u64::from(u32::MAX) {
-            let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
-            return Err(Stopped::Refused(Fault::new("edge", message)));
-        }
-        let mut sums = &chunk.sums[..];
-        for (t, piece) in (start..).zip(&chunk.pieces) {
-            let (of, rest) = sums.split_at(piece.bounds.len());
-            sums = rest;
-            links.add(&tiling.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
-        }
-        out.write_all(&chunk.records).map_err(Stopped::Io)
-    })?;
-    let triangles = bytes / stl::RECORD as u64;
-    not_empty(triangles, edge)?;
-    let found = links.census().judge(islands).map_err(Stopped::Refused)?;
-    finish(found, triangles, sifts.then_some(&sifting), out)
-}
-
-/// A ready cell in a single regular tetrahedron.
-pub(super) fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
+/// The surface of a ready tetrahedral cell at its own fraction, in a regular tetrahedron of edge 1 mm divided into `steps`
+/// steps.
+///
+/// # Errors
+/// Steps below 4 or above 64.
+pub fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
     let stencil = ready.stencil().map_err(Stopped::Refused)?;
     let h = 0.5f64.sqrt() / 2.0;
     let mesh = TetMesh {
@@ -388,28 +397,5 @@ pub(super) fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> R
     let map = Tets::new(&mesh, 0.0).map_err(Stopped::Refused)?;
     let level = Level::Same(stencil.iso(ready.part, ready.fraction));
     let tiling = Tiling::new(Arc::new(map), Arc::new(stencil), ready.part, level);
-    Ok(surface(&tiling, 1.0 / steps as f64, Islands::Keep, progress)?.0)
-}
-
-/// What a spacing will take: counted where all pieces are the same, else found on some of them.
-pub(super) fn estimate(tiling: &Tiling, edge: f64) -> Result<Estimate, Fault> {
-    const SAMPLES: usize = 64;
-    let work = Work::new(tiling, edge)?;
-    let total = tiling.map.len();
-    let step = if tiling.varies() { total.div_ceil(SAMPLES) } else { 1 };
-    let mut scratch = Scratch::default();
-    let (mut count, mut looked) = (0.0, 0.0);
-    for t in (step / 2..total).step_by(step) {
-        count += work.piece(t, &mut scratch).triangles.len() as f64;
-        looked += 1.0;
-    }
-    let triangles = count * total as f64 / looked;
-    let n = work.cells[0].0.grid.n as u64;
-    Ok(Estimate {
-        cells: [n * total as u64, n, n],
-        triangles,
-        // Half as many vertices as triangles, of three f64 each.
-        memory: triangles * (12.0 + 12.0 + 1.0),
-        stl: stl::HEADER as f64 + triangles * stl::RECORD as f64,
-    })
+    Ok(TilingSurface(&tiling).mesh(&Options::new(1.0 / steps as f64), progress)?.surface)
 }

@@ -1,61 +1,61 @@
-//! Leaving bodies out of a surface that is written already: what stays moves up, in order.
+//! Compaction: removing ranges of records from a file in place. Records that stay keep their order.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
-/// Where a surface is streamed to: something that begins at its start, can be read back and cut off.
+/// A file-like output that can be read back and truncated. Streaming begins at its start.
 pub trait Store: Read + Write + Seek + Send {
-    /// Makes it end at `length` bytes.
+    /// Truncates it to `length` bytes.
     ///
     /// # Errors
-    /// Those of what lies behind it.
-    fn end_at(&mut self, length: u64) -> io::Result<()>;
+    /// Failures of the underlying file.
+    fn truncate_to(&mut self, length: u64) -> io::Result<()>;
 }
 
 impl Store for std::fs::File {
-    fn end_at(&mut self, length: u64) -> io::Result<()> {
+    fn truncate_to(&mut self, length: u64) -> io::Result<()> {
         self.set_len(length)
     }
 }
 
 impl Store for io::Cursor<Vec<u8>> {
-    fn end_at(&mut self, length: u64) -> io::Result<()> {
+    fn truncate_to(&mut self, length: u64) -> io::Result<()> {
         self.get_mut().truncate(usize::try_from(length).unwrap_or(usize::MAX));
         Ok(())
     }
 }
 
-/// Runs of items that stay, from the lengths of consecutive parts and whether they stay.
-pub(super) fn runs(parts: &[(u64, bool)]) -> Vec<std::ops::Range<u64>> {
-    let mut runs: Vec<std::ops::Range<u64>> = Vec::new();
+/// The ranges of items that stay, given the length of each part in order and whether it stays.
+pub(super) fn ranges(parts: &[(u64, bool)]) -> Vec<std::ops::Range<u64>> {
+    let mut ranges: Vec<std::ops::Range<u64>> = Vec::new();
     let mut at = 0;
     for &(count, stays) in parts {
         let end = at + count;
         if stays {
-            match runs.last_mut().filter(|r| r.end == at) {
+            match ranges.last_mut().filter(|r| r.end == at) {
                 Some(run) => run.end = end,
-                None => runs.push(at..end),
+                None => ranges.push(at..end),
             }
         }
         at = end;
     }
-    runs
+    ranges
 }
 
-/// Bytes that are moved at once.
+/// Bytes moved at once.
 const CHUNK: u64 = 1 << 20;
 
-/// Keeps the first `head` bytes and, of the records of `size` bytes that follow, those in `runs`. `go_on` is told the
-/// number of records done and answers whether to go on.
-pub(super) fn sift(
+/// Keeps the first `head` bytes and, of the records of `size` bytes that follow, those in `ranges`. `go_on`
+/// receives the number of records done and returns whether to continue.
+pub(super) fn compact(
     out: &mut dyn Store,
     head: u64,
     size: u64,
-    runs: &[std::ops::Range<u64>],
+    ranges: &[std::ops::Range<u64>],
     mut go_on: impl FnMut(u64) -> bool,
 ) -> io::Result<bool> {
     let mut to = head;
     let mut chunk = Vec::new();
-    for run in runs {
+    for run in ranges {
         let (mut from, end) = (head + run.start * size, head + run.end * size);
         if from == to {
             to = end;
@@ -74,7 +74,7 @@ pub(super) fn sift(
             to += chunk.len() as u64;
         }
     }
-    out.end_at(to)?;
+    out.truncate_to(to)?;
     Ok(true)
 }
 
@@ -85,15 +85,15 @@ mod tests {
     #[test]
     fn what_stays_moves_up() {
         let parts = [(2, true), (1, true), (3, false), (0, true), (2, true), (1, false), (1, true)];
-        assert_eq!(runs(&parts), [0..3, 6..8, 9..10]);
-        assert_eq!(runs(&[(3, false)]), []);
+        assert_eq!(ranges(&parts), [0..3, 6..8, 9..10]);
+        assert_eq!(ranges(&[(3, false)]), []);
         let bytes: Vec<u8> = (0..4 + 3 * 10).collect();
         let mut out = io::Cursor::new(bytes.clone());
-        let whole = sift(&mut out, 4, 3, &runs(&parts), |_| true).expect("memory");
+        let done = compact(&mut out, 4, 3, &ranges(&parts), |_| true).expect("memory");
         let want = [&bytes[..13], &bytes[22..28], &bytes[31..34]].concat();
-        assert!(whole && out.into_inner() == want);
+        assert!(done && out.into_inner() == want);
         let mut out = io::Cursor::new(bytes);
-        assert!(!sift(&mut out, 4, 3, &runs(&parts), |_| false).expect("memory"));
+        assert!(!compact(&mut out, 4, 3, &ranges(&parts), |_| false).expect("memory"));
     }
 
     #[test]
@@ -101,9 +101,9 @@ mod tests {
         let n = 3 * CHUNK / 2;
         let bytes: Vec<u8> = (0..2 * n).map(|i| (i % 251) as u8).collect();
         let mut out = io::Cursor::new(bytes.clone());
-        // Less than a chunk further up, so that places written were read before.
+        // Less than a chunk further up, so that bytes are read before they are overwritten.
         let parts = [(7, false), (2 * n - 7, true)];
-        sift(&mut out, 0, 1, &runs(&parts), |_| true).expect("memory");
+        compact(&mut out, 0, 1, &ranges(&parts), |_| true).expect("memory");
         assert!(out.into_inner() == bytes[7..]);
     }
 }

@@ -1,26 +1,26 @@
-//! Vertices that tetrahedra have in common, by the simplices of the mesh that they lie in.
+//! Vertices that tetrahedra share, by the simplices of the mesh in which they lie.
 
 use std::collections::HashMap;
 
-use super::super::Stopped;
 use super::piece::Piece;
 use crate::map::tets::NONE;
 use geometry::fault::Fault;
 use geometry::math::Vec3;
+use geometry::progress::Stopped;
 
-/// Where the vertices that tetrahedra share stand in the whole mesh: the first of those on each simplex of the tetrahedral
-/// mesh. They come in the same order in every tetrahedron.
+/// The number of the first shared vertex on each simplex of the tetrahedral mesh. Vertices on a simplex have the same order in
+/// every tetrahedron.
 #[derive(Default)]
-pub(super) struct Shared {
+pub(super) struct SharedVertices {
     faces: HashMap<[u32; 3], u32>,
     /// Corners on edges, and nodes of caps, which only tetrahedra with a boundary face have.
     edges: [HashMap<[u32; 2], u32>; 2],
     nodes: HashMap<u32, u32>,
 }
 
-impl Shared {
-    /// The number of each vertex of a piece; new ones are put to the mesh.
-    pub fn names(
+impl SharedVertices {
+    /// The number of each vertex of a piece; new vertices are added to the mesh.
+    pub fn numbers(
         &mut self,
         ids: [u32; 4],
         piece: &Piece,

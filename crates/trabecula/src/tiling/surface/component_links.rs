@@ -1,24 +1,21 @@
-//! What hangs together across tetrahedra: bodies of the surface by the corners on common faces, pieces of the solid by their
-//! traces, both told by order alone. A few numbers for each tetrahedron are held, and the runs on faces that wait for their
-//! other side.
+//! Connected components across tetrahedra: those of the surface by the vertices on common faces, those of the solid by its
+//! traces there, both matched by order alone. A few numbers for each tetrahedron are held, and the runs on faces whose other
+//! tetrahedron is still to come.
 
 use std::collections::{HashMap, HashSet};
 
-use super::super::bodies::Sum;
-use super::super::islands::Census;
 use super::piece::{NONE as NOBODY, Piece, Run};
 use super::template::PAIRS;
 use crate::map::Tets;
 use crate::map::tets::NONE;
+use crate::surface_maker::{ComponentGraph, Totals};
 use geometry::fault::Fault;
 use geometry::union_find::{find, unite};
 
-/// Bodies and pieces of the tetrahedra so far. Each tetrahedron adds its bodies, then its pieces of solid.
+/// Components of the tetrahedra so far. Each tetrahedron adds its surface components, then those of its solid.
 #[derive(Default)]
-pub(super) struct Links {
-    sums: Vec<Sum>,
-    body: Vec<u32>,
-    solid: Vec<u32>,
+pub(super) struct ComponentLinks {
+    graph: ComponentGraph,
     /// Runs on faces, by the tetrahedron and the corner on their other side.
     faces: HashMap<(u32, u8), Vec<Run>>,
     /// Runs of caps on edges of the boundary, by their nodes.
@@ -28,24 +25,15 @@ pub(super) struct Links {
     nodes: HashSet<u32>,
 }
 
-impl Links {
-    /// Adds the next tetrahedron, with what its bodies add up to.
-    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &Piece, sums: &[Sum]) -> Result<(), Fault> {
-        let base = self.sums.len();
-        let bodies = piece.bounds.len();
-        let end = base + bodies + piece.solids as usize;
-        if end >= NOBODY as usize {
-            let message = "the surface falls into more than 4e9 bodies; use fewer tetrahedra";
-            return Err(Fault::new("edge", message));
-        }
-        self.sums.extend(sums);
-        self.sums.resize(end, Sum::NONE);
-        self.body.extend(base as u32..end as u32);
-        self.solid.extend(base as u32..end as u32);
+impl ComponentLinks {
+    /// Adds the next tetrahedron with the totals of its surface components.
+    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &Piece, totals: &[Totals]) -> Result<(), Fault> {
+        let components = piece.bounds.len();
+        let base = self.graph.add(totals, piece.solids as usize)? as usize;
         let surface = |s: u32| if s == NOBODY { s } else { base as u32 + s };
-        let inner = |s: u32| (base + bodies) as u32 + s;
+        let inner = |s: u32| (base + components) as u32 + s;
         for (b, solid) in piece.bounds.iter().enumerate() {
-            unite(&mut self.solid, (base + b) as u32, inner(*solid));
+            unite(&mut self.graph.solid, (base + b) as u32, inner(*solid));
         }
         let named = |runs: &[Run]| -> Vec<Run> {
             let one = |r: &Run| Run { surface: surface(r.surface), solid: inner(r.solid), ..*r };
@@ -110,7 +98,7 @@ impl Links {
                 _ => (0..4).find(on).is_some_and(|i| self.nodes.insert(ids[i])),
             };
             if mine {
-                self.sums[base + piece.body[v] as usize].vertices += 1;
+                self.graph.totals[base + piece.body[v] as usize].vertices += 1;
             }
         }
         Ok(())
@@ -122,9 +110,9 @@ impl Links {
         let (mut x, mut y) = (a.next(), b.next());
         while let (Some(r), Some(s)) = (&mut x, &mut y) {
             if r.surface != NOBODY && s.surface != NOBODY {
-                unite(&mut self.body, r.surface, s.surface);
+                unite(&mut self.graph.surface, r.surface, s.surface);
             }
-            unite(&mut self.solid, r.solid, s.solid);
+            unite(&mut self.graph.solid, r.solid, s.solid);
             let n = r.count.min(s.count);
             (r.count, s.count) = (r.count - n, s.count - n);
             let (next_x, next_y) = (r.count == 0, s.count == 0);
@@ -138,19 +126,19 @@ impl Links {
         debug_assert!(x.is_none() && y.is_none(), "faces have the same points");
     }
 
-    /// For each piece of solid of each tetrahedron so far, in their order, what names the piece of the whole that it is of.
-    pub fn wholes(&mut self, first: &[u32]) -> Vec<u32> {
-        first.iter().map(|i| find(&mut self.solid, *i)).collect()
+    /// For each of these solid components of tetrahedra, the number of the component of the whole solid that contains it.
+    pub fn roots(&mut self, first: &[u32]) -> Vec<u32> {
+        first.iter().map(|i| find(&mut self.graph.solid, *i)).collect()
     }
 
-    /// Where the pieces of solid of the next tetrahedron will begin, if it has so many bodies.
-    pub fn next(&self, bodies: usize) -> u32 {
-        (self.sums.len() + bodies) as u32
+    /// Number of the first solid component of the next tetrahedron, if it has `components` surface components.
+    pub fn next(&self, components: usize) -> u32 {
+        (self.graph.totals.len() + components) as u32
     }
 
-    /// All bodies, joined.
-    pub fn census(self) -> Census {
-        Census::joined(self.sums, self.body, self.solid)
+    /// All components, joined.
+    pub fn graph(self) -> ComponentGraph {
+        self.graph
     }
 }
 

@@ -1,0 +1,145 @@
+//! Tiles of a grid are extracted in parallel, a few at a time, and consumed in order.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use geometry::progress::{Progress, Stopped};
+use rayon::Scope;
+
+use super::grid::Grid;
+use super::tile::{self, Scratch, View};
+
+/// A used buffer, or a new one: memory that is not returned to the system need not be cleared by it again.
+pub(super) fn borrow<T: Default>(pool: &Mutex<Vec<T>>) -> T {
+    pool.lock().ok().and_then(|mut p| p.pop()).unwrap_or_default()
+}
+
+pub(super) fn give_back<T>(pool: &Mutex<Vec<T>>, buffer: T) {
+    if let Ok(mut p) = pool.lock() {
+        p.push(buffer);
+    }
+}
+
+/// Tiles per thread that may be extracted ahead of their turn: few enough to stay in the cache.
+const AHEAD: usize = 4;
+
+/// State shared by the threads.
+struct Queue<T> {
+    /// The next tile to extract.
+    next: usize,
+    /// The next tile to consume.
+    turn: usize,
+    /// Tiles that wait for their turn; `None` for those without surface.
+    ready: HashMap<usize, Option<T>>,
+    /// Whether a thread is consuming tiles.
+    consuming: bool,
+    /// Number of threads that have ended because too many tiles wait.
+    idle: usize,
+    ended: Result<(), Stopped>,
+}
+
+/// Extracts all tiles, maps each by `map` on its thread and passes the results to `take` in order.
+///
+/// Every thread extracts the next tile, then consumes what is ready unless another thread does. A thread that is too far
+/// ahead ends and is started again when a tile has been consumed: none ever blocks, so there is no deadlock.
+pub(super) fn each_tile<T: Send>(
+    grid: &Grid,
+    progress: &dyn Progress,
+    map: impl Fn(View) -> T + Sync,
+    take: impl FnMut(T) -> Result<(), Stopped> + Send,
+) -> Result<(), Stopped> {
+    let total: usize = grid.tiles().iter().product();
+    let threads = rayon::current_num_threads();
+    let work = Work {
+        grid,
+        progress,
+        total,
+        ahead: AHEAD * threads,
+        scratch: Mutex::default(),
+        map,
+        take: Mutex::new(take),
+        queue: Mutex::new(Queue { next: 0, turn: 0, ready: HashMap::new(), consuming: false, idle: 0, ended: Ok(()) }),
+    };
+    rayon::scope(|scope| (0..threads).for_each(|_| scope.spawn(|scope| work.run(scope))));
+    let queue = work.queue.into_inner();
+    queue.unwrap_or_else(PoisonError::into_inner).ended
+}
+
+/// The work on all tiles.
+struct Work<'a, T, C, K> {
+    grid: &'a Grid,
+    progress: &'a dyn Progress,
+    total: usize,
+    ahead: usize,
+    scratch: Mutex<Vec<Scratch>>,
+    map: C,
+    take: Mutex<K>,
+    queue: Mutex<Queue<T>>,
+}
+
+impl<T, C, K> Work<'_, T, C, K>
+where
+    T: Send,
+    C: Fn(View) -> T + Sync,
+    K: FnMut(T) -> Result<(), Stopped> + Send,
+{
+    /// The queue. No thread panics while it holds it.
+    fn queue(&self) -> MutexGuard<'_, Queue<T>> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn run<'s>(&'s self, scope: &Scope<'s>) {
+        let mut scratch = borrow(&self.scratch);
+        while let Some(i) = self.claim() {
+            let found = tile::extract(self.grid, self.grid.tile(i), &mut scratch).map(&self.map);
+            self.queue().ready.insert(i, found);
+            self.take_ready(scope);
+        }
+        give_back(&self.scratch, scratch);
+    }
+
+    /// The next tile to extract, unless there is none or too many wait.
+    fn claim(&self) -> Option<usize> {
+        let mut q = self.queue();
+        if q.next == self.total || q.ended.is_err() {
+            return None;
+        }
+        if q.next >= q.turn + self.ahead {
+            q.idle += 1;
+            return None;
+        }
+        q.next += 1;
+        Some(q.next - 1)
+    }
+
+    /// Consumes the tiles whose turn it is, unless another thread does.
+    fn take_ready<'s>(&'s self, scope: &Scope<'s>) {
+        let mut q = self.queue();
+        if q.consuming {
+            return;
+        }
+        q.consuming = true;
+        while q.ended.is_ok() {
+            let turn = q.turn;
+            let Some(found) = q.ready.remove(&turn) else {
+                break;
+            };
+            drop(q);
+            let taken = match (found, self.take.lock()) {
+                (Some(found), Ok(mut take)) => take(found),
+                _ => Ok(()),
+            };
+            let go_on = self.progress.step(turn as u64 + 1, self.total as u64);
+            q = self.queue();
+            q.turn += 1;
+            if q.ended.is_ok() {
+                q.ended = taken.and(if go_on { Ok(()) } else { Err(Stopped::Interrupted) });
+            }
+            if q.idle > 0 {
+                q.idle -= 1;
+                scope.spawn(|scope| self.run(scope));
+            }
+        }
+        q.consuming = false;
+    }
+}

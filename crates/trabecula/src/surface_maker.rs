@@ -1,0 +1,204 @@
+//! Surface makers: methods that turn a solid into a closed triangle mesh.
+//!
+//! There are three: marching cubes on a grid (`extract`), direct cutting of a tetrahedral mesh (`tiling::surface`), and
+//! triangulation of the beams' own patches (`beam_surface`). A built design says which of them it can use.
+
+use std::io;
+
+use geometry::fault::Fault;
+use geometry::formats::stl;
+use geometry::progress::{Progress, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
+
+mod compact;
+mod components;
+
+pub use compact::Store;
+pub use components::{Component, Components, Islands};
+pub(crate) use components::{ComponentGraph, NONE, Resolved, Totals};
+
+/// A method of meshing one solid.
+pub trait SurfaceMaker {
+    /// The surface, held in memory. Same bytes for any number of threads.
+    ///
+    /// # Errors
+    /// A resolution at which no mesh can be made; an interruption; more than 2³² vertices; several connected components, if
+    /// the options refuse them.
+    fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped>;
+
+    /// The surface, streamed as binary STL without holding the mesh. The 84-byte header is rewritten at the end. Same bytes
+    /// for any number of threads.
+    ///
+    /// # Errors
+    /// As `mesh`; failures of `out`; more triangles than the format can count (2³²).
+    fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped>;
+
+    /// The work and memory that a resolution (mm) requires, estimated.
+    ///
+    /// # Errors
+    /// A resolution at which no mesh can be made.
+    fn estimate(&self, resolution: f64) -> Result<Estimate, Fault>;
+}
+
+/// How a surface is to be made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Grid spacing, or chord error for beams, mm.
+    pub resolution: f64,
+    /// Treatment of all connected components but the largest.
+    pub islands: Islands,
+}
+
+impl Options {
+    /// This resolution (mm) with all connected components kept.
+    pub fn new(resolution: f64) -> Options {
+        Options { resolution, islands: Islands::Keep }
+    }
+}
+
+/// A surface that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Made {
+    /// The surface.
+    pub surface: SurfaceMesh,
+    /// Connected components of the solid.
+    pub components: Components,
+    /// Greatest distance of triangles from the surface (mm), where the method measures it.
+    pub error: Option<f64>,
+}
+
+/// What a streamed surface contains.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Number of triangles.
+    pub triangles: u64,
+    /// Enclosed volume, mm³.
+    pub volume: f64,
+    /// Area on the lattice, mm².
+    pub area_lattice: f64,
+    /// Area on the region's boundary, mm².
+    pub area_cut: f64,
+    /// Connected components of the solid.
+    pub components: Components,
+    /// Greatest distance of triangles from the surface (mm), where the method measures it.
+    pub error: Option<f64>,
+}
+
+/// The work and memory that making a surface requires.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Grid cells along each axis; zeros without a grid.
+    pub cells: [u64; 3],
+    /// Approximate number of triangles.
+    pub triangles: f64,
+    /// Approximate number of triangles held in memory while streaming, beyond a bounded number.
+    pub held: f64,
+    /// Approximate memory of an indexed mesh, bytes.
+    pub memory: f64,
+    /// Approximate size of a binary STL, bytes.
+    pub stl: f64,
+}
+
+/// Refuses an empty surface.
+pub(crate) fn not_empty(triangles: u64, edge: f64) -> Result<(), Stopped> {
+    if triangles > 0 {
+        return Ok(());
+    }
+    let message = format!("no surface was found at grid spacing {edge} mm: all walls are thinner; use a smaller edge");
+    Err(Stopped::Refused(Fault::new("edge", message)))
+}
+
+/// Refuses more triangles than an STL can count.
+pub(crate) fn check_count(triangles: u64) -> Result<(), Stopped> {
+    if triangles <= u64::from(u32::MAX) {
+        return Ok(());
+    }
+    let message = "more than 2^32 triangles, the most an STL can count; use a larger edge";
+    Err(Stopped::Refused(Fault::new("edge", message)))
+}
+
+/// The components of a mesh that stay: the mesh without those that were dropped.
+pub(crate) fn kept(surface: SurfaceMesh, found: &Resolved) -> SurfaceMesh {
+    if found.components.dropped == 0 {
+        return surface;
+    }
+    surface.select(&compact::ranges(&found.parts))
+}
+
+/// An STL that is being streamed. Components that are to be dropped are known only at the end: they are written like the
+/// rest and taken out of the file then, which moves bytes but avoids a second extraction.
+pub(crate) struct StlStream<'a> {
+    out: &'a mut dyn Store,
+    progress: &'a dyn Progress,
+    compacts: bool,
+}
+
+/// Progress steps of making the surface for each step of compaction, which moves records that much faster.
+const COMPACTION: u64 = 16;
+
+impl<'a> StlStream<'a> {
+    pub fn new(out: &'a mut dyn Store, islands: Islands, progress: &'a dyn Progress) -> Result<StlStream<'a>, Stopped> {
+        out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
+        Ok(StlStream { out, progress, compacts: islands == Islands::Drop })
+    }
+
+    /// The progress of making the surface, which leaves a share for compaction.
+    pub fn progress(&self) -> impl Progress + use<'a> {
+        Scaled { progress: self.progress, compacts: self.compacts }
+    }
+
+    pub fn write(&mut self, records: &[u8]) -> Result<(), Stopped> {
+        self.out.write_all(records).map_err(Stopped::Io)
+    }
+
+    /// Removes dropped components and writes the header.
+    pub fn finish(self, found: Resolved, triangles: u64) -> Result<Summary, Stopped> {
+        let moved = |share: f64| !self.compacts || compacted(self.progress, share);
+        if found.components.dropped > 0 {
+            let ranges = compact::ranges(&found.parts);
+            let go_on = |record: u64| moved(record as f64 / triangles as f64);
+            let (head, size) = (stl::HEADER as u64, stl::RECORD as u64);
+            if !compact::compact(self.out, head, size, &ranges, go_on).map_err(Stopped::Io)? {
+                return Err(Stopped::Interrupted);
+            }
+        }
+        if !moved(1.0) {
+            return Err(Stopped::Interrupted);
+        }
+        let header = stl::header(found.totals.triangles as u32);
+        self.out
+            .seek(io::SeekFrom::Start(0))
+            .and_then(|_| self.out.write_all(&header))
+            .and_then(|()| self.out.flush())
+            .map_err(Stopped::Io)?;
+        Ok(Summary {
+            triangles: found.totals.triangles,
+            volume: found.totals.volume,
+            area_lattice: found.totals.area[0],
+            area_cut: found.totals.area[1],
+            components: found.components,
+            error: None,
+        })
+    }
+}
+
+/// Reports the share of records that compaction has moved.
+fn compacted(progress: &dyn Progress, share: f64) -> bool {
+    const FINE: f64 = 1000.0;
+    let made = FINE * COMPACTION as f64;
+    progress.step((made + share * FINE) as u64, (made + FINE) as u64)
+}
+
+struct Scaled<'a> {
+    progress: &'a dyn Progress,
+    compacts: bool,
+}
+
+impl Progress for Scaled<'_> {
+    fn step(&self, done: u64, total: u64) -> bool {
+        match self.compacts {
+            true => self.progress.step(done * COMPACTION, total * (COMPACTION + 1)),
+            false => self.progress.step(done, total),
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Connected components of a solid and of its surface.
+//!
+//! A surface maker finds its surface in parts: tiles or tetrahedra. Each part adds up the totals of its own surface
+//! components, and a `ComponentGraph` joins them: components of the surface, and components of the solid between them. A
+//! whole surface component of positive volume is the outer boundary of a component of the solid; one of negative volume is
+//! the wall of a cavity, which belongs to the solid component around it.
+
+use std::collections::HashMap;
+
+use geometry::fault::{Fault, number};
+use geometry::math::{Aabb, Vec3};
+use geometry::union_find::{find, unite};
+
+/// Treatment of all connected components of the solid but the largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Islands {
+    /// They are kept.
+    #[default]
+    Keep,
+    /// They are removed.
+    Drop,
+    /// They are an error.
+    Error,
+}
+
+impl Islands {
+    /// The value of this name: "keep", "drop" or "error".
+    pub fn named(word: &str) -> Option<Islands> {
+        match word {
+            "keep" => Some(Islands::Keep),
+            "drop" => Some(Islands::Drop),
+            "error" => Some(Islands::Error),
+            _ => None,
+        }
+    }
+}
+
+/// A connected component other than the largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Component {
+    /// Its volume without its cavities, mm³.
+    pub volume: f64,
+    /// Lower and upper corner of its bounds, mm.
+    pub bounds: [Vec3; 2],
+}
+
+impl Component {
+    /// The centre of its bounds, mm.
+    pub fn center(&self) -> Vec3 {
+        let [low, high] = self.bounds;
+        [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0)
+    }
+}
+
+/// The connected components of a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Components {
+    /// Components in the result: surface components with positive volume.
+    pub count: u64,
+    /// Cavities in the result: surface components with negative volume.
+    pub cavities: u64,
+    /// V − E + F of the result.
+    pub euler: i64,
+    /// Volume of the largest component without its cavities, mm³.
+    pub largest: f64,
+    /// Number of components found other than the largest.
+    pub others: u64,
+    /// How many of them are not in the result.
+    pub dropped: u64,
+    /// How many of them touch the region's boundary: mostly fragments of walls and struts that it cuts off. The rest lie
+    /// inside.
+    pub border: u64,
+    /// Their total volume, mm³.
+    pub volume: f64,
+    /// The largest of them.
+    pub second: Option<Component>,
+}
+
+impl Components {
+    /// The largest component's share of the total volume.
+    pub fn share(&self) -> f64 {
+        self.largest / (self.largest + self.volume)
+    }
+
+    /// One sentence on the components other than the largest: number, volume, position.
+    pub fn words(&self) -> String {
+        let Some(second) = self.second else {
+            return "one piece".into();
+        };
+        let short = |v: f64| number(format!("{v:.2e}").parse().unwrap_or(v));
+        // Rounded downwards: what is not all of it is never 100 %.
+        let share = number((1e4 * self.share()).floor() / 100.0);
+        // Plus zero: −0 is 0.
+        let [x, y, z] = second.center().map(|v| number((1e3 * v).round() / 1e3 + 0.0));
+        let (volume, largest) = (short(self.volume), short(second.volume));
+        let place = format!("about ({x}, {y}, {z}) mm");
+        match (self.others, self.border) {
+            (1, b) => format!(
+                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",
+                if b > 0 { "at" } else { "away from" }
+            ),
+            (n, b) => format!(
+                "{n} pieces beside the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them at the \
+                 region's boundary; the largest of them has {largest} mm³ and lies {place}"
+            ),
+        }
+    }
+}
+
+/// No component.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Totals over the triangles and vertices of a surface component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Totals {
+    pub triangles: u64,
+    /// A vertex that several parts share is counted in one of them.
+    pub vertices: u64,
+    /// Signed sum of cones from a common apex, mm³; the volume once the component is complete.
+    pub volume: f64,
+    /// Area on the lattice and on the region's boundary, mm².
+    pub area: [f64; 2],
+    pub bounds: Aabb,
+}
+
+impl Totals {
+    pub const ZERO: Totals = Totals { triangles: 0, vertices: 0, volume: 0.0, area: [0.0; 2], bounds: Aabb::EMPTY };
+
+    pub fn add(&mut self, o: &Totals) {
+        self.triangles += o.triangles;
+        self.vertices += o.vertices;
+        self.volume += o.volume;
+        self.area[0] += o.area[0];
+        self.area[1] += o.area[1];
+        self.bounds = self.bounds.union(o.bounds);
+    }
+}
+
+/// Surface components of all parts so far, numbered as they come, and how they are joined.
+#[derive(Default)]
+pub(crate) struct ComponentGraph {
+    /// Totals of each component within its part.
+    pub totals: Vec<Totals>,
+    /// Union-find over parts of one surface component.
+    pub surface: Vec<u32>,
+    /// Union-find over surface components of one solid component.
+    pub solid: Vec<u32>,
+}
+
+/// The connected components of a complete surface.
+pub(crate) struct Resolved {
+    /// For each component of each part, in order, its number of triangles and whether it stays.
+    pub parts: Vec<(u64, bool)>,
+    /// Totals of what stays.
+    pub totals: Totals,
+    pub components: Components,
+}
+
+impl ComponentGraph {
+    /// Adds the components of the next part and `inner` solid components without surface; returns the first number.
+    pub fn add(&mut self, totals: &[Totals], inner: usize) -> Result<u32, Fault> {
+        let base = self.totals.len();
+        let end = base + totals.len() + inner;
+        if end >= NONE as usize {
+            return Err(Fault::new("edge", "the surface has more than 4e9 connected components; use a larger edge"));
+        }
+        self.totals.extend(totals);
+        self.totals.resize(end, Totals::ZERO);
+        self.surface.extend(base as u32..end as u32);
+        self.solid.extend(base as u32..end as u32);
+        Ok(base as u32)
+    }
+
+    /// Determines the connected components and which of them stay.
+    pub fn resolve(mut self, islands: Islands) -> Result<Resolved, Fault> {
+        let count = self.totals.len();
+        // Roots are never above their members: an ascending pass gathers whole components at their roots.
+        let mut whole = self.totals.clone();
+        for i in 0..count {
+            let root = find(&mut self.surface, i as u32);
+            unite(&mut self.solid, i as u32, root);
+            if root as usize != i {
+                let part = whole[i];
+                whole[root as usize].add(&part);
+            }
+        }
+        let roots: Vec<usize> = (0..count).filter(|&i| self.surface[i] as usize == i).collect();
+        // The outer boundary of each solid component, and its volume without its cavities.
+        let mut outside: HashMap<u32, usize> = HashMap::new();
+        for &i in roots.iter().filter(|i| whole[**i].volume > 0.0) {
+            let at = outside.entry(find(&mut self.solid, i as u32)).or_insert(i);
+            if whole[i].volume > whole[*at].volume {
+                *at = i;
+            }
+        }
+        let mut net: Vec<f64> = whole.iter().map(|s| s.volume).collect();
+        let mut owner = vec![NONE; count];
+        for &i in &roots {
+            let positive = whole[i].volume > 0.0;
+            owner[i] = if positive {
+                i as u32
+            } else {
+                // A void that no grid line meets is smaller than a grid step. It has no owner and is filled where anything
+                // is dropped, so that no inverted component can be left over.
+                let solid = find(&mut self.solid, i as u32);
+                outside.get(&solid).map_or(NONE, |o| *o as u32)
+            };
+            if !positive && owner[i] != NONE {
+                net[owner[i] as usize] += whole[i].volume;
+            }
+        }
+        let outer = || roots.iter().copied().filter(|&i| whole[i].volume > 0.0);
+        let largest = outer().reduce(|a, b| if net[b] > net[a] { b } else { a });
+        let mut found = Components::default();
+        for i in outer() {
+            if Some(i) == largest {
+                found.largest = net[i];
+                continue;
+            }
+            found.others += 1;
+            found.border += u64::from(whole[i].area[1] > 0.0);
+            found.volume += net[i];
+            if found.second.is_none_or(|o| net[i] > o.volume) {
+                let Aabb { min, max } = whole[i].bounds;
+                found.second = Some(Component { volume: net[i], bounds: [min, max] });
+            }
+        }
+        if islands == Islands::Error && found.others > 0 {
+            return Err(Fault::new("islands", refusal(&found)));
+        }
+        let drops = islands == Islands::Drop && found.others > 0;
+        let stays = |i: usize| !drops || largest.is_some_and(|l| owner[i] == l as u32);
+        let mut sum = Totals::ZERO;
+        for &i in roots.iter().filter(|i| stays(**i)) {
+            sum.add(&whole[i]);
+            found.count += u64::from(whole[i].volume > 0.0);
+            found.cavities += u64::from(whole[i].volume < 0.0);
+        }
+        if drops {
+            found.dropped = found.others;
+        }
+        // Closed and made of triangles: three edges for two of them.
+        found.euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
+        let part = |i: usize| (self.totals[i].triangles, stays(self.surface[i] as usize));
+        Ok(Resolved { parts: (0..count).map(part).collect(), totals: sum, components: found })
+    }
+}
+
+/// Why a solid in several pieces is refused.
+fn refusal(p: &Components) -> String {
+    let words = p.words();
+    format!("the solid is not in one piece: {words}; drop them, make walls thicker, or change what cuts them off")
+}
