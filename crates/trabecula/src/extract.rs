@@ -15,19 +15,19 @@ use rustc_hash::FxHashMap;
 use crate::solid::Solid;
 use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, not_empty};
 
-mod cap;
-mod crease;
-mod grid;
-mod key;
-mod knot;
-mod signs;
-mod table;
+mod cube_table;
+mod feature_cells;
+mod feature_edges;
+mod planar_caps;
+mod sampling_grid;
+mod sign_words;
 mod tile;
 mod tile_components;
 mod tile_queue;
+mod vertex_id;
 mod voxelize;
 
-use grid::Grid;
+use sampling_grid::Grid;
 use tile::{Scratch, View};
 use tile_components::{TileComponents, TileSweep};
 use tile_queue::{borrow, each_tile, give_back};
@@ -87,7 +87,7 @@ impl SurfaceMaker for GridSurface<'_> {
         let spare = Mutex::new(Vec::<Vec<u8>>::new());
         let map = |view: View| {
             let mut records = borrow(&spare);
-            let positions = view.places();
+            let positions = view.positions();
             let components = TileComponents::each_triangle(&view, middle, |t, _| {
                 let corners = t.map(|v| positions[v as usize].map(|x| x as f32));
                 stl::push_record(&mut records, corners);

@@ -1,24 +1,24 @@
 //! The surface inside one tile.
 //!
-//! Where a single smooth face of the solid crosses a cell, that is nearly everywhere: marching cubes, with every vertex
+//! Where a single smooth surface of the solid crosses a cell, that is nearly everywhere: marching cubes, with every vertex
 //! strictly inside its own grid edge. Then the mesh is closed, manifold, free of self-intersection and of degenerate
-//! triangles by construction (see `table`), whatever the face does; and rounding to f32 cannot undo it, because
+//! triangles by construction (see `table`), whatever the surface does; and rounding to f32 cannot undo it, because
 //! rounding is monotone: it maps the grid to a grid and edges to edges.
 //!
 //! Two things move these vertices, only ever along their edges:
 //! - a bracketed Newton iteration puts them on the true surface;
-//! - a chord lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
+//! - a contour lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
 //!   first order in curvature · h². Each triangle learns from the normals at its corners how far it lies from the
 //!   surface, and its vertices share the move that cancels its volume error. What is left is of fourth order.
 //!
-//! Where faces meet, `knot` cuts the cell up. Where a flat face of the solid is a plane of the grid, `cap` closes it.
+//! Where surfaces meet, `feature cell` cuts the cell up. Where a flat surface of the solid is a plane of the grid, `cap` closes it.
 //!
 //! A tile looks one cell beyond itself. All it computes there is a function of the grid edge or triangle alone, done
 //! in the same order, so neighbouring tiles find bit-identical vertices.
 
-mod balance;
-mod triangles;
-mod vertices;
+mod edge_vertices;
+mod plain_triangles;
+mod volume_balance;
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -26,16 +26,16 @@ use std::ops::Range;
 use crate::field::Block;
 use geometry::math::Vec3;
 
-use super::cap;
-use super::crease::{self, Edges, Fits, Seen};
-use super::grid::{Flat, Grid, Local, TILE};
-use super::key::Key;
-use super::knot::{Extra, Knots};
-use super::signs::{Signs, below, bits, negative};
+use super::feature_cells::{FeatureCells, FeatureMesh};
+use super::feature_edges::{self, DividedFaces, EdgeStore, SurfaceContext};
+use super::planar_caps;
+use super::sampling_grid::{Grid, GridPlane, LocalSolid, TILE};
+use super::sign_words::{Signs, below, bits, negative};
 use super::tile_components::TileComponents;
-use balance::balance;
-use triangles::list_triangles;
-use vertices::{list_vertices, solve};
+use super::vertex_id::VertexId;
+use edge_vertices::{list_vertices, solve};
+use plain_triangles::list_triangles;
+use volume_balance::balance;
 
 /// The surface in one tile, by itself.
 #[derive(Default)]
@@ -53,7 +53,7 @@ pub(super) struct Patch {
 /// Buffers that one thread uses again and again.
 #[derive(Default)]
 pub(super) struct Scratch {
-    /// Values of the live faces at the nodes.
+    /// Values of the live surfaces at the nodes.
     samples: Vec<Vec<f32>>,
     signs: Signs,
     numbers: Vec<Numbers>,
@@ -63,16 +63,16 @@ pub(super) struct Scratch {
     vertices: Vec<Vertex>,
     plain: Plain,
     /// Places of all vertices: those on grid edges, then the extra ones.
-    places: Vec<Vec3>,
+    positions: Vec<Vec3>,
     /// Unit normals of the vertices on edges.
     normals: Vec<[f32; 3]>,
     /// For each vertex on an edge: the volume it is to lose, and three times what it loses per mm along its edge.
     moments: Vec<(f32, f32)>,
-    extra: Extra,
-    edges: Edges,
+    extra: FeatureMesh,
+    edges: EdgeStore,
 }
 
-/// Numbers of the vertices of one face: those on x-edges, then y, then z, each in node order.
+/// Numbers of the vertices of one surface: those on x-edges, then y, then z, each in node order.
 #[derive(Default)]
 pub(super) struct Numbers {
     crossed: [Vec<u64>; 3],
@@ -98,34 +98,34 @@ impl Numbers {
 }
 
 /// The number of a vertex of a plain cell by its name.
-pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: Key) -> Option<u32> {
+pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: VertexId) -> Option<u32> {
     let steps = key.steps();
     if !(steps.is_power_of_two() && steps < 8) {
         return None;
     }
     let [i, j, k] = nodes.at(key.node());
     let row = k * nodes.shape[1] + j;
-    numbers[key.faces().next()?].get(steps.trailing_zeros() as usize, row, i)
+    numbers[key.surfaces().next()?].get(steps.trailing_zeros() as usize, row, i)
 }
 
 /// What plain cells make.
 #[derive(Default)]
 struct Plain {
-    /// Face by face.
+    /// Surface by surface.
     triangles: Vec<[u32; 3]>,
-    /// Number of triangles of each face.
+    /// Number of triangles of each surface.
     counts: Vec<usize>,
     kinds: Vec<Kind>,
     seams: Vec<Seam>,
 }
 
-/// A plain cell beside a knotted one, and its face.
+/// A plain cell next to a feature one, and its surface.
 type Seam = ([usize; 3], usize);
 
 /// What a triangle of a plain cell is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// Only to balance its neighbours: it belongs to another tile, or something finer takes its place.
+    /// Only to balance its neighbours: it belongs to another tile, or something finer takes its position.
     Neighbour,
     /// The lattice's surface.
     Lattice,
@@ -139,10 +139,10 @@ struct Vertex {
     /// The lower node of the edge.
     node: [u8; 3],
     axis: u8,
-    face: u8,
+    surface: u8,
     /// Whether the solid end is the lower one.
     up: bool,
-    /// Whether a knotted cell has the edge too: then its way of placing the vertex holds.
+    /// Whether a feature cell has the edge too: then its way of placing the vertex holds.
     fixed: bool,
     /// Position on the edge from the solid end (0) to the void end (1). Rounding moves the vertex by 1e-7 of the edge.
     t: f32,
@@ -169,7 +169,7 @@ impl Vertex {
         core::array::from_fn(|a| {
             let n = usize::from(self.node[a]) % 64;
             let share = if a == usize::from(self.axis) { s } else { 0.0 };
-            nodes.places[a][n] + share * nodes.steps[a][n]
+            nodes.positions[a][n] + share * nodes.steps[a][n]
         })
     }
 }
@@ -180,21 +180,21 @@ pub(super) struct Nodes<'a> {
     pub shape: [usize; 3],
     pub stride: [usize; 3],
     /// The coordinates again, and the steps to the next, where any index is within bounds.
-    places: [[f64; 64]; 3],
+    positions: [[f64; 64]; 3],
     steps: [[f64; 64]; 3],
 }
 
 impl<'a> Nodes<'a> {
     fn new(block: &Block<'a>) -> Nodes<'a> {
         let shape = block.shape();
-        let (mut places, mut steps) = ([[0.0; 64]; 3], [[0.0; 64]; 3]);
+        let (mut positions, mut steps) = ([[0.0; 64]; 3], [[0.0; 64]; 3]);
         for (a, axis) in block.axes.iter().enumerate() {
-            places[a][..axis.len()].copy_from_slice(axis);
+            positions[a][..axis.len()].copy_from_slice(axis);
             for (step, ends) in steps[a].iter_mut().zip(axis.windows(2)) {
                 *step = ends[1] - ends[0];
             }
         }
-        Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], places, steps }
+        Nodes { axes: block.axes, shape, stride: [1, shape[0], shape[0] * shape[1]], positions, steps }
     }
 
     pub fn count(&self) -> usize {
@@ -212,7 +212,7 @@ impl<'a> Nodes<'a> {
         at[0] + at[1] * self.stride[1] + at[2] * self.stride[2]
     }
 
-    pub fn place(&self, n: usize) -> Vec3 {
+    pub fn position(&self, n: usize) -> Vec3 {
         let at = self.at(n);
         [0, 1, 2].map(|a| self.axes[a][at[a]])
     }
@@ -226,7 +226,7 @@ pub(super) struct View<'a> {
     s: &'a Scratch,
     pub nodes: Nodes<'a>,
     grid: &'a Grid,
-    local: Local,
+    local: LocalSolid,
     /// First node of the block.
     from: [usize; 3],
     /// Cells of the tile itself, in block coordinates.
@@ -244,37 +244,37 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
         let first = tile[a] * TILE - from[a];
         first..(first + TILE).min(nodes.shape[a] - 1)
     });
-    follow(s, grid, &local, &nodes, tile);
+    trace_edges(s, grid, &local, &nodes, tile);
     sample(s, grid, &local, &block, &nodes);
     let crossed = s.signs.sort(&local);
-    if !crossed && local.flat.is_empty() {
+    if !crossed && local.grid_planes.is_empty() {
         return None;
     }
-    take(s, grid, &local, &nodes);
+    claim_cells(s, grid, &local, &nodes);
     list_vertices(s, &nodes);
     let mut first = 0;
-    for (i, &face) in local.live.iter().enumerate() {
-        let count = s.vertices[first..].iter().take_while(|v| usize::from(v.face) == i).count();
-        solve(s, &nodes, &*grid.faces[face].field, i, first..first + count);
+    for (i, &surface) in local.live.iter().enumerate() {
+        let count = s.vertices[first..].iter().take_while(|v| usize::from(v.surface) == i).count();
+        solve(s, &nodes, &*grid.surfaces[surface].field, i, first..first + count);
         first += count;
     }
     let margin = grid.margin as f32;
-    s.places.clear();
-    s.places.extend(s.vertices.iter_mut().map(|v| {
+    s.positions.clear();
+    s.positions.extend(s.vertices.iter_mut().map(|v| {
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
-    let settled = s.edges.any() && s.signs.is_any_knotted();
-    if settled {
-        // Chords are laid between the points that stay.
-        let (mut knots, vertices, _) = knots(s, grid, &local, &nodes);
-        settle(&mut knots, vertices);
+    let snapped = s.edges.any() && s.signs.has_features();
+    if snapped {
+        // Contours are grid-aligned between the points that stay.
+        let (mut features, vertices, _) = features(s, grid, &local, &nodes);
+        snap(&mut features, vertices);
     }
     edges(s, grid, &local, &nodes);
-    if settled {
+    if snapped {
         // What is balanced are points as they were found: which of them stay a tile knows in its own cells only.
-        for (place, v) in s.places.iter_mut().zip(&s.vertices) {
-            *place = v.at(&nodes, f64::from(v.t));
+        for (position, v) in s.positions.iter_mut().zip(&s.vertices) {
+            *position = v.at(&nodes, f64::from(v.t));
         }
     }
     list_triangles(s, grid, &local, &own);
@@ -284,9 +284,9 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     own_triangles.then_some(View { s, nodes, grid, local, from, own })
 }
 
-/// Fills the samples and signs of the live faces. The lattice's are dear, so they are asked for only where the region
+/// Fills the samples and signs of the live surfaces. The lattice's are dear, so they are asked for only where the region
 /// can hold solid.
-fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block, nodes: &Nodes) {
+fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes: &Nodes) {
     s.signs.shape = block.shape();
     let count = local.live.len();
     if s.samples.len() < count {
@@ -295,140 +295,140 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &Local, block: &Block, nodes: &No
     s.signs.negative.resize_with(count, Vec::new);
     let mut wanted = None;
     for (i, &f) in local.live.iter().enumerate() {
-        let face = &grid.faces[f];
+        let surface = &grid.surfaces[f];
         let out = &mut s.samples[i];
         // Every sample is written, so nothing needs clearing.
         out.resize(block.len(), 0.0);
-        if face.cut || (i == 0 && local.flat.is_empty()) {
-            face.field.fill(block, out);
+        if surface.cut || (i == 0 && local.grid_planes.is_empty()) {
+            surface.field.fill(block, out);
         } else {
             let wanted = wanted.get_or_insert_with(|| {
-                let known = local.live.iter().filter(|f| grid.faces[**f].cut).count();
+                let known = local.live.iter().filter(|f| grid.surfaces[**f].cut).count();
                 let mut wanted = s.signs.wanted(local, known);
                 s.edges.wanted(nodes, &mut wanted);
                 wanted
             });
-            face.field.fill_where(block, wanted, out);
+            surface.field.fill_where(block, wanted, out);
         }
-        negative(&mut s.signs.negative[i], out, block.shape()[0], face.cut);
+        negative(&mut s.signs.negative[i], out, block.shape()[0], surface.cut);
     }
 }
 
-/// Follows the edges that faces have of their own.
-fn follow(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, tile: [usize; 3]) {
+/// Follows the edges that surfaces have of their own.
+fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, tile: [usize; 3]) {
     s.edges.clear(nodes.shape);
-    let wide = grid.wide(tile);
-    for (face, &id) in local.live.iter().enumerate() {
+    let padded = grid.padded(tile);
+    for (surface, &id) in local.live.iter().enumerate() {
         if let Some(segments) = grid.creases(id, tile) {
-            let of = &grid.faces[id].creases;
-            s.edges.follow(nodes, &wide, of, face, segments);
+            let of = &grid.surfaces[id].creases;
+            s.edges.trace_edges(nodes, &padded, of, surface, segments);
         }
     }
 }
 
-/// Tells the cells that faces with edges make the surface in, alone or with others.
-fn take(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
-    for (face, &id) in local.live.iter().enumerate() {
+/// Tells the cells that surfaces with edges make the surface in, alone or with others.
+fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
+    for (surface, &id) in local.live.iter().enumerate() {
         if grid.has_creases(id) {
-            s.edges.take(local, &mut s.signs, nodes, face);
+            s.edges.claim(local, &mut s.signs, nodes, surface);
         }
     }
-    for (face, &id) in local.live.iter().enumerate() {
+    for (surface, &id) in local.live.iter().enumerate() {
         if grid.fitted == Some(id) {
-            s.edges.fit(local, &mut s.signs, nodes, face);
+            s.edges.claim_fitted(local, &mut s.signs, nodes, surface);
         }
     }
 }
 
-/// Finds what becomes of the edges that faces have of their own.
-fn edges(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes) {
-    let Scratch { edges, samples, signs, numbers, places, .. } = s;
-    for (face, &id) in local.live.iter().enumerate() {
-        if edges.has(face) {
-            let seen = Seen {
+/// Finds what becomes of the edges that surfaces have of their own.
+fn edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
+    let Scratch { edges, samples, signs, numbers, positions, .. } = s;
+    for (surface, &id) in local.live.iter().enumerate() {
+        if edges.has(surface) {
+            let context = SurfaceContext {
                 grid,
                 local,
                 nodes,
                 signs,
-                face,
-                samples: &samples[face],
-                field: &*grid.faces[id].field,
-                place: |node, axis| {
+                surface,
+                samples: &samples[surface],
+                field: &*grid.surfaces[id].field,
+                position: |node, axis| {
                     let [i, j, k] = nodes.at(node);
-                    let v = numbers[face].get(axis, k * nodes.shape[1] + j, i)?;
-                    Some(places[v as usize])
+                    let v = numbers[surface].get(axis, k * nodes.shape[1] + j, i)?;
+                    Some(positions[v as usize])
                 },
             };
-            edges.find(&seen);
+            edges.find(&context);
         }
     }
 }
 
-/// What fills knotted and fitted cells; the vertices of plain ones, and the seams.
-fn knots<'a>(
+/// What fills feature and fitted cells; the vertices of plain ones, and the seams.
+fn features<'a>(
     s: &'a mut Scratch,
     grid: &'a Grid,
-    local: &'a Local,
+    local: &'a LocalSolid,
     nodes: &'a Nodes,
-) -> (Knots<'a>, &'a [Vertex], &'a [Seam]) {
+) -> (FeatureCells<'a>, &'a [Vertex], &'a [Seam]) {
     s.extra.clear();
-    let knots = Knots {
+    let features = FeatureCells {
         nodes,
         grid,
         local,
         samples: &s.samples,
         signs: &s.signs,
         numbers: &s.numbers,
-        places: &mut s.places,
+        positions: &mut s.positions,
         extra: &mut s.extra,
         edges: &s.edges,
-        moved: HashSet::new(),
-        fits: Fits::none(local.live.len()),
+        perturbed_nodes: HashSet::new(),
+        divided_faces: DividedFaces::none(local.live.len()),
     };
-    (knots, &s.vertices, &s.plain.seams)
+    (features, &s.vertices, &s.plain.seams)
 }
 
-/// Places the vertices that plain cells share with knotted ones as these do.
-fn settle(knots: &mut Knots, vertices: &[Vertex]) {
+/// Places the vertices that plain cells share with feature ones as these do.
+fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
     for (i, v) in vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
-        let low = v.low(knots.nodes);
-        let key = Key::new(low, &[1 << v.axis], &[usize::from(v.face)]);
-        knots.places[i] = knots.place(key);
+        let low = v.low(features.nodes);
+        let key = VertexId::new(low, &[1 << v.axis], &[usize::from(v.surface)]);
+        features.positions[i] = features.position(key);
     }
 }
 
-/// Adds what plain cells do not make: knots, the seams around them, and caps.
-fn finish(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
-    let knotted = s.signs.is_any_knotted();
-    if !knotted && local.flat.is_empty() && !s.edges.any() {
+/// Adds what plain cells do not make: feature cells, the seams around them, and caps.
+fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
+    let featured = s.signs.has_features();
+    if !featured && local.grid_planes.is_empty() && !s.edges.any() {
         s.extra.clear();
         return;
     }
-    let (mut knots, vertices, seams) = knots(s, grid, local, nodes);
-    if knotted {
-        knots.all(own);
+    let (mut features, vertices, seams) = features(s, grid, local, nodes);
+    if featured {
+        features.all(own);
     }
-    settle(&mut knots, vertices);
-    knots.fit_sides(own);
-    for &(cell, face) in seams {
-        knots.seam(cell, face);
+    snap(&mut features, vertices);
+    features.divide_faces(own);
+    for &(cell, surface) in seams {
+        features.seam(cell, surface);
     }
-    for (cell, face) in crease::cells(knots.edges, nodes, own) {
-        if knots.edges.is_fitted(nodes, cell) {
-            knots.fitted(cell, face);
+    for (cell, surface) in feature_edges::cells(features.edges, nodes, own) {
+        if features.edges.is_fitted(nodes, cell) {
+            features.fitted(cell, surface);
         } else {
-            knots.edged(cell, face);
+            features.fill_edge_cell(cell, surface);
         }
     }
-    for flat in 0..local.flat.len() {
-        cap::close(&mut knots, flat, own);
+    for flat in 0..local.grid_planes.len() {
+        planar_caps::close(&mut features, flat, own);
     }
 }
 
 impl View<'_> {
     /// Places of the vertices that `triangles` names.
-    pub fn places(&self) -> &[Vec3] {
-        &self.s.places
+    pub fn positions(&self) -> &[Vec3] {
+        &self.s.positions
     }
 
     /// The triangles of the tile's own cells, and whether they lie on the region's surface.
@@ -443,8 +443,8 @@ impl View<'_> {
     /// The tile's surface by itself, body by body, with what stitching needs; and its bodies.
     pub fn patch(&self, middle: Vec3) -> (Patch, TileComponents) {
         let mut patch = Patch::default();
-        let mut renamed = vec![u32::MAX; self.s.places.len()];
-        let mut shared = vec![false; self.s.places.len()];
+        let mut renamed = vec![u32::MAX; self.s.positions.len()];
+        let mut shared = vec![false; self.s.positions.len()];
         self.each_shared(&mut |v| shared[v as usize] = true);
         let bodies = TileComponents::each_triangle(self, middle, |t, cut| {
             patch.cut.push(cut);
@@ -452,7 +452,7 @@ impl View<'_> {
                 let slot = &mut renamed[v as usize];
                 if *slot == u32::MAX {
                     *slot = patch.vertices.len() as u32;
-                    patch.vertices.push(self.s.places[v as usize]);
+                    patch.vertices.push(self.s.positions[v as usize]);
                     patch.shared.push(shared[v as usize].then(|| self.name(v as usize)));
                 }
                 *slot
@@ -466,29 +466,29 @@ impl View<'_> {
         [0, 1, 2].map(|a| (self.from[a] + self.own[a].start) / TILE)
     }
 
-    /// For each live face, the numbers of its vertices on grid edges.
+    /// For each live surface, the numbers of its vertices on grid edges.
     pub fn numbers(&self) -> &[Numbers] {
         &self.s.numbers[..self.local.live.len()]
     }
 
-    /// Where a live face is negative on a row of nodes.
-    pub fn negative(&self, face: usize, row: usize) -> u64 {
-        self.s.signs.negative[face][row]
+    /// Where a live surface is negative on a row of nodes.
+    pub fn negative(&self, surface: usize, row: usize) -> u64 {
+        self.s.signs.negative[surface][row]
     }
 
-    /// The faces that are node planes.
-    pub fn flat(&self) -> &[Flat] {
-        &self.local.flat
+    /// The surfaces that are node planes.
+    pub fn flat(&self) -> &[GridPlane] {
+        &self.local.grid_planes
     }
 
     /// The other vertices, with their names in the block.
-    pub fn extra(&self) -> impl Iterator<Item = (u32, Key)> {
+    pub fn extra(&self) -> impl Iterator<Item = (u32, VertexId)> {
         (self.s.vertices.len() as u32..).zip(self.s.extra.keys.iter().copied())
     }
 
-    fn key(&self, v: usize) -> Key {
+    fn key(&self, v: usize) -> VertexId {
         match self.s.vertices.get(v) {
-            Some(v) => Key::new(v.low(&self.nodes), &[1 << v.axis], &[usize::from(v.face)]),
+            Some(v) => VertexId::new(v.low(&self.nodes), &[1 << v.axis], &[usize::from(v.surface)]),
             None => self.s.extra.keys[v - self.s.vertices.len()],
         }
     }

@@ -12,8 +12,8 @@ use geometry::union_find::{find, unite};
 
 use rustc_hash::FxHashMap;
 
-use super::grid::TILE;
-use super::signs::{bits, within};
+use super::sampling_grid::TILE;
+use super::sign_words::{bits, within};
 use super::tile::View;
 use crate::surface_maker::{ComponentGraph, Islands, NONE, Resolved, Totals};
 
@@ -49,14 +49,14 @@ impl TileComponents {
     /// removed later is contiguous: with the numbers of the vertices, and whether the triangle is a cut. `middle` is the
     /// apex of the cones by which volumes are summed.
     pub fn each_triangle(view: &View, middle: Vec3, mut take: impl FnMut([u32; 3], bool)) -> TileComponents {
-        let places = view.places();
-        let mut root = vec![NONE; places.len()];
+        let positions = view.positions();
+        let mut root = vec![NONE; positions.len()];
         for (t, _) in view.triangles() {
             join(&mut root, t);
         }
-        let (component, mut totals) = number(root, places);
+        let (component, mut totals) = number(root, positions);
         let mut add = |sum: &mut Totals, t: [u32; 3], cut: bool| {
-            let [a, b, c] = t.map(|v| places[v as usize]);
+            let [a, b, c] = t.map(|v| positions[v as usize]);
             let n = cross(sub(b, a), sub(c, a));
             sum.triangles += 1;
             sum.volume += dot(sub(a, middle), n) / 6.0;
@@ -168,10 +168,10 @@ fn join(root: &mut [u32], [a, b, c]: [u32; 3]) {
 }
 
 /// The component of each vertex, and the number and bounds of each component's vertices.
-fn number(mut root: Vec<u32>, places: &[Vec3]) -> (Vec<u32>, Vec<Totals>) {
+fn number(mut root: Vec<u32>, positions: &[Vec3]) -> (Vec<u32>, Vec<Totals>) {
     let mut component = vec![NONE; root.len()];
     let mut totals: Vec<Totals> = Vec::new();
-    for (v, place) in places.iter().enumerate() {
+    for (v, position) in positions.iter().enumerate() {
         if root[v] == NONE {
             continue;
         }
@@ -183,7 +183,7 @@ fn number(mut root: Vec<u32>, places: &[Vec3]) -> (Vec<u32>, Vec<Totals>) {
         component[v] = component[top];
         let sum = &mut totals[component[v] as usize];
         sum.vertices += 1;
-        sum.bounds = sum.bounds.with(*place);
+        sum.bounds = sum.bounds.with(*position);
     }
     (component, totals)
 }
@@ -254,16 +254,16 @@ impl View<'_> {
             inside.then(|| ((k - self.own[2].start) * TILE + j - self.own[1].start) as u32)
         };
         let ny = self.nodes.shape[1];
-        for (face, numbers) in self.numbers().iter().enumerate() {
+        for (surface, numbers) in self.numbers().iter().enumerate() {
             for k in self.own[2].clone() {
                 for j in self.own[1].clone() {
                     let Some(row) = row_of(j, k) else { continue };
-                    let solid = self.negative(face, k * ny + j);
+                    let solid = self.negative(surface, k * ny + j);
                     let (crossed, first) = numbers.row(0, k * ny + j);
                     for (n, i) in bits(crossed).enumerate() {
                         if mine >> i & 1 == 1 {
                             let v = first + n as u32;
-                            found(row, v, self.places()[v as usize][0], solid >> i & 1 == 0);
+                            found(row, v, self.positions()[v as usize][0], solid >> i & 1 == 0);
                         }
                     }
                 }
@@ -273,7 +273,7 @@ impl View<'_> {
             let [i, j, k] = self.nodes.at(key.node());
             let Some(row) = row_of(j, k) else { continue };
             let enters = if key.is_along(0) && mine >> i & 1 == 1 {
-                key.faces().next().map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
+                key.surfaces().next().map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
             } else if key.spans() == 0 {
                 // A node of a cap: on lines that pass through the plane, it is where they do.
                 let caps = self.flat().iter().filter(|f| f.axis == 0);
@@ -282,7 +282,7 @@ impl View<'_> {
                 None
             };
             if let Some(enters) = enters {
-                found(row, v, self.places()[v as usize][0], enters);
+                found(row, v, self.positions()[v as usize][0], enters);
             }
         }
     }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use geometry::progress::{Progress, Stopped};
 use rayon::Scope;
 
-use super::grid::Grid;
+use super::sampling_grid::Grid;
 use super::tile::{self, Scratch, View};
 
 /// A used buffer, or a new one: memory that is not returned to the system need not be cleared by it again.

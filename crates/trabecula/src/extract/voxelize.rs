@@ -5,7 +5,7 @@ use geometry::progress::{Progress, Stopped};
 use geometry::voxels::Voxels;
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::sampling_grid::Grid;
 use crate::field::{Block, Field};
 use crate::solid::Solid;
 

@@ -10,7 +10,7 @@ use crate::solid::Solid;
 use geometry::fault::{Fault, number};
 use geometry::math::Aabb;
 
-use super::crease;
+use super::feature_edges;
 
 /// Cells along a tile's edge: with one cell of halo on each side, 64 nodes, so that a row of signs is one machine word.
 pub(super) const TILE: usize = 61;
@@ -26,30 +26,30 @@ pub(super) struct Grid {
     pub margin: f64,
     /// The step asked for, mm.
     pub step: f64,
-    /// The smooth faces of the solid.
-    pub faces: Vec<Surface>,
+    /// The smooth surfaces of the solid.
+    pub surfaces: Vec<Surface>,
     /// How they make it.
     tree: CsgTree,
-    /// For each face, the number of the node plane that it is, if it is one: then it needs no samples.
-    laid: Vec<Option<usize>>,
-    /// For each face, the edges that it has of its own in each tile.
+    /// For each surface, the number of the node plane that it is, if it is one: then it needs no samples.
+    grid_plane: Vec<Option<usize>>,
+    /// For each surface, the edges that it has of its own in each tile.
     creases: Vec<HashMap<usize, Vec<u32>>>,
-    /// The face with edges of its own to which cells are fitted where it meets others.
+    /// The surface with edges of its own to which cells are fitted where it meets others.
     pub fitted: Option<usize>,
 }
 
 /// What is known of the solid in a block without sampling it.
-pub(super) struct Local {
-    /// The solid, by the numbers of faces here: those in `live`, then those in `flat`.
+pub(super) struct LocalSolid {
+    /// The solid, by the numbers of surfaces here: those in `live`, then those in `flat`.
     pub tree: CsgTree,
-    /// Faces that may change sign at the block's nodes.
+    /// Surfaces that may change sign at the block's nodes.
     pub live: Vec<usize>,
-    /// Faces that are node planes within the block.
-    pub flat: Vec<Flat>,
+    /// Surfaces that are node planes within the block.
+    pub grid_planes: Vec<GridPlane>,
 }
 
-/// A face that is a node plane.
-pub(super) struct Flat {
+/// A surface that is a node plane.
+pub(super) struct GridPlane {
     pub axis: usize,
     /// The plane's number in the block.
     pub at: usize,
@@ -79,15 +79,15 @@ impl Grid {
             );
             return Err(Fault::new("edge", message));
         }
-        let (faces, tree) = solid.surfaces();
-        // Faces that all of the solid lies behind are laid on the grid, and so are exact. (Others may meet each other
+        let (surfaces, tree) = solid.surfaces();
+        // Surfaces that all of the solid lies behind are grid-aligned on the grid, and so are exact. (Others may meet each other
         // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
         tree.for_each_bounding(&mut |f| required.push(f));
-        let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, faces[f].plane?))).collect();
+        let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, surfaces[f].plane?))).collect();
         // What is kept apart by a hair is too near for cells that are fitted to edges.
-        let fits = faces.iter().any(|f| !f.creases.segments.is_empty()) && !faces.iter().any(|f| f.perturbed);
-        // Caps on planes of the grid know of knots alone, not of such cells.
+        let fits = surfaces.iter().any(|f| !f.creases.segments.is_empty()) && !surfaces.iter().any(|f| f.perturbed);
+        // Caps on planes of the grid know of feature cells alone, not of such cells.
         if fits {
             planes.clear();
         }
@@ -116,12 +116,12 @@ impl Grid {
             let mut stops: Vec<f64> = planes.iter().filter(|p| p.1.axis == a).map(|p| p.1.at).collect();
             stops.retain(|s| (lo..=hi).contains(s));
             stops.sort_by(f64::total_cmp);
-            // Planes closer than a hundredth of a step would make needles; the others are faces like any other.
+            // Planes closer than a hundredth of a step would make needles; the others are surfaces like any other.
             stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
-            // Other flat faces, and the points where a curved one touches its bounds, are best met half-way.
+            // Other flat surfaces, and the points where a curved one touches its bounds, are best met half-way.
             let mut flats = vec![lo, hi];
             solid.region.planes(a, &mut flats);
-            let others = faces.iter().filter(|f| !f.cut);
+            let others = surfaces.iter().filter(|f| !f.cut);
             flats.extend(others.filter_map(|f| f.plane.filter(|p| p.axis == a).map(|p| p.at)));
             flats.retain(|s| (lo..=hi).contains(s));
             for at in flats {
@@ -151,7 +151,7 @@ impl Grid {
         }
         let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
         let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
-        // Eight units in the last place of the farthest f32 coordinate between any two points of an edge: rounding
+        // Eight units in the last position of the farthest f32 coordinate between any two points of an edge: rounding
         // keeps their order, hence every guarantee.
         let resolution = farthest * f64::from(f32::EPSILON);
         let needed = 8.0 * resolution / finest;
@@ -167,31 +167,31 @@ impl Grid {
                 ),
             ));
         }
-        let mut laid = vec![None; faces.len()];
+        let mut grid_plane = vec![None; surfaces.len()];
         for (f, p) in planes {
-            laid[f] = axes[p.axis].iter().position(|&x| x == p.at);
+            grid_plane[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
         let mut grid = Grid {
             axes,
             margin: needed.max(1.0 / 4096.0),
             step: edge,
-            faces,
+            surfaces,
             tree,
-            laid,
+            grid_plane,
             creases: Vec::new(),
             fitted: None,
         };
-        grid.creases = (grid.faces.iter()).map(|f| crease::by_tile(&grid, &f.creases)).collect();
+        grid.creases = (grid.surfaces.iter()).map(|f| feature_edges::by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
         grid.fitted = creased.next().filter(|_| fits);
         grid.few_enough().map(|()| grid)
     }
 
-    /// Refuses a solid with more faces in some tile than a word has bits.
+    /// Refuses a solid with more surfaces in some tile than a word has bits.
     fn few_enough(&self) -> Result<(), Fault> {
-        const MOST_FACES: usize = 64;
-        if self.faces.len() <= MOST_FACES {
+        const MOST_SURFACES: usize = 64;
+        if self.surfaces.len() <= MOST_SURFACES {
             return Ok(());
         }
         let count = |i: usize| {
@@ -201,10 +201,10 @@ impl Grid {
         };
         let most = (0..self.tiles().iter().product()).map(count).max();
         match most {
-            Some(n) if n > MOST_FACES => Err(Fault::new(
+            Some(n) if n > MOST_SURFACES => Err(Fault::new(
                 "edge",
                 format!(
-                    "{n} smooth faces meet in a block of {TILE} grid steps, and {MOST_FACES} are possible; \
+                    "{n} smooth faces meet in a block of {TILE} grid steps, and {MOST_SURFACES} are possible; \
                      use a smaller edge, or a mesh for the region"
                 ),
             )),
@@ -222,23 +222,23 @@ impl Grid {
         self.cells().map(|n| n.div_ceil(TILE))
     }
 
-    /// Whether a plane normal to an axis is a face of the solid.
-    pub(super) fn is_laid(&self, axis: usize, at: f64) -> bool {
-        let planes = self.faces.iter().zip(&self.laid);
-        let mut laid = planes.filter_map(|(f, laid)| laid.and(f.plane));
-        laid.any(|p| p.axis == axis && p.at == at)
+    /// Whether a plane normal to an axis is a surface of the solid.
+    pub(super) fn is_grid_plane(&self, axis: usize, at: f64) -> bool {
+        let planes = self.surfaces.iter().zip(&self.grid_plane);
+        let mut grid_plane = planes.filter_map(|(f, grid_plane)| grid_plane.and(f.plane));
+        grid_plane.any(|p| p.axis == axis && p.at == at)
     }
 
-    /// The pieces of edges that a face has of its own near a tile; none if it has no edges at all.
-    pub(super) fn creases(&self, face: usize, [i, j, k]: [usize; 3]) -> Option<&[u32]> {
+    /// The pieces of edges that a surface has of its own near a tile; none if it has no edges at all.
+    pub(super) fn creases(&self, surface: usize, [i, j, k]: [usize; 3]) -> Option<&[u32]> {
         let n = self.tiles();
-        let found = self.creases[face].get(&(i + n[0] * (j + n[1] * k)));
-        (!self.creases[face].is_empty()).then(|| found.map_or(&[][..], |f| f))
+        let found = self.creases[surface].get(&(i + n[0] * (j + n[1] * k)));
+        (!self.creases[surface].is_empty()).then(|| found.map_or(&[][..], |f| f))
     }
 
-    /// Whether a face has edges of its own.
-    pub(super) fn has_creases(&self, face: usize) -> bool {
-        !self.creases[face].is_empty()
+    /// Whether a surface has edges of its own.
+    pub(super) fn has_creases(&self, surface: usize) -> bool {
+        !self.creases[surface].is_empty()
     }
 
     /// The tile at a position in the order x fastest.
@@ -259,10 +259,10 @@ impl Grid {
     }
 
     /// The same with one node more on each side, where there is one.
-    pub(super) fn wide(&self, tile: [usize; 3]) -> crease::Wide<'_> {
+    pub(super) fn padded(&self, tile: [usize; 3]) -> feature_edges::PaddedNodes<'_> {
         let n = self.nodes(tile);
         let from = n.each_ref().map(|n| n.start.saturating_sub(1));
-        crease::Wide {
+        feature_edges::PaddedNodes {
             axes: [0, 1, 2].map(|a| {
                 let axis = &self.axes[a];
                 &axis[from[a]..(n[a].end + 1).min(axis.len())]
@@ -271,16 +271,16 @@ impl Grid {
         }
     }
 
-    /// What bounds and places say of the solid in a block; `None` if no surface crosses it.
-    pub(super) fn local(&self, nodes: &[std::ops::Range<usize>; 3], b: &Aabb) -> Option<Local> {
+    /// What bounds and positions say of the solid in a block; `None` if no surface crosses it.
+    pub(super) fn local(&self, nodes: &[std::ops::Range<usize>; 3], b: &Aabb) -> Option<LocalSolid> {
         let (mut live, mut flat) = (Vec::new(), Vec::new());
-        let mut signs = Vec::with_capacity(self.faces.len());
-        for (f, face) in self.faces.iter().enumerate() {
-            signs.push(match (face.plane, self.laid[f]) {
+        let mut signs = Vec::with_capacity(self.surfaces.len());
+        for (f, surface) in self.surfaces.iter().enumerate() {
+            signs.push(match (surface.plane, self.grid_plane[f]) {
                 (Some(p), Some(at)) => {
                     let range = &nodes[p.axis];
                     if at > range.start && at + 1 < range.end {
-                        flat.push((f, Flat { axis: p.axis, at: at - range.start, below: p.below }));
+                        flat.push((f, GridPlane { axis: p.axis, at: at - range.start, below: p.below }));
                         None
                     } else if (at <= range.start) == p.below {
                         Some(Sign::Positive)
@@ -289,7 +289,7 @@ impl Grid {
                     }
                 }
                 _ => {
-                    let r = face.field.bound(b);
+                    let r = surface.field.bound(b);
                     if r.hi <= 0.0 {
                         Some(Sign::Negative)
                     } else if r.lo > 0.0 {
@@ -300,17 +300,17 @@ impl Grid {
                 }
             });
         }
-        // A face may still not matter here; but a neighbouring tile may see it matter in a cell that both have.
+        // A surface may still not matter here; but a neighbouring tile may see it matter in a cell that both have.
         let tree = self.tree.simplified(&|f| signs[f].unwrap_or(Sign::Varies(f)));
         if matches!(&tree, CsgTree::Intersection(of) | CsgTree::Union(of) if of.is_empty()) {
             return None;
         }
-        live.extend((0..self.faces.len()).filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)));
-        let place = |f: usize| {
+        live.extend((0..self.surfaces.len()).filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)));
+        let position = |f: usize| {
             let at = live.iter().position(|&g| g == f);
             at.or_else(|| Some(live.len() + flat.iter().position(|(g, _)| *g == f)?))
         };
-        let tree = tree.simplified(&|f| place(f).map_or(Sign::Negative, Sign::Varies));
-        Some(Local { tree, live, flat: flat.into_iter().map(|(_, p)| p).collect() })
+        let tree = tree.simplified(&|f| position(f).map_or(Sign::Negative, Sign::Varies));
+        Some(LocalSolid { tree, live, grid_planes: flat.into_iter().map(|(_, p)| p).collect() })
     }
 }

@@ -1,18 +1,22 @@
-//! Grid edges that a face crosses twice.
+//! Grid edges that a surface crosses twice.
 
-use super::{Edges, Seen};
+use super::{EdgeStore, SurfaceContext};
 use geometry::math::Vec3;
 
-/// Crossings nearer to each other than so many times what points keep from nodes are left out. Beyond the edge a side is
+/// Crossings nearer to each other than so many times what points keep from nodes are left out. Beyond the edge a face is
 /// then cut off straight, by much more than what is left out.
 const CLOSE: f64 = 2.0;
 /// Rounds in which a crossing is found: each at least halves what is left, most of them do far better.
 const ROUNDS: usize = 40;
 
-impl Edges {
-    /// Finds the grid edges that the face crosses twice, of some cells by their lowest nodes.
-    pub(super) fn find_twice<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, seen: &Seen<P>, cells: Vec<usize>) {
-        let stride = seen.nodes.stride;
+impl EdgeStore {
+    /// Finds the grid edges that the surface crosses twice, of some cells by their lowest nodes.
+    pub(super) fn find_double_crossings<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        context: &SurfaceContext<P>,
+        cells: Vec<usize>,
+    ) {
+        let stride = context.nodes.stride;
         let mut edges: Vec<(usize, usize)> = Vec::with_capacity(12 * cells.len());
         for cell in cells {
             for axis in 0..3 {
@@ -23,36 +27,36 @@ impl Edges {
         edges.sort_unstable();
         edges.dedup();
         for (node, axis) in edges {
-            if let Some(points) = seen.twice(self, node, axis) {
-                self.twice.insert((seen.face, node, axis), points);
+            if let Some(points) = context.double_crossings(self, node, axis) {
+                self.double_crossings.insert((context.surface, node, axis), points);
             }
         }
-        for ((face, node, axis), points) in &self.twice {
+        for ((surface, node, axis), points) in &self.double_crossings {
             for (i, p) in points.iter().enumerate() {
-                self.points.insert(super::Key::crossing(*node, *axis, *face, i), *p);
+                self.points.insert(super::VertexId::crossing(*node, *axis, *surface, i), *p);
             }
         }
     }
 }
 
-impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
-    /// The two points at which the face crosses a grid edge whose ends are on the same side of it.
-    fn twice(&self, edges: &Edges, node: usize, axis: usize) -> Option<[Vec3; 2]> {
+impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
+    /// The two points at which the surface crosses a grid edge whose ends are on the same side of it.
+    fn double_crossings(&self, edges: &EdgeStore, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
         if at[axis] + 2 > nodes.shape[axis] || around.clone().any(|a| at[a] == 0 || at[a] + 2 > nodes.shape[a]) {
             return None;
         }
         let [a, b] = self.open(node, axis)?;
-        let on_plane = around.clone().any(|a| self.grid.is_laid(a, nodes.axes[a][at[a]]));
-        let mut beside = around;
-        let (u, v) = (beside.next()?, beside.next()?);
+        let on_plane = around.clone().any(|a| self.grid.is_grid_plane(a, nodes.axes[a][at[a]]));
+        let mut adjacent = around;
+        let (u, v) = (adjacent.next()?, adjacent.next()?);
         let all_join = || {
             [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().all(|(x, y)| {
                 let mut cell = at;
                 cell[u] -= x;
                 cell[v] -= y;
-                edges.joins(self, cell)
+                edges.takes_extra_points(self, cell)
             })
         };
         if on_plane || !all_join() {
@@ -66,7 +70,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
         (q - p >= CLOSE * margin).then(|| [p, q].map(|t| self.along(node, axis, t)))
     }
 
-    /// Whether the face crosses none of the grid edges of a cell.
+    /// Whether the surface crosses none of the grid edges of a cell.
     pub(super) fn untouched(&self, cell: [usize; 3]) -> bool {
         let [i, j, k] = cell;
         let low = self.nodes.index(cell);
@@ -77,18 +81,18 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
             let height = |t| self.height(low + by, axis, t);
             deepest(&height, (a, 1.0 - b), CLOSE * self.grid.margin).is_none()
         };
-        matches!(self.signs.corners(self.face, i, j, k), 0 | 0xff)
+        matches!(self.signs.corners(self.surface, i, j, k), 0 | 0xff)
             && (0..3).all(|axis| {
                 let [u, v] = [1, 2].map(|n| self.nodes.stride[(axis + n) % 3]);
                 [0, u, v, u + v].into_iter().all(|by| edge(axis, by))
             })
     }
 
-    /// How far from the ends of a grid edge, as shares of it, the face may cross it twice: a distance falls no faster than
-    /// the place moves. None if it may not.
+    /// How far from the ends of a grid edge, as shares of it, the surface may cross it twice: a distance falls no faster than
+    /// the position moves. None if it may not.
     fn open(&self, node: usize, axis: usize) -> Option<[f64; 2]> {
         let ends = [node, node + self.nodes.stride[axis]];
-        let [p, q] = ends.map(|n| self.signs.is_negative(self.face, n));
+        let [p, q] = ends.map(|n| self.signs.is_negative(self.surface, n));
         let [a, b] = ends.map(|n| f64::from(self.samples[n].abs()) / self.length(node, axis));
         (p == q && a + b < 1.0 - CLOSE * self.grid.margin).then_some([a, b])
     }
@@ -100,19 +104,19 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> Seen<'_, P> {
 
     /// A point of a grid edge.
     fn along(&self, node: usize, axis: usize, t: f64) -> Vec3 {
-        let mut p = self.nodes.place(node);
+        let mut p = self.nodes.position(node);
         p[axis] += t * self.length(node, axis);
         p
     }
 
-    /// How far a point of a grid edge is on the side of the face on which its lower end is, in shares of the edge.
+    /// How far a point of a grid edge is on the face of the surface on which its lower end is, in shares of the edge.
     fn height(&self, node: usize, axis: usize, t: f64) -> f64 {
         let d = self.field.value(self.along(node, axis, t)) / self.length(node, axis);
-        if self.signs.is_negative(self.face, node) { -d } else { d }
+        if self.signs.is_negative(self.surface, node) { -d } else { d }
     }
 }
 
-/// A place between two where a function is not above zero that falls and rises by no more than its argument; none if
+/// A position between two where a function is not above zero that falls and rises by no more than its argument; none if
 /// there is none but by a hair.
 fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Option<(f64, f64)> {
     let mut open = vec![range];
@@ -136,7 +140,7 @@ fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Optio
     None
 }
 
-/// A root between a place where a function is positive and one where it is not: by chords, or halves where these crawl.
+/// A root between a position where a function is positive and one where it is not: by contours, or halves where these crawl.
 fn root(height: &impl Fn(f64) -> f64, positive: (f64, f64), other: (f64, f64)) -> f64 {
     let (mut p, mut q) = (positive, other);
     for round in 0..ROUNDS {

@@ -1,39 +1,39 @@
-//! Where the edges of a face run: which of them the grid shows, and the cells and sides that these pass.
+//! Where the edges of a surface run: which of them the grid shows, and the cells and faces that these pass.
 
 use std::collections::HashMap;
 
-use super::Edges;
-use crate::extract::grid::{Grid, TILE};
+use super::EdgeStore;
+use crate::extract::sampling_grid::{Grid, TILE};
 use crate::extract::tile::Nodes;
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, scale, sub};
 
-/// Straight edges that are this many steps long or more are shown, however little the face turns there.
+/// Straight edges that are this many steps long or more are shown, however little the surface turns there.
 const LONG: f64 = 3.0;
 /// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
 /// step.
 const SHARP: f64 = 0.436;
 
 /// The nodes of a block and one more on every side, and how many there are before the block's.
-pub(in crate::extract) struct Wide<'a> {
+pub(in crate::extract) struct PaddedNodes<'a> {
     pub axes: [&'a [f64]; 3],
     pub before: [isize; 3],
 }
 
-impl Edges {
-    /// Follows the edges of a live face through the cells of the block.
-    pub fn follow(&mut self, nodes: &Nodes, wide: &Wide, of: &Creases, face: usize, segments: &[u32]) {
+impl EdgeStore {
+    /// Follows the edges of a live surface through the cells of the block.
+    pub fn trace_edges(&mut self, nodes: &Nodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
         for &i in segments {
-            self.walk(nodes, wide, face, of.segments[i as usize].ends);
+            self.walk(nodes, padded, surface, of.segments[i as usize].ends);
         }
     }
 
     /// Follows a piece of an edge through the cells of the block, and those around it.
-    fn walk(&mut self, nodes: &Nodes, wide: &Wide, face: usize, [p, q]: [Vec3; 2]) {
+    fn walk(&mut self, nodes: &Nodes, padded: &PaddedNodes, surface: usize, [p, q]: [Vec3; 2]) {
         let along = sub(q, p);
         let mut stops = vec![0.0, 1.0];
         for a in 0..3 {
-            let axis = wide.axes[a];
+            let axis = padded.axes[a];
             let [from, to] = [p, q].map(|x| axis.partition_point(|n| *n < x[a]));
             for n in from.min(to)..from.max(to) {
                 let t = (axis[n] - p[a]) / along[a];
@@ -41,7 +41,7 @@ impl Edges {
                 let mut at = add(p, scale(along, t));
                 at[a] = axis[n];
                 if let Some(cell) = cell_of(nodes.axes, at) {
-                    self.pierced.push((face, (nodes.index(cell), a), at));
+                    self.pierced.push((surface, (nodes.index(cell), a), at));
                 }
             }
         }
@@ -50,11 +50,11 @@ impl Edges {
             let ends = [w[0], w[1]].map(|t| add(p, scale(along, t)));
             let middle = scale(add(ends[0], ends[1]), 0.5);
             if let Some(cell) = cell_of(nodes.axes, middle) {
-                let here = (face, nodes.index(cell));
-                self.pieces.entry(here).or_default().push(ends);
+                let here = (surface, nodes.index(cell));
+                self.segments.entry(here).or_default().push(ends);
             }
-            if let Some(cell) = cell_of(wide.axes, middle) {
-                self.mark(nodes, [0, 1, 2].map(|a| cell[a] as isize - wide.before[a]));
+            if let Some(cell) = cell_of(padded.axes, middle) {
+                self.mark(nodes, [0, 1, 2].map(|a| cell[a] as isize - padded.before[a]));
             }
         }
     }
@@ -74,14 +74,14 @@ impl Edges {
         }
     }
 
-    /// Whether a piece of an edge of some face lies within two cells of a node: chords that end on grid edges farther away
+    /// Whether a piece of an edge of some surface lies within two cells of a node: contours that end on grid edges farther away
     /// are all known in every tile that has these.
     pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
         self.near[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 }
 
-/// The cell between nodes that a place lies in.
+/// The cell between nodes that a position lies in.
 pub(super) fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
     let mut cell = [0; 3];
     for a in 0..3 {
@@ -94,7 +94,7 @@ pub(super) fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
     Some(cell)
 }
 
-/// The pieces of a face's edges that the grid shows, by the numbers of the tiles that they come near.
+/// The pieces of a surface's edges that the grid shows, by the numbers of the tiles that they come near.
 pub(in crate::extract) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
     let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
     let tiles = grid.tiles();

@@ -5,81 +5,81 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::{Nodes, Scratch, numbered};
-use crate::extract::grid::{Grid, Local};
+use crate::extract::sampling_grid::{Grid, LocalSolid};
 use geometry::math::Vec3;
 
-/// A turn of more than 45 degrees within a triangle is an edge of the face, not its curvature; the cosine.
+/// A turn of more than 45 degrees within a triangle is an edge of the surface, not its curvature; the cosine.
 const EDGE: f32 = 0.7;
-/// Where edges are known, one of more than 25 degrees is: as many are shown in any case, and points beside them stay on
-/// the face.
+/// Where edges are known, one of more than 25 degrees is: as many are shown in any case, and points next to them stay on
+/// the surface.
 const CREASE: f32 = 0.906;
 
-/// Moves vertices along their edges so that each triangle's chord error in volume cancels.
+/// Moves vertices along their edges so that each triangle's contour error in volume cancels.
 ///
 /// A surface that is locally quadratic, through the corners of a triangle, lies on average Σ II(e)/24 above it, e the
 /// triangle's edges and II the second fundamental form; and II(e) = Δn · e with Δn the change of the unit normal along
 /// e. The triangle hands this volume, with opposite sign, to its corners in shares (n · e)², e now the corner's grid
-/// edge: what faces its edge can move without running far along it.
-pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &Local, nodes: &Nodes, own: &[Range<usize>; 3]) {
+/// edge: what surfaces its edge can move without running far along it.
+pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
     s.moments.clear();
     s.moments.resize(s.vertices.len(), (0.0, 0.0));
     let mut rest = &s.plain.triangles[..];
-    for (face, numbers) in s.numbers.iter().enumerate().take(local.live.len()) {
-        let (triangles, others) = rest.split_at(s.plain.counts[face]);
+    for (surface, numbers) in s.numbers.iter().enumerate().take(local.live.len()) {
+        let (triangles, others) = rest.split_at(s.plain.counts[surface]);
         rest = others;
-        // The face's vertices on edges along x come first, then y, then z.
+        // The surface's vertices on edges along x come first, then y, then z.
         let starts = [numbers.offset[1][0], numbers.offset[2][0]];
-        let id = local.live[face];
+        let id = local.live[surface];
         let least = if grid.has_creases(id) {
             CREASE
-        } else if grid.faces[id].has_creases {
+        } else if grid.surfaces[id].has_creases {
             EDGE
         } else {
             f32::NEG_INFINITY
         };
-        share_out(triangles, starts, least, &s.places, &s.normals, &mut s.moments);
+        share_out(triangles, starts, least, &s.positions, &s.normals, &mut s.moments);
     }
-    // Chords over corners were laid between points where these are.
-    for key in s.edges.chord_ends() {
+    // Contours over corners were grid-aligned between points where these are.
+    for key in s.edges.contour_ends() {
         if let Some(v) = numbered(&s.numbers, nodes, key) {
             s.moments[v as usize] = (0.0, 0.0);
         }
     }
-    // The chords around its border a tile knows only where no edge is near: its neighbour may lay others there.
+    // The contours around its border a tile knows only where no edge is near: its neighbour may lay others there.
     let creased: Vec<bool> = local.live.iter().map(|id| grid.has_creases(*id)).collect();
     if creased.contains(&true) {
         for (v, m) in s.vertices.iter().zip(&mut s.moments) {
             let node = v.node.map(usize::from);
             let on_border =
                 (0..3).filter(|a| *a != usize::from(v.axis)).any(|a| node[a] == own[a].start || node[a] == own[a].end);
-            if on_border && creased[usize::from(v.face)] && s.edges.are_near(nodes, node) {
+            if on_border && creased[usize::from(v.surface)] && s.edges.are_near(nodes, node) {
                 *m = (0.0, 0.0);
             }
         }
     }
     let margin = grid.margin as f32;
-    for ((v, place), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.places).zip(&s.moments) {
+    for ((v, position), &(volume, area)) in s.vertices.iter_mut().zip(&mut s.positions).zip(&s.moments) {
         // Volume gained per unit of t: a third of the ring's area as seen along the edge.
         let gain = area * v.reach(nodes) as f32 / 3.0;
         if gain > 0.0 {
             let step = (volume / gain).clamp(-0.25, 0.25);
             v.t = (v.t + step).clamp(margin, 1.0 - margin);
-            *place = v.at(nodes, f64::from(v.t));
+            *position = v.at(nodes, f64::from(v.t));
         }
     }
 }
 
-/// Gives the corners of a face's triangles their shares, but for triangles within which normals turn so that their product
+/// Gives the corners of a surface's triangles their shares, but for triangles within which normals turn so that their product
 /// is below `least`.
 ///
 /// Single precision is ample for a move that is a small share of an edge, and neighbouring tiles still agree: it is used
-/// on differences of places that they have in common.
+/// on differences of positions that they have in common.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 fn share_out(
     triangles: &[[u32; 3]],
     starts: [u32; 2],
     least: f32,
-    places: &[Vec3],
+    positions: &[Vec3],
     normals: &[[f32; 3]],
     moments: &mut [(f32, f32)],
 ) {
@@ -87,7 +87,7 @@ fn share_out(
     let sub = |a: Short, b: Short| -> Short { core::array::from_fn(|i| a[i] - b[i]) };
     let dot = |a: Short, b: Short| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for t in triangles {
-        let [a, b, c] = t.map(|v| places[v as usize]);
+        let [a, b, c] = t.map(|v| positions[v as usize]);
         let [na, nb, nc] = t.map(|v| normals[v as usize]);
         let edge = |p: Vec3, q: Vec3| -> Short { core::array::from_fn(|i| (q[i] - p[i]) as f32) };
         let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));

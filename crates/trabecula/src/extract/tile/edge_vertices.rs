@@ -5,34 +5,34 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::{BATCH, Nodes, Numbers, Scratch, Vertex};
-use crate::extract::signs::{Signs, below};
+use crate::extract::sign_words::{Signs, below};
 use crate::field::Field;
 use geometry::math::unit;
 
-/// Lists the vertices of plain cells, face by face.
+/// Lists the vertices of plain cells, surface by surface.
 pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
     let Scratch { signs, numbers, vertices, edges, .. } = s;
     vertices.clear();
     numbers.resize_with(signs.negative.len(), Numbers::default);
-    let any_knot = signs.is_any_knotted();
-    for (face, numbers) in numbers.iter_mut().enumerate() {
-        let knots = if any_knot { Some(edges.knots(signs, face)) } else { None };
-        list_face(signs, numbers, vertices, nodes, face, knots.as_deref());
+    let any_feature = signs.has_features();
+    for (surface, numbers) in numbers.iter_mut().enumerate() {
+        let features = if any_feature { Some(edges.features(signs, surface)) } else { None };
+        list_surface(signs, numbers, vertices, nodes, surface, features.as_deref());
     }
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
-fn list_face(
+fn list_surface(
     signs: &Signs,
     numbers: &mut Numbers,
     vertices: &mut Vec<Vertex>,
     nodes: &Nodes,
-    face: usize,
-    knots: Option<&[u64]>,
+    surface: usize,
+    features: Option<&[u64]>,
 ) {
     let [nx, ny, nz] = nodes.shape;
     let inner = below(nx - 1);
-    let n = &signs.negative[face];
+    let n = &signs.negative[surface];
     for axis in 0..3 {
         numbers.crossed[axis].clear();
         numbers.offset[axis].clear();
@@ -46,10 +46,10 @@ fn list_face(
                     2 if k + 1 < nz => w ^ n[row + ny],
                     _ => 0,
                 };
-                let used = change & signs.edges_of(&signs.plain[face], axis, j, k);
+                let used = change & signs.edges_of(&signs.plain[surface], axis, j, k);
                 numbers.crossed[axis].push(used);
                 numbers.offset[axis].push(vertices.len() as u32);
-                let fixed = knots.map_or(0, |knots| signs.edges_of(knots, axis, j, k));
+                let fixed = features.map_or(0, |features| signs.edges_of(features, axis, j, k));
                 let mut bits = used;
                 while bits != 0 {
                     let i = bits.trailing_zeros() as usize;
@@ -58,7 +58,7 @@ fn list_face(
                     vertices.push(Vertex {
                         node: node.map(|n| n as u8),
                         axis: axis as u8,
-                        face: face as u8,
+                        surface: surface as u8,
                         up: w >> i & 1 == 1,
                         fixed: fixed >> i & 1 == 1,
                         t: 1.0,
@@ -104,17 +104,17 @@ impl Root {
 
 /// A step this small (as a share of the edge) ends the iteration: its square is the error that is left.
 const SETTLED: f64 = 1e-3;
-/// Rounds in which a smooth function's root is found. Those left cross an edge of the face, where slopes say little: every
+/// Rounds in which a smooth function's root is found. Those left cross an edge of the surface, where slopes say little: every
 /// other round halves what is left of these.
 const SMOOTH: usize = 6;
 /// Most rounds of the iteration: by halves alone the last come as near as those that settle.
 const ROUNDS: usize = SMOOTH + 20;
 
-/// Finds where a face crosses the edges of its vertices, and its normals there.
-pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, which: Range<usize>) {
+/// Finds where a surface crosses the edges of its vertices, and its normals there.
+pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, surface: usize, which: Range<usize>) {
     let Scratch { samples, points, values, gradients, vertices, normals, .. } = s;
     normals.resize(vertices.len(), [0.0; 3]);
-    let samples = &samples[face];
+    let samples = &samples[surface];
     let mut roots = Vec::with_capacity(BATCH);
     for from in which.clone().step_by(BATCH) {
         roots.clear();
@@ -127,8 +127,8 @@ pub(super) fn solve(s: &mut Scratch, nodes: &Nodes, f: &dyn Field, face: usize, 
         }
         for round in 0..ROUNDS {
             points.clear();
-            let place = |r: &Root| vertices[r.vertex as usize].at(nodes, r.t);
-            points.extend(roots.iter().map(place));
+            let position = |r: &Root| vertices[r.vertex as usize].at(nodes, r.t);
+            points.extend(roots.iter().map(position));
             values.resize(roots.len(), 0.0);
             gradients.resize(roots.len(), [0.0; 3]);
             f.gradients(points, values, gradients);

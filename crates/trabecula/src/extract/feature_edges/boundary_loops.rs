@@ -1,88 +1,88 @@
-//! Patches by their rims: cells in which a face has an edge.
+//! Patches by their boundary loops: cells in which a surface has an edge.
 
 use std::collections::HashMap;
 
-use super::patch::Patches;
-use super::polygon::triangles;
-use crate::extract::key::Key;
-use crate::extract::knot::Knots;
+use super::polygon_triangulation::triangles;
+use super::surface_patch::Patches;
+use crate::extract::feature_cells::FeatureCells;
+use crate::extract::vertex_id::VertexId;
 use geometry::math::{add, scale, sub};
 use geometry::mesh::exact::drop_axis;
 
 /// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
 const INNER: f64 = 0.5;
 
-/// A rim's way through a side: from a point on the side's boundary, perhaps over others, to one.
+/// A boundary loop's way through a face: from a point on the face's boundary, perhaps over others, to one.
 pub(super) struct Step {
-    from: Key,
-    via: Vec<Key>,
-    to: Key,
-    /// The side: its axis, and whether it is the upper one.
-    side: (usize, bool),
+    from: VertexId,
+    via: Vec<VertexId>,
+    to: VertexId,
+    /// The face: its axis, and whether it is the upper one.
+    face: (usize, bool),
 }
 
 impl Step {
-    pub fn path(&self) -> Vec<Key> {
+    pub fn path(&self) -> Vec<VertexId> {
         let ends = (std::iter::once(self.from), std::iter::once(self.to));
         ends.0.chain(self.via.iter().copied()).chain(ends.1).collect()
     }
 }
 
-impl Knots<'_> {
-    /// Fills a cell in which a face has an edge.
-    pub fn edged(&mut self, cell: [usize; 3], face: usize) {
-        let steps = self.steps(cell, face);
-        let rims = rims(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let (node, cut) = (self.nodes.index(cell), self.grid.faces[self.local.live[face]].cut);
-        let (edges, of) = (self.edges, self.cell_of(cell, face));
-        let patches: Vec<Patches> = rims
+impl FeatureCells<'_> {
+    /// Fills a cell in which a surface has an edge.
+    pub fn fill_edge_cell(&mut self, cell: [usize; 3], surface: usize) {
+        let steps = self.steps(cell, surface);
+        let boundary_loops = boundary_loops(&steps.iter().map(Step::path).collect::<Vec<_>>());
+        let (node, cut) = (self.nodes.index(cell), self.grid.surfaces[self.local.live[surface]].cut);
+        let (edges, of) = (self.edges, self.cell_of(cell, surface));
+        let patches: Vec<Patches> = boundary_loops
             .iter()
-            .map(|keys| match (self.rim(cell, keys), rims.len()) {
-                (rim, 1) => edges.patches(of, &rim, edges.beyond(of)),
-                (rim, _) => edges.patches_among(of, &rim),
+            .map(|keys| match (self.boundary_loop(cell, keys), boundary_loops.len()) {
+                (boundary_loop, 1) => edges.patches(of, &boundary_loop, edges.neighbour_corners(of)),
+                (boundary_loop, _) => edges.patches_among(of, &boundary_loop),
             })
             .collect();
         let any = patches.iter().any(|p| p.divided.is_some());
         let first = self.extra.triangles.len();
         for divided in [true, false].into_iter().skip(usize::from(!any)) {
-            for (keys, patches) in rims.iter().zip(&patches) {
+            for (keys, patches) in boundary_loops.iter().zip(&patches) {
                 let patch = patches.best(divided);
                 let mut names: Vec<u32> = keys.iter().map(|k| self.vertex(*k)).collect();
                 let inner = patch.inner.iter();
-                names.extend(inner.map(|p| self.push(Key::center(node, 7), *p)));
+                names.extend(inner.map(|p| self.push(VertexId::center(node, 7), *p)));
                 let triangles = patch.triangles.iter();
-                let named = triangles.map(|t| (t.map(|i| names[i]), cut));
-                self.extra.triangles.extend(named);
+                let vertex_at = triangles.map(|t| (t.map(|i| names[i]), cut));
+                self.extra.triangles.extend(vertex_at);
             }
             // One cone cannot meet itself, but several may meet each other.
-            let single = !divided && rims.len() == 1;
-            if single || !(self.muddled(first) || self.touch(first, |x| x)) {
+            let single = !divided && boundary_loops.len() == 1;
+            if single || !(self.self_intersects_rounded(first) || self.self_intersects(first, |x| x)) {
                 return;
             }
             self.extra.triangles.truncate(first);
         }
-        self.hollow(cell, face, &steps, cut);
+        self.fill_by_shell(cell, surface, &steps, cut);
     }
 
-    /// The ways of all rims through the sides of a cell: counter-clockwise seen from the void.
-    pub(super) fn steps(&self, cell: [usize; 3], face: usize) -> Vec<Step> {
+    /// The ways of all boundary loops through the faces of a cell: counter-clockwise seen from the void.
+    pub(super) fn steps(&self, cell: [usize; 3], surface: usize) -> Vec<Step> {
         let node = self.nodes.index(cell);
         let mut steps = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
             let low = node + self.offset(usize::from(upper) << axis);
-            if let Some(side) = self.fits.sides.get(&(low, axis)) {
-                steps.extend(side.chords.iter().map(|c| {
+            if let Some(face) = self.divided_faces.faces.get(&(low, axis)) {
+                steps.extend(face.contours.iter().map(|c| {
                     let mut path = c.clone();
                     if !upper {
                         path.reverse();
                     }
                     let last = path.len() - 1;
-                    Step { from: path[0], via: path[1..last].to_vec(), to: path[last], side: (axis, upper) }
+                    Step { from: path[0], via: path[1..last].to_vec(), to: path[last], face: (axis, upper) }
                 }));
                 continue;
             }
-            if let Some(chords) = self.edges.sides.get(&(low, axis)) {
-                steps.extend(chords.iter().map(|c| Step {
+            if let Some(contours) = self.edges.faces.get(&(low, axis)) {
+                steps.extend(contours.iter().map(|c| Step {
                     from: if upper { c.from } else { c.to },
                     via: if upper {
                         c.via.iter().map(|v| v.0).collect()
@@ -90,7 +90,7 @@ impl Knots<'_> {
                         c.via.iter().rev().map(|v| v.0).collect()
                     },
                     to: if upper { c.to } else { c.from },
-                    side: (axis, upper),
+                    face: (axis, upper),
                 }));
                 continue;
             }
@@ -100,9 +100,9 @@ impl Knots<'_> {
             let ring = [low, low + du, low + du + dv, low + dv];
             for i in 0..4 {
                 let (a, b) = (ring[i], ring[(i + 1) % 4]);
-                let [p, q] = [a, b].map(|n| self.signs.is_negative(face, n));
+                let [p, q] = [a, b].map(|n| self.signs.is_negative(surface, n));
                 let along = if i % 2 == 0 { u } else { v };
-                let key = Key::new(a.min(b), &[1 << along], &[face]);
+                let key = VertexId::new(a.min(b), &[1 << along], &[surface]);
                 // From where the boundary enters the solid, seen from outside the cell.
                 if p != q {
                     (if q == upper { &mut enters } else { &mut leaves }).push(key);
@@ -110,35 +110,35 @@ impl Knots<'_> {
             }
             let mut across = cell;
             across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
-            let knotted = across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_knotted(across);
+            let featured = across[axis] < self.nodes.shape[axis] - 1 && self.signs.is_feature(across);
             for from in enters {
-                let (via, to) = if knotted {
-                    self.trace(cell, axis, upper, face, from)
+                let (via, to) = if featured {
+                    self.trace(cell, axis, upper, surface, from)
                 } else {
                     (Vec::new(), leaves.first().copied())
                 };
                 let Some(to) = to else { continue };
-                steps.push(Step { from, via, to, side: (axis, upper) });
+                steps.push(Step { from, via, to, face: (axis, upper) });
             }
         }
         steps
     }
 
-    /// Fills a cell with several rims: walls run from them half-way to the middle of the cell, where they end at what is
-    /// solid of the boundary of a smaller cell. Walls over rims that do not meet keep apart.
-    fn hollow(&mut self, cell: [usize; 3], face: usize, steps: &[Step], cut: bool) {
+    /// Fills a cell with several boundary loops: walls run from them half-way to the middle of the cell, where they end at what is
+    /// solid of the boundary of a smaller cell. Walls over boundary loops that do not meet keep apart.
+    fn fill_by_shell(&mut self, cell: [usize; 3], surface: usize, steps: &[Step], cut: bool) {
         let node = self.nodes.index(cell);
-        let ends = [node, node + self.offset(7)].map(|n| self.nodes.place(n));
+        let ends = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
         let center = scale(add(ends[0], ends[1]), 0.5);
-        let mut inner: HashMap<Key, u32> = HashMap::new();
-        let mut pairs: HashMap<Key, u32> = HashMap::new();
-        let mut keys: Vec<Key> = Vec::new();
+        let mut inner: HashMap<VertexId, u32> = HashMap::new();
+        let mut pairs: HashMap<VertexId, u32> = HashMap::new();
+        let mut keys: Vec<VertexId> = Vec::new();
         for s in steps {
             keys.push(s.from);
             keys.extend(&s.via);
             keys.push(s.to);
         }
-        let polygons: Vec<((usize, bool), Vec<Key>)> = self.solid_polygons(cell, face, steps);
+        let polygons: Vec<((usize, bool), Vec<VertexId>)> = self.solid_polygons(cell, surface, steps);
         for &key in &keys {
             let v = self.vertex(key);
             pairs.insert(key, v);
@@ -148,12 +148,12 @@ impl Knots<'_> {
             if inner.contains_key(&key) {
                 continue;
             }
-            let place = match pairs.get(&key) {
-                Some(v) => self.places[*v as usize],
-                None => self.nodes.place(key.node()),
+            let position = match pairs.get(&key) {
+                Some(v) => self.positions[*v as usize],
+                None => self.nodes.position(key.node()),
             };
-            let place = add(center, scale(sub(place, center), INNER));
-            let v = self.push(Key::center(node, 7), place);
+            let position = add(center, scale(sub(position, center), INNER));
+            let v = self.push(VertexId::center(node, 7), position);
             inner.insert(key, v);
         }
         for s in steps {
@@ -176,14 +176,14 @@ impl Knots<'_> {
     /// Adds a simple polygon across an axis, not convex perhaps, by its vertices.
     pub(super) fn flat(&mut self, names: &[u32], axis: usize, cut: bool) {
         let flat: Vec<[f64; 2]> =
-            names.iter().map(|v| drop_axis(self.places[*v as usize].map(|x| f64::from(x as f32)), axis)).collect();
+            names.iter().map(|v| drop_axis(self.positions[*v as usize].map(|x| f64::from(x as f32)), axis)).collect();
         for t in triangles(&flat, 0) {
             self.extra.triangles.push((t.map(|i| names[i]), cut));
         }
     }
 
-    /// What is solid of the sides of a cell: polygons, counter-clockwise about the side's axis.
-    fn solid_polygons(&self, cell: [usize; 3], face: usize, steps: &[Step]) -> Vec<((usize, bool), Vec<Key>)> {
+    /// What is solid of the faces of a cell: polygons, counter-clockwise about the face's axis.
+    fn solid_polygons(&self, cell: [usize; 3], surface: usize, steps: &[Step]) -> Vec<((usize, bool), Vec<VertexId>)> {
         let node = self.nodes.index(cell);
         let mut all = Vec::new();
         for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
@@ -192,23 +192,23 @@ impl Knots<'_> {
             let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
             let ring = [low, low + du, low + du + dv, low + dv];
             // The boundary: nodes, and where it enters the solid or leaves it.
-            let mut boundary: Vec<Key> = Vec::new();
+            let mut boundary: Vec<VertexId> = Vec::new();
             for i in 0..4 {
                 let (a, b) = (ring[i], ring[(i + 1) % 4]);
                 let along = if i % 2 == 0 { u } else { v };
-                boundary.push(Key::new(a, &[], &[]));
-                let [p, q] = [a, b].map(|n| self.signs.is_negative(face, n));
+                boundary.push(VertexId::new(a, &[], &[]));
+                let [p, q] = [a, b].map(|n| self.signs.is_negative(surface, n));
                 if p != q {
-                    boundary.push(Key::new(a.min(b), &[1 << along], &[face]));
-                } else if self.edges.twice.contains_key(&(face, a.min(b), along)) {
+                    boundary.push(VertexId::new(a.min(b), &[1 << along], &[surface]));
+                } else if self.edges.double_crossings.contains_key(&(surface, a.min(b), along)) {
                     let order = if i < 2 { [0, 1] } else { [1, 0] };
-                    let key = |n| Key::crossing(a.min(b), along, face, n);
+                    let key = |n| VertexId::crossing(a.min(b), along, surface, n);
                     boundary.extend(order.map(key));
                 }
             }
-            let here: Vec<(Key, Vec<Key>, Key)> = steps
+            let here: Vec<(VertexId, Vec<VertexId>, VertexId)> = steps
                 .iter()
-                .filter(|s| s.side == (axis, upper))
+                .filter(|s| s.face == (axis, upper))
                 .map(|s| {
                     let mut via = s.via.clone();
                     if upper {
@@ -220,19 +220,19 @@ impl Knots<'_> {
                 })
                 .collect();
             if here.is_empty() {
-                if self.signs.is_negative(face, low) {
+                if self.signs.is_negative(surface, low) {
                     all.push(((axis, upper), boundary));
                 }
                 continue;
             }
-            let mut open: Vec<Key> = here.iter().map(|c| c.0).collect();
+            let mut open: Vec<VertexId> = here.iter().map(|c| c.0).collect();
             while let Some(first) = open.pop() {
                 let mut polygon = Vec::new();
                 let mut enter = first;
                 loop {
-                    // Along the boundary to where it leaves the solid, then back along the chord.
+                    // Along the boundary to where it leaves the solid, then back along the contour.
                     let mut i = boundary.iter().position(|k| *k == enter).unwrap_or(0);
-                    let chord = loop {
+                    let contour = loop {
                         polygon.push(boundary[i]);
                         i = (i + 1) % boundary.len();
                         if let Some(c) = here.iter().find(|c| c.2 == boundary[i]) {
@@ -242,9 +242,9 @@ impl Knots<'_> {
                             break &here[0];
                         }
                     };
-                    polygon.push(chord.2);
-                    polygon.extend(chord.1.iter().rev());
-                    enter = chord.0;
+                    polygon.push(contour.2);
+                    polygon.extend(contour.1.iter().rev());
+                    enter = contour.0;
                     if enter == first || polygon.len() > 64 {
                         break;
                     }
@@ -258,23 +258,23 @@ impl Knots<'_> {
 }
 
 /// The closed lines that some paths make.
-pub(super) fn rims(paths: &[Vec<Key>]) -> Vec<Vec<Key>> {
+pub(super) fn boundary_loops(paths: &[Vec<VertexId>]) -> Vec<Vec<VertexId>> {
     let mut used = vec![false; paths.len()];
-    let mut rims = Vec::new();
+    let mut boundary_loops = Vec::new();
     for first in 0..paths.len() {
-        let (mut rim, mut at) = (Vec::new(), first);
+        let (mut boundary_loop, mut at) = (Vec::new(), first);
         while !used[at] {
             used[at] = true;
             let path = &paths[at];
-            rim.extend(&path[..path.len() - 1]);
+            boundary_loop.extend(&path[..path.len() - 1]);
             match paths.iter().rposition(|p| p[0] == path[path.len() - 1]) {
                 Some(n) => at = n,
                 None => break,
             }
         }
-        if !rim.is_empty() {
-            rims.push(rim);
+        if !boundary_loop.is_empty() {
+            boundary_loops.push(boundary_loop);
         }
     }
-    rims
+    boundary_loops
 }

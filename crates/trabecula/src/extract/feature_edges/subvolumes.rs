@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
 
-use super::fill::{Base, Tet};
-use super::patch::Patch;
-use crate::extract::knot::{Knots, middle};
+use super::fill_fitted::{Base, Tet};
+use super::surface_patch::Patch;
+use crate::extract::feature_cells::{FeatureCells, middle};
 use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
 /// A point that is behind all that bounds a volume by so many steps is taken at once, if that is more than it must be.
@@ -25,13 +25,13 @@ struct Facet<'b> {
 
 #[derive(Clone, Copy)]
 enum Of<'b> {
-    Side(&'b Base),
+    CellFace(&'b Base),
     Patch,
     /// What divides a volume that is not seen whole from any point.
-    Wall,
+    Partition,
 }
 
-/// A volume, and whether the face is negative in it.
+/// A volume, and whether the surface is negative in it.
 struct Volume<'b> {
     facets: Vec<Facet<'b>>,
     inside: bool,
@@ -59,39 +59,39 @@ fn turned([a, b, c]: [usize; 3], stays: bool) -> [usize; 3] {
     if stays { [a, b, c] } else { [a, c, b] }
 }
 
-impl Knots<'_> {
+impl FeatureCells<'_> {
     /// The tetrahedra from points in the volumes between patches to all that bounds each; none if that cannot be had. `patches`:
-    /// with the numbers of their rims' points.
+    /// with the numbers of their boundary loops' points.
     pub(super) fn volumes<'b>(
         &mut self,
         cell: [usize; 3],
         bases: &'b [Base],
         patches: &[(&[usize], &Patch)],
     ) -> Option<Vec<Tet<'b>>> {
-        // Points of sides that were divided anew have other values there than elsewhere.
-        let is_shaken = |b: &Base| b.divided.as_ref().is_some_and(|(s, _)| s.tries > 0);
-        if bases.iter().any(is_shaken) {
+        // Points of faces that were divided anew have other values there than elsewhere.
+        let is_perturbed = |b: &Base| b.divided.as_ref().is_some_and(|(s, _)| s.tries > 0);
+        if bases.iter().any(is_perturbed) {
             return None;
         }
-        let side = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: Of::Side(b) };
-        let sides: Vec<Facet> = bases.iter().map(side).collect();
-        let rims: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
+        let face = |b: &'b Base| Facet { ids: turned(b.ids, b.left), of: Of::CellFace(b) };
+        let faces: Vec<Facet> = bases.iter().map(face).collect();
+        let boundary_loops: Vec<Line> = patches.iter().flat_map(|p| around(p.0)).collect();
         let mut volumes: Vec<Volume> = Vec::with_capacity(patches.len() + 1);
-        for facets in parts(&sides, &rims) {
-            let inside = matches!(facets[0].of, Of::Side(b) if b.inside);
+        for facets in parts(&faces, &boundary_loops) {
+            let inside = matches!(facets[0].of, Of::CellFace(b) if b.inside);
             volumes.push(Volume { facets, inside });
         }
         // A closed line divides the cell's boundary in two.
         if volumes.len() != patches.len() + 1 {
             return None;
         }
-        let mut ways: Vec<Vec<usize>> = Vec::new();
-        for (rim, patch) in patches {
-            let mut ids = rim.to_vec();
+        let mut routes: Vec<Vec<usize>> = Vec::new();
+        for (boundary_loop, patch) in patches {
+            let mut ids = boundary_loop.to_vec();
             ids.extend(patch.inner.iter().map(|p| self.inner_point(cell, *p)));
-            let ids_of = |way: &Vec<usize>| way.iter().map(|i| ids[*i]).collect();
-            ways.extend(patch.ways.iter().map(ids_of));
-            let start = line(rim[0], rim[1]);
+            let ids_of = |route: &Vec<usize>| route.iter().map(|i| ids[*i]).collect();
+            routes.extend(patch.routes.iter().map(ids_of));
+            let start = line(boundary_loop[0], boundary_loop[1]);
             let meets = |v: &&mut Volume| v.facets.iter().any(|f| lines_of(f.ids).contains(&start));
             for volume in volumes.iter_mut().filter(meets) {
                 let stays = volume.inside;
@@ -99,12 +99,12 @@ impl Knots<'_> {
                 volume.facets.extend(patch.triangles.iter().map(facet));
             }
         }
-        if ways.len() > MOST {
-            ways.clear();
+        if routes.len() > MOST {
+            routes.clear();
         }
         let mut tets = Vec::with_capacity(2 * bases.len());
         for volume in volumes {
-            self.divide(cell, volume, ways.clone(), &mut tets)?;
+            self.divide(cell, volume, routes.clone(), &mut tets)?;
         }
         Some(tets)
     }
@@ -115,88 +115,91 @@ impl Knots<'_> {
         &mut self,
         cell: [usize; 3],
         mut volume: Volume<'b>,
-        mut ways: Vec<Vec<usize>>,
+        mut routes: Vec<Vec<usize>>,
         tets: &mut Vec<Tet<'b>>,
     ) -> Option<()> {
         // One part after the other is cut off.
-        while !self.is_seen(cell, &volume, tets) {
-            let (rest, taken) = ways.iter().enumerate().find_map(|(n, way)| {
-                let [one, other] = self.walled_off(cell, &volume, way)?;
-                if self.is_seen(cell, &one, tets) {
+        while !self.fill_star_shaped(cell, &volume, tets) {
+            let (rest, taken) = routes.iter().enumerate().find_map(|(n, route)| {
+                let [one, other] = self.partitioned(cell, &volume, route)?;
+                if self.fill_star_shaped(cell, &one, tets) {
                     return Some((other, n));
                 }
-                self.is_seen(cell, &other, tets).then_some((one, n))
+                self.fill_star_shaped(cell, &other, tets).then_some((one, n))
             })?;
             volume = rest;
-            ways.swap_remove(taken);
+            routes.swap_remove(taken);
         }
         Some(())
     }
 
     /// Adds the tetrahedra of a volume, if it is seen whole from a point.
-    fn is_seen<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<Tet<'b>>) -> bool {
+    fn fill_star_shaped<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<Tet<'b>>) -> bool {
         let facets = volume.facets.iter();
-        let places: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.place_of(i))).collect();
+        let positions: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.position_of(i))).collect();
         let step = self.grid.step;
-        let Some(apex) = behind(&places, step, self.grid.margin * step) else {
+        let Some(apex) = behind(&positions, step, self.grid.margin * step) else {
             return false;
         };
         let apex = self.inner_point(cell, apex);
         tets.extend(volume.facets.iter().map(|f| match f.of {
-            Of::Side(b) => Tet::over(b, apex),
+            Of::CellFace(b) => Tet::over(b, apex),
             Of::Patch => Tet::inner(f.ids, volume.inside, apex, volume.inside),
-            Of::Wall => Tet::inner(f.ids, volume.inside, apex, false),
+            Of::Partition => Tet::inner(f.ids, volume.inside, apex, false),
         }));
         true
     }
 
     /// The halves of a volume that is divided by a wall between a way along its patches and one along its sides.
-    fn walled_off<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, way: &[usize]) -> Option<[Volume<'b>; 2]> {
-        let mut ring = way.to_vec();
-        ring.extend(back(&volume.facets, way)?);
+    fn partitioned<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, route: &[usize]) -> Option<[Volume<'b>; 2]> {
+        let mut ring = route.to_vec();
+        ring.extend(back(&volume.facets, route)?);
         let lines = around(&ring);
         let [one, other] = <[_; 2]>::try_from(parts(&volume.facets, &lines)).ok()?;
-        let wall: Vec<[usize; 3]> = match ring[..] {
+        let partition: Vec<[usize; 3]> = match ring[..] {
             [a, b, c] => vec![[a, b, c]],
             _ => {
-                let places: Vec<Vec3> = ring.iter().map(|i| self.place_of(*i)).collect();
-                let apex = self.inner_point(cell, middle(&places));
+                let positions: Vec<Vec3> = ring.iter().map(|i| self.position_of(*i)).collect();
+                let apex = self.inner_point(cell, middle(&positions));
                 let next = ring.iter().cycle().skip(1);
-                let sides = ring.iter().zip(next);
-                sides.map(|(a, b)| [apex, *a, *b]).collect()
+                let faces = ring.iter().zip(next);
+                faces.map(|(a, b)| [apex, *a, *b]).collect()
             }
         };
-        Some([one, other].map(|half| Volume { facets: closed(half, &wall, [ring[0], ring[1]]), inside: volume.inside }))
+        Some(
+            [one, other]
+                .map(|half| Volume { facets: closed(half, &partition, [ring[0], ring[1]]), inside: volume.inside }),
+        )
     }
 }
 
 /// Half of a surface, closed by a wall. `line`: one of those they share, as the wall has it.
-fn closed<'b>(mut half: Vec<Facet<'b>>, wall: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
+fn closed<'b>(mut half: Vec<Facet<'b>>, partition: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
     let runs = |ids: [usize; 3]| (0..3).any(|k| [ids[k], ids[(k + 1) % 3]] == line);
     let stays = !half.iter().any(|f| runs(f.ids));
-    half.extend(wall.iter().map(|t| Facet { ids: turned(*t, stays), of: Of::Wall }));
+    half.extend(partition.iter().map(|t| Facet { ids: turned(*t, stays), of: Of::Partition }));
     half
 }
 
 /// The parts that some lines divide a surface into.
 fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
-    let mut beside: FxHashMap<Line, Vec<usize>> = FxHashMap::default();
+    let mut adjacent: FxHashMap<Line, Vec<usize>> = FxHashMap::default();
     for (i, f) in facets.iter().enumerate() {
         for l in lines_of(f.ids) {
-            beside.entry(l).or_default().push(i);
+            adjacent.entry(l).or_default().push(i);
         }
     }
     let mut all = Vec::new();
-    let mut seen = vec![false; facets.len()];
+    let mut visited = vec![false; facets.len()];
     for first in 0..facets.len() {
         let (mut open, mut part) = (vec![first], Vec::new());
         while let Some(i) = open.pop() {
-            if std::mem::replace(&mut seen[i], true) {
+            if std::mem::replace(&mut visited[i], true) {
                 continue;
             }
             part.push(facets[i]);
             let inner = lines_of(facets[i].ids).into_iter().filter(|l| !lines.contains(l));
-            open.extend(inner.flat_map(|l| beside[&l].iter().copied()));
+            open.extend(inner.flat_map(|l| adjacent[&l].iter().copied()));
         }
         if !part.is_empty() {
             all.push(part);
@@ -205,14 +208,14 @@ fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
     all
 }
 
-/// The points between the end of a way along patches and its start on the shortest way back along sides, by the count of lines,
+/// The points between the end of a way along patches and its start on the shortest way back along faces, by the count of lines,
 /// that meets no patch or wall.
-fn back(facets: &[Facet], way: &[usize]) -> Option<Vec<usize>> {
-    let (start, end) = (way[way.len() - 1], way[0]);
-    let is_side = |f: &&Facet| matches!(f.of, Of::Side(_));
-    let others = facets.iter().filter(|f| !is_side(f));
+fn back(facets: &[Facet], route: &[usize]) -> Option<Vec<usize>> {
+    let (start, end) = (route[route.len() - 1], route[0]);
+    let is_cell_face = |f: &&Facet| matches!(f.of, Of::CellFace(_));
+    let others = facets.iter().filter(|f| !is_cell_face(f));
     let taken: Vec<usize> = others.flat_map(|f| f.ids).collect();
-    let lines: Vec<Line> = (facets.iter().filter(is_side)).flat_map(|f| lines_of(f.ids)).collect();
+    let lines: Vec<Line> = (facets.iter().filter(is_cell_face)).flat_map(|f| lines_of(f.ids)).collect();
     let mut from: FxHashMap<usize, usize> = FxHashMap::default();
     let mut open = VecDeque::from([start]);
     while let Some(at) = open.pop_front() {
@@ -261,7 +264,7 @@ fn behind(triangles: &[[Vec3; 3]], step: f64, least: f64) -> Option<Vec3> {
 mod tests {
     use super::*;
 
-    /// The sides of a prism over a polygon in the unit square, whose ends are triangles of its corners.
+    /// The faces of a prism over a polygon in the unit square, whose ends are triangles of its corners.
     fn prism(polygon: &[[f64; 2]], ends: &[[usize; 3]]) -> (Vec<Facet<'static>>, Vec<Vec3>) {
         let n = polygon.len();
         let mut ids: Vec<[usize; 3]> = Vec::new();
@@ -279,8 +282,8 @@ mod tests {
         (facets.collect(), at(0.0).chain(at(1.0)).collect())
     }
 
-    fn places(facets: &[Facet], places: &[Vec3]) -> Vec<[Vec3; 3]> {
-        facets.iter().map(|f| f.ids.map(|i| places[i])).collect()
+    fn positions(facets: &[Facet], positions: &[Vec3]) -> Vec<[Vec3; 3]> {
+        facets.iter().map(|f| f.ids.map(|i| positions[i])).collect()
     }
 
     const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
@@ -292,10 +295,10 @@ mod tests {
     #[test]
     fn a_point_behind_all_sides_is_found_where_there_is_one() {
         let (facets, at) = prism(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
-        let p = behind(&places(&facets, &at), 1.0, 1e-3).expect("a cube");
+        let p = behind(&positions(&facets, &at), 1.0, 1e-3).expect("a cube");
         assert!(p.iter().all(|x| (0.05..0.95).contains(x)), "{p:?}");
         let (facets, at) = prism(&SLOT, &SLOT_ENDS);
-        assert_eq!(behind(&places(&facets, &at), 1.0, 1e-3), None);
+        assert_eq!(behind(&positions(&facets, &at), 1.0, 1e-3), None);
     }
 
     #[test]
@@ -308,11 +311,11 @@ mod tests {
         assert_eq!(halves[0].len() + halves[1].len(), facets.len());
         for half in halves {
             let half = closed(half, &[[2, 10, 15], [2, 15, 7]], [2, 10]);
-            let ways = |f: &Facet| [0, 1, 2].map(|k| (f.ids[k], f.ids[(k + 1) % 3]));
-            let ways: Vec<(usize, usize)> = half.iter().flat_map(ways).collect();
-            assert!(ways.iter().all(|(a, b)| ways.contains(&(*b, *a))));
+            let routes = |f: &Facet| [0, 1, 2].map(|k| (f.ids[k], f.ids[(k + 1) % 3]));
+            let routes: Vec<(usize, usize)> = half.iter().flat_map(routes).collect();
+            assert!(routes.iter().all(|(a, b)| routes.contains(&(*b, *a))));
             // The left leg is convex; all of the rest is seen from the far right.
-            assert!(behind(&places(&half, &at), 1.0, 1e-3).is_some());
+            assert!(behind(&positions(&half, &at), 1.0, 1e-3).is_some());
         }
         assert_eq!(parts(&facets, &[line(2, 10)]).len(), 1);
     }

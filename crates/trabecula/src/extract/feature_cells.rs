@@ -1,20 +1,20 @@
-//! Cells where faces of the solid meet: its edges and corners, thin walls, and patches that are not plain.
+//! Cells where surfaces of the solid meet: its edges and corners, thin walls, and patches that are not plain.
 //!
-//! Such a cell is divided into the six tetrahedra between its lowest and its highest corner. In a tetrahedron each face
+//! Such a cell is divided into the six tetrahedra between its lowest and its highest corner. In a tetrahedron each surface
 //! is taken as the plane of its values at the four corners, so that the solid is a polyhedron, exactly: the tetrahedron
-//! is cut by one plane after the other, and what lies between a solid and a void piece is surface. Faces of second
+//! is cut by one plane after the other, and what lies between a solid and a void piece is surface. Surfaces of second
 //! order smoothness are met to second order, and so are the curves and points where they meet, for nothing depends on
-//! a node of the grid lying within a wedge. Neighbouring tetrahedra see the same planes on their common side. A plain
-//! neighbour of a knotted cell gets a vertex inside and the cone from it over its rim, to which the points on the
-//! common side's diagonal are added.
+//! a node of the grid lying within a wedge. Neighbouring tetrahedra see the same planes on their common face. A plain
+//! neighbour of a feature cell gets a vertex inside and the cone from it over its boundary loop, to which the points on the
+//! common face's diagonal are added.
 //!
-//! A vertex is named by the simplex of nodes that it lies in and the faces that meet there, and its place is computed
+//! A vertex is named by the simplex of nodes that it lies in and the surfaces that meet there, and its position is computed
 //! from these alone; so it is the same from whichever cell, tile or thread.
 //!
 //! Source: planes in tetrahedra, as X. Du, Q. Zhou, N. Carr and T. Ju, Robust computation of implicit surface networks
 //! for piecewise linear functions, ACM Trans. Graph. 41 (2022) 41; the division after H. Freudenthal (1942).
 
-mod simplex;
+mod simplex_cut;
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -23,25 +23,25 @@ use geometry::math::{Vec3, add, scale};
 use geometry::mesh::{Mesh, is_embedded};
 use rustc_hash::FxHashMap;
 
-use super::crease::{Edges, Fits};
-use super::grid::{Grid, Local};
-use super::key::Key;
-use super::signs::Signs;
-use super::table::{CASES, EDGES};
+use super::cube_table::{CASES, EDGES};
+use super::feature_edges::{DividedFaces, EdgeStore};
+use super::sampling_grid::{Grid, LocalSolid};
+use super::sign_words::Signs;
 use super::tile::{Nodes, Numbers, numbered};
-pub(super) use simplex::{Simplex, Spot};
+use super::vertex_id::VertexId;
+pub(super) use simplex_cut::{CutVertex, Simplex};
 
 /// What is not on plain cells' edges.
 #[derive(Default)]
-pub(super) struct Extra {
-    names: FxHashMap<Key, u32>,
+pub(super) struct FeatureMesh {
+    names: FxHashMap<VertexId, u32>,
     /// The names of the extra vertices.
-    pub keys: Vec<Key>,
+    pub keys: Vec<VertexId>,
     /// Triangles, and whether they lie on the region's surface.
     pub triangles: Vec<([u32; 3], bool)>,
 }
 
-impl Extra {
+impl FeatureMesh {
     pub fn clear(&mut self) {
         self.names.clear();
         self.keys.clear();
@@ -50,19 +50,19 @@ impl Extra {
 }
 
 /// The block as it is while extra vertices and triangles are added.
-pub(super) struct Knots<'a> {
+pub(super) struct FeatureCells<'a> {
     pub nodes: &'a Nodes<'a>,
     pub grid: &'a Grid,
-    pub local: &'a Local,
+    pub local: &'a LocalSolid,
     pub samples: &'a [Vec<f32>],
     pub signs: &'a Signs,
     pub numbers: &'a [Numbers],
-    pub places: &'a mut Vec<Vec3>,
-    pub extra: &'a mut Extra,
-    pub edges: &'a Edges,
-    /// Nodes at which the faces are moved a little.
-    pub moved: HashSet<usize>,
-    pub fits: Fits,
+    pub positions: &'a mut Vec<Vec3>,
+    pub extra: &'a mut FeatureMesh,
+    pub edges: &'a EdgeStore,
+    /// Nodes at which the surfaces are moved a little.
+    pub perturbed_nodes: HashSet<usize>,
+    pub divided_faces: DividedFaces,
 }
 
 /// The six ways from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron they make
@@ -76,43 +76,43 @@ pub(super) fn middle(points: &[Vec3]) -> Vec3 {
     scale(sum, 1.0 / points.len() as f64)
 }
 
-impl Knots<'_> {
+impl FeatureCells<'_> {
     /// The vertex of a name; made if it is new.
-    pub fn vertex(&mut self, key: Key) -> u32 {
+    pub fn vertex(&mut self, key: VertexId) -> u32 {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
         }
         let n = self.numbered(key).unwrap_or_else(|| {
-            let own = self.edges.place(key);
-            self.push(key, own.unwrap_or_else(|| self.place(key)))
+            let own = self.edges.position(key);
+            self.push(key, own.unwrap_or_else(|| self.position(key)))
         });
         self.extra.names.insert(key, n);
         n
     }
 
-    /// The vertex of a name that has this place; made if it is new.
-    pub fn named(&mut self, key: Key, place: Vec3) -> u32 {
+    /// The vertex of a name that has this position; made if it is new.
+    pub fn vertex_at(&mut self, key: VertexId, position: Vec3) -> u32 {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
         }
-        let n = self.push(key, place);
+        let n = self.push(key, position);
         self.extra.names.insert(key, n);
         n
     }
 
     /// The number of a vertex that a plain cell has too.
-    pub fn numbered(&self, key: Key) -> Option<u32> {
+    pub fn numbered(&self, key: VertexId) -> Option<u32> {
         numbered(self.numbers, self.nodes, key)
     }
 
-    pub fn push(&mut self, key: Key, place: Vec3) -> u32 {
-        self.places.push(place);
+    pub fn push(&mut self, key: VertexId, position: Vec3) -> u32 {
+        self.positions.push(position);
         self.extra.keys.push(key);
-        self.places.len() as u32 - 1
+        self.positions.len() as u32 - 1
     }
 
     /// Adds a convex polygon by its vertices' names.
-    pub fn polygon(&mut self, ring: &[Key], cut: bool) {
+    pub fn polygon(&mut self, ring: &[VertexId], cut: bool) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         self.fan(&names, cut);
     }
@@ -124,13 +124,13 @@ impl Knots<'_> {
         }
     }
 
-    /// Fills a plain cell beside a knotted one.
-    pub fn seam(&mut self, cell: [usize; 3], face: usize) {
+    /// Fills a plain cell next to a feature one.
+    pub fn seam(&mut self, cell: [usize; 3], surface: usize) {
         let [i, j, k] = cell;
         let node = self.nodes.index(cell);
-        let case = &CASES[self.signs.corners(face, i, j, k)];
+        let case = &CASES[self.signs.corners(surface, i, j, k)];
         let n = case.ring.len();
-        let mut ring: Vec<Key> = Vec::with_capacity(2 * n);
+        let mut ring: Vec<VertexId> = Vec::with_capacity(2 * n);
         let ends = |e: u8| {
             let (corner, axis) = EDGES[e as usize];
             (corner, corner | 1 << axis)
@@ -138,8 +138,8 @@ impl Knots<'_> {
         for at in 0..n {
             let (e, next) = (case.ring[at], case.ring[(at + 1) % n]);
             let ((a, b), (c, d)) = (ends(e), ends(next));
-            ring.push(Key::new(node + self.offset(a), &[a ^ b], &[face]));
-            // The side that both edges lie in, and the cell across it.
+            ring.push(VertexId::new(node + self.offset(a), &[a ^ b], &[surface]));
+            // The face that both edges lie in, and the cell across it.
             let Some(axis) = (0..3).find(|x| [b, c, d].iter().all(|m| (m ^ a) >> x & 1 == 0)) else {
                 continue;
             };
@@ -152,14 +152,14 @@ impl Knots<'_> {
             } else {
                 continue;
             }
-            if !self.signs.is_knotted(across) {
+            if !self.signs.is_feature(across) {
                 continue;
             }
-            let key = |k: &Self, c: usize, d: usize| Key::new(node + k.offset(c & d), &[c ^ d], &[face]);
+            let key = |k: &Self, c: usize, d: usize| VertexId::new(node + k.offset(c & d), &[c ^ d], &[surface]);
             let from = key(self, a, b);
-            ring.extend(self.trace(cell, axis, upper, face, from).0);
+            ring.extend(self.trace(cell, axis, upper, surface, from).0);
         }
-        let cut = self.grid.faces[self.local.live[face]].cut;
+        let cut = self.grid.surfaces[self.local.live[surface]].cut;
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         if names.len() == n {
             // Nothing was added: the plain patch will do.
@@ -167,101 +167,101 @@ impl Knots<'_> {
             self.extra.triangles.extend(case.triangles[..case.count].iter().map(|t| (t.map(name), cut)));
             return;
         }
-        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
-        self.cone(Key::center(node, 7), middle(&rim), &names, cut);
+        let boundary_loop: Vec<Vec3> = names.iter().map(|v| self.positions[*v as usize]).collect();
+        self.cone(VertexId::center(node, 7), middle(&boundary_loop), &names, cut);
     }
 
     /// Adds the cone over a ring of vertices from a new one.
-    pub fn cone(&mut self, apex: Key, place: Vec3, ring: &[u32], cut: bool) {
-        let middle = self.push(apex, place);
+    pub fn cone(&mut self, apex: VertexId, position: Vec3, ring: &[u32], cut: bool) {
+        let middle = self.push(apex, position);
         for at in 0..ring.len() {
             let (a, b) = (ring[at], ring[(at + 1) % ring.len()]);
             self.extra.triangles.push(([middle, a, b], cut));
         }
     }
 
-    /// Adds a polygon in the side of a cell that spans two axes; it may have straight angles.
-    pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[Key]) {
+    /// Adds a polygon in the face of a cell that spans two axes; it may have straight angles.
+    pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[VertexId]) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
-        let rim: Vec<Vec3> = names.iter().map(|v| self.places[*v as usize]).collect();
-        self.cone(Key::center(low, span), middle(&rim), &names, true);
+        let boundary_loop: Vec<Vec3> = names.iter().map(|v| self.positions[*v as usize]).collect();
+        self.cone(VertexId::center(low, span), middle(&boundary_loop), &names, true);
     }
 
-    /// Whether cells are fitted to a face.
-    pub fn is_fitted(&self, face: usize) -> bool {
-        self.grid.fitted == Some(self.local.live[face])
+    /// Whether cells are fitted to a surface.
+    pub fn is_fitted(&self, surface: usize) -> bool {
+        self.grid.fitted == Some(self.local.live[surface])
     }
 
     /// Which signs are solid in a cell.
-    pub fn holds(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
+    pub fn is_solid(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
         let live = self.local.live.len();
         let sign = |f: usize| match f.checked_sub(live) {
-            Some(flat) => Signs::beside(self.local, flat, j, k) >> i,
+            Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
             None => negative >> f,
         };
         self.local.tree.solid(&sign) & 1 == 1
     }
 
-    /// Cuts up a knotted cell.
+    /// Cuts up a feature cell.
     pub fn cell(&mut self, cell: [usize; 3]) {
         let node = self.nodes.index(cell);
         for ([one, two], right) in PATHS {
             let simplex = self.simplex(node, &[one, two, 7]);
-            let (negative, mixed) = self.faces_of(&simplex);
-            if mixed == 0 || self.holds(cell, negative) == self.holds(cell, negative | mixed) {
+            let (negative, mixed) = self.signs_of(&simplex);
+            if mixed == 0 || self.is_solid(cell, negative) == self.is_solid(cell, negative | mixed) {
                 continue;
             }
-            for piece in self.cut(&simplex, right, (negative, mixed), [None; 4]) {
-                if !self.holds(cell, piece.negative) {
+            for fragment in self.cut(&simplex, right, (negative, mixed), [None; 4]) {
+                if !self.is_solid(cell, fragment.negative) {
                     continue;
                 }
-                for side in &piece.sides {
-                    let Some(f) = side.face else { continue };
-                    if self.holds(cell, piece.negative & !(1 << f)) {
+                for facet in &fragment.facets {
+                    let Some(f) = facet.surface else { continue };
+                    if self.is_solid(cell, fragment.negative & !(1 << f)) {
                         continue;
                     }
-                    let ring: Vec<Key> = side.ring.iter().map(|s| self.key(&simplex, *s)).collect();
-                    let cut = self.grid.faces[self.local.live[f]].cut;
+                    let ring: Vec<VertexId> = facet.ring.iter().map(|s| self.key(&simplex, *s)).collect();
+                    let cut = self.grid.surfaces[self.local.live[f]].cut;
                     self.polygon(&ring, cut);
                 }
             }
         }
-        for flat in &self.local.flat {
+        for flat in &self.local.grid_planes {
             let layer = if flat.below { flat.at - 1 } else { flat.at };
             if cell[flat.axis] == layer {
-                self.cut_side(cell, flat.axis, flat.below);
+                self.cap_face(cell, flat.axis, flat.below);
             }
         }
     }
 
-    /// Cuts up all knotted cells of the block, and keeps what belongs to the tile.
+    /// Cuts up all feature cells of the block, and keeps what belongs to the tile.
     ///
     /// Exact arithmetic would end here: the pieces of a tetrahedron meet only where they should. But planes may pass so
-    /// near to each other's common points that single precision mixes them up. Where that happens in a cell the faces
+    /// near to each other's common points that single precision mixes them up. Where that happens in a cell the surfaces
     /// are moved by chance at its nodes, by far less than the cell is wide, and the cells there are cut again.
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
         let fitted = |c: &[usize; 3]| self.edges.is_fitted(self.nodes, *c);
-        let cells = self.signs.knotted_cells().filter(|c| !fitted(c));
+        let cells = self.signs.feature_cells().filter(|c| !fitted(c));
         let cells: Vec<[usize; 3]> = cells.collect();
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
         // Not moved before all have been looked at: what is found in a cell must not depend on the cells before it, which
         // a neighbouring tile may not see.
-        let mut moved = HashSet::new();
+        let mut perturbed_nodes = HashSet::new();
         for c in &cells {
             let first = self.extra.triangles.len();
             self.cell(*c);
-            if self.muddled(first) {
+            if self.self_intersects_rounded(first) {
                 let node = self.nodes.index(*c);
                 let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| node + self.offset(corner));
-                moved.extend(corners);
+                perturbed_nodes.extend(corners);
             }
             if !mine(c) {
                 self.extra.triangles.truncate(first);
             }
         }
-        self.moved = moved;
-        if !self.moved.is_empty() {
-            self.places.truncate(self.places.len() - self.extra.keys.len());
+        self.perturbed_nodes = perturbed_nodes;
+        if !self.perturbed_nodes.is_empty() {
+            self.positions.truncate(self.positions.len() - self.extra.keys.len());
             self.extra.clear();
             for c in cells.iter().filter(|c| mine(c)) {
                 self.cell(*c);
@@ -270,12 +270,12 @@ impl Knots<'_> {
     }
 
     /// Whether the triangles from the `first` on touch where they should not, once rounded to single precision.
-    pub fn muddled(&self, first: usize) -> bool {
-        self.touch(first, |x| f64::from(x as f32))
+    pub fn self_intersects_rounded(&self, first: usize) -> bool {
+        self.self_intersects(first, |x| f64::from(x as f32))
     }
 
     /// Whether the triangles from the `first` on touch where they should not, once rounded somehow.
-    pub fn touch(&self, first: usize, rounded: impl Fn(f64) -> f64) -> bool {
+    pub fn self_intersects(&self, first: usize, rounded: impl Fn(f64) -> f64) -> bool {
         let triangles = &self.extra.triangles[first..];
         let mut mesh = Mesh::default();
         let mut names: Vec<u32> = Vec::with_capacity(32);
@@ -283,7 +283,7 @@ impl Knots<'_> {
             mesh.triangles.push(t.map(|v| {
                 let at = names.iter().position(|n| *n == v).unwrap_or_else(|| {
                     names.push(v);
-                    mesh.vertices.push(self.places[v as usize].map(&rounded));
+                    mesh.vertices.push(self.positions[v as usize].map(&rounded));
                     names.len() - 1
                 });
                 at as u32
@@ -293,22 +293,22 @@ impl Knots<'_> {
         (1..names.len()).any(same) || !is_embedded(&mesh)
     }
 
-    /// The side of a cell along an axis, divided by the faces that cross it: the pieces of its two triangles with the
-    /// faces that are negative there, counter-clockwise seen from outside the cell.
-    pub(super) fn side_pieces(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<Key>)> {
+    /// The face of a cell along an axis, divided by the surfaces that cross it: the pieces of its two triangles with the
+    /// surfaces that are negative there, counter-clockwise seen from outside the cell.
+    pub(super) fn face_fragments(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<VertexId>)> {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
         let mut all = Vec::new();
         for (step, right) in [(u, true), (v, false)] {
             let simplex = self.simplex(node, &[step, u | v]);
-            let (negative, mixed) = self.faces_of(&simplex);
-            let mut ring: Vec<Spot> = (0..3).map(|c| Spot { corners: 1 << c, faces: 0 }).collect();
+            let (negative, mixed) = self.signs_of(&simplex);
+            let mut ring: Vec<CutVertex> = (0..3).map(|c| CutVertex { corners: 1 << c, surfaces: 0 }).collect();
             if right != upper {
                 ring.reverse();
             }
-            let pieces = self.split_by(&simplex, negative, mixed, ring);
+            let fragments = self.split_by(&simplex, negative, mixed, ring);
             all.extend(
-                pieces
+                fragments
                     .into_iter()
                     .map(|(negative, ring)| (negative, ring.iter().map(|s| self.key(&simplex, *s)).collect())),
             );
@@ -316,36 +316,43 @@ impl Knots<'_> {
         all
     }
 
-    /// The cap of a knotted cell on its lower or upper side along an axis.
-    fn cut_side(&mut self, cell: [usize; 3], axis: usize, upper: bool) {
-        for (negative, ring) in self.side_pieces(cell, axis, upper) {
-            if self.holds(cell, negative) {
+    /// The cap of a feature cell on its lower or upper face along an axis.
+    fn cap_face(&mut self, cell: [usize; 3], axis: usize, upper: bool) {
+        for (negative, ring) in self.face_fragments(cell, axis, upper) {
+            if self.is_solid(cell, negative) {
                 self.polygon(&ring, true);
             }
         }
     }
 
-    /// The points after one on the line in which a face crosses the side of a cell, up to the next grid edge; and the one
+    /// The points after one on the line in which a surface crosses the face of a cell, up to the next grid edge; and the one
     /// there.
-    pub fn trace(&self, cell: [usize; 3], axis: usize, upper: bool, face: usize, from: Key) -> (Vec<Key>, Option<Key>) {
-        let mut steps: Vec<(Key, Key)> = Vec::new();
-        let on = |k: &Key| k.faces().any(|f| f == face);
+    pub fn trace(
+        &self,
+        cell: [usize; 3],
+        axis: usize,
+        upper: bool,
+        surface: usize,
+        from: VertexId,
+    ) -> (Vec<VertexId>, Option<VertexId>) {
+        let mut steps: Vec<(VertexId, VertexId)> = Vec::new();
+        let on = |k: &VertexId| k.surfaces().any(|f| f == surface);
         let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
-        let fitted = self.fits.sides.get(&(low, axis));
-        if let Some(side) = fitted.filter(|_| self.is_fitted(face)) {
-            let chords = side.chords.iter();
-            steps.extend(chords.flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
+        let fitted = self.divided_faces.faces.get(&(low, axis));
+        if let Some(facet) = fitted.filter(|_| self.is_fitted(surface)) {
+            let contours = facet.contours.iter();
+            steps.extend(contours.flat_map(|c| c.windows(2).map(|w| (w[0], w[1]))));
         } else {
-            let mut add = |negative: u64, ring: &[Key]| {
-                if negative >> face & 1 == 1 {
+            let mut add = |negative: u64, ring: &[VertexId]| {
+                if negative >> surface & 1 == 1 {
                     let edges = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
                     steps.extend(edges.filter(|(a, b)| on(a) && on(b)));
                 }
             };
             match fitted {
-                Some(side) => side.pieces().for_each(|(n, ring)| add(n, ring)),
+                Some(facet) => facet.fragments().for_each(|(n, ring)| add(n, ring)),
                 None => {
-                    let cut = self.side_pieces(cell, axis, upper);
+                    let cut = self.face_fragments(cell, axis, upper);
                     cut.iter().for_each(|(n, ring)| add(*n, ring));
                 }
             }

@@ -16,7 +16,7 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
             p[0] * q[1] - p[1] * q[0]
         })
         .sum();
-    let way = if area > 0.0 { 1 } else { -1 };
+    let orientation = if area > 0.0 { 1 } else { -1 };
     // For the part from i to j, the height of its flattest triangle and the corner over the diagonal.
     let mut best = vec![(f64::INFINITY, 0); n * n];
     for reach in 2..n {
@@ -24,7 +24,7 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
             let j = i + reach;
             let over = |k: usize| {
                 let corners = [i, k, j].map(|c| ring[c]);
-                let turns = orient2d(corners[0], corners[1], corners[2]) * way > 0;
+                let turns = orient2d(corners[0], corners[1], corners[2]) * orientation > 0;
                 let own = if turns { height(corners) * weight([i, k, j], other) } else { f64::NEG_INFINITY };
                 (own.min(best[i * n + k].0).min(best[k * n + j].0), k)
             };
@@ -45,11 +45,11 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
     found
 }
 
-/// The height of a triangle above its longest side, as a share of that.
+/// The height of a triangle above its longest face, as a share of that.
 fn height([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    let side = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
+    let face = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    area.abs() / side(a, b).max(side(b, c)).max(side(c, a))
+    area.abs() / face(a, b).max(face(b, c)).max(face(c, a))
 }
 
 /// One, or by `other` something from a quarter to one.
@@ -88,9 +88,9 @@ mod tests {
         let mut back = comb;
         back.reverse();
         for other in 0..5 {
-            for (ring, way) in [(&comb, 1.0), (&back, -1.0)] {
+            for (ring, orientation) in [(&comb, 1.0), (&back, -1.0)] {
                 let found = triangles(ring, other);
-                let areas: Vec<f64> = found.iter().map(|t| area(ring, *t) * way).collect();
+                let areas: Vec<f64> = found.iter().map(|t| area(ring, *t) * orientation).collect();
                 assert_eq!(areas.len(), 7);
                 assert!(areas.iter().all(|a| *a > 0.0), "{areas:?}");
                 // Its back of 4 by 1 and its teeth: 1, 1, 1.5 and 0.5.
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn points_of_one_line_are_not_joined() {
-        // Four corners of a square, and two points of a side of it but for 1e-9: cut off by themselves they are nothing.
+        // Four corners of a square, and two points of a face of it but for 1e-9: cut off by themselves they are nothing.
         let ring = [[0.0, 0.0], [0.3, 1e-9], [0.6, -1e-9], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         for other in 0..8 {
             let flattest = triangles(&ring, other).into_iter().map(|t| height(t.map(|i| ring[i])));

@@ -1,22 +1,22 @@
-//! What the signs of the faces at the nodes say of the cells of a block, 64 cells at a time.
+//! What the signs of the surfaces at the nodes say of the cells of a block, 64 cells at a time.
 
 use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::grid::Local;
-use super::table::CASES;
+use super::cube_table::CASES;
+use super::sampling_grid::LocalSolid;
 
 /// The words of signs in a block. Rows of nodes and rows of cells have the same numbers: y + ny · z.
 #[derive(Default)]
 pub(super) struct Signs {
     pub shape: [usize; 3],
-    /// For each live face and each row of nodes: where it is negative.
+    /// For each live surface and each row of nodes: where it is negative.
     pub negative: Vec<Vec<u64>>,
-    /// For each live face and each row of cells: the cells that it alone crosses, in one plain patch.
+    /// For each live surface and each row of cells: the cells that it alone crosses, in one plain patch.
     pub plain: Vec<Vec<u64>>,
-    /// For each row of cells: those where faces meet, or one face makes more than a plain patch.
-    pub knotted: Vec<u64>,
+    /// For each row of cells: those where surfaces meet, or one surface makes more than a plain patch.
+    pub featured: Vec<u64>,
 }
 
 /// The bits below `n`.
@@ -25,9 +25,9 @@ pub(super) fn below(n: usize) -> u64 {
 }
 
 impl Signs {
-    /// The cells of row (j, k) on the solid side of a laid face.
-    pub fn beside(local: &Local, flat: usize, j: usize, k: usize) -> u64 {
-        let f = &local.flat[flat];
+    /// The cells of row (j, k) on the solid side of a grid-aligned plane.
+    pub fn adjacent(local: &LocalSolid, flat: usize, j: usize, k: usize) -> u64 {
+        let f = &local.grid_planes[flat];
         let lower = match f.axis {
             0 => below(f.at),
             1 => [0, u64::MAX][usize::from(j < f.at)],
@@ -36,25 +36,25 @@ impl Signs {
         if f.below { lower } else { !lower }
     }
 
-    /// Cells of row (j, k) in which a face is negative at some corner, and at all.
+    /// Cells of row (j, k) in which a surface is negative at some corner, and at all.
     #[inline(always)]
-    fn some_and_all(&self, face: usize, j: usize, k: usize) -> (u64, u64) {
-        let n = &self.negative[face];
+    fn some_and_all(&self, surface: usize, j: usize, k: usize) -> (u64, u64) {
+        let n = &self.negative[surface];
         let row = k * self.shape[1] + j;
         let w = [row, row + 1, row + self.shape[1], row + self.shape[1] + 1].map(|r| n[r]);
         let (some, all) = (w[0] | w[1] | w[2] | w[3], w[0] & w[1] & w[2] & w[3]);
         (some | some >> 1, all & all >> 1)
     }
 
-    /// For each row of nodes, those at cells that can hold solid as far as the first `known` live faces tell.
-    pub fn wanted(&self, local: &Local, known: usize) -> Vec<u64> {
+    /// For each row of nodes, those at cells that can hold solid as far as the first `known` live surfaces tell.
+    pub fn wanted(&self, local: &LocalSolid, known: usize) -> Vec<u64> {
         let [nx, ny, nz] = self.shape;
         let mut nodes = vec![0u64; ny * nz];
         let inner = below(nx - 1);
         for k in 0..nz - 1 {
             for j in 0..ny - 1 {
                 let solid = local.tree.solid(&|f| match f.checked_sub(local.live.len()) {
-                    Some(flat) => Signs::beside(local, flat, j, k),
+                    Some(flat) => Signs::adjacent(local, flat, j, k),
                     None if f < known => self.some_and_all(f, j, k).0,
                     None => u64::MAX,
                 }) & inner;
@@ -68,24 +68,24 @@ impl Signs {
     }
 
     /// Sorts the cells; whether any holds surface.
-    pub fn sort(&mut self, local: &Local) -> bool {
+    pub fn sort(&mut self, local: &LocalSolid) -> bool {
         let [nx, ny, nz] = self.shape;
-        let faces = self.negative.len();
-        self.plain.resize_with(faces, Vec::new);
+        let surfaces = self.negative.len();
+        self.plain.resize_with(surfaces, Vec::new);
         for p in &mut self.plain {
             p.clear();
             p.resize(ny * nz, 0);
         }
-        self.knotted.clear();
-        self.knotted.resize(ny * nz, 0);
+        self.featured.clear();
+        self.featured.resize(ny * nz, 0);
         let inner = below(nx - 1);
-        let mut seen = vec![(0u64, 0u64); faces];
-        let mut decides = vec![0u64; faces];
+        let mut context = vec![(0u64, 0u64); surfaces];
+        let mut decides = vec![0u64; surfaces];
         let mut found = false;
         for k in 0..nz - 1 {
             for j in 0..ny - 1 {
                 let mut crossed = 0u64;
-                for (f, s) in seen.iter_mut().enumerate() {
+                for (f, s) in context.iter_mut().enumerate() {
                     *s = self.some_and_all(f, j, k);
                     crossed |= s.0 & !s.1;
                 }
@@ -93,20 +93,20 @@ impl Signs {
                     continue;
                 }
                 decides.fill(0);
-                let beside = |f: usize| Signs::beside(local, f - faces, j, k);
+                let adjacent = |f: usize| Signs::adjacent(local, f - surfaces, j, k);
                 local.tree.deciding(
                     crossed & inner,
-                    &|f| if f < faces { seen[f].0 } else { beside(f) },
-                    &|f| if f < faces { seen[f].1 } else { beside(f) },
-                    &mut |f, places| {
-                        if f < faces {
-                            decides[f] |= places;
+                    &|f| if f < surfaces { context[f].0 } else { adjacent(f) },
+                    &|f| if f < surfaces { context[f].1 } else { adjacent(f) },
+                    &mut |f, positions| {
+                        if f < surfaces {
+                            decides[f] |= positions;
                         }
                     },
                 );
-                let (mut once, mut twice) = (0u64, 0u64);
+                let (mut once, mut double_crossings) = (0u64, 0u64);
                 for d in &decides {
-                    twice |= once & d;
+                    double_crossings |= once & d;
                     once |= d;
                 }
                 if once == 0 {
@@ -114,63 +114,63 @@ impl Signs {
                 }
                 found = true;
                 let row = k * ny + j;
-                let mut knotted = twice;
-                for f in 0..faces {
-                    let one = decides[f] & !twice;
+                let mut featured = double_crossings;
+                for f in 0..surfaces {
+                    let one = decides[f] & !double_crossings;
                     let odd = self.odd(f, j, k, one);
-                    knotted |= odd;
+                    featured |= odd;
                     self.plain[f][row] = one & !odd;
                 }
-                self.knotted[row] = knotted;
+                self.featured[row] = featured;
             }
         }
         found
     }
 
-    /// Those of the cells whose patch is not plain: several loops, or corners that touch across a face.
+    /// Those of the cells whose patch is not plain: several loops, or corners that touch across a surface.
     #[inline(always)]
-    fn odd(&self, face: usize, j: usize, k: usize, cells: u64) -> u64 {
+    fn odd(&self, surface: usize, j: usize, k: usize, cells: u64) -> u64 {
         let mut odd = 0;
         let mut bits = cells;
         while bits != 0 {
             let i = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            odd |= u64::from(!CASES[self.corners(face, i, j, k)].plain) << i;
+            odd |= u64::from(!CASES[self.corners(surface, i, j, k)].plain) << i;
         }
         odd
     }
 
-    /// The pattern of a cell's corners at which a face is negative; corner bits are x = 1, y = 2, z = 4.
+    /// The pattern of a cell's corners at which a surface is negative; corner bits are x = 1, y = 2, z = 4.
     #[inline(always)]
-    pub fn corners(&self, face: usize, i: usize, j: usize, k: usize) -> usize {
-        let n = &self.negative[face];
+    pub fn corners(&self, surface: usize, i: usize, j: usize, k: usize) -> usize {
+        let n = &self.negative[surface];
         let row = k * self.shape[1] + j;
         let pair = |r: usize| (n[r] >> i & 3) as usize;
         pair(row) | pair(row + 1) << 2 | pair(row + self.shape[1]) << 4 | pair(row + self.shape[1] + 1) << 6
     }
 
-    /// Whether a face is negative at a node.
+    /// Whether a surface is negative at a node.
     #[inline]
-    pub fn is_negative(&self, face: usize, node: usize) -> bool {
+    pub fn is_negative(&self, surface: usize, node: usize) -> bool {
         let nx = self.shape[0];
-        self.negative[face][node / nx] >> (node % nx) & 1 == 1
+        self.negative[surface][node / nx] >> (node % nx) & 1 == 1
     }
 
-    /// Whether a cell of the block is knotted.
+    /// Whether a cell of the block is feature.
     #[inline]
-    pub fn is_knotted(&self, cell: [usize; 3]) -> bool {
-        self.knotted[cell[2] * self.shape[1] + cell[1]] >> cell[0] & 1 == 1
+    pub fn is_feature(&self, cell: [usize; 3]) -> bool {
+        self.featured[cell[2] * self.shape[1] + cell[1]] >> cell[0] & 1 == 1
     }
 
-    /// Whether any cell of the block is knotted.
-    pub fn is_any_knotted(&self) -> bool {
-        self.knotted.iter().any(|w| *w != 0)
+    /// Whether any cell of the block is feature.
+    pub fn has_features(&self) -> bool {
+        self.featured.iter().any(|w| *w != 0)
     }
 
-    /// The knotted cells of the block.
-    pub fn knotted_cells(&self) -> impl Iterator<Item = [usize; 3]> {
+    /// The feature cells of the block.
+    pub fn feature_cells(&self) -> impl Iterator<Item = [usize; 3]> {
         let ny = self.shape[1];
-        self.knotted.iter().enumerate().flat_map(move |(row, w)| bits(*w).map(move |i| [i, row % ny, row / ny]))
+        self.featured.iter().enumerate().flat_map(move |(row, w)| bits(*w).map(move |i| [i, row % ny, row / ny]))
     }
 
     /// For a word of cells in each row: the grid edges along `axis` that belong to any of them, for row (j, k).

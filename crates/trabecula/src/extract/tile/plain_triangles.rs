@@ -5,22 +5,22 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::{Kind, Numbers, Plain, Scratch};
-use crate::extract::grid::{Grid, Local};
-use crate::extract::signs::{Signs, within};
-use crate::extract::table::{CASES, EDGES, MOST};
+use crate::extract::cube_table::{CASES, EDGES, MOST};
+use crate::extract::sampling_grid::{Grid, LocalSolid};
+use crate::extract::sign_words::{Signs, within};
 
-/// Lists the triangles of all plain cells of the block, halo included; and the plain cells beside knotted ones, which
-/// `knot` fills in its own way.
-pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &[Range<usize>; 3]) {
+/// Lists the triangles of all plain cells of the block, halo included; and the plain cells next to feature ones, which
+/// `feature cell` fills in its own way.
+pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, own: &[Range<usize>; 3]) {
     let Scratch { signs, numbers, plain, edges, .. } = s;
     plain.triangles.clear();
     plain.counts.clear();
     plain.kinds.clear();
     plain.seams.clear();
-    for (face, numbers) in numbers.iter().enumerate().take(local.live.len()) {
-        let kind = if grid.faces[local.live[face]].cut { Kind::Cut } else { Kind::Lattice };
+    for (surface, numbers) in numbers.iter().enumerate().take(local.live.len()) {
+        let kind = if grid.surfaces[local.live[surface]].cut { Kind::Cut } else { Kind::Lattice };
         let before = plain.triangles.len();
-        list_patches(signs, &edges.cells, numbers, face, own, kind, plain);
+        list_patches(signs, &edges.cells, numbers, surface, own, kind, plain);
         plain.counts.push(plain.triangles.len() - before);
     }
 }
@@ -28,9 +28,9 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &Local, own: &
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn list_patches(
     signs: &Signs,
-    edged: &[u64],
+    fill_edge_cell: &[u64],
     numbers: &Numbers,
-    face: usize,
+    surface: usize,
     own: &[Range<usize>; 3],
     kind: Kind,
     out: &mut Plain,
@@ -42,25 +42,25 @@ fn list_patches(
     for k in 0..nz - 1 {
         for j in 0..ny - 1 {
             let row = k * ny + j;
-            let mut bits = signs.plain[face][row];
+            let mut bits = signs.plain[surface][row];
             if bits == 0 {
                 continue;
             }
             let mine = if own[1].contains(&j) && own[2].contains(&k) { mine_x } else { 0 };
             let mut seam = 0;
             if mine != 0 {
-                let kn = &signs.knotted;
+                let kn = &signs.featured;
                 let here = kn[row];
                 // The block's last row of words holds no cells, so the upper neighbours exist; the lower ones do for
                 // cells of the tile itself, except at the grid's padding.
                 let below = if j > 0 { kn[row - 1] } else { 0 } | if k > 0 { kn[row - ny] } else { 0 };
-                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine & !edged[row];
+                seam = (here << 1 | here >> 1 | kn[row + 1] | kn[row + ny] | below) & mine & !fill_edge_cell[row];
             }
             // For each edge of a cell, the row of grid edges that it is of: its crossings, and the first one's number.
             let rows = [row, row + 1, row + ny, row + ny + 1];
             let crossed = EDGES.map(|(corner, axis)| numbers.crossed[axis][rows[corner >> 1]]);
             let first = EDGES.map(|(corner, axis)| numbers.offset[axis][rows[corner >> 1]]);
-            let signs = rows.map(|r| signs.negative[face][r]);
+            let signs = rows.map(|r| signs.negative[surface][r]);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
@@ -75,10 +75,10 @@ fn list_patches(
                     names[e] = first[e] + (crossed[e] & below[corner & 1]).count_ones();
                 }
                 let mut kind = if mine >> i & 1 == 1 { kind } else { Kind::Neighbour };
-                if edged[row] >> i & 1 == 1 {
+                if fill_edge_cell[row] >> i & 1 == 1 {
                     kind = Kind::Neighbour;
                 } else if seam >> i & 1 == 1 {
-                    seams.push(([i, j, k], face));
+                    seams.push(([i, j, k], surface));
                     kind = Kind::Neighbour;
                 }
                 let count = triangles.len() + case.count;

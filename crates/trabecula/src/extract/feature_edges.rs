@@ -1,0 +1,434 @@
+//! Edges that a surface has of its own, such as those of a mesh: where it alone makes the surface, and (`fit`) where it meets
+//! others.
+//!
+//! The line in which a surface meets the face of a cell runs straight from one grid edge to another. Where an edge of the
+//! surface pierces the face it gets a corner there, if it lies nearer to the surface and its edges with it. A grid edge that the
+//! surface crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its boundary loop from a
+//! point of the surface's edge inside the cell, or several where edges divide it. A boundary loop is a simple curve on the boundary of a
+//! convex cell, so one cone cannot meet itself; several are looked at. What a face or a grid edge gets depends on nothing but
+//! what all cells around it see alike.
+//!
+//! Source: corners in the faces of cells after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares,
+//! Comput. Graph. Forum 24 (2005) 537.
+
+mod boundary_loops;
+mod cell_faces;
+mod contours;
+mod double_crossings;
+mod edge_graph;
+mod fallback_fill;
+mod fill_fitted;
+mod fitted_cells;
+mod polygon_triangulation;
+mod subvolumes;
+mod surface_patch;
+mod trace_edges;
+
+use std::cmp::Ordering;
+
+use rustc_hash::FxHashMap;
+
+use crate::field::Field;
+use geometry::math::{Vec3, add, dot, scale, sub};
+
+use super::sampling_grid::{Grid, LocalSolid};
+use super::sign_words::{Signs, bits};
+use super::tile::Nodes;
+use super::vertex_id::VertexId;
+pub(super) use contours::Contour;
+pub(super) use fitted_cells::DividedFaces;
+use trace_edges::cell_of;
+pub(super) use trace_edges::{PaddedNodes, by_tile};
+
+/// An edge of a surface that passes a grid edge this near may pierce a face in which the surface does not show, in multiples of what
+/// points keep from nodes: a wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to keep.
+const NEAR_EDGE: f64 = 8.0;
+
+/// Edges of surfaces in the cells of a block.
+#[derive(Default)]
+pub(super) struct EdgeStore {
+    /// For each row of cells: those that are filled by their boundary loops.
+    pub cells: Vec<u64>,
+    /// Those of them in which the surface meets others, and which surface that is.
+    fitted: Vec<u64>,
+    fitted_to: Option<usize>,
+    /// The surface that has the edges.
+    pub surface: FxHashMap<usize, usize>,
+    /// The contours of faces, by the lowest node of the face and the axis normal to it.
+    faces: FxHashMap<(usize, usize), Vec<Contour>>,
+    /// Grid edges that a surface crosses twice, by the surface, their lower nodes and axes: the lower point first.
+    double_crossings: FxHashMap<(usize, usize, usize), [Vec3; 2]>,
+    /// The positions of points that nothing else has.
+    points: FxHashMap<VertexId, Vec3>,
+    /// Where edges of live surfaces pierce faces.
+    pierced: Vec<(usize, (usize, usize), Vec3)>,
+    /// Pieces of edges in cells, by the surface and the cells' lowest nodes.
+    segments: FxHashMap<(usize, usize), Vec<[Vec3; 2]>>,
+    /// Places where edges end, meet or bend, and how many are there, likewise.
+    corners: FxHashMap<(usize, usize), Vec<(Vec3, usize)>>,
+    /// The corner that the patch of a cell has in a cell next to it, likewise.
+    neighbour_corners: FxHashMap<usize, Vec3>,
+    /// For each row of nodes: those within two cells of a piece of an edge.
+    near: Vec<u64>,
+}
+
+/// A block, and a surface in it.
+pub(super) struct SurfaceContext<'a, P: Fn(usize, usize) -> Option<Vec3>> {
+    pub grid: &'a Grid,
+    pub local: &'a LocalSolid,
+    pub nodes: &'a Nodes<'a>,
+    pub signs: &'a Signs,
+    /// The surface's number among the live ones, its samples and its field.
+    pub surface: usize,
+    pub samples: &'a [f32],
+    pub field: &'a dyn Field,
+    /// The vertices of plain cells: by the lower node of their grid edge, and its axis.
+    pub position: P,
+}
+
+impl EdgeStore {
+    pub fn clear(&mut self, shape: [usize; 3]) {
+        self.cells.clear();
+        self.cells.resize(shape[1] * shape[2], 0);
+        self.fitted_to = None;
+        self.fitted.clear();
+        self.fitted.resize(shape[1] * shape[2], 0);
+        self.surface.clear();
+        self.faces.clear();
+        self.double_crossings.clear();
+        self.points.clear();
+        self.pierced.clear();
+        self.segments.clear();
+        self.corners.clear();
+        self.neighbour_corners.clear();
+        self.near.clear();
+        self.near.resize(shape[1] * shape[2], 0);
+    }
+
+    /// Whether a live surface has edges here.
+    pub fn has(&self, surface: usize) -> bool {
+        self.pierced.iter().any(|p| p.0 == surface) || self.surface.values().any(|f| *f == surface)
+    }
+
+    /// Whether there are any.
+    pub fn any(&self) -> bool {
+        !self.surface.is_empty()
+    }
+
+    /// The ends of all contours.
+    pub fn contour_ends(&self) -> impl Iterator<Item = VertexId> {
+        let contours = self.faces.values().flatten();
+        contours.flat_map(|c| [c.from, c.to])
+    }
+
+    /// The position of a point that is none of a plain or a feature cell.
+    pub fn position(&self, key: VertexId) -> Option<Vec3> {
+        self.points.get(&key).copied()
+    }
+
+    /// Takes the cells that a surface with edges alone crosses, in several patches, out of those to be cut up: such are
+    /// next to edges, mostly, where distances at nodes say little of where the surface is.
+    pub fn claim(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
+        let featured: Vec<[usize; 3]> = signs.feature_cells().collect();
+        for cell in featured {
+            let [i, j, k] = cell;
+            let (row, node) = (k * nodes.shape[1] + j, nodes.index(cell));
+            let crossed = !matches!(signs.corners(surface, i, j, k), 0 | 0xff);
+            if crossed && decides(local, signs, surface, cell) {
+                signs.featured[row] &= !(1 << i);
+                signs.plain[surface][row] |= 1 << i;
+                self.cells[row] |= 1 << i;
+                self.surface.insert(node, surface);
+            }
+        }
+    }
+
+    /// Adds the edges of a surface that were followed.
+    pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, context: &SurfaceContext<P>) {
+        let nodes = context.nodes;
+        let of = &context.grid.surfaces[context.local.live[context.surface]].creases;
+        if context.is_fitted() {
+            let own = self.segments.keys().filter(|p| p.0 == context.surface);
+            let cells: Vec<usize> = own.map(|p| p.1).collect();
+            self.find_double_crossings(context, cells);
+        }
+        // In the order of the segments where they pierce one face.
+        let mut at: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
+        for (_, face, p) in self.pierced.iter().filter(|p| p.0 == context.surface) {
+            at.entry(*face).or_default().push(context.inside(*face, *p));
+        }
+        // Faces whose four grid edges are all crossed.
+        for &node in self.surface.iter().filter(|f| *f.1 == context.surface).map(|f| f.0) {
+            for axis in 0..3 {
+                at.entry((node, axis)).or_default();
+                at.entry((node + nodes.stride[axis], axis)).or_default();
+            }
+        }
+        for &(_, node, axis) in self.double_crossings.keys().filter(|t| t.0 == context.surface) {
+            for face in faces_around(nodes, (node, axis)) {
+                at.entry(face).or_default();
+            }
+        }
+        let adjacent = self.adjacent(context, &at);
+        for face in adjacent.keys() {
+            at.entry(*face).or_default();
+        }
+        for (&face, pierced) in &at {
+            let also = adjacent.get(&face).map_or(&[][..], |p| p);
+            let Some(contours) = self.contours(context, face, pierced, also) else {
+                continue;
+            };
+            let mut cell = nodes.at(face.0);
+            for _ in 0..2 {
+                if context.is_sole_surface(cell) {
+                    self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
+                    self.surface.insert(nodes.index(cell), context.surface);
+                }
+                cell[face.1] = cell[face.1].wrapping_sub(1);
+            }
+            for c in &contours {
+                self.points.extend(c.via.iter().copied());
+            }
+            self.faces.insert(face, contours);
+        }
+        if self.any() {
+            for p in &of.corners {
+                if let Some(cell) = cell_of(nodes.axes, p.0) {
+                    let here = (context.surface, nodes.index(cell));
+                    self.corners.entry(here).or_default().push(*p);
+                }
+            }
+            self.find_neighbour_corners(context, &at);
+        }
+    }
+
+    /// The points in which edges pierce faces so near to a grid edge that the surface does not cross it twice: the faces around
+    /// that one may have their corners there too, or instead.
+    fn adjacent<P: Fn(usize, usize) -> Option<Vec3>>(
+        &self,
+        context: &SurfaceContext<P>,
+        pierced: &FxHashMap<(usize, usize), Vec<Vec3>>,
+    ) -> FxHashMap<(usize, usize), Vec<Vec3>> {
+        let nodes = context.nodes;
+        let mut found: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
+        for (&face, positions) in pierced {
+            for line in lines_of(nodes, face) {
+                let (node, along) = line;
+                if !context.ends_agree(line) || self.double_crossings.contains_key(&(context.surface, node, along)) {
+                    continue;
+                }
+                let (from, across) = (nodes.position(node), 3 - along - face.1);
+                let near = NEAR_EDGE * context.grid.margin * context.length(node, across);
+                let is_near = |p: &&Vec3| (p[across] - from[across]).abs() < near;
+                for p in positions.iter().filter(is_near) {
+                    for other in faces_around(nodes, line).into_iter().filter(|s| *s != face) {
+                        let mut q = *p;
+                        q[other.1] = from[other.1];
+                        found.entry(other).or_default().push(context.inside(other, q));
+                    }
+                }
+            }
+        }
+        // In an order that is the same in all tiles.
+        for positions in found.values_mut() {
+            positions.sort_by(|p, q| p.partial_cmp(q).unwrap_or(Ordering::Equal));
+        }
+        found
+    }
+
+    /// Finds the corners that lie in cells without any other surface, all their edges coming through one face: the patch
+    /// behind that face reaches through it. Its boundary loop lies on the boundary of the two cells together, which are convex.
+    fn find_neighbour_corners<P: Fn(usize, usize) -> Option<Vec3>>(
+        &mut self,
+        context: &SurfaceContext<P>,
+        pierced: &FxHashMap<(usize, usize), Vec<Vec3>>,
+    ) {
+        let nodes = context.nodes;
+        let mut found: Vec<(usize, Vec3)> = Vec::new();
+        for (&(_, node), corners) in self.corners.iter().filter(|c| c.0.0 == context.surface) {
+            let cell = nodes.at(node);
+            let [(position, count)] = corners[..] else {
+                continue;
+            };
+            let untouched = || context.is_sole_surface(cell) && context.untouched(cell);
+            if count < 3 || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
+                continue;
+            }
+            let faces = (0..3).flat_map(|a| [(a, false), (a, true)]);
+            let mut open = faces.filter_map(|(axis, upper)| {
+                let low = node + if upper { nodes.stride[axis] } else { 0 };
+                let here = pierced.get(&(low, axis)).map_or(0, Vec::len);
+                (here > 0).then_some((axis, upper, here))
+            });
+            let (Some((axis, upper, here)), None) = (open.next(), open.next()) else {
+                continue;
+            };
+            let plane = nodes.axes[axis][cell[axis] + usize::from(upper)];
+            if here != count || context.grid.is_grid_plane(axis, plane) {
+                continue;
+            }
+            let behind = if upper {
+                node + nodes.stride[axis]
+            } else if cell[axis] > 0 {
+                node - nodes.stride[axis]
+            } else {
+                continue;
+            };
+            let position = [0, 1, 2].map(|a| within(context.grid, nodes.axes[a], cell[a], position[a]));
+            found.push((behind, position));
+        }
+        // One for each patch.
+        found.sort_by_key(|f| f.0);
+        for pair in found.chunk_by(|a, b| a.0 == b.0) {
+            if let [(behind, position)] = pair {
+                self.neighbour_corners.insert(*behind, *position);
+            }
+        }
+    }
+}
+
+impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
+    /// Whether cells are fitted to the surface.
+    fn is_fitted(&self) -> bool {
+        self.grid.fitted == Some(self.local.live[self.surface])
+    }
+
+    /// Whether the surface alone makes the surface in a cell of the block, or would if it crossed it.
+    fn is_sole_surface(&self, cell: [usize; 3]) -> bool {
+        let (signs, [i, j, k]) = (self.signs, cell);
+        let row = k * signs.shape[1] + j;
+        if signs.featured[row] >> i & 1 == 1 {
+            return false;
+        }
+        if signs.plain[self.surface][row] >> i & 1 == 1 {
+            return true;
+        }
+        let live = self.local.live.len();
+        if (0..live).any(|f| signs.plain[f][row] >> i & 1 == 1) {
+            return false;
+        }
+        decides(self.local, signs, self.surface, cell)
+    }
+
+    /// Whether a grid edge that is not on the border of the block has both ends on the same side of the surface.
+    fn ends_agree(&self, (node, along): (usize, usize)) -> bool {
+        let (at, shape) = (self.nodes.at(node), self.nodes.shape);
+        let ends = [node, node + self.nodes.stride[along]];
+        (0..3).all(|a| at[a] > 0 && at[a] + 2 <= shape[a]) && {
+            let [p, q] = ends.map(|n| self.signs.is_negative(self.surface, n));
+            p == q
+        }
+    }
+
+    /// A point of a face kept within it.
+    fn inside(&self, (low, axis): (usize, usize), mut p: Vec3) -> Vec3 {
+        let at = self.nodes.at(low);
+        for a in (0..3).filter(|a| *a != axis) {
+            p[a] = within(self.grid, self.nodes.axes[a], at[a], p[a]);
+        }
+        p
+    }
+}
+
+/// What surfaces but one are at the corners of a cell.
+struct OtherSurfaces<'a> {
+    local: &'a LocalSolid,
+    cell: [usize; 3],
+    own: u64,
+    negative: u64,
+    varies: u64,
+}
+
+impl<'a> OtherSurfaces<'a> {
+    fn of(local: &'a LocalSolid, signs: &Signs, surface: usize, [i, j, k]: [usize; 3]) -> OtherSurfaces<'a> {
+        let (mut varies, mut negative) = (0u64, 0u64);
+        for f in (0..local.live.len()).filter(|f| *f != surface) {
+            match signs.corners(f, i, j, k) {
+                0 => {}
+                0xff => negative |= 1 << f,
+                _ => varies |= 1 << f,
+            }
+        }
+        OtherSurfaces { local, cell: [i, j, k], own: 1 << surface, negative, varies }
+    }
+
+    fn is_solid(&self, mask: u64) -> bool {
+        let [i, j, k] = self.cell;
+        let live = self.local.live.len();
+        let sign = |f: usize| match f.checked_sub(live) {
+            Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
+            None => mask >> f,
+        };
+        self.local.tree.solid(&sign) & 1 == 1
+    }
+
+    /// Whether the surface makes all the surface there may be, whatever the others are: the tree never falls when a surface becomes
+    /// negative, so two cases stand for all.
+    fn always_decides(&self) -> bool {
+        self.each_case(|without, with| with && !without)
+    }
+
+    /// Whether it makes a difference in none of the two cases.
+    fn never_decides(&self) -> bool {
+        self.each_case(|without, with| with == without)
+    }
+
+    fn each_case(&self, is: impl Fn(bool, bool) -> bool) -> bool {
+        let cases = [self.negative, self.negative | self.varies];
+        cases.iter().all(|n| is(self.is_solid(*n), self.is_solid(n | self.own)))
+    }
+
+    /// Whether there is no surface at all.
+    fn is_dead(&self) -> bool {
+        self.is_solid(self.negative) == self.is_solid(self.negative | self.varies | self.own)
+    }
+}
+
+/// Whether a surface alone would make the surface in a cell if it crossed it, whatever the other surfaces are there.
+fn decides(local: &LocalSolid, signs: &Signs, surface: usize, cell: [usize; 3]) -> bool {
+    OtherSurfaces::of(local, signs, surface, cell).always_decides()
+}
+
+/// The point of a segment nearest to another one.
+fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
+    let along = sub(q, p);
+    let square = dot(along, along);
+    let t = if square > 0.0 { (dot(sub(to, p), along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    add(p, scale(along, t))
+}
+
+/// The grid edges of a face: each by its lower node and its axis.
+fn lines_of(nodes: &Nodes, (low, axis): (usize, usize)) -> [(usize, usize); 4] {
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (du, dv) = (nodes.stride[u], nodes.stride[v]);
+    [(low, u), (low + du, v), (low + dv, u), (low, v)]
+}
+
+/// The faces around a grid edge that is not on the border of the block.
+fn faces_around(nodes: &Nodes, (node, along): (usize, usize)) -> [(usize, usize); 4] {
+    let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+    let (du, dv) = (nodes.stride[u], nodes.stride[v]);
+    [(node, u), (node - dv, u), (node, v), (node - du, v)]
+}
+
+/// A coordinate kept within a step of the grid, away from its ends.
+fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
+    let (low, high) = (axis[at], axis[at + 1]);
+    let margin = grid.margin * (high - low);
+    x.clamp(low + margin, high - margin)
+}
+
+/// The cells that have edges, among some.
+pub(super) fn cells(edges: &EdgeStore, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
+    let ny = nodes.shape[1];
+    let mut found = Vec::new();
+    for (row, w) in edges.cells.iter().enumerate() {
+        for i in bits(*w) {
+            let cell = [i, row % ny, row / ny];
+            if (0..3).all(|a| own[a].contains(&cell[a])) {
+                found.push((cell, edges.surface[&nodes.index(cell)]));
+            }
+        }
+    }
+    found
+}

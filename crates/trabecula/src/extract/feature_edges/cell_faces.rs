@@ -1,0 +1,395 @@
+//! The faces of cells that are fitted to a surface: cut along its contours and into triangles.
+//!
+//! What becomes of a face follows from the face alone, so that the cells next to it, in whichever tiles, agree. Where single
+//! precision makes intersect it, it is divided again into other triangles, with other values at its points, by chance, but of the same
+//! signs: then its grid edges stay what they are.
+
+use std::ops::Range;
+use std::rc::Rc;
+
+use super::polygon_triangulation::triangles;
+use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex};
+use crate::extract::sign_words::bits;
+use crate::extract::vertex_id::VertexId;
+use geometry::math::Vec3;
+use geometry::mesh::exact::{drop_axis, orient2d};
+
+/// A face of a cell, cut along its contours and into triangles.
+pub(in crate::extract) struct CellFace {
+    /// Its nodes and the points in it: number behind that of the nodes, number in the face, and name.
+    pub(super) corners: Vec<Corner>,
+    pub(super) parts: Vec<FaceTriangle>,
+    /// The parts cut by all other surfaces, as the faces of a feature cell are: the names of all their corners, and for each
+    /// the surfaces that are negative in it and where its names end.
+    names: Vec<VertexId>,
+    ends: Vec<(u64, usize)>,
+    /// The contours with the points where other surfaces cross them.
+    pub contours: Vec<Vec<VertexId>>,
+    /// How often it was divided anew.
+    pub(super) tries: usize,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Corner {
+    pub id: usize,
+    /// Nodes from 0 on, points of the four grid edges from 4 on in pairs, corners of contours from 12 on.
+    pub code: usize,
+    pub key: VertexId,
+}
+
+/// A triangle of a face.
+#[derive(Clone, Copy)]
+pub(super) struct FaceTriangle {
+    /// Among the corners, in rising order.
+    pub corners: [usize; 3],
+    /// Whether they run counter-clockwise about the face's axis.
+    pub left: bool,
+    /// Whether the surface is negative in it.
+    pub inside: bool,
+    /// Whether the line across from each corner is part of a contour.
+    pub on_contour: [bool; 3],
+}
+
+impl CellFace {
+    /// The parts cut by all other surfaces: those that are negative, and the corners counter-clockwise about the face's axis.
+    pub fn fragments(&self) -> impl Iterator<Item = (u64, &[VertexId])> {
+        let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
+        let each = starts.zip(&self.ends);
+        each.map(|(start, (negative, end))| (*negative, &self.names[start..*end]))
+    }
+}
+
+const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The surfaces that are negative in a polygon, and the names and positions of its corners.
+type Polygon = (u64, Vec<(VertexId, Vec3)>);
+
+/// How often a face is divided anew if single precision makes intersect it.
+const TRIES: usize = 8;
+
+/// The grid edges of a face that a corner lies on, as bits.
+fn lines(code: usize) -> u8 {
+    match code {
+        0..4 => 1 << code | 1 << ((code + 3) % 4),
+        4..12 => 1 << ((code - 4) / 2),
+        _ => 0,
+    }
+}
+
+impl FeatureCells<'_> {
+    /// Divides the faces of the fitted cells in and around the tile's own.
+    pub fn divide_faces(&mut self, own: &[Range<usize>; 3]) {
+        let ny = self.nodes.shape[1];
+        let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
+        for row in 0..self.edges.fitted.len() {
+            for i in bits(self.edges.fitted[row]) {
+                let cell = [i, row % ny, row / ny];
+                let surface = self.edges.surface[&self.nodes.index(cell)];
+                for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
+                    let mut across = cell;
+                    across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
+                    if !mine(&cell) && !mine(&across) {
+                        continue;
+                    }
+                    let low = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
+                    if !self.divided_faces.faces.contains_key(&(low, axis))
+                        && let Some(face) = self.divide_face((low, axis), surface)
+                    {
+                        self.divided_faces.faces.insert((low, axis), Rc::new(face));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Divides a face, if the surface shows in it.
+    fn divide_face(&mut self, (low, axis): (usize, usize), surface: usize) -> Option<CellFace> {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
+        let ring = [low, low + du, low + du + dv, low + dv];
+        let mut corners: Vec<Corner> = Vec::with_capacity(8);
+        // Counter-clockwise: corners, and for points whether the boundary enters the solid there.
+        let mut boundary: Vec<(usize, Option<bool>)> = Vec::with_capacity(8);
+        let mut solid = self.signs.is_negative(surface, low);
+        for i in 0..4 {
+            boundary.push((corners.len(), None));
+            corners.push(Corner { id: ring[i], code: i, key: VertexId::new(ring[i], &[], &[]) });
+            let (node, along) = (ring[i].min(ring[(i + 1) % 4]), if i % 2 == 0 { u } else { v });
+            let mut points: Vec<_> = self.points_of(node, along, surface).into_iter().enumerate().collect();
+            if i > 1 {
+                points.reverse();
+            }
+            for (n, (key, position)) in points {
+                solid = !solid;
+                boundary.push((corners.len(), Some(solid)));
+                let id = self.point(key, position, |k| {
+                    let share = k.share_of(node, along, position);
+                    let surfaces = 0..k.local.live.len();
+                    surfaces.map(|f| k.value_along(f, node, along, share)).collect()
+                });
+                let code = 4 + 2 * i + n;
+                corners.push(Corner { id, code, key });
+            }
+        }
+        if boundary.len() == 4 {
+            return None;
+        }
+        let contours = self.contours_of((low, axis), &ring, &mut corners, &boundary);
+        let solid = self.signs.is_negative(surface, low);
+        let mut face = CellFace {
+            parts: self.parts(axis, &corners, &boundary, &contours, (solid, 0)),
+            corners,
+            names: Vec::new(),
+            ends: Vec::new(),
+            contours: Vec::new(),
+            tries: 0,
+        };
+        let at = (low, axis);
+        let mut fragments = self.cut_parts(at, surface, &face);
+        while !is_sound(&fragments, axis) && face.tries < TRIES {
+            face.tries += 1;
+            for i in 0..face.corners.len() {
+                face.corners[i].id = self.perturbed(low, &face.corners[i], face.tries);
+            }
+            let again = (solid, face.tries);
+            face.parts = self.parts(axis, &face.corners, &boundary, &contours, again);
+            fragments = self.cut_parts(at, surface, &face);
+        }
+        face.ends.reserve(fragments.len());
+        face.names.reserve(fragments.iter().map(|p| p.1.len()).sum());
+        for (negative, ring) in fragments {
+            for (key, position) in ring {
+                if key.is_between() {
+                    self.vertex_at(key, position);
+                }
+                face.names.push(key);
+            }
+            face.ends.push((negative, face.names.len()));
+        }
+        let contours = contours.iter().map(|c| self.crossed(at, surface, &face, c));
+        face.contours = contours.collect();
+        Some(face)
+    }
+
+    fn point(&mut self, key: VertexId, position: Vec3, values: impl Fn(&Self) -> Vec<f64>) -> usize {
+        if let Some(id) = self.divided_faces.numbers.get(&key) {
+            return *id;
+        }
+        let values = values(self);
+        let line = (0..3).find(|a| key.is_along(*a)).map(|a| (key.node(), a));
+        let id = self.add_point(position, line, values);
+        self.divided_faces.numbers.insert(key, id);
+        id
+    }
+
+    /// The contours of a face as corners, from where its boundary enters the solid to where it leaves it.
+    fn contours_of(
+        &mut self,
+        face: (usize, usize),
+        ring: &[usize],
+        corners: &mut Vec<Corner>,
+        boundary: &[(usize, Option<bool>)],
+    ) -> Vec<Vec<usize>> {
+        let edges = self.edges;
+        if let Some(contours) = edges.faces.get(&face) {
+            let mut via = 0;
+            let mut all = Vec::with_capacity(contours.len());
+            for c in contours {
+                let end = |corners: &[Corner], key: VertexId| corners.iter().position(|c| c.key == key);
+                let mut path: Vec<usize> = end(corners, c.from).into_iter().collect();
+                for &(key, position) in &c.via {
+                    let id = self.point(key, position, |k| k.values_between(position, ring));
+                    path.push(corners.len());
+                    corners.push(Corner { id, code: 12 + via, key });
+                    via += 1;
+                }
+                path.extend(end(corners, c.to));
+                all.push(path);
+            }
+            return all;
+        }
+        let ends: Vec<(usize, bool)> = boundary.iter().filter_map(|b| Some((b.0, b.1?))).collect();
+        let next = |i: usize| vec![ends[i].0, ends[(i + 1) % ends.len()].0];
+        (0..ends.len()).filter(|i| ends[*i].1).map(next).collect()
+    }
+
+    /// The triangles between the boundary of a face and its contours; other ones each time it is divided anew, where there are
+    /// others. `solid`: whether the surface is negative at the face's first node.
+    fn parts(
+        &self,
+        axis: usize,
+        corners: &[Corner],
+        boundary: &[(usize, Option<bool>)],
+        contours: &[Vec<usize>],
+        (solid, tries): (bool, usize),
+    ) -> Vec<FaceTriangle> {
+        let flat: Vec<[f64; 2]> = corners.iter().map(|c| drop_axis(self.position_of(c.id), axis)).collect();
+        let is_on_contour = |a: usize, b: usize| {
+            contours.iter().any(|c| c.windows(2).any(|w| (w[0], w[1]) == (a, b) || (w[1], w[0]) == (a, b)))
+        };
+        let mut parts = Vec::new();
+        let mut add = |polygon: &[usize], inside: bool| {
+            let positions: Vec<[f64; 2]> = polygon.iter().map(|c| flat[*c]).collect();
+            for t in triangles(&positions, tries) {
+                let t = t.map(|i| polygon[i]);
+                let mut sorted = t;
+                sorted.sort_by_key(|c| corners[*c].code);
+                let turns = (0..3).any(|k| sorted == [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]);
+                let [a, b, c] = sorted;
+                parts.push(FaceTriangle {
+                    corners: sorted,
+                    left: turns,
+                    inside,
+                    on_contour: [is_on_contour(b, c), is_on_contour(a, c), is_on_contour(a, b)],
+                });
+            }
+        };
+        if contours.is_empty() {
+            let all: Vec<usize> = boundary.iter().map(|b| b.0).collect();
+            add(&all, solid);
+            return parts;
+        }
+        // What is solid runs from where the boundary enters it along the boundary, and back along a contour; what is void
+        // from where it leaves the solid, and on along a contour.
+        for inside in [true, false] {
+            let start = |c: &Vec<usize>| if inside { c[0] } else { c[c.len() - 1] };
+            let mut open: Vec<usize> = contours.iter().map(start).collect();
+            while let Some(first) = open.pop() {
+                let mut polygon = Vec::new();
+                let mut enter = first;
+                loop {
+                    let mut i = boundary.iter().position(|b| b.0 == enter).unwrap_or(0);
+                    polygon.push(boundary[i].0);
+                    let contour = loop {
+                        i = (i + 1) % boundary.len();
+                        let ends = |c: &&Vec<usize>| (if inside { c[c.len() - 1] } else { c[0] }) == boundary[i].0;
+                        if let Some(c) = contours.iter().find(ends) {
+                            break c;
+                        }
+                        if polygon.len() > 32 {
+                            break &contours[0];
+                        }
+                        polygon.push(boundary[i].0);
+                    };
+                    if inside {
+                        polygon.extend(contour[1..].iter().rev());
+                    } else {
+                        polygon.extend(&contour[..contour.len() - 1]);
+                    }
+                    enter = start(contour);
+                    if enter == first || polygon.len() > 32 {
+                        break;
+                    }
+                    open.retain(|c| *c != enter);
+                }
+                add(&polygon, inside);
+            }
+        }
+        parts
+    }
+
+    /// The triangles of a face cut by all surfaces but one: the surfaces that are negative, and names and positions, counter-clockwise
+    /// about the face's axis.
+    fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace) -> Vec<Polygon> {
+        let mut fragments = Vec::with_capacity(face.parts.len());
+        for part in &face.parts {
+            let [a, b, c] = part.corners.map(|c| face.corners[c].id);
+            let simplex = Simplex { nodes: [a, b, c, a], count: 3 };
+            let (negative, mixed) = self.others_of(&simplex, surface, part.inside);
+            let mut ring = [1, 2, 4].map(|corners| CutVertex { corners, surfaces: 0 });
+            if !part.left {
+                ring.reverse();
+            }
+            for (negative, ring) in self.split_by(&simplex, negative, mixed, ring.to_vec()) {
+                let ring = ring.iter().map(|s| {
+                    let key = self.face_vertex_id(at, face, &part.corners, *s);
+                    (key, self.face_vertex_position(key, face, &simplex, *s))
+                });
+                fragments.push((negative, ring.collect()));
+            }
+        }
+        fragments
+    }
+
+    /// The position of a cut vertex of a triangle in a face.
+    fn face_vertex_position(&mut self, key: VertexId, face: &CellFace, simplex: &Simplex, vertex: CutVertex) -> Vec3 {
+        if key.is_between() || vertex.surfaces == 0 {
+            // The more often a face is divided, the farther cut vertices keep from its points.
+            return self.vertex_position(simplex, vertex, (1 + 2 * face.tries) as f64);
+        }
+        let v = self.vertex(key);
+        self.positions[v as usize]
+    }
+
+    /// The surfaces but one that are negative at all corners of a simplex, with that one if it is; and those that vary.
+    pub(super) fn others_of(&self, simplex: &Simplex, surface: usize, inside: bool) -> (u64, u64) {
+        let (negative, mixed) = self.signs_of(simplex);
+        let own = 1 << surface;
+        (negative & !own | if inside { own } else { 0 }, mixed & !own)
+    }
+
+    /// The name of a cut vertex of a triangle in a face, or of a line in it.
+    pub(super) fn face_vertex_id(
+        &self,
+        (low, axis): (usize, usize),
+        face: &CellFace,
+        corners: &[usize],
+        vertex: CutVertex,
+    ) -> VertexId {
+        let (mut all, mut count) = ([face.corners[0]; 3], 0);
+        for c in bits(u64::from(vertex.corners)) {
+            all[count] = face.corners[corners[c]];
+            count += 1;
+        }
+        let between = &mut all[..count];
+        if let [only] = between {
+            return only.key;
+        }
+        between.sort_by_key(|c| c.code);
+        let line = between.iter().fold(15, |l, c| l & lines(c.code));
+        let (mut surfaces, mut met) = ([0; 3], 0);
+        for f in bits(vertex.surfaces).take(3) {
+            surfaces[met] = f;
+            met += 1;
+        }
+        let surfaces = &surfaces[..met];
+        if line != 0 {
+            let lines = super::lines_of(self.nodes, (low, axis));
+            let (node, along) = lines[line.trailing_zeros() as usize];
+            return VertexId::new(node, &[1 << along], surfaces);
+        }
+        let codes = all.map(|c| c.code);
+        VertexId::between(low, 7 & !(1 << axis), &codes[..count], surfaces)
+    }
+
+    /// A contour with the points where surfaces cross it.
+    fn crossed(&mut self, at: (usize, usize), surface: usize, face: &CellFace, contour: &[usize]) -> Vec<VertexId> {
+        let mut path = vec![face.corners[contour[0]].key];
+        for w in contour.windows(2) {
+            let mut ends = [w[0], w[1]];
+            ends.sort_by_key(|c| face.corners[*c].code);
+            let simplex = Simplex { nodes: [ends[0], ends[1], ends[0], ends[0]].map(|c| face.corners[c].id), count: 2 };
+            let mut found = self.crossings(&simplex);
+            found.retain(|c| c.1 != surface);
+            if ends[0] != w[0] {
+                found.reverse();
+            }
+            path.extend(found.into_iter().map(|(_, f)| {
+                let vertex = CutVertex { corners: 3, surfaces: 1 << f };
+                self.face_vertex_id(at, face, &ends, vertex)
+            }));
+            path.push(face.corners[w[1]].key);
+        }
+        path
+    }
+}
+
+/// Whether all polygons of a face are what they are meant to be in single precision: then they do not overlap either, for
+/// together they fill the face.
+fn is_sound(fragments: &[Polygon], axis: usize) -> bool {
+    let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
+    fragments.iter().all(|(_, ring)| {
+        let at = |i: usize| drop_axis(ring[i].1.map(|x| f64::from(x as f32)), axis);
+        (2..ring.len()).all(|i| orient2d(at(0), at(i - 1), at(i)) == way)
+    })
+}

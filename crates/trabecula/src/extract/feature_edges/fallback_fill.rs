@@ -1,0 +1,115 @@
+//! Fitted cells that nothing else fills: walls between what is solid and what is void of their faces.
+//!
+//! Where single precision makes intersect a cell from whatever points inside it is filled, or no point sees one of its volumes whole,
+//! nothing is asked of the surfaces any more but what they say of the cell's faces, which neighbours share: the lines there
+//! between solid and void run inwards as walls, up to a smaller cell that is all solid or all void. Between the two cells there is a copy of the faces for every
+//! depth, so walls meet no more than lines of the faces do.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::extract::feature_cells::FeatureCells;
+use crate::extract::vertex_id::VertexId;
+use geometry::math::{Vec3, add, scale, sub};
+
+/// How much smaller than the cell the one is in which walls end.
+const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
+
+/// A polygon of a face, counter-clockwise seen from outside; the face's axis, and whether the polygon is solid.
+struct Polygon {
+    ring: Vec<VertexId>,
+    axis: usize,
+    solid: bool,
+}
+
+impl FeatureCells<'_> {
+    /// Fills a cell with walls, as long as single precision makes intersect them for one smaller cell after the other.
+    pub(super) fn fallback_fill(&mut self, cell: [usize; 3]) {
+        let polygons = self.polygons(cell);
+        let solid = self.is_solid_at(cell, self.center_of(cell));
+        let first = self.extra.triangles.len();
+        for share in INNER {
+            self.extra.triangles.truncate(first);
+            self.fallback_walls(cell, &polygons, solid, share);
+            if !self.self_intersects_rounded(first) {
+                return;
+            }
+        }
+    }
+
+    pub(super) fn center_of(&self, cell: [usize; 3]) -> Vec3 {
+        let node = self.nodes.index(cell);
+        let ends = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
+        scale(add(ends[0], ends[1]), 0.5)
+    }
+
+    /// Whether a position in a cell is solid.
+    fn is_solid_at(&self, cell: [usize; 3], position: Vec3) -> bool {
+        let negative = self.local.live.iter().enumerate().fold(0, |w, (f, id)| {
+            let is = self.grid.surfaces[*id].field.value(position) <= 0.0;
+            w | u64::from(is) << f
+        });
+        self.is_solid(cell, negative)
+    }
+
+    /// The faces of a cell, divided by all surfaces.
+    fn polygons(&self, cell: [usize; 3]) -> Vec<Polygon> {
+        let node = self.nodes.index(cell);
+        let mut all = Vec::new();
+        for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
+            let low = node + self.offset(usize::from(upper) << axis);
+            let fitted = self.divided_faces.faces.get(&(low, axis));
+            let fragments = match fitted {
+                Some(face) => face.fragments().map(|(n, ring)| (n, ring.to_vec())).collect(),
+                None => self.face_fragments(cell, axis, upper),
+            };
+            for (negative, mut ring) in fragments {
+                if fitted.is_some() && !upper {
+                    ring.reverse();
+                }
+                let solid = self.is_solid(cell, negative);
+                all.push(Polygon { ring, axis, solid });
+            }
+        }
+        all
+    }
+
+    fn fallback_walls(&mut self, cell: [usize; 3], polygons: &[Polygon], solid: bool, share: f64) {
+        let node = self.nodes.index(cell);
+        let center = self.center_of(cell);
+        let mut inner: HashMap<VertexId, u32> = HashMap::new();
+        let mut within = |features: &mut Self, key: VertexId| {
+            *inner.entry(key).or_insert_with(|| {
+                let v = features.vertex(key);
+                let out = sub(features.positions[v as usize], center);
+                features.push(VertexId::center(node, 7), add(center, scale(out, share)))
+            })
+        };
+        let around = |ring: &[VertexId]| -> Vec<(VertexId, VertexId)> {
+            (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()])).collect()
+        };
+        let of_solid = polygons.iter().filter(|p| p.solid);
+        let lines: Vec<(VertexId, VertexId)> = of_solid.flat_map(|p| around(&p.ring)).collect();
+        let known: HashSet<(VertexId, VertexId)> = lines.iter().copied().collect();
+        for (p, q) in lines.into_iter().filter(|(p, q)| !known.contains(&(*q, *p))) {
+            let cut = self.is_cut(p, q);
+            let [a, b] = [p, q].map(|k| self.vertex(k));
+            let [c, d] = [p, q].map(|k| within(self, k));
+            self.extra.triangles.push(([d, b, a], cut));
+            self.extra.triangles.push(([d, a, c], cut));
+        }
+        for p in polygons.iter().filter(|p| p.solid != solid) {
+            let cut = self.is_cut(p.ring[0], p.ring[1]);
+            let mut names: Vec<u32> = p.ring.iter().map(|k| within(self, *k)).collect();
+            if !solid {
+                names.reverse();
+            }
+            self.flat(&names, p.axis, cut);
+        }
+    }
+
+    /// Whether a line between two points lies on the region's surface: not if it is on a surface that is not.
+    fn is_cut(&self, p: VertexId, q: VertexId) -> bool {
+        let mut both = p.surfaces().filter(|f| q.surfaces().any(|g| g == *f));
+        both.all(|f| self.grid.surfaces[self.local.live[f]].cut)
+    }
+}

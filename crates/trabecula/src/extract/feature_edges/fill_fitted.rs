@@ -1,0 +1,286 @@
+//! The surface in cells in which a surface with edges meets others.
+
+use std::rc::Rc;
+
+use super::boundary_loops::{Step, boundary_loops};
+use super::cell_faces::{CellFace, FaceTriangle};
+use super::surface_patch::{BoundaryLoop, Patch, Patches};
+use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle};
+use crate::extract::vertex_id::VertexId;
+use geometry::math::{Vec3, add, scale};
+
+/// How often a cell is filled anew from another point inside, if single precision makes intersect it.
+const TRIES: usize = 6;
+
+/// A tetrahedron of a fitted cell.
+pub(super) struct Tet<'b> {
+    /// Nodes and points: last that inside the volume, the others in the same order in both tetrahedra that share them.
+    simplex: Simplex,
+    right: bool,
+    /// Whether the surface is negative in it.
+    inside: bool,
+    /// Which of its sides, each across from a corner, lie on the surface.
+    on_patch: [bool; 4],
+    /// The triangle of a face that it is over, if it is.
+    base: Option<&'b Base>,
+}
+
+/// A triangle of a face of a cell, seen from outside.
+pub(super) struct Base {
+    pub ids: [usize; 3],
+    pub left: bool,
+    pub inside: bool,
+    on_patch: [bool; 3],
+    face: (usize, usize),
+    /// The face and the corners among its own, if it is divided.
+    pub divided: Option<(Rc<CellFace>, [usize; 3])>,
+}
+
+impl<'b> Tet<'b> {
+    /// From a point to a triangle of a face.
+    pub fn over(b: &'b Base, apex: usize) -> Tet<'b> {
+        Tet {
+            simplex: Simplex { nodes: [b.ids[0], b.ids[1], b.ids[2], apex], count: 4 },
+            right: !b.left,
+            inside: b.inside,
+            on_patch: [false; 4],
+            base: Some(b),
+        }
+    }
+
+    /// The same, where the patch is the cone from the point.
+    fn of_cone(b: &'b Base, apex: usize) -> Tet<'b> {
+        let [p, q, r] = b.on_patch;
+        Tet { on_patch: [p, q, r, false].map(|w| w && b.inside), ..Tet::over(b, apex) }
+    }
+
+    /// From a point to a triangle inside the cell, counter-clockwise seen from beyond it; `wall`: whether it lies on the surface.
+    pub fn inner(ids: [usize; 3], inside: bool, apex: usize, on_patch: bool) -> Tet<'b> {
+        // The same order on both sides of it.
+        let mut sorted = ids;
+        sorted.sort_unstable();
+        let [a, b, c] = sorted;
+        let left = [[a, b, c], [b, c, a], [c, a, b]].contains(&ids);
+        Tet {
+            simplex: Simplex { nodes: [a, b, c, apex], count: 4 },
+            right: !left,
+            inside,
+            on_patch: [false, false, false, on_patch],
+            base: None,
+        }
+    }
+}
+
+/// The name of a cut vertex inside a cell: the nodes and points that it lies between, and the surfaces that meet there.
+type Inner = ([usize; 4], u64);
+
+impl FeatureCells<'_> {
+    /// Fills a cell in which a surface with edges meets others.
+    pub fn fitted(&mut self, cell: [usize; 3], surface: usize) {
+        let bases = self.bases(cell, surface);
+        let steps = self.steps(cell, surface);
+        let boundary_loops = boundary_loops(&steps.iter().map(Step::path).collect::<Vec<_>>());
+        let boundary_loops: Vec<(BoundaryLoop, Vec<usize>)> =
+            boundary_loops.iter().map(|keys| self.bare_loop(cell, keys)).collect();
+        let (edges, of) = (self.edges, self.cell_of(cell, surface));
+        let patches: Vec<Patches> = match &boundary_loops[..] {
+            [(boundary_loop, _)] => vec![edges.patches(of, boundary_loop, None)],
+            _ => boundary_loops.iter().map(|r| edges.patches_among(of, &r.0)).collect(),
+        };
+        // The only cone of a cell bounds tetrahedra of its own.
+        let any = patches.iter().any(|p| p.divided.is_some());
+        let routes = [(true, any), (false, boundary_loops.len() > 1)];
+        for (divided, _) in routes.into_iter().filter(|w| w.1) {
+            let patches = patches.iter().map(|p| p.best(divided));
+            let ids = boundary_loops.iter().map(|r| &r.1[..]);
+            let all: Vec<(&[usize], &Patch)> = ids.zip(patches).collect();
+            let tets = self.volumes(cell, &bases, &all);
+            if tets.is_some_and(|t| self.is_filled(cell, surface, &bases, &t)) {
+                return;
+            }
+        }
+        let apexes = match (&boundary_loops[..], &patches[..]) {
+            ([], _) => self.apexes(cell, None),
+            ([boundary_loop], [patches]) => {
+                let center = middle(&boundary_loop.0.positions);
+                self.apexes(cell, Some([patches.cone.inner[0], center]))
+            }
+            _ => Vec::new(),
+        };
+        for apex in apexes {
+            let apex = self.inner_point(cell, apex);
+            let tets: Vec<Tet> = bases.iter().map(|b| Tet::of_cone(b, apex)).collect();
+            if self.is_filled(cell, surface, &bases, &tets) {
+                return;
+            }
+        }
+        self.fallback_fill(cell);
+    }
+
+    /// The points from which a cell is filled with a single cone, one after the other, as long as single precision makes intersect it.
+    /// `boundary loop`: the best point and the middle of the only boundary loop.
+    fn apexes(&self, cell: [usize; 3], boundary_loop: Option<[Vec3; 2]>) -> Vec<Vec3> {
+        let node = self.nodes.index(cell);
+        let [low, high] = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
+        let center = self.center_of(cell);
+        let first = match boundary_loop {
+            Some([best, middle]) => vec![best, scale(add(middle, center), 0.5)],
+            None => vec![center],
+        };
+        let by_chance = (2..TRIES).map(|n| {
+            let by = |a: usize| 0.3 * self.noise(3 * n + a, node) * (high[a] - low[a]);
+            [0, 1, 2].map(|a| center[a] + by(a))
+        });
+        first.into_iter().chain(by_chance).collect()
+    }
+
+    /// Adds the surface in some tetrahedra of a cell, unless single precision makes intersect it.
+    fn is_filled(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) -> bool {
+        let first = self.extra.triangles.len();
+        self.fill(cell, surface, bases, tets);
+        let is_muddled = self.self_intersects_rounded(first);
+        if is_muddled {
+            self.extra.triangles.truncate(first);
+        }
+        !is_muddled
+    }
+
+    /// The boundary loop of a patch without the points where other surfaces cross it, and the numbers of its points.
+    fn bare_loop(&mut self, cell: [usize; 3], boundary_loop: &[VertexId]) -> (BoundaryLoop, Vec<usize>) {
+        let number = |key: &VertexId| Some((*key, *self.divided_faces.numbers.get(key)?));
+        let (keys, ids): (Vec<VertexId>, Vec<usize>) = boundary_loop.iter().filter_map(number).unzip();
+        (self.boundary_loop(cell, &keys), ids)
+    }
+
+    /// The triangles of the faces of a cell.
+    fn bases(&self, cell: [usize; 3], surface: usize) -> Vec<Base> {
+        let node = self.nodes.index(cell);
+        let mut bases = Vec::with_capacity(24);
+        for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
+            let low = node + self.offset(usize::from(upper) << axis);
+            let face = (low, axis);
+            if let Some(fit) = self.divided_faces.faces.get(&face) {
+                bases.extend(fit.parts.iter().map(|p: &FaceTriangle| Base {
+                    ids: p.corners.map(|c| fit.corners[c].id),
+                    left: p.left == upper,
+                    inside: p.inside,
+                    on_patch: p.on_contour,
+                    face,
+                    divided: Some((fit.clone(), p.corners)),
+                }));
+                continue;
+            }
+            let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            for (step, right) in [(u, true), (v, false)] {
+                bases.push(Base {
+                    ids: [low, low + self.offset(step), low + self.offset(u | v)],
+                    left: right == upper,
+                    inside: self.signs.is_negative(surface, low),
+                    on_patch: [false; 3],
+                    face,
+                    divided: None,
+                });
+            }
+        }
+        bases
+    }
+
+    /// A new point inside a cell.
+    pub(super) fn inner_point(&mut self, cell: [usize; 3], position: Vec3) -> usize {
+        let node = self.nodes.index(cell);
+        let around = [0, 1, 2, 3, 4, 5, 6, 7].map(|c| node + self.offset(c));
+        let values = self.values_between(position, &around);
+        self.add_point(position, None, values)
+    }
+
+    /// Adds the surface in some tetrahedra of a cell.
+    fn fill(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) {
+        let node = self.nodes.index(cell);
+        let mut names: Vec<(Inner, u32)> = Vec::with_capacity(16);
+        for tet in tets {
+            let (negative, mixed) = self.others_of(&tet.simplex, surface, tet.inside);
+            let on_surface = tet.on_patch.map(|w| w.then_some(surface));
+            let on_patch = tet.on_patch.contains(&true) && self.is_solid(cell, negative | mixed);
+            if !on_patch && self.is_solid(cell, negative) == self.is_solid(cell, negative | mixed) {
+                continue;
+            }
+            if mixed == 0 {
+                if !self.is_solid(cell, negative & !(1 << surface)) {
+                    self.fill_patch(node, surface, bases, tet, &mut names);
+                }
+                continue;
+            }
+            for fragment in self.cut(&tet.simplex, tet.right, (negative, mixed), on_surface) {
+                if !self.is_solid(cell, fragment.negative) {
+                    continue;
+                }
+                for facet in &fragment.facets {
+                    let Some(f) = facet.surface else { continue };
+                    if self.is_solid(cell, fragment.negative & !(1 << f)) {
+                        continue;
+                    }
+                    let ring: Vec<u32> =
+                        facet.ring.iter().map(|s| self.vertex_name(node, bases, tet, *s, &mut names)).collect();
+                    let cut = self.grid.surfaces[self.local.live[f]].cut;
+                    self.fan(&ring, cut);
+                }
+            }
+        }
+    }
+
+    /// Adds the faces of a tetrahedron that lie on the surface, where no other crosses it.
+    fn fill_patch(&mut self, node: usize, surface: usize, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
+        let cut = self.grid.surfaces[self.local.live[surface]].cut;
+        let facets = Simplex::facets(tet.right);
+        for (ring, _) in facets.iter().zip(tet.on_patch).filter(|s| s.1) {
+            let ring = ring.map(|s| self.vertex_name(node, bases, tet, s, names));
+            self.fan(&ring, cut);
+        }
+    }
+
+    /// The vertex at a cut vertex of a tetrahedron; `inner` are those inside the cell.
+    fn vertex_name(
+        &mut self,
+        node: usize,
+        bases: &[Base],
+        tet: &Tet,
+        vertex: CutVertex,
+        inner: &mut Vec<(Inner, u32)>,
+    ) -> u32 {
+        let corners = (0..4).filter(|c| vertex.corners >> c & 1 == 1);
+        if vertex.corners & 8 == 0 {
+            let is_solid = |b: &&Base| corners.clone().all(|c| b.ids.contains(&tet.simplex.nodes[c]));
+            if let Some(base) = tet.base.or_else(|| bases.iter().find(is_solid)) {
+                let key = self.base_key(base, &tet.simplex, vertex);
+                return self.vertex(key);
+            }
+        }
+        let mut ids = [usize::MAX; 4];
+        for c in corners {
+            ids[c] = self.first_of(tet.simplex.nodes[c]);
+        }
+        ids.sort_unstable();
+        let name = (ids, vertex.surfaces);
+        if let Some((_, v)) = inner.iter().find(|(n, _)| *n == name) {
+            return *v;
+        }
+        let position = self.vertex_position(&tet.simplex, vertex, 1.0);
+        let v = self.push(VertexId::center(node, 7), position);
+        inner.push((name, v));
+        v
+    }
+
+    /// The name of a cut vertex of a triangle in a face.
+    fn base_key(&self, base: &Base, simplex: &Simplex, vertex: CutVertex) -> VertexId {
+        let Some((face, corners)) = &base.divided else {
+            return self.key(simplex, vertex);
+        };
+        let is_of = |c: &usize| {
+            let mut of = (0..4).filter(|i| vertex.corners >> i & 1 == 1);
+            of.any(|i| simplex.nodes[i] == base.ids[*c])
+        };
+        let corners_of = (0..3).filter(is_of).fold(0, |w, c| w | 1 << c);
+        let vertex = CutVertex { corners: corners_of, ..vertex };
+        self.face_vertex_id(base.face, face, corners, vertex)
+    }
+}

@@ -1,0 +1,292 @@
+//! Cells in which a surface with edges meets others: which they are, and the points that they have next to nodes.
+//!
+//! Such a cell is divided into tetrahedra so that the patch of the surface with edges is made of faces of them: each side of
+//! the cell is cut along its contours and into triangles, and the tetrahedra run from these to a point inside; or, from these
+//! and from patches that edges divide, to one in each volume between patches. So the surface needs no values there. Every other surface is the plane of its values at a tetrahedron's corners, as in a feature cell, but these
+//! corners are points of the edges as well as nodes.
+//!
+//! On a grid edge the other surfaces stay what their values at its two nodes make of them, and at points inside a face or
+//! a cell they keep between their values at the nodes around: then none shows where a neighbour would not see it.
+
+use std::borrow::Cow;
+use std::rc::Rc;
+
+use rustc_hash::FxHashMap;
+
+use super::cell_faces::{CellFace, Corner};
+use super::{EdgeStore, OtherSurfaces, SurfaceContext};
+use crate::extract::feature_cells::FeatureCells;
+use crate::extract::sampling_grid::LocalSolid;
+use crate::extract::sign_words::Signs;
+use crate::extract::tile::Nodes;
+use crate::extract::vertex_id::VertexId;
+use geometry::math::Vec3;
+
+/// Points that are no nodes, and the faces of cells that they divide.
+#[derive(Default)]
+pub(in crate::extract) struct DividedFaces {
+    /// How many surfaces there are.
+    live: usize,
+    /// Places of the points.
+    positions: Vec<Vec3>,
+    /// Values of all live surfaces at them, one point after the other.
+    values: Vec<f64>,
+    /// The first of those that are the same point, with other values.
+    first: Vec<usize>,
+    /// The grid edge that each lies on, if it does: by its lower node and its axis.
+    lines: Vec<Option<(usize, usize)>>,
+    pub(super) numbers: FxHashMap<VertexId, usize>,
+    /// By the lowest node and the axis normal to the face.
+    pub faces: FxHashMap<(usize, usize), Rc<CellFace>>,
+}
+
+impl DividedFaces {
+    /// None yet, where there are so many surfaces.
+    pub fn none(live: usize) -> DividedFaces {
+        DividedFaces { live, ..DividedFaces::default() }
+    }
+
+    pub fn position(&self, point: usize) -> Vec3 {
+        self.positions[point]
+    }
+
+    pub fn value(&self, point: usize, surface: usize) -> f64 {
+        self.values[point * self.live + surface]
+    }
+
+    pub fn line(&self, point: usize) -> Option<(usize, usize)> {
+        self.lines[point]
+    }
+}
+
+impl EdgeStore {
+    /// Takes the cells in which a surface with edges meets others out of those to be cut as feature cells.
+    pub fn claim_fitted(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
+        self.fitted_to = Some(surface);
+        let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| !matches!(signs.corners(surface, i, j, k), 0 | 0xff);
+        let mut found: Vec<[usize; 3]> = signs.feature_cells().collect();
+        found.retain(|c| mixed(signs, *c));
+        for &(_, node) in self.segments.keys().filter(|p| p.0 == surface) {
+            let cell = nodes.at(node);
+            let others = OtherSurfaces::of(local, signs, surface, cell);
+            if !mixed(signs, cell) && others.varies != 0 && !others.always_decides() && !others.never_decides() {
+                found.push(cell);
+            }
+        }
+        for cell in found {
+            let [i, j, k] = cell;
+            let row = k * nodes.shape[1] + j;
+            for plain in &mut signs.plain {
+                plain[row] &= !(1 << i);
+            }
+            signs.plain[surface][row] |= 1 << i;
+            signs.featured[row] |= 1 << i;
+            self.cells[row] |= 1 << i;
+            self.fitted[row] |= 1 << i;
+            self.surface.insert(nodes.index(cell), surface);
+        }
+    }
+
+    /// Whether a surface meets others in a cell in which it is fitted.
+    pub fn is_fitted(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
+        self.fitted[k * nodes.shape[1] + j] >> i & 1 == 1
+    }
+
+    /// The cells that position the vertices of a surface on their grid edges by the values at the nodes.
+    pub fn features<'a>(&self, signs: &'a Signs, surface: usize) -> Cow<'a, [u64]> {
+        if self.fitted_to != Some(surface) {
+            return Cow::Borrowed(&signs.featured);
+        }
+        let rows = signs.featured.iter().zip(&self.fitted);
+        Cow::Owned(rows.map(|(k, f)| k & !f).collect())
+    }
+
+    /// Adds to the nodes at which the other surfaces are asked for those about pieces of edges.
+    pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
+        for &(_, node) in self.segments.keys() {
+            let [i, j, k] = nodes.at(node);
+            let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);
+            let row = around(i, 0).fold(0, |w, i| w | 1u64 << i);
+            for k in around(k, 2) {
+                for j in around(j, 1) {
+                    wanted[k * nodes.shape[1] + j] |= row;
+                }
+            }
+        }
+    }
+
+    /// Whether a cell can follow whatever a face or a grid edge of it gets.
+    pub(super) fn takes_extra_points<P: Fn(usize, usize) -> Option<Vec3>>(
+        &self,
+        context: &SurfaceContext<P>,
+        cell: [usize; 3],
+    ) -> bool {
+        if context.is_sole_surface(cell) {
+            return true;
+        }
+        let dead = || OtherSurfaces::of(context.local, context.signs, context.surface, cell).is_dead();
+        context.is_fitted() && (self.is_fitted(context.nodes, cell) || dead())
+    }
+}
+
+impl FeatureCells<'_> {
+    /// A value kept away from zero, as those at nodes are.
+    pub(super) fn clamped_from_zero(&self, surface: usize, v: f64) -> f64 {
+        let id = self.local.live[surface];
+        let least = self.grid.margin * self.grid.surfaces[id].lipschitz * self.grid.step;
+        if v <= 0.0 { v.min(-least) } else { v.max(least) }
+    }
+
+    /// The value of a surface at a share of a grid edge: between those at its nodes.
+    pub(super) fn value_along(&self, surface: usize, node: usize, axis: usize, share: f64) -> f64 {
+        let [a, b] = [node, node + self.offset(1 << axis)].map(|n| self.value(surface, n));
+        self.clamped_from_zero(surface, a + (b - a) * share)
+    }
+
+    /// Where on a grid edge a position is.
+    pub(super) fn share_of(&self, node: usize, axis: usize, position: Vec3) -> f64 {
+        let (axis_nodes, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        (position[axis] - axis_nodes[at]) / (axis_nodes[at + 1] - axis_nodes[at])
+    }
+
+    /// The points in which the surface with edges crosses a grid edge, the lower one first.
+    pub(super) fn points_of(&self, node: usize, axis: usize, surface: usize) -> Vec<(VertexId, Vec3)> {
+        if let Some(points) = self.edges.double_crossings.get(&(surface, node, axis)) {
+            return (0..2).map(|i| (VertexId::crossing(node, axis, surface, i), points[i])).collect();
+        }
+        let ends = [node, node + self.offset(1 << axis)];
+        let [p, q] = ends.map(|n| self.signs.is_negative(surface, n));
+        let key = VertexId::new(node, &[1 << axis], &[surface]);
+        match self.numbered(key) {
+            Some(v) if p != q => vec![(key, self.positions[v as usize])],
+            _ if p != q => vec![(key, self.position(key))],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Where the others than the fitted surface cross a grid edge that this crosses too: as their values at its nodes say, but
+    /// on their face of its points, and apart from these and from each other.
+    pub fn position_along_edge(&self, key: VertexId) -> Option<Vec3> {
+        let axis = (0..3).find(|a| key.is_along(*a))?;
+        let fitted = self.grid.fitted?;
+        let fitted = self.local.live.iter().position(|f| *f == fitted)?;
+        let (node, surface) = (key.node(), key.surfaces().next()?);
+        if surface == fitted {
+            return None;
+        }
+        let (at, order) = self.order_along(node, axis, fitted);
+        if at.is_empty() {
+            return None;
+        }
+        let here = order.iter().find(|o| o.2 == surface)?.0;
+        let stretch = order.iter().filter(|o| o.0 == here);
+        let mut all: Vec<(f64, usize)> = stretch.map(|o| (o.1, o.2)).collect();
+        let low = if here == 0 { 0.0 } else { at[here - 1] };
+        let high = at.get(here).copied().unwrap_or(1.0);
+        let count = all.len();
+        let apart = self.grid.margin.min((high - low) / (count + 1) as f64);
+        let mut before = low;
+        for s in &mut all {
+            s.0 = s.0.max(before + apart);
+            before = s.0;
+        }
+        let mut after = high;
+        for s in all.iter_mut().rev() {
+            s.0 = s.0.min(after - apart);
+            after = s.0;
+        }
+        let share = all.iter().find(|s| s.1 == surface)?.0;
+        let mut position = self.nodes.position(node);
+        let (axis_nodes, i) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
+        position[axis] += share * (axis_nodes[i + 1] - axis_nodes[i]);
+        Some(position)
+    }
+
+    /// The points in which the fitted surface crosses a grid edge, as shares of it; and the other surfaces that cross it, in
+    /// order: after how many of these points each does, the share by its values at the nodes, and its number.
+    fn order_along(&self, node: usize, axis: usize, fitted: usize) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
+        let points = self.points_of(node, axis, fitted);
+        let at: Vec<f64> = points.iter().map(|p| self.share_of(node, axis, p.1)).collect();
+        let stretch = |f: usize| {
+            let same = |s: &&f64| (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0);
+            at.iter().take_while(same).count()
+        };
+        let others = self.crossings(&self.simplex(node, &[1 << axis]));
+        let others = others.into_iter().filter(|(_, f)| *f != fitted);
+        let mut order: Vec<_> = others.map(|(s, f)| (stretch(f), s, f)).collect();
+        order.sort_by_key(|o| o.0);
+        (at, order)
+    }
+
+    /// Whether a surface is negative where another one crosses a part of a grid edge that the fitted surface crosses too: by their
+    /// order along the whole of it, which all faces and cells around it share. None if the part is of no such edge.
+    pub fn sign_on_line(&self, ends: [usize; 2], other: usize, surface: usize) -> Option<bool> {
+        let count = self.nodes.count();
+        let line = |n: usize| self.divided_faces.line(n.checked_sub(count)?);
+        let (node, axis) = line(ends[0]).or_else(|| line(ends[1]))?;
+        let high = node + self.offset(1 << axis);
+        let on = |n: usize| n == node || n == high || line(n) == Some((node, axis));
+        if !ends.into_iter().all(on) {
+            return None;
+        }
+        let at_ends = [node, high].map(|n| self.signs.is_negative(surface, n));
+        if at_ends[0] == at_ends[1] {
+            return Some(at_ends[0]);
+        }
+        let fitted = self.grid.fitted?;
+        let fitted = self.local.live.iter().position(|f| *f == fitted)?;
+        let (_, order) = self.order_along(node, axis, fitted);
+        let position = |f: usize| order.iter().position(|o| o.2 == f);
+        let passed = match (position(surface), position(other)) {
+            (Some(own), Some(at)) => own < at,
+            _ => false,
+        };
+        Some(at_ends[usize::from(passed)])
+    }
+
+    /// Adds a point that is no node; gives its number.
+    pub(super) fn add_point(&mut self, position: Vec3, line: Option<(usize, usize)>, values: Vec<f64>) -> usize {
+        self.divided_faces.positions.push(position);
+        self.divided_faces.lines.push(line);
+        self.divided_faces.values.extend(values);
+        let id = self.nodes.count() + self.divided_faces.positions.len() - 1;
+        self.divided_faces.first.push(id);
+        id
+    }
+
+    /// The number that stands for a node or a point and those that are the same.
+    pub(super) fn first_of(&self, id: usize) -> usize {
+        id.checked_sub(self.nodes.count()).map_or(id, |p| self.divided_faces.first[p])
+    }
+
+    /// The same point with other values of the same signs, by chance.
+    pub(super) fn perturbed(&mut self, low: usize, corner: &Corner, attempt: usize) -> usize {
+        let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
+            return corner.id;
+        };
+        let surfaces = 0..self.local.live.len();
+        let perturbed = surfaces.map(|f| {
+            let seed = self.local.live[f] + 64 * (corner.code + 16 * attempt);
+            self.clamped_from_zero(f, self.divided_faces.value(point, f) * (1.0 + 0.7 * self.noise(seed, low)))
+        });
+        let values = perturbed.collect();
+        let id = self.add_point(self.divided_faces.positions[point], self.divided_faces.lines[point], values);
+        let first = self.divided_faces.first[point];
+        self.divided_faces.first[id - self.nodes.count()] = first;
+        id
+    }
+
+    /// The values of all live surfaces at a position, between those at some nodes. The one with edges needs none.
+    pub(super) fn values_between(&self, position: Vec3, around: &[usize]) -> Vec<f64> {
+        let value = |f: usize| {
+            let at = around.iter().map(|n| self.value(f, *n));
+            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            if (low <= 0.0) == (high <= 0.0) || self.is_fitted(f) {
+                return low;
+            }
+            let id = self.local.live[f];
+            self.clamped_from_zero(f, self.grid.surfaces[id].field.value(position).clamp(low, high))
+        };
+        (0..self.local.live.len()).map(value).collect()
+    }
+}
