@@ -1,18 +1,18 @@
-//! Cells where surfaces of the solid meet: its edges and corners, thin walls, and patches that are not plain.
+//! Feature cells: grid cells where several implicit surfaces meet (edges and corners of the solid, thin walls), or where one
+//! surface has several patches.
 //!
-//! Such a cell is divided into the six tetrahedra between its lowest and its highest corner. In a tetrahedron each surface
-//! is taken as the plane of its values at the four corners, so that the solid is a polyhedron, exactly: the tetrahedron
-//! is cut by one plane after the other, and what lies between a solid and a void piece is surface. Surfaces of second
-//! order smoothness are met to second order, and so are the curves and points where they meet, for nothing depends on
-//! a node of the grid lying within a wedge. Neighbouring tetrahedra see the same planes on their common face. A plain
-//! neighbour of a feature cell gets a vertex inside and the cone from it over its boundary loop, to which the points on the
-//! common face's diagonal are added.
+//! Such a cell is divided into the six tetrahedra between its lowest and its highest corner. In a tetrahedron each surface is
+//! taken as the plane of its values at the four corners, so that the solid is exactly a polyhedron there: the tetrahedron is
+//! cut by one plane after the other, and a facet between a solid and a void fragment is surface. Smooth surfaces, and the
+//! curves and points where they meet, are approximated to second order; nothing depends on a node lying inside a wedge.
+//! Adjacent tetrahedra have the same planes on their common facet. A plain neighbour of a feature cell becomes a cone from a
+//! point inside over its boundary loop, to which the points on the diagonal of the common face are added.
 //!
-//! A vertex is named by the simplex of nodes that it lies in and the surfaces that meet there, and its position is computed
-//! from these alone; so it is the same from whichever cell, tile or thread.
+//! Invariant: the id of a vertex is the simplex of nodes in which it lies and the surfaces that meet there, and its position is
+//! computed from the id alone; so it is the same from whichever cell, tile or thread.
 //!
-//! Source: planes in tetrahedra, as X. Du, Q. Zhou, N. Carr and T. Ju, Robust computation of implicit surface networks
-//! for piecewise linear functions, ACM Trans. Graph. 41 (2022) 41; the division after H. Freudenthal (1942).
+//! Source: planes in tetrahedra, as X. Du, Q. Zhou, N. Carr and T. Ju, Robust computation of implicit surface networks for
+//! piecewise linear functions, ACM Trans. Graph. 41 (2022) 41; the division after H. Freudenthal (1942).
 
 mod simplex_cut;
 
@@ -31,13 +31,13 @@ use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
 pub(super) use simplex_cut::{CutVertex, Simplex};
 
-/// What is not on plain cells' edges.
+/// Vertices and triangles that marching cubes does not make.
 #[derive(Default)]
 pub(super) struct FeatureMesh {
     names: FxHashMap<VertexId, u32>,
-    /// The names of the extra vertices.
+    /// The ids of the vertices.
     pub keys: Vec<VertexId>,
-    /// Triangles, and whether they lie on the region's surface.
+    /// Triangles, and whether they are cuts.
     pub triangles: Vec<([u32; 3], bool)>,
 }
 
@@ -49,7 +49,7 @@ impl FeatureMesh {
     }
 }
 
-/// The block as it is while extra vertices and triangles are added.
+/// A block while the vertices and triangles of feature cells, fitted cells and caps are added to it.
 pub(super) struct FeatureCells<'a> {
     pub nodes: &'a Nodes<'a>,
     pub grid: &'a Grid,
@@ -60,24 +60,24 @@ pub(super) struct FeatureCells<'a> {
     pub positions: &'a mut Vec<Vec3>,
     pub extra: &'a mut FeatureMesh,
     pub edges: &'a EdgeStore,
-    /// Nodes at which the surfaces are moved a little.
+    /// Nodes at which the surfaces are perturbed.
     pub perturbed_nodes: HashSet<usize>,
     pub divided_faces: DividedFaces,
 }
 
-/// The six ways from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron they make
-/// is right-handed.
+/// The six paths from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron on each is
+/// right-handed.
 const PATHS: [([usize; 2], bool); 6] =
     [([1, 3], true), ([2, 6], true), ([4, 5], true), ([1, 5], false), ([2, 3], false), ([4, 6], false)];
 
-/// The middle of some points.
+/// The centroid of some points.
 pub(super) fn middle(points: &[Vec3]) -> Vec3 {
     let sum = points.iter().fold([0.0; 3], |s, p| add(s, *p));
     scale(sum, 1.0 / points.len() as f64)
 }
 
 impl FeatureCells<'_> {
-    /// The vertex of a name; made if it is new.
+    /// The vertex with this id; made if it is new.
     pub fn vertex(&mut self, key: VertexId) -> u32 {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
@@ -90,7 +90,7 @@ impl FeatureCells<'_> {
         n
     }
 
-    /// The vertex of a name that has this position; made if it is new.
+    /// The vertex with this id at this position; made if it is new.
     pub fn vertex_at(&mut self, key: VertexId, position: Vec3) -> u32 {
         if let Some(&n) = self.extra.names.get(&key) {
             return n;
@@ -100,7 +100,7 @@ impl FeatureCells<'_> {
         n
     }
 
-    /// The number of a vertex that a plain cell has too.
+    /// The number of a vertex that a plain cell has as well.
     pub fn numbered(&self, key: VertexId) -> Option<u32> {
         numbered(self.numbers, self.nodes, key)
     }
@@ -111,7 +111,7 @@ impl FeatureCells<'_> {
         self.positions.len() as u32 - 1
     }
 
-    /// Adds a convex polygon by its vertices' names.
+    /// Adds a convex polygon by the ids of its vertices.
     pub fn polygon(&mut self, ring: &[VertexId], cut: bool) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         self.fan(&names, cut);
@@ -124,7 +124,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Fills a plain cell next to a feature one.
+    /// Fills a plain cell that is adjacent to a feature cell.
     pub fn seam(&mut self, cell: [usize; 3], surface: usize) {
         let [i, j, k] = cell;
         let node = self.nodes.index(cell);
@@ -139,7 +139,7 @@ impl FeatureCells<'_> {
             let (e, next) = (case.ring[at], case.ring[(at + 1) % n]);
             let ((a, b), (c, d)) = (ends(e), ends(next));
             ring.push(VertexId::new(node + self.offset(a), &[a ^ b], &[surface]));
-            // The face that both edges lie in, and the cell across it.
+            // The face on which both edges lie, and the cell across it.
             let Some(axis) = (0..3).find(|x| [b, c, d].iter().all(|m| (m ^ a) >> x & 1 == 0)) else {
                 continue;
             };
@@ -162,7 +162,7 @@ impl FeatureCells<'_> {
         let cut = self.grid.surfaces[self.local.live[surface]].cut;
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         if names.len() == n {
-            // Nothing was added: the plain patch will do.
+            // Nothing was added: the plain patch serves.
             let name = |e: u8| case.ring.iter().position(|r| *r == e).map_or(0, |at| names[at]);
             self.extra.triangles.extend(case.triangles[..case.count].iter().map(|t| (t.map(name), cut)));
             return;
@@ -180,7 +180,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Adds a polygon in the face of a cell that spans two axes; it may have straight angles.
+    /// Adds a polygon in a cell face that spans two axes; it may have straight angles.
     pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[VertexId]) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         let boundary_loop: Vec<Vec3> = names.iter().map(|v| self.positions[*v as usize]).collect();
@@ -192,7 +192,7 @@ impl FeatureCells<'_> {
         self.grid.fitted == Some(self.local.live[surface])
     }
 
-    /// Which signs are solid in a cell.
+    /// Whether these negative surfaces make a position in a cell solid.
     pub fn is_solid(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
         let live = self.local.live.len();
         let sign = |f: usize| match f.checked_sub(live) {
@@ -202,7 +202,7 @@ impl FeatureCells<'_> {
         self.local.tree.solid(&sign) & 1 == 1
     }
 
-    /// Cuts up a feature cell.
+    /// Cuts a feature cell.
     pub fn cell(&mut self, cell: [usize; 3]) {
         let node = self.nodes.index(cell);
         for ([one, two], right) in PATHS {
@@ -234,18 +234,18 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Cuts up all feature cells of the block, and keeps what belongs to the tile.
+    /// Cuts all feature cells of the block and keeps what belongs to the tile.
     ///
-    /// Exact arithmetic would end here: the pieces of a tetrahedron meet only where they should. But planes may pass so
-    /// near to each other's common points that single precision mixes them up. Where that happens in a cell the surfaces
-    /// are moved by chance at its nodes, by far less than the cell is wide, and the cells there are cut again.
+    /// In exact arithmetic the fragments meet only where they should. Planes may, however, pass so near to each other's common
+    /// points that single precision mixes them up. Where that happens in a cell, the surfaces are perturbed at its nodes by far
+    /// less than a grid step, and the cells there are cut again.
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
         let fitted = |c: &[usize; 3]| self.edges.is_fitted(self.nodes, *c);
         let cells = self.signs.feature_cells().filter(|c| !fitted(c));
         let cells: Vec<[usize; 3]> = cells.collect();
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
-        // Not moved before all have been looked at: what is found in a cell must not depend on the cells before it, which
-        // a neighbouring tile may not see.
+        // All cells are tested before any node is perturbed: the result for a cell must not depend on other cells, which an
+        // adjacent tile may not have.
         let mut perturbed_nodes = HashSet::new();
         for c in &cells {
             let first = self.extra.triangles.len();
@@ -269,12 +269,12 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Whether the triangles from the `first` on touch where they should not, once rounded to single precision.
+    /// Whether the triangles from `first` on intersect after rounding to single precision.
     pub fn self_intersects_rounded(&self, first: usize) -> bool {
         self.self_intersects(first, |x| f64::from(x as f32))
     }
 
-    /// Whether the triangles from the `first` on touch where they should not, once rounded somehow.
+    /// Whether the triangles from `first` on intersect after some rounding.
     pub fn self_intersects(&self, first: usize, rounded: impl Fn(f64) -> f64) -> bool {
         let triangles = &self.extra.triangles[first..];
         let mut mesh = Mesh::default();
@@ -293,8 +293,8 @@ impl FeatureCells<'_> {
         (1..names.len()).any(same) || !is_embedded(&mesh)
     }
 
-    /// The face of a cell along an axis, divided by the surfaces that cross it: the pieces of its two triangles with the
-    /// surfaces that are negative there, counter-clockwise seen from outside the cell.
+    /// A face of a cell divided by the surfaces that cross it: the fragments of its two triangles with the surfaces that are
+    /// negative there, counter-clockwise seen from outside the cell.
     pub(super) fn face_fragments(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<VertexId>)> {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
@@ -325,7 +325,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// The points after one on the line in which a surface crosses the face of a cell, up to the next grid edge; and the one
+    /// Follows the contour of a surface in a cell face from a point up to the next grid edge: the points between, and the one
     /// there.
     pub fn trace(
         &self,

@@ -1,15 +1,22 @@
-//! Edges that a surface has of its own, such as those of a mesh: where it alone makes the surface, and (`fit`) where it meets
-//! others.
+//! Feature edges: curves across which the normal of one implicit surface is discontinuous, such as the edges of a mesh.
 //!
-//! The line in which a surface meets the face of a cell runs straight from one grid edge to another. Where an edge of the
-//! surface pierces the face it gets a corner there, if it lies nearer to the surface and its edges with it. A grid edge that the
-//! surface crosses twice, for one of its edges is close by, gets both points. The patch is then the cone over its boundary loop from a
-//! point of the surface's edge inside the cell, or several where edges divide it. A boundary loop is a simple curve on the boundary of a
-//! convex cell, so one cone cannot meet itself; several are looked at. What a face or a grid edge gets depends on nothing but
-//! what all cells around it see alike.
+//! In a cell that one surface alone crosses, the surface is reconstructed from the cell's faces inwards:
 //!
-//! Source: corners in the faces of cells after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares,
-//! Comput. Graph. Forum 24 (2005) 537.
+//! 1. Each face gets *contours*, the polylines in which the surface meets it. They run from grid edge to grid edge, with a
+//!    corner where a feature edge pierces the face if that brings the contours nearer to the surface and to its edges
+//!    (`contours`). A grid edge that the surface crosses twice, because a feature edge is near, gets both points
+//!    (`double_crossings`).
+//! 2. The contours join to closed *boundary loops* on the cell's boundary (`boundary_loops`).
+//! 3. Each loop is filled by a patch: a cone from a point of the feature edge inside the cell, or several fans where several
+//!    edges divide it (`surface_patch`, `edge_graph`). A loop is a simple curve on the boundary of a convex cell, so a single cone
+//!    cannot intersect itself; several fans are tested exactly.
+//!
+//! Cells where such a surface meets others are *fitted* (`fitted_cells`).
+//!
+//! Invariant: what a face or a grid edge gets is computed from data that all adjacent cells share, in whichever tile they are.
+//!
+//! Source: corners in cell faces after C. Ho, F. Wu, B. Chen, Y. Chuang and M. Ouhyoung, Cubical marching squares, Comput.
+//! Graph. Forum 24 (2005) 537.
 
 mod boundary_loops;
 mod cell_faces;
@@ -40,49 +47,53 @@ pub(super) use fitted_cells::DividedFaces;
 use trace_edges::cell_of;
 pub(super) use trace_edges::{PaddedNodes, by_tile};
 
-/// An edge of a surface that passes a grid edge this near may pierce a face in which the surface does not show, in multiples of what
-/// points keep from nodes: a wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to keep.
+/// A feature edge that passes a grid edge within this distance may pierce a face without a contour, in multiples of the least
+/// distance of points from nodes. A wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to
+/// keep.
 const NEAR_EDGE: f64 = 8.0;
 
-/// Edges of surfaces in the cells of a block.
+/// Feature edges in the cells of a block, and the points and contours made from them. Filled in three steps: `trace_edges`,
+/// `claim` and `claim_fitted`, `find`; read-only afterwards.
 #[derive(Default)]
 pub(super) struct EdgeStore {
-    /// For each row of cells: those that are filled by their boundary loops.
+    /// For each row of cells: those that are filled from their boundary loops.
     pub cells: Vec<u64>,
-    /// Those of them in which the surface meets others, and which surface that is.
+    /// Those of them where the surface meets others, and which surface that is.
     fitted: Vec<u64>,
     fitted_to: Option<usize>,
-    /// The surface that has the edges.
+    /// The surface with feature edges, by the lowest node of the cell.
     pub surface: FxHashMap<usize, usize>,
-    /// The contours of faces, by the lowest node of the face and the axis normal to it.
+    /// The contours of cell faces, by the lowest node of the face and the axis normal to it.
     faces: FxHashMap<(usize, usize), Vec<Contour>>,
-    /// Grid edges that a surface crosses twice, by the surface, their lower nodes and axes: the lower point first.
+    /// Both crossings of grid edges that a surface crosses twice, by the surface, the lower node and the axis; the lower point
+    /// first.
     double_crossings: FxHashMap<(usize, usize, usize), [Vec3; 2]>,
-    /// The positions of points that nothing else has.
+    /// Positions of contour corners and double crossings.
     points: FxHashMap<VertexId, Vec3>,
-    /// Where edges of live surfaces pierce faces.
+    /// Points where feature edges of live surfaces pierce cell faces: surface, face, position.
     pierced: Vec<(usize, (usize, usize), Vec3)>,
-    /// Pieces of edges in cells, by the surface and the cells' lowest nodes.
+    /// Segments of feature edges in cells, by the surface and the lowest node of the cell.
     segments: FxHashMap<(usize, usize), Vec<[Vec3; 2]>>,
-    /// Places where edges end, meet or bend, and how many are there, likewise.
+    /// Points where feature edges end, meet or bend, and the number of edges there; keyed likewise.
     corners: FxHashMap<(usize, usize), Vec<(Vec3, usize)>>,
-    /// The corner that the patch of a cell has in a cell next to it, likewise.
+    /// A corner of the surface in an adjacent cell that the patch of this cell has as its apex, by the lowest node of this
+    /// cell.
     neighbour_corners: FxHashMap<usize, Vec3>,
-    /// For each row of nodes: those within two cells of a piece of an edge.
+    /// For each row of nodes: those within two cells of a feature edge.
     near: Vec<u64>,
 }
 
-/// A block, and a surface in it.
+/// One surface in a block, with all that its contours depend on.
 pub(super) struct SurfaceContext<'a, P: Fn(usize, usize) -> Option<Vec3>> {
     pub grid: &'a Grid,
     pub local: &'a LocalSolid,
     pub nodes: &'a Nodes<'a>,
     pub signs: &'a Signs,
-    /// The surface's number among the live ones, its samples and its field.
+    /// Index of the surface among the live ones, its samples and its function.
     pub surface: usize,
     pub samples: &'a [f32],
     pub field: &'a dyn Field,
-    /// The vertices of plain cells: by the lower node of their grid edge, and its axis.
+    /// Vertices of plain cells, by the lower node of their grid edge and its axis.
     pub position: P,
 }
 
@@ -105,12 +116,12 @@ impl EdgeStore {
         self.near.resize(shape[1] * shape[2], 0);
     }
 
-    /// Whether a live surface has edges here.
+    /// Whether a live surface has feature edges here.
     pub fn has(&self, surface: usize) -> bool {
         self.pierced.iter().any(|p| p.0 == surface) || self.surface.values().any(|f| *f == surface)
     }
 
-    /// Whether there are any.
+    /// Whether any cell is filled from its boundary loops.
     pub fn any(&self) -> bool {
         !self.surface.is_empty()
     }
@@ -121,13 +132,13 @@ impl EdgeStore {
         contours.flat_map(|c| [c.from, c.to])
     }
 
-    /// The position of a point that is none of a plain or a feature cell.
+    /// The position of a contour corner or double crossing.
     pub fn position(&self, key: VertexId) -> Option<Vec3> {
         self.points.get(&key).copied()
     }
 
-    /// Takes the cells that a surface with edges alone crosses, in several patches, out of those to be cut up: such are
-    /// next to edges, mostly, where distances at nodes say little of where the surface is.
+    /// Claims the feature cells in which a surface with feature edges is the only one: the sampled values near feature edges
+    /// say little of the position of the surface, so such cells are filled from their boundary loops.
     pub fn claim(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
         let featured: Vec<[usize; 3]> = signs.feature_cells().collect();
         for cell in featured {
@@ -143,7 +154,7 @@ impl EdgeStore {
         }
     }
 
-    /// Adds the edges of a surface that were followed.
+    /// Makes the contours of a surface whose feature edges were traced.
     pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, context: &SurfaceContext<P>) {
         let nodes = context.nodes;
         let of = &context.grid.surfaces[context.local.live[context.surface]].creases;
@@ -152,7 +163,7 @@ impl EdgeStore {
             let cells: Vec<usize> = own.map(|p| p.1).collect();
             self.find_double_crossings(context, cells);
         }
-        // In the order of the segments where they pierce one face.
+        // In the order of the segments, where several pierce one face.
         let mut at: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
         for (_, face, p) in self.pierced.iter().filter(|p| p.0 == context.surface) {
             at.entry(*face).or_default().push(context.inside(*face, *p));
@@ -202,8 +213,8 @@ impl EdgeStore {
         }
     }
 
-    /// The points in which edges pierce faces so near to a grid edge that the surface does not cross it twice: the faces around
-    /// that one may have their corners there too, or instead.
+    /// Points where feature edges pierce a face so near to a grid edge that the surface does not cross that edge twice. The
+    /// other faces around the edge may have their corners there as well, or instead.
     fn adjacent<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         context: &SurfaceContext<P>,
@@ -229,15 +240,16 @@ impl EdgeStore {
                 }
             }
         }
-        // In an order that is the same in all tiles.
+        // The order must be the same in all tiles.
         for positions in found.values_mut() {
             positions.sort_by(|p, q| p.partial_cmp(q).unwrap_or(Ordering::Equal));
         }
         found
     }
 
-    /// Finds the corners that lie in cells without any other surface, all their edges coming through one face: the patch
-    /// behind that face reaches through it. Its boundary loop lies on the boundary of the two cells together, which are convex.
+    /// Finds corners that lie in a cell without other surface and whose edges all enter through one face. The patch of the
+    /// adjacent cell behind that face then has its apex there: its boundary loop lies on the boundary of the two cells
+    /// together, which is convex.
     fn find_neighbour_corners<P: Fn(usize, usize) -> Option<Vec3>>(
         &mut self,
         context: &SurfaceContext<P>,
@@ -277,7 +289,7 @@ impl EdgeStore {
             let position = [0, 1, 2].map(|a| within(context.grid, nodes.axes[a], cell[a], position[a]));
             found.push((behind, position));
         }
-        // One for each patch.
+        // At most one for each patch.
         found.sort_by_key(|f| f.0);
         for pair in found.chunk_by(|a, b| a.0 == b.0) {
             if let [(behind, position)] = pair {
@@ -293,7 +305,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
         self.grid.fitted == Some(self.local.live[self.surface])
     }
 
-    /// Whether the surface alone makes the surface in a cell of the block, or would if it crossed it.
+    /// Whether the surface is the only one in a cell of the block, or would be if it crossed the cell.
     fn is_sole_surface(&self, cell: [usize; 3]) -> bool {
         let (signs, [i, j, k]) = (self.signs, cell);
         let row = k * signs.shape[1] + j;
@@ -310,7 +322,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
         decides(self.local, signs, self.surface, cell)
     }
 
-    /// Whether a grid edge that is not on the border of the block has both ends on the same side of the surface.
+    /// Whether both ends of a grid edge that is not on the border of the block are on the same side of the surface.
     fn ends_agree(&self, (node, along): (usize, usize)) -> bool {
         let (at, shape) = (self.nodes.at(node), self.nodes.shape);
         let ends = [node, node + self.nodes.stride[along]];
@@ -320,7 +332,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
         }
     }
 
-    /// A point of a face kept within it.
+    /// A point of a face, clamped to its interior.
     fn inside(&self, (low, axis): (usize, usize), mut p: Vec3) -> Vec3 {
         let at = self.nodes.at(low);
         for a in (0..3).filter(|a| *a != axis) {
@@ -330,7 +342,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
     }
 }
 
-/// What surfaces but one are at the corners of a cell.
+/// Signs of all other surfaces at the corners of a cell.
 struct OtherSurfaces<'a> {
     local: &'a LocalSolid,
     cell: [usize; 3],
@@ -362,13 +374,12 @@ impl<'a> OtherSurfaces<'a> {
         self.local.tree.solid(&sign) & 1 == 1
     }
 
-    /// Whether the surface makes all the surface there may be, whatever the others are: the tree never falls when a surface becomes
-    /// negative, so two cases stand for all.
+    /// Whether this surface decides what is solid, whatever the others do. The CSG tree is monotone, so two cases cover all.
     fn always_decides(&self) -> bool {
         self.each_case(|without, with| with && !without)
     }
 
-    /// Whether it makes a difference in none of the two cases.
+    /// Whether it decides in neither of the two cases.
     fn never_decides(&self) -> bool {
         self.each_case(|without, with| with == without)
     }
@@ -378,18 +389,18 @@ impl<'a> OtherSurfaces<'a> {
         cases.iter().all(|n| is(self.is_solid(*n), self.is_solid(n | self.own)))
     }
 
-    /// Whether there is no surface at all.
+    /// Whether the cell contains no surface at all.
     fn is_dead(&self) -> bool {
         self.is_solid(self.negative) == self.is_solid(self.negative | self.varies | self.own)
     }
 }
 
-/// Whether a surface alone would make the surface in a cell if it crossed it, whatever the other surfaces are there.
+/// Whether a surface would be the only one in a cell if it crossed the cell, whatever the other surfaces do there.
 fn decides(local: &LocalSolid, signs: &Signs, surface: usize, cell: [usize; 3]) -> bool {
     OtherSurfaces::of(local, signs, surface, cell).always_decides()
 }
 
-/// The point of a segment nearest to another one.
+/// The point of a segment nearest to another point.
 fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
     let along = sub(q, p);
     let square = dot(along, along);
@@ -397,7 +408,7 @@ fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
     add(p, scale(along, t))
 }
 
-/// The grid edges of a face: each by its lower node and its axis.
+/// The grid edges of a face, each by its lower node and its axis.
 fn lines_of(nodes: &Nodes, (low, axis): (usize, usize)) -> [(usize, usize); 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let (du, dv) = (nodes.stride[u], nodes.stride[v]);
@@ -411,14 +422,14 @@ fn faces_around(nodes: &Nodes, (node, along): (usize, usize)) -> [(usize, usize)
     [(node, u), (node - dv, u), (node, v), (node - du, v)]
 }
 
-/// A coordinate kept within a step of the grid, away from its ends.
+/// A coordinate clamped to a grid step, without its ends.
 fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
     let (low, high) = (axis[at], axis[at + 1]);
     let margin = grid.margin * (high - low);
     x.clamp(low + margin, high - margin)
 }
 
-/// The cells that have edges, among some.
+/// Those of some cells that are filled from their boundary loops, with their surfaces.
 pub(super) fn cells(edges: &EdgeStore, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
     let ny = nodes.shape[1];
     let mut found = Vec::new();

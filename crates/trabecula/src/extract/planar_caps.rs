@@ -1,7 +1,6 @@
 //! Caps: the parts of the solid's flat surfaces that are planes of the grid.
 //!
-//! Such a surface bounds everything solid, so on its far side there is nothing, and what the solid's cells show of
-//! themselves on the plane is surface.
+//! The whole solid lies on one side of such a plane, so the solid cross-section of the adjacent layer of cells is surface.
 
 use std::ops::Range;
 
@@ -55,14 +54,14 @@ pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize
     }
 }
 
-/// Whether a cell lies on the solid side of all grid-aligned surfaces.
+/// Whether a cell lies on the solid side of all grid-aligned planes.
 fn is_solid(features: &FeatureCells, [i, j, k]: [usize; 3]) -> bool {
     let flats = 0..features.local.grid_planes.len();
     let adjacent = |f| Signs::adjacent(features.local, f, j, k);
     flats.fold(u64::MAX, |w, f| w & adjacent(f)) >> i & 1 == 1
 }
 
-/// Whether a cell has a feature neighbour in its layer, which may divide a common edge.
+/// Whether a cell has an adjacent feature cell in its layer, which may divide a common edge.
 fn is_next_to_feature(features: &FeatureCells, cell: [usize; 3], faces: [usize; 2]) -> bool {
     faces.into_iter().any(|face| {
         [cell[face].wrapping_sub(1), cell[face] + 1].into_iter().any(|n| {
@@ -73,7 +72,7 @@ fn is_next_to_feature(features: &FeatureCells, cell: [usize; 3], faces: [usize; 
     })
 }
 
-/// Where the other surfaces are solid on a plane of nodes: a word along the next axis, for each node along the last.
+/// Where the other surfaces make a plane of nodes solid: a word along the next axis, for each node along the last.
 fn solid_nodes(features: &FeatureCells, axis: usize, plane: usize) -> [u64; 64] {
     let signs = features.signs;
     let [_, ny, nz] = signs.shape;
@@ -136,7 +135,7 @@ fn plain(features: &mut FeatureCells, cell: [usize; 3], axis: usize, upper: bool
     let row = k * signs.shape[1] + j;
     let crossing = (0..live).find(|&f| signs.plain[f][row] >> i & 1 == 1);
     let mut polygon: Vec<VertexId> = Vec::with_capacity(5);
-    // A feature cell next to this one divides the common edge wherever any surface crosses it.
+    // A feature cell adjacent to this one divides the common edge wherever any surface crosses it.
     let mut divided = false;
     for c in 0..4 {
         let (here, next) = (ring[c], ring[(c + 1) % 4]);

@@ -1,5 +1,5 @@
-//! The rectilinear grid: even steps between the planes of the region, and one step of padding around it; and what is
-//! known of the solid in a block of it.
+//! The rectilinear sampling grid: equal steps between the grid-aligned planes of the region, with one step of padding; and what
+//! bounds say of the solid in a block of it.
 
 use std::collections::HashMap;
 
@@ -22,25 +22,25 @@ const MOST: f64 = 4e6;
 pub(super) struct Grid {
     /// Node planes along the three axes (mm, ascending). The outermost ones lie outside the region.
     pub axes: [Vec<f64>; 3],
-    /// Points stay this far from the ends of their grid edges, as a share of the edge.
+    /// Least distance of points from the ends of their grid edges, as a share of the edge.
     pub margin: f64,
     /// The step asked for, mm.
     pub step: f64,
-    /// The smooth surfaces of the solid.
+    /// The implicit surfaces of the solid.
     pub surfaces: Vec<Surface>,
     /// How they make it.
     tree: CsgTree,
-    /// For each surface, the number of the node plane that it is, if it is one: then it needs no samples.
+    /// For each surface, the index of the node plane that it is, if it is one: then it needs no samples.
     grid_plane: Vec<Option<usize>>,
-    /// For each surface, the edges that it has of its own in each tile.
+    /// For each surface, its feature edges near each tile.
     creases: Vec<HashMap<usize, Vec<u32>>>,
-    /// The surface with edges of its own to which cells are fitted where it meets others.
+    /// The surface with feature edges to which cells are fitted where it meets others.
     pub fitted: Option<usize>,
 }
 
-/// What is known of the solid in a block without sampling it.
+/// What bounds say of the solid in a block, without sampling.
 pub(super) struct LocalSolid {
-    /// The solid, by the numbers of surfaces here: those in `live`, then those in `flat`.
+    /// The solid, by the indices of surfaces here: those in `live`, then those in `grid_planes`.
     pub tree: CsgTree,
     /// Surfaces that may change sign at the block's nodes.
     pub live: Vec<usize>,
@@ -59,128 +59,30 @@ pub(super) struct GridPlane {
 
 impl Grid {
     pub(super) fn new(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
-        if !(edge > 0.0 && edge.is_finite()) {
-            return Err(Fault::new("edge", format!("{edge} mm; the grid spacing is a positive, finite length")));
-        }
-        let bounds = solid.region.bounds();
-        if bounds.is_empty() {
-            return Err(Fault::new("region", "the region is empty; there is nothing to fill"));
-        }
-        if !bounds.is_finite() {
-            return Err(Fault::new(
-                "region",
-                "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
-            ));
-        }
-        if let Some(width) = solid.transition.filter(|w| *w < edge) {
-            let message = format!(
-                "{edge} mm; a transition between lattices is only {width:.3} mm wide, less than a grid step. Widen it, or use \
-                 a finer edge"
-            );
-            return Err(Fault::new("edge", message));
-        }
+        check(solid, edge)?;
         let (surfaces, tree) = solid.surfaces();
-        // Surfaces that all of the solid lies behind are grid-aligned on the grid, and so are exact. (Others may meet each other
-        // in ways that a grid plane cannot follow, such as two boxes that touch along an edge.)
+        // Planes that bound the whole solid become node planes and so are exact. (Others may meet each other in ways that a
+        // node plane cannot represent, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
         tree.for_each_bounding(&mut |f| required.push(f));
         let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, surfaces[f].plane?))).collect();
-        // What is kept apart by a hair is too near for cells that are fitted to edges.
+        // Perturbed surfaces are too near to others for fitted cells.
         let fits = surfaces.iter().any(|f| !f.creases.segments.is_empty()) && !surfaces.iter().any(|f| f.perturbed);
-        // Caps on planes of the grid know of feature cells alone, not of such cells.
+        // Caps on node planes know feature cells only, not fitted ones.
         if fits {
             planes.clear();
         }
         let mut axes: [Vec<f64>; 3] = Default::default();
         for (a, nodes) in axes.iter_mut().enumerate() {
-            let (lo, hi) = (bounds.min[a], bounds.max[a]);
-            if (hi - lo) / edge > MOST {
-                return Err(Fault::new(
-                    "edge",
-                    format!(
-                        "{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible",
-                        hi - lo,
-                        (hi - lo) / edge
-                    ),
-                ));
-            }
-            if hi - lo < 0.05 * edge {
-                let message = format!(
-                    "the region is only {:e} mm thick along {}, less than a twentieth of the grid step of {edge} mm; use an edge of {:e} mm or less",
-                    hi - lo,
-                    ["x", "y", "z"][a],
-                    20.0 * (hi - lo)
-                );
-                return Err(Fault::new("edge", message));
-            }
-            let mut stops: Vec<f64> = planes.iter().filter(|p| p.1.axis == a).map(|p| p.1.at).collect();
-            stops.retain(|s| (lo..=hi).contains(s));
-            stops.sort_by(f64::total_cmp);
-            // Planes closer than a hundredth of a step would make needles; the others are surfaces like any other.
-            stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
-            // Other flat surfaces, and the points where a curved one touches its bounds, are best met half-way.
-            let mut flats = vec![lo, hi];
-            solid.region.planes(a, &mut flats);
-            let others = surfaces.iter().filter(|f| !f.cut);
-            flats.extend(others.filter_map(|f| f.plane.filter(|p| p.axis == a).map(|p| p.at)));
-            flats.retain(|s| (lo..=hi).contains(s));
-            for at in flats {
-                // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes. No
-                // two shares are the same, nor make one together.
-                let share = [0.4, 0.5, 0.3][a];
-                if stops.iter().all(|s| (s - at).abs() > 0.75 * edge) {
-                    stops.extend([at - share * edge, at + (1.0 - share) * edge]);
-                }
-            }
-            stops.sort_by(f64::total_cmp);
-            if stops.is_empty() {
-                stops.push(lo);
-            }
-            let below = ((stops[0] - lo) / edge).max(0.0).ceil() + 1.0;
-            nodes.extend((0..below as usize).map(|i| stops[0] - edge * (below - i as f64)));
-            for w in stops.windows(2) {
-                let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
-                nodes.extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
-            }
-            let last = stops[stops.len() - 1];
-            nodes.push(last);
-            while nodes[nodes.len() - 1] <= hi {
-                nodes.push(nodes[nodes.len() - 1] + edge);
-            }
-            nodes.push(nodes[nodes.len() - 1] + edge);
+            let fixed = planes.iter().filter(|p| p.1.axis == a).map(|p| p.1.at).collect();
+            *nodes = node_planes(solid, &surfaces, fixed, edge, a)?;
         }
-        let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
-        let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
-        // Eight units in the last position of the farthest f32 coordinate between any two points of an edge: rounding
-        // keeps their order, hence every guarantee.
-        let resolution = farthest * f64::from(f32::EPSILON);
-        let needed = 8.0 * resolution / finest;
-        if needed > 0.125 {
-            return Err(Fault::new(
-                "edge",
-                format!(
-                    "steps of {} mm at {} mm from the origin vanish in the files' single precision; use an edge above {} mm or \
-                     move the part nearer to the origin",
-                    number(finest),
-                    number(farthest),
-                    number(64.0 * farthest * f64::from(f32::EPSILON))
-                ),
-            ));
-        }
+        let margin = margin(&axes)?;
         let mut grid_plane = vec![None; surfaces.len()];
         for (f, p) in planes {
             grid_plane[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
-        let mut grid = Grid {
-            axes,
-            margin: needed.max(1.0 / 4096.0),
-            step: edge,
-            surfaces,
-            tree,
-            grid_plane,
-            creases: Vec::new(),
-            fitted: None,
-        };
+        let mut grid = Grid { axes, margin, step: edge, surfaces, tree, grid_plane, creases: Vec::new(), fitted: None };
         grid.creases = (grid.surfaces.iter()).map(|f| feature_edges::by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
@@ -222,21 +124,21 @@ impl Grid {
         self.cells().map(|n| n.div_ceil(TILE))
     }
 
-    /// Whether a plane normal to an axis is a surface of the solid.
+    /// Whether a plane normal to an axis is both a node plane and a surface of the solid.
     pub(super) fn is_grid_plane(&self, axis: usize, at: f64) -> bool {
         let planes = self.surfaces.iter().zip(&self.grid_plane);
         let mut grid_plane = planes.filter_map(|(f, grid_plane)| grid_plane.and(f.plane));
         grid_plane.any(|p| p.axis == axis && p.at == at)
     }
 
-    /// The pieces of edges that a surface has of its own near a tile; none if it has no edges at all.
+    /// The feature edges of a surface near a tile; none if it has no feature edges at all.
     pub(super) fn creases(&self, surface: usize, [i, j, k]: [usize; 3]) -> Option<&[u32]> {
         let n = self.tiles();
         let found = self.creases[surface].get(&(i + n[0] * (j + n[1] * k)));
         (!self.creases[surface].is_empty()).then(|| found.map_or(&[][..], |f| f))
     }
 
-    /// Whether a surface has edges of its own.
+    /// Whether a surface has feature edges.
     pub(super) fn has_creases(&self, surface: usize) -> bool {
         !self.creases[surface].is_empty()
     }
@@ -271,7 +173,7 @@ impl Grid {
         }
     }
 
-    /// What bounds and positions say of the solid in a block; `None` if no surface crosses it.
+    /// The solid in a block by bounds alone; `None` if no surface crosses it.
     pub(super) fn local(&self, nodes: &[std::ops::Range<usize>; 3], b: &Aabb) -> Option<LocalSolid> {
         let (mut live, mut flat) = (Vec::new(), Vec::new());
         let mut signs = Vec::with_capacity(self.surfaces.len());
@@ -300,7 +202,7 @@ impl Grid {
                 }
             });
         }
-        // A surface may still not matter here; but a neighbouring tile may see it matter in a cell that both have.
+        // A surface may still not matter here; but it may matter to an adjacent tile in a cell that both have.
         let tree = self.tree.simplified(&|f| signs[f].unwrap_or(Sign::Varies(f)));
         if matches!(&tree, CsgTree::Intersection(of) | CsgTree::Union(of) if of.is_empty()) {
             return None;
@@ -313,4 +215,122 @@ impl Grid {
         let tree = tree.simplified(&|f| position(f).map_or(Sign::Negative, Sign::Varies));
         Some(LocalSolid { tree, live, grid_planes: flat.into_iter().map(|(_, p)| p).collect() })
     }
+}
+
+/// Refuses spacings and regions for which there is no grid.
+fn check(solid: &Solid, edge: f64) -> Result<(), Fault> {
+    if !(edge > 0.0 && edge.is_finite()) {
+        return Err(Fault::new("edge", format!("{edge} mm; the grid spacing is a positive, finite length")));
+    }
+    let bounds = solid.region.bounds();
+    if bounds.is_empty() {
+        return Err(Fault::new("region", "the region is empty; there is nothing to fill"));
+    }
+    if !bounds.is_finite() {
+        return Err(Fault::new(
+            "region",
+            "the region is not bounded; intersect it with a box, cylinder, sphere or mesh",
+        ));
+    }
+    if let Some(width) = solid.transition.filter(|w| *w < edge) {
+        let message = format!(
+            "{edge} mm; a transition between lattices is only {width:.3} mm wide, less than a grid step. Widen it, or use \
+             a finer edge"
+        );
+        return Err(Fault::new("edge", message));
+    }
+    Ok(())
+}
+
+/// The coordinates of the node planes normal to an axis: planes that are to be exact (`stops` at first), steps of about
+/// `edge` between them, and one step of padding.
+fn node_planes(
+    solid: &Solid,
+    surfaces: &[Surface],
+    mut stops: Vec<f64>,
+    edge: f64,
+    axis: usize,
+) -> Result<Vec<f64>, Fault> {
+    let bounds = solid.region.bounds();
+    let (lo, hi) = (bounds.min[axis], bounds.max[axis]);
+    if (hi - lo) / edge > MOST {
+        return Err(Fault::new(
+            "edge",
+            format!(
+                "{edge} mm cuts the region's {:.6} mm into {:.3e} steps; at most {MOST:.0e} are possible",
+                hi - lo,
+                (hi - lo) / edge
+            ),
+        ));
+    }
+    if hi - lo < 0.05 * edge {
+        let message = format!(
+            "the region is only {:e} mm thick along {}, less than a twentieth of the grid step of {edge} mm; use an edge of {:e} mm or less",
+            hi - lo,
+            ["x", "y", "z"][axis],
+            20.0 * (hi - lo)
+        );
+        return Err(Fault::new("edge", message));
+    }
+    stops.retain(|s| (lo..=hi).contains(s));
+    stops.sort_by(f64::total_cmp);
+    // Planes closer than a hundredth of a step would make needles; the others are treated like any surface.
+    stops.dedup_by(|b, a| *b - *a < 0.01 * edge);
+    // Other flat surfaces, and the points where a curved one touches its bounds, are best placed near the middle of a
+    // step.
+    let mut flats = vec![lo, hi];
+    solid.region.planes(axis, &mut flats);
+    let others = surfaces.iter().filter(|f| !f.cut);
+    flats.extend(others.filter_map(|f| f.plane.filter(|p| p.axis == axis).map(|p| p.at)));
+    flats.retain(|s| (lo..=hi).contains(s));
+    for at in flats {
+        // Not quite: an edge of a box that ran through the middles of cells would lie in their diagonal planes. No
+        // two shares are the same, nor make one together.
+        let share = [0.4, 0.5, 0.3][axis];
+        if stops.iter().all(|s| (s - at).abs() > 0.75 * edge) {
+            stops.extend([at - share * edge, at + (1.0 - share) * edge]);
+        }
+    }
+    stops.sort_by(f64::total_cmp);
+    if stops.is_empty() {
+        stops.push(lo);
+    }
+    let mut nodes = Vec::new();
+    let below = ((stops[0] - lo) / edge).max(0.0).ceil() + 1.0;
+    nodes.extend((0..below as usize).map(|i| stops[0] - edge * (below - i as f64)));
+    for w in stops.windows(2) {
+        let steps = ((w[1] - w[0]) / edge - 1e-9).ceil().max(1.0);
+        nodes.extend((0..steps as usize).map(|i| w[0] + (w[1] - w[0]) * (i as f64 / steps)));
+    }
+    let last = stops[stops.len() - 1];
+    nodes.push(last);
+    while nodes[nodes.len() - 1] <= hi {
+        nodes.push(nodes[nodes.len() - 1] + edge);
+    }
+    nodes.push(nodes[nodes.len() - 1] + edge);
+    Ok(nodes)
+}
+
+/// The least distance of points from the ends of their grid edges, as a share of the edge, that rounding to single precision
+/// requires.
+fn margin(axes: &[Vec<f64>; 3]) -> Result<f64, Fault> {
+    let finest = axes.iter().flat_map(|n| n.windows(2).map(|w| w[1] - w[0])).fold(f64::INFINITY, f64::min);
+    let farthest = axes.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+    // Eight units in the last position of the farthest f32 coordinate between any two points of an edge: rounding
+    // keeps their order, hence every guarantee.
+    let resolution = farthest * f64::from(f32::EPSILON);
+    let needed = 8.0 * resolution / finest;
+    if needed > 0.125 {
+        return Err(Fault::new(
+            "edge",
+            format!(
+                "steps of {} mm at {} mm from the origin vanish in the files' single precision; use an edge above {} mm or \
+                 move the part nearer to the origin",
+                number(finest),
+                number(farthest),
+                number(64.0 * farthest * f64::from(f32::EPSILON))
+            ),
+        ));
+    }
+    Ok(needed.max(1.0 / 4096.0))
 }

@@ -1,4 +1,4 @@
-//! What the signs of the surfaces at the nodes say of the cells of a block, 64 cells at a time.
+//! Signs of the surfaces at the nodes of a block, and the classification of its cells by them, 64 at a time.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub(super) struct Signs {
     pub negative: Vec<Vec<u64>>,
     /// For each live surface and each row of cells: the cells that it alone crosses, in one plain patch.
     pub plain: Vec<Vec<u64>>,
-    /// For each row of cells: those where surfaces meet, or one surface makes more than a plain patch.
+    /// For each row of cells: the feature cells, where surfaces meet or one surface has more than a plain patch.
     pub featured: Vec<u64>,
 }
 
@@ -46,7 +46,7 @@ impl Signs {
         (some | some >> 1, all & all >> 1)
     }
 
-    /// For each row of nodes, those at cells that can hold solid as far as the first `known` live surfaces tell.
+    /// For each row of nodes, those of cells that can contain solid according to the first `known` live surfaces.
     pub fn wanted(&self, local: &LocalSolid, known: usize) -> Vec<u64> {
         let [nx, ny, nz] = self.shape;
         let mut nodes = vec![0u64; ny * nz];
@@ -67,7 +67,7 @@ impl Signs {
         nodes
     }
 
-    /// Sorts the cells; whether any holds surface.
+    /// Classifies the cells; returns whether any contains surface.
     pub fn sort(&mut self, local: &LocalSolid) -> bool {
         let [nx, ny, nz] = self.shape;
         let surfaces = self.negative.len();
@@ -127,7 +127,7 @@ impl Signs {
         found
     }
 
-    /// Those of the cells whose patch is not plain: several loops, or corners that touch across a surface.
+    /// Those of the cells whose patch is not plain: several loops, or corners that touch across a face of the cell.
     #[inline(always)]
     fn odd(&self, surface: usize, j: usize, k: usize, cells: u64) -> u64 {
         let mut odd = 0;
@@ -156,13 +156,13 @@ impl Signs {
         self.negative[surface][node / nx] >> (node % nx) & 1 == 1
     }
 
-    /// Whether a cell of the block is feature.
+    /// Whether a cell of the block is a feature cell.
     #[inline]
     pub fn is_feature(&self, cell: [usize; 3]) -> bool {
         self.featured[cell[2] * self.shape[1] + cell[1]] >> cell[0] & 1 == 1
     }
 
-    /// Whether any cell of the block is feature.
+    /// Whether the block has a feature cell.
     pub fn has_features(&self) -> bool {
         self.featured.iter().any(|w| *w != 0)
     }

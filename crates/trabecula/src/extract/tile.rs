@@ -1,20 +1,21 @@
-//! The surface inside one tile.
+//! The surface in one tile.
 //!
-//! Where a single smooth surface of the solid crosses a cell, that is nearly everywhere: marching cubes, with every vertex
-//! strictly inside its own grid edge. Then the mesh is closed, manifold, free of self-intersection and of degenerate
-//! triangles by construction (see `table`), whatever the surface does; and rounding to f32 cannot undo it, because
-//! rounding is monotone: it maps the grid to a grid and edges to edges.
+//! Where a single smooth surface crosses a cell, which is nearly everywhere: marching cubes, with every vertex strictly inside
+//! its own grid edge. Then the mesh is closed, manifold, free of self-intersection and of degenerate triangles by construction
+//! (see `cube_table`), whatever the surface does; and rounding to f32 preserves that, because rounding is monotone: it maps the
+//! grid to a grid and edges to edges.
 //!
-//! Two things move these vertices, only ever along their edges:
+//! Two steps move these vertices, only ever along their edges:
 //! - a bracketed Newton iteration puts them on the true surface;
-//! - a contour lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of
-//!   first order in curvature · h². Each triangle learns from the normals at its corners how far it lies from the
-//!   surface, and its vertices share the move that cancels its volume error. What is left is of fourth order.
+//! - a chord lies on one side of a curved surface, so a mesh with its vertices on the surface has a volume error of first order
+//!   in curvature · h². For each triangle the distance from the surface is estimated from the normals at its corners, and its
+//!   vertices share the move that cancels its volume error. What remains is of fourth order.
 //!
-//! Where surfaces meet, `feature cell` cuts the cell up. Where a flat surface of the solid is a plane of the grid, `cap` closes it.
+//! Where surfaces meet, `feature_cells` cuts the cell. Where a flat surface of the solid is a plane of the grid, `planar_caps`
+//! closes it.
 //!
-//! A tile looks one cell beyond itself. All it computes there is a function of the grid edge or triangle alone, done
-//! in the same order, so neighbouring tiles find bit-identical vertices.
+//! A tile includes a halo of one cell. All that is computed there is a function of the grid edge or triangle alone, in the same
+//! order, so that adjacent tiles find bit-identical vertices.
 
 mod edge_vertices;
 mod plain_triangles;
@@ -37,16 +38,16 @@ use edge_vertices::{list_vertices, solve};
 use plain_triangles::list_triangles;
 use volume_balance::balance;
 
-/// The surface in one tile, by itself.
+/// The surface of one tile.
 #[derive(Default)]
 pub(super) struct Patch {
     /// Vertex positions.
     pub vertices: Vec<Vec3>,
-    /// For each vertex, its name among all tiles if a neighbouring one may use it too.
+    /// For each vertex, its id among all tiles if an adjacent one may use it too.
     pub shared: Vec<Option<u128>>,
     /// Triangles of the tile's own cells.
     pub triangles: Vec<[u32; 3]>,
-    /// For each triangle, whether it lies on the region's surface.
+    /// For each triangle, whether it is a cut.
     pub cut: Vec<bool>,
 }
 
@@ -62,7 +63,7 @@ pub(super) struct Scratch {
     gradients: Vec<Vec3>,
     vertices: Vec<Vertex>,
     plain: Plain,
-    /// Places of all vertices: those on grid edges, then the extra ones.
+    /// Positions of all vertices: those on grid edges, then the extra ones.
     positions: Vec<Vec3>,
     /// Unit normals of the vertices on edges.
     normals: Vec<[f32; 3]>,
@@ -97,7 +98,7 @@ impl Numbers {
     }
 }
 
-/// The number of a vertex of a plain cell by its name.
+/// The number of a vertex of a plain cell by its id.
 pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: VertexId) -> Option<u32> {
     let steps = key.steps();
     if !(steps.is_power_of_two() && steps < 8) {
@@ -111,7 +112,7 @@ pub(super) fn numbered(numbers: &[Numbers], nodes: &Nodes, key: VertexId) -> Opt
 /// What plain cells make.
 #[derive(Default)]
 struct Plain {
-    /// Surface by surface.
+    /// Ordered by surface.
     triangles: Vec<[u32; 3]>,
     /// Number of triangles of each surface.
     counts: Vec<usize>,
@@ -119,7 +120,7 @@ struct Plain {
     seams: Vec<Seam>,
 }
 
-/// A plain cell next to a feature one, and its surface.
+/// A plain cell adjacent to a feature cell, and its surface.
 type Seam = ([usize; 3], usize);
 
 /// What a triangle of a plain cell is for.
@@ -133,7 +134,7 @@ enum Kind {
     Cut,
 }
 
-/// A vertex on a grid edge. Small, as a tile has ten thousand of them: what the block tells is not kept.
+/// A vertex on a grid edge. Compact, as a tile has ten thousand of them: what follows from the block is not stored.
 #[derive(Clone, Copy)]
 struct Vertex {
     /// The lower node of the edge.
@@ -142,7 +143,7 @@ struct Vertex {
     surface: u8,
     /// Whether the solid end is the lower one.
     up: bool,
-    /// Whether a feature cell has the edge too: then its way of placing the vertex holds.
+    /// Whether a feature cell has the edge too: then that places the vertex.
     fixed: bool,
     /// Position on the edge from the solid end (0) to the void end (1). Rounding moves the vertex by 1e-7 of the edge.
     t: f32,
@@ -221,7 +222,7 @@ impl<'a> Nodes<'a> {
 /// Points evaluated at once: enough to amortise a call, few enough to stay in the cache.
 const BATCH: usize = 512;
 
-/// The surface found in a tile, in the buffers that it was found in.
+/// The surface found in a tile, in the buffers of its thread.
 pub(super) struct View<'a> {
     s: &'a Scratch,
     pub nodes: Nodes<'a>,
@@ -272,7 +273,8 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     }
     edges(s, grid, &local, &nodes);
     if snapped {
-        // What is balanced are points as they were found: which of them stay a tile knows in its own cells only.
+        // Vertices are balanced from the positions found before snapping: which of them snap is known to a tile in its own
+        // cells only.
         for (position, v) in s.positions.iter_mut().zip(&s.vertices) {
             *position = v.at(&nodes, f64::from(v.t));
         }
@@ -284,8 +286,8 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     own_triangles.then_some(View { s, nodes, grid, local, from, own })
 }
 
-/// Fills the samples and signs of the live surfaces. The lattice's are dear, so they are asked for only where the region
-/// can hold solid.
+/// Fills the samples and signs of the live surfaces. Those of the lattice are expensive, so they are evaluated only where the
+/// region can contain solid.
 fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes: &Nodes) {
     s.signs.shape = block.shape();
     let count = local.live.len();
@@ -314,7 +316,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
     }
 }
 
-/// Follows the edges that surfaces have of their own.
+/// Traces the feature edges of all live surfaces.
 fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, tile: [usize; 3]) {
     s.edges.clear(nodes.shape);
     let padded = grid.padded(tile);
@@ -326,7 +328,7 @@ fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, 
     }
 }
 
-/// Tells the cells that surfaces with edges make the surface in, alone or with others.
+/// Claims the cells in which surfaces with feature edges make the surface, alone or with others.
 fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
     for (surface, &id) in local.live.iter().enumerate() {
         if grid.has_creases(id) {
@@ -340,7 +342,7 @@ fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) 
     }
 }
 
-/// Finds what becomes of the edges that surfaces have of their own.
+/// Makes the contours of surfaces with feature edges.
 fn edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
     let Scratch { edges, samples, signs, numbers, positions, .. } = s;
     for (surface, &id) in local.live.iter().enumerate() {
@@ -364,7 +366,7 @@ fn edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
     }
 }
 
-/// What fills feature and fitted cells; the vertices of plain ones, and the seams.
+/// The builder of feature and fitted cells; the vertices of plain cells, and the seams.
 fn features<'a>(
     s: &'a mut Scratch,
     grid: &'a Grid,
@@ -388,7 +390,7 @@ fn features<'a>(
     (features, &s.vertices, &s.plain.seams)
 }
 
-/// Places the vertices that plain cells share with feature ones as these do.
+/// Snaps the vertices that plain cells share with feature cells to the positions these give them.
 fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
     for (i, v) in vertices.iter().enumerate().filter(|(_, v)| v.fixed) {
         let low = v.low(features.nodes);
@@ -397,7 +399,7 @@ fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
     }
 }
 
-/// Adds what plain cells do not make: feature cells, the seams around them, and caps.
+/// Adds all that marching cubes does not make: feature and fitted cells, the seams around them, and caps.
 fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
     let featured = s.signs.has_features();
     if !featured && local.grid_planes.is_empty() && !s.edges.any() {
@@ -426,12 +428,12 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: 
 }
 
 impl View<'_> {
-    /// Places of the vertices that `triangles` names.
+    /// Positions of the vertices that `triangles` refers to.
     pub fn positions(&self) -> &[Vec3] {
         &self.s.positions
     }
 
-    /// The triangles of the tile's own cells, and whether they lie on the region's surface.
+    /// The triangles of the tile's own cells, and whether they are cuts.
     pub fn triangles(&self) -> impl Iterator<Item = ([u32; 3], bool)> {
         let plain = self.s.plain.triangles.iter().zip(&self.s.plain.kinds);
         plain
@@ -440,7 +442,7 @@ impl View<'_> {
             .chain(self.s.extra.triangles.iter().copied())
     }
 
-    /// The tile's surface by itself, body by body, with what stitching needs; and its bodies.
+    /// The surface of the tile by components, with what stitching needs; and the components.
     pub fn patch(&self, middle: Vec3) -> (Patch, TileComponents) {
         let mut patch = Patch::default();
         let mut renamed = vec![u32::MAX; self.s.positions.len()];
@@ -471,17 +473,17 @@ impl View<'_> {
         &self.s.numbers[..self.local.live.len()]
     }
 
-    /// Where a live surface is negative on a row of nodes.
+    /// The signs of a live surface on a row of nodes: bits where it is negative.
     pub fn negative(&self, surface: usize, row: usize) -> u64 {
         self.s.signs.negative[surface][row]
     }
 
-    /// The surfaces that are node planes.
+    /// The surfaces that are planes of the grid.
     pub fn flat(&self) -> &[GridPlane] {
         &self.local.grid_planes
     }
 
-    /// The other vertices, with their names in the block.
+    /// The extra vertices, with their ids in the block.
     pub fn extra(&self) -> impl Iterator<Item = (u32, VertexId)> {
         (self.s.vertices.len() as u32..).zip(self.s.extra.keys.iter().copied())
     }
@@ -522,7 +524,7 @@ impl View<'_> {
         }
     }
 
-    /// The name of a vertex among all tiles.
+    /// The id of a vertex among all tiles.
     pub fn name(&self, v: usize) -> u128 {
         let key = self.key(v);
         let at = self.nodes.at(key.node());

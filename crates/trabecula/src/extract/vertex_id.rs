@@ -1,7 +1,7 @@
 //! Names of vertices.
 
-/// The name of a vertex in a block: the lowest node of its simplex, the steps (sets of axes, each within the next) to
-/// the others, and the surfaces that meet in it. In a face that is fitted to an edge, also the corners it lies between.
+/// The id of a vertex in a block: the lowest node of its simplex, the steps (sets of axes, each within the next) to the others,
+/// and the surfaces that meet in it. In a divided cell face, also the points between which it lies.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) struct VertexId(u64);
 
@@ -9,7 +9,7 @@ impl VertexId {
     const NODE: u32 = 18;
     const SURFACE: u32 = 7;
     const POINTS: u32 = VertexId::NODE + 9 + 3 * VertexId::SURFACE;
-    /// The first two steps of the point inside a plain cell or its side: no simplex repeats a step.
+    /// The first two steps of a point inside a plain cell or its face: no simplex repeats a step.
     const CENTER: u64 = 0o11;
 
     pub fn new(node: usize, steps: &[usize], surfaces: &[usize]) -> VertexId {
@@ -18,20 +18,20 @@ impl VertexId {
         VertexId(node as u64 | (steps | surfaces << 9) << VertexId::NODE)
     }
 
-    /// The point in the middle of the patch in a cell, or in a face of it, that spans some axes.
+    /// The apex of the patch in a cell, or of the polygon in a face of it, that spans these axes.
     pub fn center(node: usize, span: usize) -> VertexId {
         VertexId(node as u64 | (VertexId::CENTER * span as u64) << VertexId::NODE)
     }
 
-    /// The first or second point of a grid edge that a surface crosses twice: the surface is named twice or thrice.
+    /// The first or second point of a double crossing: the surface is named twice or three times.
     pub fn crossing(node: usize, axis: usize, surface: usize, which: usize) -> VertexId {
         VertexId::new(node, &[1 << axis], &[surface; 3][..2 + which])
     }
 
-    /// How many points of this kind there are in a face.
+    /// Greatest number of contour corners in a face.
     pub const CORNERS: usize = 4;
 
-    /// A point in a face, which spans two axes: one of several, those after the first of which name the surface.
+    /// A contour corner in a face, which spans two axes; those after the first name the surface.
     pub fn corner(node: usize, span: usize, surface: usize, which: usize) -> VertexId {
         let surfaces = VertexId::new(0, &[], &[surface; 3][..which]);
         VertexId(VertexId::center(node, span).0 | surfaces.0)
@@ -48,7 +48,7 @@ impl VertexId {
         self.0 >> VertexId::POINTS != 0
     }
 
-    /// Of a point of a grid edge that a surface crosses twice: one for the lower, two for the upper one; zero for others.
+    /// For a double crossing, 1 at the lower and 2 at the upper point; 0 for other vertices.
     pub fn index(self) -> usize {
         let mut surfaces = self.surfaces();
         let first = surfaces.next();
@@ -76,15 +76,15 @@ impl VertexId {
         (s | s >> 3 | s >> 6) & 7
     }
 
-    /// Whether this is a point of a grid edge along an axis.
+    /// Whether it lies on a grid edge along an axis.
     pub fn is_along(self, axis: usize) -> bool {
         self.steps() == 1 << axis
     }
 
-    /// The name among all tiles.
+    /// The id among all tiles.
     pub fn global(self, node: u128, surface: impl Fn(usize) -> usize) -> u128 {
         let surfaces = self.surfaces().fold(0u128, |w, f| w << 16 | (surface(f) as u128 + 1));
-        // In a face at most two surfaces meet: the third one's room is free.
+        // In a face at most two surfaces meet: the bits of the third are free.
         let points = u128::from(self.0 >> VertexId::POINTS) << 32;
         node << 57 | u128::from(self.steps()) << 48 | surfaces | points
     }

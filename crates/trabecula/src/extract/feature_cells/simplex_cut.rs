@@ -1,40 +1,40 @@
-//! Simplices of the grid, cut by the planes of the surfaces.
+//! Simplices of the grid, cut by the planes of surfaces.
 
 use super::FeatureCells;
 use crate::extract::sign_words::bits;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, cross, scale, sub};
 
-/// Vertices of a simplex of the grid, in rising order; or of one of a fitted cell, which may be points as well.
+/// Corners of a simplex: nodes of the grid in ascending order; in fitted cells extra points as well.
 #[derive(Clone, Copy)]
 pub(in crate::extract) struct Simplex {
     pub nodes: [usize; 4],
     pub count: usize,
 }
 
-/// A vertex while a simplex is cut: the corners of the face that it lies in, and the surfaces that meet there, as bits.
+/// A vertex while a simplex is cut: the corners of the face in which it lies and the surfaces that meet there, as bits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(in crate::extract) struct CutVertex {
     pub corners: u8,
     pub surfaces: u64,
 }
 
-/// A face of a piece, counter-clockwise seen from outside.
+/// A facet of a fragment, counter-clockwise seen from outside.
 #[derive(Clone)]
 pub(in crate::extract) struct FragmentFacet {
-    /// The surface it lies on; none if it is part of the simplex's own face.
+    /// The surface on which it lies; none if it is part of the simplex's own facet.
     pub surface: Option<usize>,
     pub ring: Vec<CutVertex>,
 }
 
-/// A convex piece of a tetrahedron.
+/// A convex fragment of a tetrahedron.
 pub(in crate::extract) struct Fragment {
     /// The surfaces that are negative in it.
     pub negative: u64,
     pub facets: Vec<FragmentFacet>,
 }
 
-/// How far the surfaces are moved at the nodes of a cell that single precision cannot hold, in steps.
+/// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps.
 const SHIFT: f64 = 1.0 / 512.0;
 
 /// A polygon cut in two.
@@ -42,22 +42,22 @@ pub(super) struct Halves {
     /// Where the surface is negative.
     pub(super) inside: Vec<CutVertex>,
     pub(super) outside: Vec<CutVertex>,
-    /// The edge between them, as the new face of the inside runs along it.
+    /// The edge between them, directed as in the new facet of the inner part.
     edge: Option<(CutVertex, CutVertex)>,
 }
 
-/// What a surface makes of a polygon.
+/// The parts of a polygon on either side of a surface.
 pub(super) enum Split {
-    /// It is negative everywhere.
+    /// The surface is negative everywhere.
     Inside(Vec<CutVertex>),
-    /// Nowhere.
+    /// It is positive everywhere.
     Outside(Vec<CutVertex>),
     Both(Halves),
 }
 
 impl Simplex {
-    /// The corners of a tetrahedron's faces, each across from a corner, counter-clockwise seen from outside; `right`: whether
-    /// it is right-handed.
+    /// The corners of a tetrahedron's facets, each opposite a corner, counter-clockwise seen from outside. `right` is whether
+    /// the tetrahedron is right-handed.
     pub fn facets(right: bool) -> [[CutVertex; 3]; 4] {
         let facets = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
         facets.map(|mut c: [u8; 3]| {
@@ -74,7 +74,7 @@ impl FeatureCells<'_> {
         (0..3).filter(|a| step >> a & 1 == 1).map(|a| self.nodes.stride[a]).sum()
     }
 
-    /// The value of a surface at a node, kept away from zero: a plane that passed through a node would leave needles.
+    /// The value of a surface at a node, kept away from zero: a plane through a node would leave needles.
     pub(in crate::extract) fn value(&self, surface: usize, node: usize) -> f64 {
         if let Some(point) = node.checked_sub(self.nodes.count()) {
             return self.divided_faces.value(point, surface);
@@ -86,7 +86,7 @@ impl FeatureCells<'_> {
         if self.signs.is_negative(surface, node) { v.min(-least) } else { v.max(least) }
     }
 
-    /// A number between −1 and 1 that depends on the surface and the node alone.
+    /// A pseudo-random number between −1 and 1 that depends on the surface and the node alone.
     pub(in crate::extract) fn noise(&self, id: usize, node: usize) -> f64 {
         let mix = |h: u64, x: u64| (h ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
         let bits = self.nodes.position(node).map(f64::to_bits);
@@ -108,7 +108,7 @@ impl FeatureCells<'_> {
         self.simplex(key.node(), &all[..count])
     }
 
-    /// The name of a cut vertex of a simplex.
+    /// The id of a cut vertex of a simplex.
     pub(in crate::extract) fn key(&self, simplex: &Simplex, vertex: CutVertex) -> VertexId {
         let mut nodes = (0..4).filter(|c| vertex.corners >> c & 1 == 1).map(|c| simplex.nodes[c]);
         let Some(first) = nodes.next() else {
@@ -129,7 +129,7 @@ impl FeatureCells<'_> {
         VertexId::new(first, &steps[..count], &surfaces[..met])
     }
 
-    /// The shares of its corners in the point of a simplex where as many surfaces vanish as it has dimensions.
+    /// Barycentric coordinates of the point of a simplex where as many surfaces vanish as it has dimensions.
     pub(super) fn shares(&self, simplex: &Simplex, surfaces: &[usize]) -> [f64; 4] {
         let v = |f: usize| {
             [0, 1, 2, 3].map(|c| if c < simplex.count { self.value(surfaces[f], simplex.nodes[c]) } else { 0.0 })
@@ -159,7 +159,7 @@ impl FeatureCells<'_> {
         w.map(|x| (x / sum).clamp(0.0, 1.0))
     }
 
-    /// The face of a simplex that a cut vertex lies in, and the surfaces that meet in it.
+    /// The face of a simplex on which a cut vertex lies, and the surfaces that meet in it.
     fn part(&self, simplex: &Simplex, vertex: CutVertex) -> (Simplex, [usize; 3], usize) {
         let mut part = Simplex { nodes: [simplex.nodes[0]; 4], count: 0 };
         for c in (0..4).filter(|c| vertex.corners >> c & 1 == 1) {
@@ -188,7 +188,7 @@ impl FeatureCells<'_> {
         value.sum::<f64>() <= 0.0
     }
 
-    /// The position of a node or a point.
+    /// The position of a node or an extra point.
     pub fn position_of(&self, node: usize) -> Vec3 {
         match node.checked_sub(self.nodes.count()) {
             Some(point) => self.divided_faces.position(point),
@@ -196,8 +196,8 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// The position of a cut vertex of a simplex. Points may be near to each other: a cut vertex between two keeps away from both,
-    /// by `apart` times what crossings keep from nodes.
+    /// The position of a cut vertex of a simplex. Points may be near to each other: a cut vertex between two keeps `apart`
+    /// times the least distance of crossings from nodes from both.
     pub fn vertex_position(&self, simplex: &Simplex, vertex: CutVertex, apart: f64) -> Vec3 {
         let (part, surfaces, met) = self.part(simplex, vertex);
         let first = self.position_of(part.nodes[0]);
@@ -217,7 +217,7 @@ impl FeatureCells<'_> {
         (1..part.count).fold(positions[0], |p, c| add(p, scale(sub(positions[c], positions[0]), shares[c])))
     }
 
-    /// The position of a vertex: a function of its name and the samples at its nodes alone.
+    /// The position of a vertex, a function of its id and the samples at its nodes alone.
     pub fn position(&self, key: VertexId) -> Vec3 {
         if let Some(position) = self.position_along_edge(key) {
             return position;
@@ -229,13 +229,13 @@ impl FeatureCells<'_> {
             met += 1;
         }
         let shares = self.shares(&simplex, &surfaces[..met]);
-        // Steps from the first corner: coordinates that all corners share come out exactly.
+        // Offsets from the first corner: coordinates that all corners share are exact.
         let first = self.nodes.position(simplex.nodes[0]);
         (1..simplex.count)
             .fold(first, |p, c| add(p, scale(sub(self.nodes.position(simplex.nodes[c]), first), shares[c])))
     }
 
-    /// Where surfaces cross the edge between two nodes, in order, as shares of it.
+    /// The crossings of surfaces with the edge between two nodes in order, as shares of it.
     pub(in crate::extract) fn crossings(&self, edge: &Simplex) -> Vec<(f64, usize)> {
         let mut found: Vec<(f64, usize)> = Vec::with_capacity(4);
         for f in 0..self.local.live.len() {
@@ -248,7 +248,7 @@ impl FeatureCells<'_> {
         found
     }
 
-    /// The names of the points where surfaces cross the grid edge along `axis` from a node, in order.
+    /// The ids of the crossings of surfaces with the grid edge along `axis` from a node, in order.
     pub fn edge_points(&self, node: usize, axis: usize) -> Vec<(usize, VertexId)> {
         let edge = self.simplex(node, &[1 << axis]);
         let name = |(_, f)| (f, VertexId::new(node, &[1 << axis], &[f]));
@@ -262,7 +262,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// The surfaces that are negative at all of the corners, and those that change sign between them.
+    /// The surfaces that are negative at all corners, and those that change sign between them.
     pub(in crate::extract) fn signs_of(&self, simplex: &Simplex) -> (u64, u64) {
         let (mut all, mut some) = (0, 0);
         for f in 0..self.local.live.len() {
@@ -273,8 +273,8 @@ impl FeatureCells<'_> {
         (all, some & !all)
     }
 
-    /// The pieces of a tetrahedron between the planes of the mixed surfaces. `walls` are surfaces that its own faces lie on,
-    /// each across from a corner.
+    /// The fragments of a tetrahedron between the planes of the `mixed` surfaces. `lying_on` are surfaces on which its own
+    /// facets lie, each opposite a corner.
     pub(in crate::extract) fn cut(
         &self,
         simplex: &Simplex,
@@ -290,7 +290,7 @@ impl FeatureCells<'_> {
             for fragment in fragments {
                 let room = fragment.facets.len() + 1;
                 let (mut inside, mut outside) = (Vec::with_capacity(room), Vec::with_capacity(room));
-                // The new edges, from end to end as the inside's new face has them.
+                // The new edges, directed as in the new facet of the inner part.
                 let mut edges: Vec<(CutVertex, CutVertex)> = Vec::new();
                 for facet in fragment.facets {
                     let halves = match self.split(simplex, facet.ring, f) {
@@ -368,10 +368,10 @@ impl FeatureCells<'_> {
         fragments
     }
 
-    /// The parts of a polygon where a surface is negative and positive, and the edge between them, as the new face of
-    /// the negative part runs along it.
+    /// The parts of a polygon where a surface is negative and positive, and the edge between them, directed as in the new facet
+    /// of the negative part.
     pub(super) fn split(&self, simplex: &Simplex, ring: Vec<CutVertex>, f: usize) -> Split {
-        // A face has three corners, and one more for each of at most 64 surfaces.
+        // A triangle has three corners, and one more for each of at most 64 surfaces.
         let signs = (0..).zip(&ring).fold(0u128, |w, (i, s)| w | u128::from(self.is_negative_at(simplex, *s, f)) << i);
         if signs == 0 {
             return Split::Outside(ring);

@@ -1,4 +1,4 @@
-//! Patches by their boundary loops: cells in which a surface has an edge.
+//! Cells filled from their boundary loops.
 
 use std::collections::HashMap;
 
@@ -9,10 +9,10 @@ use crate::extract::vertex_id::VertexId;
 use geometry::math::{add, scale, sub};
 use geometry::mesh::exact::drop_axis;
 
-/// Where patches of one cell are kept apart, what is between them is this much smaller than the cell.
+/// Size of the inner cell, as a share of the cell, up to which shells of several loops are kept apart.
 const INNER: f64 = 0.5;
 
-/// A boundary loop's way through a face: from a point on the face's boundary, perhaps over others, to one.
+/// A part of a boundary loop within one cell face: from a point on the face's boundary, perhaps over others, to another.
 pub(super) struct Step {
     from: VertexId,
     via: Vec<VertexId>,
@@ -29,7 +29,7 @@ impl Step {
 }
 
 impl FeatureCells<'_> {
-    /// Fills a cell in which a surface has an edge.
+    /// Fills a cell that one surface with a feature edge crosses.
     pub fn fill_edge_cell(&mut self, cell: [usize; 3], surface: usize) {
         let steps = self.steps(cell, surface);
         let boundary_loops = boundary_loops(&steps.iter().map(Step::path).collect::<Vec<_>>());
@@ -54,7 +54,7 @@ impl FeatureCells<'_> {
                 let vertex_at = triangles.map(|t| (t.map(|i| names[i]), cut));
                 self.extra.triangles.extend(vertex_at);
             }
-            // One cone cannot meet itself, but several may meet each other.
+            // A single cone cannot intersect itself; several patches may intersect each other.
             let single = !divided && boundary_loops.len() == 1;
             if single || !(self.self_intersects_rounded(first) || self.self_intersects(first, |x| x)) {
                 return;
@@ -64,7 +64,7 @@ impl FeatureCells<'_> {
         self.fill_by_shell(cell, surface, &steps, cut);
     }
 
-    /// The ways of all boundary loops through the faces of a cell: counter-clockwise seen from the void.
+    /// The parts of all loops in the faces of a cell, counter-clockwise seen from the void.
     pub(super) fn steps(&self, cell: [usize; 3], surface: usize) -> Vec<Step> {
         let node = self.nodes.index(cell);
         let mut steps = Vec::new();
@@ -124,8 +124,9 @@ impl FeatureCells<'_> {
         steps
     }
 
-    /// Fills a cell with several boundary loops: walls run from them half-way to the middle of the cell, where they end at what is
-    /// solid of the boundary of a smaller cell. Walls over boundary loops that do not meet keep apart.
+    /// Fills a cell with several loops without looking at the surface inside: strips run from the loops half-way to the centre
+    /// of the cell, where they end at the solid part of the boundary of a smaller cell. Strips of loops that do not meet do not
+    /// meet either.
     fn fill_by_shell(&mut self, cell: [usize; 3], surface: usize, steps: &[Step], cut: bool) {
         let node = self.nodes.index(cell);
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
@@ -173,7 +174,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Adds a simple polygon across an axis, not convex perhaps, by its vertices.
+    /// Adds a simple polygon normal to an axis by its vertices; it need not be convex.
     pub(super) fn flat(&mut self, names: &[u32], axis: usize, cut: bool) {
         let flat: Vec<[f64; 2]> =
             names.iter().map(|v| drop_axis(self.positions[*v as usize].map(|x| f64::from(x as f32)), axis)).collect();
@@ -182,7 +183,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// What is solid of the faces of a cell: polygons, counter-clockwise about the face's axis.
+    /// The solid parts of the faces of a cell: polygons, counter-clockwise about the face's axis.
     fn solid_polygons(&self, cell: [usize; 3], surface: usize, steps: &[Step]) -> Vec<((usize, bool), Vec<VertexId>)> {
         let node = self.nodes.index(cell);
         let mut all = Vec::new();
@@ -191,7 +192,7 @@ impl FeatureCells<'_> {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
             let ring = [low, low + du, low + du + dv, low + dv];
-            // The boundary: nodes, and where it enters the solid or leaves it.
+            // The boundary of the face: nodes, and crossings.
             let mut boundary: Vec<VertexId> = Vec::new();
             for i in 0..4 {
                 let (a, b) = (ring[i], ring[(i + 1) % 4]);
@@ -257,7 +258,7 @@ impl FeatureCells<'_> {
     }
 }
 
-/// The closed lines that some paths make.
+/// The closed loops that some paths make.
 pub(super) fn boundary_loops(paths: &[Vec<VertexId>]) -> Vec<Vec<VertexId>> {
     let mut used = vec![false; paths.len()];
     let mut boundary_loops = Vec::new();

@@ -1,8 +1,8 @@
-//! The faces of cells that are fitted to a surface: cut along its contours and into triangles.
+//! Faces of fitted cells, cut along contours and into triangles.
 //!
-//! What becomes of a face follows from the face alone, so that the cells next to it, in whichever tiles, agree. Where single
-//! precision makes intersect it, it is divided again into other triangles, with other values at its points, by chance, but of the same
-//! signs: then its grid edges stay what they are.
+//! Invariant: the division of a face depends on the face alone, so that both adjacent cells, in whichever tiles, agree. Where
+//! it would self-intersect in single precision it is divided again, into other triangles with pseudo-random values of the same
+//! signs at its points: its grid edges stay as they are.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -14,44 +14,45 @@ use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
 use geometry::mesh::exact::{drop_axis, orient2d};
 
-/// A face of a cell, cut along its contours and into triangles.
+/// A cell face, cut along its contours and into triangles.
 pub(in crate::extract) struct CellFace {
-    /// Its nodes and the points in it: number behind that of the nodes, number in the face, and name.
+    /// Its nodes and the points in it.
     pub(super) corners: Vec<Corner>,
     pub(super) parts: Vec<FaceTriangle>,
-    /// The parts cut by all other surfaces, as the faces of a feature cell are: the names of all their corners, and for each
-    /// the surfaces that are negative in it and where its names end.
+    /// The triangles cut by all other surfaces, as the faces of feature cells are: the ids of all corners of the fragments, and
+    /// for each fragment the surfaces that are negative in it and where its ids end.
     names: Vec<VertexId>,
     ends: Vec<(u64, usize)>,
-    /// The contours with the points where other surfaces cross them.
+    /// The contours, with the points where other surfaces cross them.
     pub contours: Vec<Vec<VertexId>>,
-    /// How often it was divided anew.
+    /// How many times it was divided again.
     pub(super) tries: usize,
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Corner {
     pub id: usize,
-    /// Nodes from 0 on, points of the four grid edges from 4 on in pairs, corners of contours from 12 on.
+    /// Nodes from 0, points of the four grid edges from 4 in pairs, corners of contours from 12.
     pub code: usize,
     pub key: VertexId,
 }
 
-/// A triangle of a face.
+/// A triangle of a cell face.
 #[derive(Clone, Copy)]
 pub(super) struct FaceTriangle {
-    /// Among the corners, in rising order.
+    /// Indices of its corners, by ascending code.
     pub corners: [usize; 3],
     /// Whether they run counter-clockwise about the face's axis.
     pub left: bool,
     /// Whether the surface is negative in it.
     pub inside: bool,
-    /// Whether the line across from each corner is part of a contour.
+    /// Whether the edge opposite each corner is part of a contour.
     pub on_contour: [bool; 3],
 }
 
 impl CellFace {
-    /// The parts cut by all other surfaces: those that are negative, and the corners counter-clockwise about the face's axis.
+    /// The fragments between all other surfaces: those that are negative, and the corners counter-clockwise about the face's
+    /// axis.
     pub fn fragments(&self) -> impl Iterator<Item = (u64, &[VertexId])> {
         let starts = [0].into_iter().chain(self.ends.iter().map(|e| e.1));
         let each = starts.zip(&self.ends);
@@ -61,13 +62,13 @@ impl CellFace {
 
 const AXES: [Vec3; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The surfaces that are negative in a polygon, and the names and positions of its corners.
+/// The surfaces that are negative in a polygon, and the ids and positions of its corners.
 type Polygon = (u64, Vec<(VertexId, Vec3)>);
 
-/// How often a face is divided anew if single precision makes intersect it.
+/// Most attempts to divide a face that self-intersects in single precision.
 const TRIES: usize = 8;
 
-/// The grid edges of a face that a corner lies on, as bits.
+/// The grid edges of a face on which a corner lies, as bits.
 fn lines(code: usize) -> u8 {
     match code {
         0..4 => 1 << code | 1 << ((code + 3) % 4),
@@ -77,7 +78,7 @@ fn lines(code: usize) -> u8 {
 }
 
 impl FeatureCells<'_> {
-    /// Divides the faces of the fitted cells in and around the tile's own.
+    /// Divides the faces of fitted cells in and around the tile's own cells.
     pub fn divide_faces(&mut self, own: &[Range<usize>; 3]) {
         let ny = self.nodes.shape[1];
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
@@ -102,13 +103,13 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Divides a face, if the surface shows in it.
+    /// Divides a face; none if the surface does not cross it.
     fn divide_face(&mut self, (low, axis): (usize, usize), surface: usize) -> Option<CellFace> {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let (du, dv) = (self.nodes.stride[u], self.nodes.stride[v]);
         let ring = [low, low + du, low + du + dv, low + dv];
         let mut corners: Vec<Corner> = Vec::with_capacity(8);
-        // Counter-clockwise: corners, and for points whether the boundary enters the solid there.
+        // Counter-clockwise: nodes, and crossings with whether the boundary enters the solid there.
         let mut boundary: Vec<(usize, Option<bool>)> = Vec::with_capacity(8);
         let mut solid = self.signs.is_negative(surface, low);
         for i in 0..4 {
@@ -182,7 +183,7 @@ impl FeatureCells<'_> {
         id
     }
 
-    /// The contours of a face as corners, from where its boundary enters the solid to where it leaves it.
+    /// The contours of a face by its corners, from where its boundary enters the solid to where it leaves it.
     fn contours_of(
         &mut self,
         face: (usize, usize),
@@ -213,8 +214,8 @@ impl FeatureCells<'_> {
         (0..ends.len()).filter(|i| ends[*i].1).map(next).collect()
     }
 
-    /// The triangles between the boundary of a face and its contours; other ones each time it is divided anew, where there are
-    /// others. `solid`: whether the surface is negative at the face's first node.
+    /// The triangles between the boundary of a face and its contours, others for each attempt where there are others. `solid`
+    /// is whether the surface is negative at the face's first node.
     fn parts(
         &self,
         axis: usize,
@@ -249,8 +250,8 @@ impl FeatureCells<'_> {
             add(&all, solid);
             return parts;
         }
-        // What is solid runs from where the boundary enters it along the boundary, and back along a contour; what is void
-        // from where it leaves the solid, and on along a contour.
+        // A solid polygon runs along the boundary from where that enters the solid, and back along a contour; a void one along
+        // the boundary from where that leaves the solid, and on along a contour.
         for inside in [true, false] {
             let start = |c: &Vec<usize>| if inside { c[0] } else { c[c.len() - 1] };
             let mut open: Vec<usize> = contours.iter().map(start).collect();
@@ -288,8 +289,8 @@ impl FeatureCells<'_> {
         parts
     }
 
-    /// The triangles of a face cut by all surfaces but one: the surfaces that are negative, and names and positions, counter-clockwise
-    /// about the face's axis.
+    /// The triangles of a face cut by all surfaces but one: the surfaces that are negative, ids and positions,
+    /// counter-clockwise about the face's axis.
     fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace) -> Vec<Polygon> {
         let mut fragments = Vec::with_capacity(face.parts.len());
         for part in &face.parts {
@@ -314,21 +315,22 @@ impl FeatureCells<'_> {
     /// The position of a cut vertex of a triangle in a face.
     fn face_vertex_position(&mut self, key: VertexId, face: &CellFace, simplex: &Simplex, vertex: CutVertex) -> Vec3 {
         if key.is_between() || vertex.surfaces == 0 {
-            // The more often a face is divided, the farther cut vertices keep from its points.
+            // With each attempt cut vertices keep farther from the points.
             return self.vertex_position(simplex, vertex, (1 + 2 * face.tries) as f64);
         }
         let v = self.vertex(key);
         self.positions[v as usize]
     }
 
-    /// The surfaces but one that are negative at all corners of a simplex, with that one if it is; and those that vary.
+    /// The surfaces that are negative at all corners of a simplex and those that change sign; for the fitted surface `inside`
+    /// decides.
     pub(super) fn others_of(&self, simplex: &Simplex, surface: usize, inside: bool) -> (u64, u64) {
         let (negative, mixed) = self.signs_of(simplex);
         let own = 1 << surface;
         (negative & !own | if inside { own } else { 0 }, mixed & !own)
     }
 
-    /// The name of a cut vertex of a triangle in a face, or of a line in it.
+    /// The id of a cut vertex of a triangle, or of an edge, in a face.
     pub(super) fn face_vertex_id(
         &self,
         (low, axis): (usize, usize),
@@ -362,7 +364,7 @@ impl FeatureCells<'_> {
         VertexId::between(low, 7 & !(1 << axis), &codes[..count], surfaces)
     }
 
-    /// A contour with the points where surfaces cross it.
+    /// A contour with the points where other surfaces cross it.
     fn crossed(&mut self, at: (usize, usize), surface: usize, face: &CellFace, contour: &[usize]) -> Vec<VertexId> {
         let mut path = vec![face.corners[contour[0]].key];
         for w in contour.windows(2) {
@@ -384,8 +386,8 @@ impl FeatureCells<'_> {
     }
 }
 
-/// Whether all polygons of a face are what they are meant to be in single precision: then they do not overlap either, for
-/// together they fill the face.
+/// Whether all polygons of a face keep their orientation in single precision. Together they fill the face, so then they do not
+/// overlap.
 fn is_sound(fragments: &[Polygon], axis: usize) -> bool {
     let way = orient2d([0.0, 0.0], drop_axis(AXES[(axis + 1) % 3], axis), drop_axis(AXES[(axis + 2) % 3], axis));
     fragments.iter().all(|(_, ring)| {

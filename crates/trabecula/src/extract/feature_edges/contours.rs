@@ -1,14 +1,18 @@
-//! The lines in which a surface meets the face of a cell.
+//! Contours: the polylines in which a surface meets a cell face.
+//!
+//! All ways to connect the crossings of the face's grid edges by paths over at most three corners are candidates. The set with
+//! the least distance from the surface and from the points where feature edges pierce the face is taken, provided its paths
+//! keep apart.
 
 use super::{EdgeStore, SurfaceContext, VertexId, nearest};
 use geometry::math::{self, Vec3, norm, scale, sub};
 use geometry::mesh::exact::{drop_axis, orient2d};
 
-/// Most corners of a contour: few corners of meshes have more than three edges that all run through one face.
+/// Greatest number of corners of a contour. Few corners of meshes have more than three edges that all pass one face.
 const BENDS: usize = 3;
 
-/// A line in a face, from where the face's boundary enters the solid to where it leaves it: the boundary counter-clockwise
-/// about the face's axis; over some corners.
+/// A polyline in a face, from where the face's boundary enters the solid to where it leaves it, the boundary being oriented
+/// counter-clockwise about the face's axis.
 #[derive(Clone, Debug)]
 pub(in crate::extract) struct Contour {
     pub from: VertexId,
@@ -16,7 +20,7 @@ pub(in crate::extract) struct Contour {
     pub via: Vec<(VertexId, Vec3)>,
 }
 
-/// A point on the boundary of a face.
+/// A crossing on the boundary of a face.
 #[derive(Clone, Copy)]
 struct Point {
     key: VertexId,
@@ -27,7 +31,7 @@ struct Point {
     enters: bool,
 }
 
-/// A contour between two points of a face, and how far it is from the surface in the middle of its straight pieces.
+/// A candidate path between two crossings, and the greatest distance of the surface from the midpoints of its segments.
 #[derive(Clone)]
 struct CandidatePath {
     ends: [usize; 2],
@@ -35,20 +39,20 @@ struct CandidatePath {
     off: f64,
 }
 
-/// The contours of a face that are looked for: those nearest to the surface, and to the points in which its edges pierce the face.
+/// The search for the set of candidate paths nearest to the surface and to the points where its feature edges pierce the face.
 struct ContourSearch<'a> {
     points: &'a [Point],
     pierced: &'a [Vec3],
     axis: usize,
-    /// How near contours may come to each other.
+    /// Least distance between paths, mm.
     apart: f64,
-    /// The best so far, and how far off they are.
+    /// The best set so far, and its distance.
     best: Option<(f64, Vec<&'a CandidatePath>)>,
 }
 
 impl EdgeStore {
-    /// The contours of a face that edges of the surface pierce, or with grid edges that are crossed twice; none if they are no
-    /// other than those of plain cells. `next to`: where they may have corners as well.
+    /// The contours of a face that feature edges pierce or that has double crossings; none if they are those of plain cells.
+    /// `adjacent` are further points where they may have corners.
     pub(super) fn contours<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         context: &SurfaceContext<P>,
@@ -72,7 +76,7 @@ impl EdgeStore {
         matchings(&points, &mut |pairs| {
             let of = |pair| candidates.iter().filter(|w| w.ends == pair).collect();
             let mut all: Vec<Vec<&CandidatePath>> = pairs.iter().map(|p| of(*p)).collect();
-            // Without corners, contours of points that do not alternate keep apart.
+            // Without corners, paths between crossings that do not alternate keep apart.
             let last: Option<Vec<&CandidatePath>> = all.iter().map(|w| w.last().copied()).collect();
             let Some(last) = last else { return };
             let off = last.iter().fold(0.0f64, |m, w| m.max(w.off));
@@ -103,7 +107,8 @@ impl EdgeStore {
         Some(candidates.into_iter().map(contour).collect())
     }
 
-    /// The points of the boundary of a face, counter-clockwise about its axis; none if cells next to it cannot follow.
+    /// The crossings on the boundary of a face, counter-clockwise about its axis; none if an adjacent cell cannot use extra
+    /// points.
     fn boundary<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         context: &SurfaceContext<P>,
@@ -145,7 +150,7 @@ impl EdgeStore {
         (!points.is_empty()).then_some(points)
     }
 
-    /// All contours that there may be; the last one between two points is the one without a corner, or with the least.
+    /// All candidate paths. The last one between two crossings has no corner, or the least detour.
     fn candidates<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         context: &SurfaceContext<P>,
@@ -190,8 +195,7 @@ impl EdgeStore {
 }
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
-    /// A point within a face, next to the middle of two points of one of its edges: as far from it as a share of their
-    /// distance.
+    /// A point in a face at the middle of two crossings of one grid edge, at a distance of `share` of theirs from it.
     fn adjacent(&self, face: (usize, usize), from: &Point, to: &Point, share: f64) -> Vec3 {
         let along = sub(to.position, from.position);
         let distance = along.iter().map(|x| x.abs()).fold(0.0, f64::max);
@@ -203,7 +207,7 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
     }
 }
 
-/// Calls `found` with some of the corners of a face in every order.
+/// Calls `found` with every ordered selection of at most `BENDS` corners.
 fn orders(corners: &[Vec3], taken: &mut Vec<Vec3>, found: &mut impl FnMut(Vec<Vec3>)) {
     if taken.len() == BENDS {
         return;
@@ -218,7 +222,7 @@ fn orders(corners: &[Vec3], taken: &mut Vec<Vec3>, found: &mut impl FnMut(Vec<Ve
     }
 }
 
-/// Calls `found` with every way to join the points that enter to those that leave so that straight contours do not cross.
+/// Calls `found` with every matching of entering to leaving crossings whose straight paths do not intersect.
 fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
     fn rest(
         points: &[Point],
@@ -250,7 +254,7 @@ fn matchings(points: &[Point], found: &mut impl FnMut(&[[usize; 2]])) {
 }
 
 impl<'a> ContourSearch<'a> {
-    /// Adds a way of each of the rest to those taken, nearest first, while they may be better than the best.
+    /// Adds one candidate for each remaining pair to those taken, nearest first, while the result can still be the best.
     fn add(&mut self, rest: &[Vec<&'a CandidatePath>], taken: &mut Vec<&'a CandidatePath>) {
         let Some((first, rest)) = rest.split_first() else {
             let off = taken.iter().fold(self.missed(taken), |m, w| m.max(w.off));
@@ -282,7 +286,7 @@ impl<'a> ContourSearch<'a> {
         path
     }
 
-    /// How far the farthest point in which an edge pierces the face is from some contours.
+    /// Greatest distance from a set of paths of the points where feature edges pierce the face.
     fn missed(&self, candidates: &[&CandidatePath]) -> f64 {
         let paths: Vec<Vec<Vec3>> = candidates.iter().map(|w| self.path(w)).collect();
         let from = |p: &Vec3| {
@@ -293,7 +297,7 @@ impl<'a> ContourSearch<'a> {
         self.pierced.iter().map(from).fold(0.0, f64::max)
     }
 
-    /// Whether contours come too near to each other, or one to itself.
+    /// Whether paths come too near to each other, or one to itself.
     fn is_crossing(&self, candidates: &[&CandidatePath]) -> bool {
         let flat = |p: Vec3| drop_axis(p, self.axis);
         let near = |p: [f64; 2], s: &[[f64; 2]]| {
@@ -307,7 +311,7 @@ impl<'a> ContourSearch<'a> {
         };
         let paths: Vec<Vec<[f64; 2]>> =
             candidates.iter().map(|w| self.path(w).into_iter().map(flat).collect()).collect();
-        // A path may cross itself, or turn back.
+        // A path may intersect itself, or turn back.
         let bent = |p: &Vec<[f64; 2]>| {
             let turns = p.windows(3).any(|w| near(w[0], &w[1..]) || near(w[2], &w[..2]));
             let of = |i: usize| &p[i..i + 2];

@@ -3,14 +3,14 @@
 use super::{EdgeStore, SurfaceContext};
 use geometry::math::Vec3;
 
-/// Crossings nearer to each other than so many times what points keep from nodes are left out. Beyond the edge a face is
-/// then cut off straight, by much more than what is left out.
+/// Two crossings nearer to each other than this many times the least distance of points from nodes are left out. Beyond the
+/// feature edge a face is then cut off straight, by more than what is left out.
 const CLOSE: f64 = 2.0;
-/// Rounds in which a crossing is found: each at least halves what is left, most of them do far better.
+/// Iterations of root finding. Each at least halves the interval.
 const ROUNDS: usize = 40;
 
 impl EdgeStore {
-    /// Finds the grid edges that the surface crosses twice, of some cells by their lowest nodes.
+    /// Finds the double crossings on grid edges of these cells, given by their lowest nodes.
     pub(super) fn find_double_crossings<P: Fn(usize, usize) -> Option<Vec3>>(
         &mut self,
         context: &SurfaceContext<P>,
@@ -40,7 +40,7 @@ impl EdgeStore {
 }
 
 impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
-    /// The two points at which the surface crosses a grid edge whose ends are on the same side of it.
+    /// Both points where the surface crosses a grid edge whose ends are on the same side of it.
     fn double_crossings(&self, edges: &EdgeStore, node: usize, axis: usize) -> Option<[Vec3; 2]> {
         let (nodes, at) = (self.nodes, self.nodes.at(node));
         let around = (0..3).filter(|a| *a != axis);
@@ -88,8 +88,8 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
             })
     }
 
-    /// How far from the ends of a grid edge, as shares of it, the surface may cross it twice: a distance falls no faster than
-    /// the position moves. None if it may not.
+    /// The distances from the ends of a grid edge, as shares of its length, within which a distance function cannot vanish by
+    /// its Lipschitz bound; none if that covers the whole edge.
     fn open(&self, node: usize, axis: usize) -> Option<[f64; 2]> {
         let ends = [node, node + self.nodes.stride[axis]];
         let [p, q] = ends.map(|n| self.signs.is_negative(self.surface, n));
@@ -109,19 +109,20 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
         p
     }
 
-    /// How far a point of a grid edge is on the face of the surface on which its lower end is, in shares of the edge.
+    /// Distance of a point of a grid edge from the surface, as a share of the edge's length; positive on the side of its lower
+    /// end.
     fn height(&self, node: usize, axis: usize, t: f64) -> f64 {
         let d = self.field.value(self.along(node, axis, t)) / self.length(node, axis);
         if self.signs.is_negative(self.surface, node) { -d } else { d }
     }
 }
 
-/// A position between two where a function is not above zero that falls and rises by no more than its argument; none if
-/// there is none but by a hair.
+/// A point of an interval where a function with Lipschitz bound 1 is not positive; none if there is none but in intervals
+/// shorter than `close`.
 fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Option<(f64, f64)> {
     let mut open = vec![range];
     for _ in 0..ROUNDS {
-        // The widest of what is left first.
+        // The widest remaining interval first.
         let i = (0..open.len()).max_by(|a, b| {
             let width = |i: &usize| open[*i].1 - open[*i].0;
             width(a).total_cmp(&width(b))
@@ -140,7 +141,8 @@ fn deepest(height: &impl Fn(f64) -> f64, range: (f64, f64), close: f64) -> Optio
     None
 }
 
-/// A root between a position where a function is positive and one where it is not: by contours, or halves where these crawl.
+/// A root between a point where a function is positive and one where it is not, by false position with a bisection in every
+/// third step.
 fn root(height: &impl Fn(f64) -> f64, positive: (f64, f64), other: (f64, f64)) -> f64 {
     let (mut p, mut q) = (positive, other);
     for round in 0..ROUNDS {

@@ -1,28 +1,28 @@
-//! Edges of a surface that divide a patch.
+//! The graph of feature edges in a cell, which divides a patch.
 
 use super::surface_patch::{BoundaryLoop, Cell, Patch};
 use crate::extract::feature_cells::middle;
 use geometry::math::{Vec3, add, cross, dot, norm, sub, unit};
 
-/// Ends of edges and points of boundary loops are the same if they are this many times as near to each other as points come to nodes:
+/// Ends of feature edges and points of the loop are identified if they are this many times as near as points may be to nodes:
 /// corners are moved into their faces by as much.
 const SAME: f64 = 2.0;
 
-/// A piece of an edge, by the numbers of its ends.
+/// A segment of a feature edge, by the indices of its ends.
 type Link = [usize; 2];
 
 /// The point from which a polygon is filled.
 enum Apex {
-    /// One of its own, by its number.
+    /// One of its own points.
     Own(usize),
     New(Vec3),
 }
 
-/// The edges that divide a patch: trees whose ends lie on its boundary loop.
+/// Connected components of the graph of feature edges; each must be a tree whose leaves lie on the boundary loop.
 pub(super) struct EdgeGraph {
-    /// The points of the boundary loop, and those inside.
+    /// Points of the loop, then those inside.
     positions: Vec<Vec3>,
-    /// How many of them are of the boundary loop.
+    /// How many of them belong to the loop.
     boundary_loop: usize,
     components: Vec<Vec<Link>>,
 }
@@ -36,13 +36,13 @@ impl EdgeGraph {
         let mut links: Vec<Link> = Vec::with_capacity(segments.len());
         for segment in segments {
             let [a, b] = segment.map(|p| graph.number(p, close));
-            // What lies in a face is no business of the patch.
+            // A segment within a cell face does not divide the patch.
             let in_face = a.max(b) < n && boundary_loop.faces[a] & boundary_loop.faces[b] != 0;
             if a != b && !in_face && !links.contains(&[a, b]) && !links.contains(&[b, a]) {
                 links.push([a, b]);
             }
         }
-        // Edges that end inside divide nothing.
+        // Edges that end inside the cell divide nothing.
         let mut count = vec![0; graph.positions.len()];
         links.iter().flatten().for_each(|i| count[*i] += 1);
         let is_loose = |l: &Link, count: &[usize]| l.iter().any(|i| *i >= n && count[*i] == 1);
@@ -61,7 +61,7 @@ impl EdgeGraph {
         graph
     }
 
-    /// The number of a position; a new one if none is near.
+    /// The index of the point near a position, or of a new one.
     fn number(&mut self, p: Vec3, close: f64) -> usize {
         let far = |i: &usize| norm(sub(self.positions[*i], p));
         let near = (0..self.positions.len()).min_by(|i, j| far(i).total_cmp(&far(j)));
@@ -76,7 +76,8 @@ impl EdgeGraph {
         links.map(|l| l.map(|i| self.positions[i]))
     }
 
-    /// The patch that is divided, and the mean square of how far it is from the surface; none if there is none to be had.
+    /// The divided patch and its mean squared distance from the surface; none if the graph does not divide the loop or a part
+    /// cannot be filled.
     pub fn patch(&self, cell: Cell) -> Option<(Patch, f64)> {
         if self.components.is_empty() {
             return None;
@@ -101,7 +102,7 @@ impl EdgeGraph {
             sum += off;
             count += part.len();
         }
-        // Parts that share a bent line must not both be cut across it.
+        // Two parts that share a bent polyline must not both be cut across it.
         let routes = |t: &[usize; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
         let mut edges: Vec<Link> = triangles.iter().flat_map(routes).collect();
         edges.sort_unstable();
@@ -110,7 +111,7 @@ impl EdgeGraph {
         once.then(|| (patch(), sum / f64::from(count as u32)))
     }
 
-    /// The ways along trees between the ends that follow each other on the boundary loop.
+    /// Polylines along each tree between leaves that follow each other on the loop.
     fn routes(&self) -> Vec<Vec<usize>> {
         let of = |component: &Vec<Link>| {
             let ends = self.ends(component);
@@ -122,7 +123,7 @@ impl EdgeGraph {
         self.components.iter().flat_map(of).collect()
     }
 
-    /// The points of the boundary loop at which a tree ends.
+    /// The leaves of a tree, which lie on the loop.
     fn ends(&self, component: &[Link]) -> Vec<usize> {
         let points = component.iter().flatten().copied();
         let mut ends: Vec<usize> = points.filter(|i| *i < self.boundary_loop).collect();
@@ -131,7 +132,7 @@ impl EdgeGraph {
         ends
     }
 
-    /// Divides a polygon by trees whose ends are among its points; none if they are no trees, or cross.
+    /// Divides a polygon by trees whose leaves are among its points; none if they are not trees, or cross.
     fn divide(&self, ring: Vec<usize>, mut components: Vec<Vec<Link>>, parts: &mut Vec<Vec<usize>>) -> Option<()> {
         let Some(component) = components.pop() else {
             parts.push(ring);
@@ -156,19 +157,19 @@ impl EdgeGraph {
             part.extend(&back[1..back.len() - 1]);
             self.divide(part, own, parts)?;
         }
-        // Around a tree every link is walked from both sides.
+        // Every link of a tree is walked once in each direction.
         (components.is_empty() && walked == 2 * component.len()).then_some(())
     }
 
-    /// The point from which a polygon is best filled, and the sum of squares of how far the surface is from it; none if it is seen
-    /// whole from none of those inside the cell.
+    /// The point from which a polygon is best filled and the sum of squared distances from the surface; none if the polygon is
+    /// star-shaped from none of the candidates.
     fn fan(&self, cell: Cell, part: &[usize]) -> Option<(Apex, f64)> {
         let positions: Vec<Vec3> = part.iter().map(|i| self.positions[*i]).collect();
         let center = middle(&positions);
         let faces = || positions.iter().zip(positions.iter().cycle().skip(1));
         let area = |apex: Vec3, a: Vec3, b: Vec3| cross(sub(a, apex), sub(b, apex));
         let route = unit(faces().fold([0.0; 3], |s, (a, b)| add(s, area(center, *a, *b))));
-        // From the void, and no triangle so flat that rounding could turn it.
+        // All triangles face the void, and none is so flat that rounding could invert it.
         let least = cell.grid.margin * cell.grid.step / 4.0;
         let is_visible = |apex: Vec3| {
             let mut across = faces().filter(|(a, b)| **a != apex && **b != apex);
@@ -190,7 +191,7 @@ impl EdgeGraph {
     }
 }
 
-/// The way through a tree from one point to another; none if it is no tree.
+/// The path through a tree from one point to another; none if it is not a tree.
 fn path(component: &[Link], from: usize, to: usize) -> Option<Vec<usize>> {
     let mut routes = vec![vec![from]];
     for _ in 0..=component.len() {
@@ -211,7 +212,7 @@ fn path(component: &[Link], from: usize, to: usize) -> Option<Vec<usize>> {
 mod tests {
     use super::*;
 
-    /// The parts of a boundary loop of so many points that some trees divide.
+    /// The parts into which trees divide a loop of `boundary_loop` points.
     fn parts(boundary_loop: usize, components: &[&[Link]]) -> Option<Vec<Vec<usize>>> {
         let graph = EdgeGraph {
             positions: Vec::new(),

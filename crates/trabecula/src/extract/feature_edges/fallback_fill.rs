@@ -1,9 +1,9 @@
-//! Fitted cells that nothing else fills: walls between what is solid and what is void of their faces.
+//! Fallback fill of fitted cells: closed and embedded, but not accurate.
 //!
-//! Where single precision makes intersect a cell from whatever points inside it is filled, or no point sees one of its volumes whole,
-//! nothing is asked of the surfaces any more but what they say of the cell's faces, which neighbours share: the lines there
-//! between solid and void run inwards as walls, up to a smaller cell that is all solid or all void. Between the two cells there is a copy of the faces for every
-//! depth, so walls meet no more than lines of the faces do.
+//! It is used where a cell self-intersects in single precision whichever point it is filled from, or one of its volumes is not
+//! star-shaped. It uses nothing but the division of the cell's faces, which adjacent cells share: from the edges there between
+//! solid and void, strips run inwards to a smaller cell that is all solid or all void. At every depth between the two cells is
+//! a scaled copy of the faces, so strips meet only where edges of the faces do.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,10 +11,10 @@ use crate::extract::feature_cells::FeatureCells;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, scale, sub};
 
-/// How much smaller than the cell the one is in which walls end.
+/// Sizes of the smaller cell as a share of the cell, tried in turn.
 const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
 
-/// A polygon of a face, counter-clockwise seen from outside; the face's axis, and whether the polygon is solid.
+/// A polygon of a cell face, counter-clockwise seen from outside; the face's axis, and whether the polygon is solid.
 struct Polygon {
     ring: Vec<VertexId>,
     axis: usize,
@@ -22,7 +22,7 @@ struct Polygon {
 }
 
 impl FeatureCells<'_> {
-    /// Fills a cell with walls, as long as single precision makes intersect them for one smaller cell after the other.
+    /// Fills a cell, with one smaller cell after the other while the result self-intersects in single precision.
     pub(super) fn fallback_fill(&mut self, cell: [usize; 3]) {
         let polygons = self.polygons(cell);
         let solid = self.is_solid_at(cell, self.center_of(cell));
@@ -107,7 +107,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Whether a line between two points lies on the region's surface: not if it is on a surface that is not.
+    /// Whether an edge between two points lies on the region's boundary: not if it lies on a surface of something else.
     fn is_cut(&self, p: VertexId, q: VertexId) -> bool {
         let mut both = p.surfaces().filter(|f| q.surfaces().any(|g| g == *f));
         both.all(|f| self.grid.surfaces[self.local.live[f]].cut)

@@ -1,4 +1,4 @@
-//! The surface in cells in which a surface with edges meets others.
+//! The surface in fitted cells: cones, subvolumes, or as a last resort the fallback fill.
 
 use std::rc::Rc;
 
@@ -9,35 +9,36 @@ use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle};
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, scale};
 
-/// How often a cell is filled anew from another point inside, if single precision makes intersect it.
+/// Most points from which a cell is filled in turn, if it self-intersects in single precision.
 const TRIES: usize = 6;
 
 /// A tetrahedron of a fitted cell.
 pub(super) struct Tet<'b> {
-    /// Nodes and points: last that inside the volume, the others in the same order in both tetrahedra that share them.
+    /// Nodes and points; the apex inside the volume comes last, the others in the same order in both tetrahedra that share
+    /// them.
     simplex: Simplex,
     right: bool,
     /// Whether the surface is negative in it.
     inside: bool,
-    /// Which of its sides, each across from a corner, lie on the surface.
+    /// Which of its facets, each opposite a corner, lie on the surface.
     on_patch: [bool; 4],
-    /// The triangle of a face that it is over, if it is.
+    /// The triangle of a cell face on which it stands, if it does.
     base: Option<&'b Base>,
 }
 
-/// A triangle of a face of a cell, seen from outside.
+/// A triangle of a cell face, seen from outside.
 pub(super) struct Base {
     pub ids: [usize; 3],
     pub left: bool,
     pub inside: bool,
     on_patch: [bool; 3],
     face: (usize, usize),
-    /// The face and the corners among its own, if it is divided.
+    /// The divided face and the triangle's corners in it, if the face is divided.
     pub divided: Option<(Rc<CellFace>, [usize; 3])>,
 }
 
 impl<'b> Tet<'b> {
-    /// From a point to a triangle of a face.
+    /// From an apex to a triangle of a cell face.
     pub fn over(b: &'b Base, apex: usize) -> Tet<'b> {
         Tet {
             simplex: Simplex { nodes: [b.ids[0], b.ids[1], b.ids[2], apex], count: 4 },
@@ -48,15 +49,16 @@ impl<'b> Tet<'b> {
         }
     }
 
-    /// The same, where the patch is the cone from the point.
+    /// The same where the patch is the cone from the apex.
     fn of_cone(b: &'b Base, apex: usize) -> Tet<'b> {
         let [p, q, r] = b.on_patch;
         Tet { on_patch: [p, q, r, false].map(|w| w && b.inside), ..Tet::over(b, apex) }
     }
 
-    /// From a point to a triangle inside the cell, counter-clockwise seen from beyond it; `wall`: whether it lies on the surface.
+    /// From an apex to a triangle inside the cell, counter-clockwise seen from beyond it. `on_patch` is whether it lies on the
+    /// surface.
     pub fn inner(ids: [usize; 3], inside: bool, apex: usize, on_patch: bool) -> Tet<'b> {
-        // The same order on both sides of it.
+        // The same order on both sides of the triangle.
         let mut sorted = ids;
         sorted.sort_unstable();
         let [a, b, c] = sorted;
@@ -71,11 +73,11 @@ impl<'b> Tet<'b> {
     }
 }
 
-/// The name of a cut vertex inside a cell: the nodes and points that it lies between, and the surfaces that meet there.
+/// The id of a cut vertex inside a cell: the points between which it lies, and the surfaces that meet there.
 type Inner = ([usize; 4], u64);
 
 impl FeatureCells<'_> {
-    /// Fills a cell in which a surface with edges meets others.
+    /// Fills a fitted cell.
     pub fn fitted(&mut self, cell: [usize; 3], surface: usize) {
         let bases = self.bases(cell, surface);
         let steps = self.steps(cell, surface);
@@ -87,7 +89,7 @@ impl FeatureCells<'_> {
             [(boundary_loop, _)] => vec![edges.patches(of, boundary_loop, None)],
             _ => boundary_loops.iter().map(|r| edges.patches_among(of, &r.0)).collect(),
         };
-        // The only cone of a cell bounds tetrahedra of its own.
+        // The cone over the only loop bounds tetrahedra with the cell's faces.
         let any = patches.iter().any(|p| p.divided.is_some());
         let routes = [(true, any), (false, boundary_loops.len() > 1)];
         for (divided, _) in routes.into_iter().filter(|w| w.1) {
@@ -117,8 +119,8 @@ impl FeatureCells<'_> {
         self.fallback_fill(cell);
     }
 
-    /// The points from which a cell is filled with a single cone, one after the other, as long as single precision makes intersect it.
-    /// `boundary loop`: the best point and the middle of the only boundary loop.
+    /// The apexes from which a cell is filled with a single cone, in turn while the result self-intersects in single precision.
+    /// `boundary_loop` holds the best apex and the centre of the only loop.
     fn apexes(&self, cell: [usize; 3], boundary_loop: Option<[Vec3; 2]>) -> Vec<Vec3> {
         let node = self.nodes.index(cell);
         let [low, high] = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
@@ -134,7 +136,7 @@ impl FeatureCells<'_> {
         first.into_iter().chain(by_chance).collect()
     }
 
-    /// Adds the surface in some tetrahedra of a cell, unless single precision makes intersect it.
+    /// Adds the surface in some tetrahedra of a cell, unless it self-intersects in single precision.
     fn is_filled(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) -> bool {
         let first = self.extra.triangles.len();
         self.fill(cell, surface, bases, tets);
@@ -228,7 +230,7 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Adds the faces of a tetrahedron that lie on the surface, where no other crosses it.
+    /// Adds the facets of a tetrahedron that lie on the surface, where no other surface crosses it.
     fn fill_patch(&mut self, node: usize, surface: usize, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
         let cut = self.grid.surfaces[self.local.live[surface]].cut;
         let facets = Simplex::facets(tet.right);
@@ -270,7 +272,7 @@ impl FeatureCells<'_> {
         v
     }
 
-    /// The name of a cut vertex of a triangle in a face.
+    /// The id of a cut vertex of a triangle in a face.
     fn base_key(&self, base: &Base, simplex: &Simplex, vertex: CutVertex) -> VertexId {
         let Some((face, corners)) = &base.divided else {
             return self.key(simplex, vertex);

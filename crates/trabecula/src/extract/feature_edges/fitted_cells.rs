@@ -1,12 +1,13 @@
-//! Cells in which a surface with edges meets others: which they are, and the points that they have next to nodes.
+//! Fitted cells: cells in which a surface with feature edges meets other surfaces, and the extra points in them.
 //!
-//! Such a cell is divided into tetrahedra so that the patch of the surface with edges is made of faces of them: each side of
-//! the cell is cut along its contours and into triangles, and the tetrahedra run from these to a point inside; or, from these
-//! and from patches that edges divide, to one in each volume between patches. So the surface needs no values there. Every other surface is the plane of its values at a tetrahedron's corners, as in a feature cell, but these
-//! corners are points of the edges as well as nodes.
+//! A fitted cell is divided into tetrahedra such that the patch of the surface with feature edges consists of their facets.
+//! Each cell face is cut along its contours and into triangles; the tetrahedra join these to a point inside, or, where feature
+//! edges divide the patch, to one point in each volume between patches. So that surface needs no values there. Every other
+//! surface is linear in each tetrahedron, as in a feature cell, but the corners may be extra points as well as nodes.
 //!
-//! On a grid edge the other surfaces stay what their values at its two nodes make of them, and at points inside a face or
-//! a cell they keep between their values at the nodes around: then none shows where a neighbour would not see it.
+//! Invariant: on a grid edge the other surfaces cross where linear interpolation between its two nodes says, and at extra
+//! points inside a face or a cell their values lie between those of the nodes around. So no surface appears where an adjacent
+//! cell does not expect it.
 
 use std::borrow::Cow;
 use std::rc::Rc;
@@ -22,26 +23,26 @@ use crate::extract::tile::Nodes;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
 
-/// Points that are no nodes, and the faces of cells that they divide.
+/// The extra points of a block and the cell faces that they divide.
 #[derive(Default)]
 pub(in crate::extract) struct DividedFaces {
-    /// How many surfaces there are.
+    /// Number of live surfaces.
     live: usize,
-    /// Places of the points.
+    /// Positions of the points.
     positions: Vec<Vec3>,
-    /// Values of all live surfaces at them, one point after the other.
+    /// Values of all live surfaces at the points, point by point.
     values: Vec<f64>,
-    /// The first of those that are the same point, with other values.
+    /// For each point, the first one at the same position; the others have other values.
     first: Vec<usize>,
-    /// The grid edge that each lies on, if it does: by its lower node and its axis.
+    /// The grid edge on which each point lies, if it does: lower node and axis.
     lines: Vec<Option<(usize, usize)>>,
     pub(super) numbers: FxHashMap<VertexId, usize>,
-    /// By the lowest node and the axis normal to the face.
+    /// Divided faces, by their lowest node and the axis normal to them.
     pub faces: FxHashMap<(usize, usize), Rc<CellFace>>,
 }
 
 impl DividedFaces {
-    /// None yet, where there are so many surfaces.
+    /// No points, for this number of live surfaces.
     pub fn none(live: usize) -> DividedFaces {
         DividedFaces { live, ..DividedFaces::default() }
     }
@@ -60,7 +61,7 @@ impl DividedFaces {
 }
 
 impl EdgeStore {
-    /// Takes the cells in which a surface with edges meets others out of those to be cut as feature cells.
+    /// Claims the feature cells in which a surface with feature edges meets others.
     pub fn claim_fitted(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
         self.fitted_to = Some(surface);
         let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| !matches!(signs.corners(surface, i, j, k), 0 | 0xff);
@@ -87,12 +88,12 @@ impl EdgeStore {
         }
     }
 
-    /// Whether a surface meets others in a cell in which it is fitted.
+    /// Whether a cell is fitted.
     pub fn is_fitted(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
         self.fitted[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 
-    /// The cells that position the vertices of a surface on their grid edges by the values at the nodes.
+    /// For each row of cells: those that place the vertices of a surface on their grid edges by linear interpolation.
     pub fn features<'a>(&self, signs: &'a Signs, surface: usize) -> Cow<'a, [u64]> {
         if self.fitted_to != Some(surface) {
             return Cow::Borrowed(&signs.featured);
@@ -101,7 +102,7 @@ impl EdgeStore {
         Cow::Owned(rows.map(|(k, f)| k & !f).collect())
     }
 
-    /// Adds to the nodes at which the other surfaces are asked for those about pieces of edges.
+    /// Adds the nodes around feature edges to those where the other surfaces are sampled.
     pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
         for &(_, node) in self.segments.keys() {
             let [i, j, k] = nodes.at(node);
@@ -115,7 +116,7 @@ impl EdgeStore {
         }
     }
 
-    /// Whether a cell can follow whatever a face or a grid edge of it gets.
+    /// Whether the cell can use extra points on its faces and edges.
     pub(super) fn takes_extra_points<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
         context: &SurfaceContext<P>,
@@ -137,19 +138,19 @@ impl FeatureCells<'_> {
         if v <= 0.0 { v.min(-least) } else { v.max(least) }
     }
 
-    /// The value of a surface at a share of a grid edge: between those at its nodes.
+    /// The value of a surface at a share of a grid edge, interpolated between its nodes.
     pub(super) fn value_along(&self, surface: usize, node: usize, axis: usize, share: f64) -> f64 {
         let [a, b] = [node, node + self.offset(1 << axis)].map(|n| self.value(surface, n));
         self.clamped_from_zero(surface, a + (b - a) * share)
     }
 
-    /// Where on a grid edge a position is.
+    /// The share of a grid edge at which a position lies.
     pub(super) fn share_of(&self, node: usize, axis: usize, position: Vec3) -> f64 {
         let (axis_nodes, at) = (self.nodes.axes[axis], self.nodes.at(node)[axis]);
         (position[axis] - axis_nodes[at]) / (axis_nodes[at + 1] - axis_nodes[at])
     }
 
-    /// The points in which the surface with edges crosses a grid edge, the lower one first.
+    /// The crossings of the fitted surface with a grid edge, the lower one first.
     pub(super) fn points_of(&self, node: usize, axis: usize, surface: usize) -> Vec<(VertexId, Vec3)> {
         if let Some(points) = self.edges.double_crossings.get(&(surface, node, axis)) {
             return (0..2).map(|i| (VertexId::crossing(node, axis, surface, i), points[i])).collect();
@@ -164,8 +165,8 @@ impl FeatureCells<'_> {
         }
     }
 
-    /// Where the others than the fitted surface cross a grid edge that this crosses too: as their values at its nodes say, but
-    /// on their face of its points, and apart from these and from each other.
+    /// The crossing of another surface with a grid edge that the fitted surface crosses too: interpolated between the nodes,
+    /// but on its own side of the fitted surface's crossings, and at a distance from these and from each other.
     pub fn position_along_edge(&self, key: VertexId) -> Option<Vec3> {
         let axis = (0..3).find(|a| key.is_along(*a))?;
         let fitted = self.grid.fitted?;
@@ -202,8 +203,8 @@ impl FeatureCells<'_> {
         Some(position)
     }
 
-    /// The points in which the fitted surface crosses a grid edge, as shares of it; and the other surfaces that cross it, in
-    /// order: after how many of these points each does, the share by its values at the nodes, and its number.
+    /// The crossings of the fitted surface with a grid edge, as shares of it; and those of the other surfaces in order: the
+    /// number of fitted crossings before each, its interpolated share, and its surface.
     fn order_along(&self, node: usize, axis: usize, fitted: usize) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
         let points = self.points_of(node, axis, fitted);
         let at: Vec<f64> = points.iter().map(|p| self.share_of(node, axis, p.1)).collect();
@@ -218,8 +219,8 @@ impl FeatureCells<'_> {
         (at, order)
     }
 
-    /// Whether a surface is negative where another one crosses a part of a grid edge that the fitted surface crosses too: by their
-    /// order along the whole of it, which all faces and cells around it share. None if the part is of no such edge.
+    /// Whether a surface is negative where another one crosses a part of a grid edge that the fitted surface crosses too: by
+    /// their order along the whole edge, which all adjacent faces and cells share. None if the part belongs to no such edge.
     pub fn sign_on_line(&self, ends: [usize; 2], other: usize, surface: usize) -> Option<bool> {
         let count = self.nodes.count();
         let line = |n: usize| self.divided_faces.line(n.checked_sub(count)?);
@@ -244,7 +245,7 @@ impl FeatureCells<'_> {
         Some(at_ends[usize::from(passed)])
     }
 
-    /// Adds a point that is no node; gives its number.
+    /// Adds an extra point; returns its number, which continues those of the nodes.
     pub(super) fn add_point(&mut self, position: Vec3, line: Option<(usize, usize)>, values: Vec<f64>) -> usize {
         self.divided_faces.positions.push(position);
         self.divided_faces.lines.push(line);
@@ -254,12 +255,12 @@ impl FeatureCells<'_> {
         id
     }
 
-    /// The number that stands for a node or a point and those that are the same.
+    /// The number that stands for a node or for all extra points at one position.
     pub(super) fn first_of(&self, id: usize) -> usize {
         id.checked_sub(self.nodes.count()).map_or(id, |p| self.divided_faces.first[p])
     }
 
-    /// The same point with other values of the same signs, by chance.
+    /// A copy of an extra point with pseudo-random values of the same signs.
     pub(super) fn perturbed(&mut self, low: usize, corner: &Corner, attempt: usize) -> usize {
         let Some(point) = corner.id.checked_sub(self.nodes.count()) else {
             return corner.id;
@@ -276,7 +277,7 @@ impl FeatureCells<'_> {
         id
     }
 
-    /// The values of all live surfaces at a position, between those at some nodes. The one with edges needs none.
+    /// The values of all live surfaces at a position, clamped to those of some nodes. The fitted surface needs none.
     pub(super) fn values_between(&self, position: Vec3, around: &[usize]) -> Vec<f64> {
         let value = |f: usize| {
             let at = around.iter().map(|n| self.value(f, *n));

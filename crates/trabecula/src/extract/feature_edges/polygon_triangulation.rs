@@ -1,13 +1,14 @@
-//! Simple polygons in triangles.
+//! Triangulation of simple polygons.
 
 use geometry::mesh::exact::orient2d;
 
-/// The triangles of a simple polygon the flattest of which is as little flat as can be: of all its triangulations the one
-/// that rounding harms least. `other`: ones that are nearly as good, each number another.
+/// The triangulation of a simple polygon whose flattest triangle is as little flat as possible, and so the one that rounding
+/// harms least. A nonzero `other` selects a nearly optimal one, each number another.
 ///
-/// The best one of a part of the polygon, cut off by a diagonal, is the best pair of what a triangle over that diagonal
-/// leaves (G. T. Klincsek, Minimal triangulations of polygonal domains, Ann. Discrete Math. 9 (1980) 121). Whether a
-/// diagonal stays inside need not be asked: if all triangles turn as the polygon does they cover it once.
+/// Dynamic programming over diagonals: the best triangulation of the part cut off by a diagonal is that of the two parts which
+/// a triangle on this diagonal leaves (G. T. Klincsek, Minimal triangulations of polygonal domains, Ann. Discrete Math. 9
+/// (1980) 121). Whether a diagonal lies inside need not be tested: if all triangles turn as the polygon does, they cover it
+/// once.
 pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
     let n = ring.len();
     let area: f64 = (0..n)
@@ -17,7 +18,7 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
         })
         .sum();
     let orientation = if area > 0.0 { 1 } else { -1 };
-    // For the part from i to j, the height of its flattest triangle and the corner over the diagonal.
+    // For the part from i to j: the height of its flattest triangle, and the apex over the diagonal.
     let mut best = vec![(f64::INFINITY, 0); n * n];
     for reach in 2..n {
         for i in 0..n - reach {
@@ -45,14 +46,14 @@ pub(super) fn triangles(ring: &[[f64; 2]], other: usize) -> Vec<[usize; 3]> {
     found
 }
 
-/// The height of a triangle above its longest face, as a share of that.
+/// Height of a triangle above its longest edge, as a share of that edge.
 fn height([a, b, c]: [[f64; 2]; 3]) -> f64 {
     let face = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     area.abs() / face(a, b).max(face(b, c)).max(face(c, a))
 }
 
-/// One, or by `other` something from a quarter to one.
+/// One, or a factor between a quarter and one that depends on `other`.
 fn weight([i, j, k]: [usize; 3], other: usize) -> f64 {
     let mix =
         [i, j, k].iter().fold(other as u64, |h, x| (h ^ *x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));

@@ -1,4 +1,5 @@
-//! Cells that patches divide into volumes: tetrahedra in all of them.
+//! Cells that patches divide into volumes: each volume is divided into tetrahedra from a point in its kernel. A volume that is
+//! not star-shaped is first divided by partitions along feature edges.
 
 use std::collections::VecDeque;
 
@@ -9,14 +10,14 @@ use super::surface_patch::Patch;
 use crate::extract::feature_cells::{FeatureCells, middle};
 use geometry::math::{Vec3, cross, dot, scale, sub, unit};
 
-/// A point that is behind all that bounds a volume by so many steps is taken at once, if that is more than it must be.
+/// A point at least this deep behind all facets, in grid steps, is taken at once if that satisfies the required depth.
 const DEEP: f64 = 0.1;
-/// How often a point is moved to come farther behind.
+/// Most moves of a point to a greater depth.
 const MOVES: u32 = 200;
-/// Where edges cross a cell in more ways than this, volumes are not divided along them.
+/// With more routes along feature edges than this, volumes are not partitioned.
 const MOST: usize = 8;
 
-/// A triangle that bounds a volume: counter-clockwise seen from outside of it.
+/// A triangle that bounds a volume, counter-clockwise seen from outside.
 #[derive(Clone, Copy)]
 struct Facet<'b> {
     ids: [usize; 3],
@@ -27,7 +28,7 @@ struct Facet<'b> {
 enum Of<'b> {
     CellFace(&'b Base),
     Patch,
-    /// What divides a volume that is not seen whole from any point.
+    /// A partition of a volume that is not star-shaped.
     Partition,
 }
 
@@ -37,7 +38,7 @@ struct Volume<'b> {
     inside: bool,
 }
 
-/// A line between two points, the same in both directions.
+/// An undirected edge between two points.
 type Line = [usize; 2];
 
 fn line(a: usize, b: usize) -> Line {
@@ -48,27 +49,27 @@ fn lines_of([a, b, c]: [usize; 3]) -> [Line; 3] {
     [line(a, b), line(b, c), line(c, a)]
 }
 
-/// The lines of a closed way.
+/// The edges of a closed polyline.
 fn around(ring: &[usize]) -> Vec<Line> {
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(a, b)| line(*a, *b)).collect()
 }
 
-/// A triangle, turned over unless it is to stay.
+/// A triangle, reversed unless it is to stay.
 fn turned([a, b, c]: [usize; 3], stays: bool) -> [usize; 3] {
     if stays { [a, b, c] } else { [a, c, b] }
 }
 
 impl FeatureCells<'_> {
-    /// The tetrahedra from points in the volumes between patches to all that bounds each; none if that cannot be had. `patches`:
-    /// with the numbers of their boundary loops' points.
+    /// The tetrahedra of all volumes between patches; none if a volume cannot be divided into star-shaped ones. `patches` come
+    /// with the numbers of their loops' points.
     pub(super) fn volumes<'b>(
         &mut self,
         cell: [usize; 3],
         bases: &'b [Base],
         patches: &[(&[usize], &Patch)],
     ) -> Option<Vec<Tet<'b>>> {
-        // Points of faces that were divided anew have other values there than elsewhere.
+        // Points of faces that were divided again have other values in that face.
         let is_perturbed = |b: &Base| b.divided.as_ref().is_some_and(|(s, _)| s.tries > 0);
         if bases.iter().any(is_perturbed) {
             return None;
@@ -81,7 +82,7 @@ impl FeatureCells<'_> {
             let inside = matches!(facets[0].of, Of::CellFace(b) if b.inside);
             volumes.push(Volume { facets, inside });
         }
-        // A closed line divides the cell's boundary in two.
+        // A closed polyline divides the boundary of the cell in two.
         if volumes.len() != patches.len() + 1 {
             return None;
         }
@@ -109,8 +110,8 @@ impl FeatureCells<'_> {
         Some(tets)
     }
 
-    /// Adds the tetrahedra of a volume; of its parts, where it is not seen whole from any point. `ways`: those it may be divided
-    /// along.
+    /// Adds the tetrahedra of a volume, or of its parts where it is not star-shaped. `routes` are the polylines along which it
+    /// may be partitioned.
     fn divide<'b>(
         &mut self,
         cell: [usize; 3],
@@ -133,7 +134,7 @@ impl FeatureCells<'_> {
         Some(())
     }
 
-    /// Adds the tetrahedra of a volume, if it is seen whole from a point.
+    /// Adds the tetrahedra of a volume; false if no point is found in its kernel.
     fn fill_star_shaped<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, tets: &mut Vec<Tet<'b>>) -> bool {
         let facets = volume.facets.iter();
         let positions: Vec<[Vec3; 3]> = facets.map(|f| f.ids.map(|i| self.position_of(i))).collect();
@@ -150,7 +151,7 @@ impl FeatureCells<'_> {
         true
     }
 
-    /// The halves of a volume that is divided by a wall between a way along its patches and one along its sides.
+    /// Both halves of a volume that is partitioned between a route along its patches and one along its cell faces.
     fn partitioned<'b>(&mut self, cell: [usize; 3], volume: &Volume<'b>, route: &[usize]) -> Option<[Volume<'b>; 2]> {
         let mut ring = route.to_vec();
         ring.extend(back(&volume.facets, route)?);
@@ -173,7 +174,7 @@ impl FeatureCells<'_> {
     }
 }
 
-/// Half of a surface, closed by a wall. `line`: one of those they share, as the wall has it.
+/// Half of a boundary, closed by a partition. `line` is one of the edges that they share, directed as in the partition.
 fn closed<'b>(mut half: Vec<Facet<'b>>, partition: &[[usize; 3]], line: [usize; 2]) -> Vec<Facet<'b>> {
     let runs = |ids: [usize; 3]| (0..3).any(|k| [ids[k], ids[(k + 1) % 3]] == line);
     let stays = !half.iter().any(|f| runs(f.ids));
@@ -181,7 +182,7 @@ fn closed<'b>(mut half: Vec<Facet<'b>>, partition: &[[usize; 3]], line: [usize; 
     half
 }
 
-/// The parts that some lines divide a surface into.
+/// The parts into which some edges divide a boundary.
 fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
     let mut adjacent: FxHashMap<Line, Vec<usize>> = FxHashMap::default();
     for (i, f) in facets.iter().enumerate() {
@@ -208,8 +209,8 @@ fn parts<'b>(facets: &[Facet<'b>], lines: &[Line]) -> Vec<Vec<Facet<'b>>> {
     all
 }
 
-/// The points between the end of a way along patches and its start on the shortest way back along faces, by the count of lines,
-/// that meets no patch or wall.
+/// The points of the shortest route, by number of edges, from the end of a route along patches back to its start along cell
+/// faces, meeting no patch or partition.
 fn back(facets: &[Facet], route: &[usize]) -> Option<Vec<usize>> {
     let (start, end) = (route[route.len() - 1], route[0]);
     let is_cell_face = |f: &&Facet| matches!(f.of, Of::CellFace(_));
@@ -238,14 +239,14 @@ fn back(facets: &[Facet], route: &[usize]) -> Option<Vec<usize>> {
     None
 }
 
-/// A point that is farther than so much behind all of some triangles, counter-clockwise seen from the front.
+/// A point deeper than `least` behind all of some triangles, counter-clockwise seen from the front.
 fn behind(triangles: &[[Vec3; 3]], step: f64, least: f64) -> Option<Vec3> {
     let plane = |t: &[Vec3; 3]| (unit(cross(sub(t[1], t[0]), sub(t[2], t[0]))), t[0]);
     let planes: Vec<(Vec3, Vec3)> = triangles.iter().map(plane).collect();
     let corners: Vec<Vec3> = triangles.iter().flatten().copied().collect();
     let mut at = middle(&corners);
     let mut best = (at, f64::NEG_INFINITY);
-    // Away from the nearest plane by less and less: how far the nearest one is, is a concave function.
+    // Away from the nearest plane by decreasing steps: the depth below the nearest plane is a concave function.
     for moves in 1..=MOVES {
         let depths = planes.iter().map(|p| (dot(p.0, sub(p.1, at)), p.0));
         let (depth, normal) = depths.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -264,7 +265,7 @@ fn behind(triangles: &[[Vec3; 3]], step: f64, least: f64) -> Option<Vec3> {
 mod tests {
     use super::*;
 
-    /// The faces of a prism over a polygon in the unit square, whose ends are triangles of its corners.
+    /// The facets of a prism over a polygon in the unit square, whose ends are triangles of its corners.
     fn prism(polygon: &[[f64; 2]], ends: &[[usize; 3]]) -> (Vec<Facet<'static>>, Vec<Vec3>) {
         let n = polygon.len();
         let mut ids: Vec<[usize; 3]> = Vec::new();
@@ -314,7 +315,7 @@ mod tests {
             let routes = |f: &Facet| [0, 1, 2].map(|k| (f.ids[k], f.ids[(k + 1) % 3]));
             let routes: Vec<(usize, usize)> = half.iter().flat_map(routes).collect();
             assert!(routes.iter().all(|(a, b)| routes.contains(&(*b, *a))));
-            // The left leg is convex; all of the rest is seen from the far right.
+            // The left leg is convex; the kernel of the rest is at the far right.
             assert!(behind(&positions(&half, &at), 1.0, 1e-3).is_some());
         }
         assert_eq!(parts(&facets, &[line(2, 10)]).len(), 1);

@@ -1,7 +1,7 @@
-//! The patch over a boundary loop: a cone, or several face by face where more than one edge of the surface divides it.
+//! Patches that fill a boundary loop: a cone, or several fans where more than one feature edge divides it.
 //!
-//! Of all that is tried, that is taken which the surface and its edges are nearest to. One cone cannot meet itself, for a boundary loop is
-//! a simple curve on the boundary of a convex cell; whether several meet is only known once they are there.
+//! Of all candidates the one nearest to the surface and to its feature edges is taken. A single cone cannot intersect itself,
+//! since the loop is a simple curve on the boundary of a convex cell; several fans are tested after they are made.
 
 use super::edge_graph::EdgeGraph;
 use super::{EdgeStore, Grid, Nodes, nearest, within};
@@ -10,15 +10,16 @@ use crate::extract::vertex_id::VertexId;
 use crate::field::Field;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
-/// More pieces of edges than this in one cell are not looked at one by one: they are far shorter than a step.
+/// Cells with more segments of feature edges than this are treated as if they had none: such segments are far shorter than a
+/// grid step.
 const MOST: usize = 128;
 
-/// A cell, and the surface whose patch is in it.
+/// A cell and the surface whose patch it contains.
 #[derive(Clone, Copy)]
 pub(super) struct Cell<'a> {
     pub grid: &'a Grid,
     nodes: &'a Nodes<'a>,
-    /// Its lowest node.
+    /// The lowest node.
     node: usize,
     surface: usize,
     field: &'a dyn Field,
@@ -26,23 +27,23 @@ pub(super) struct Cell<'a> {
 
 /// The boundary loop of a patch.
 pub(super) struct BoundaryLoop {
-    /// The points, counter-clockwise seen from the void.
+    /// Its points, counter-clockwise seen from the void.
     pub positions: Vec<Vec3>,
-    /// The faces of the cell that each lies in, as bits: corners lie in one.
+    /// The faces of the cell on which each point lies, as bits; a contour corner lies on one.
     pub faces: Vec<u8>,
 }
 
-/// Triangles over a boundary loop: by the numbers of its points, and from their count on those of the points inside.
+/// Triangles that fill a loop. Indices below the number of its points are these; the others are `inner`.
 pub(super) struct Patch {
     pub inner: Vec<Vec3>,
     pub triangles: Vec<[usize; 3]>,
-    /// Along the edges that divide it from one point of the boundary loop to another.
+    /// Polylines along the dividing feature edges, from one point of the loop to another.
     pub routes: Vec<Vec<usize>>,
 }
 
-/// What may be over a boundary loop.
+/// The candidates that fill a loop.
 pub(super) struct Patches {
-    /// Where edges divide it, if that is nearer to the surface than a single cone.
+    /// Divided by feature edges, if that is nearer to the surface than a single cone.
     pub divided: Option<Patch>,
     pub cone: Patch,
 }
@@ -61,13 +62,13 @@ impl Patch {
 }
 
 impl Cell<'_> {
-    /// A point kept within the cell.
+    /// A point clamped to the interior of the cell.
     pub fn within(&self, p: Vec3) -> Vec3 {
         let at = self.nodes.at(self.node);
         [0, 1, 2].map(|a| within(self.grid, self.nodes.axes[a], at[a], p[a]))
     }
 
-    /// The sum of squares of how far the surface is from the middles between a point and others.
+    /// Sum of squared distances of the surface from the midpoints between a point and others.
     pub fn off(&self, from: Vec3, to: &[Vec3]) -> f64 {
         let middles: Vec<Vec3> = to.iter().map(|p| scale(add(from, *p), 0.5)).collect();
         let mut off = vec![0.0; middles.len()];
@@ -88,7 +89,7 @@ impl<'a> FeatureCells<'a> {
         }
     }
 
-    /// The boundary loop of a patch, by the names of its points.
+    /// The boundary loop of a patch, by the ids of its points.
     pub(super) fn boundary_loop(&mut self, cell: [usize; 3], keys: &[VertexId]) -> BoundaryLoop {
         let faces = |k: &VertexId| {
             let at = self.nodes.at(k.node());
@@ -103,7 +104,7 @@ impl<'a> FeatureCells<'a> {
 }
 
 impl EdgeStore {
-    /// The patches over the only boundary loop of a cell. `beyond`: as for [`Edges::apex`].
+    /// The candidates for the only loop of a cell. `neighbour_corners`: as for [`EdgeStore::apex`].
     pub(super) fn patches(&self, cell: Cell, boundary_loop: &BoundaryLoop, neighbour_corners: Option<Vec3>) -> Patches {
         let (apex, off) = self.apex(cell, boundary_loop, neighbour_corners);
         let is_exact = off < (cell.grid.margin * cell.grid.step).powi(2);
@@ -112,7 +113,7 @@ impl EdgeStore {
         Patches { divided: divided.map(|d| d.0), cone: Patch::cone(boundary_loop, apex) }
     }
 
-    /// The same over one of several boundary loops.
+    /// The candidates for one of several loops.
     pub(super) fn patches_among(&self, cell: Cell, boundary_loop: &BoundaryLoop) -> Patches {
         let graph = EdgeGraph::new(cell, boundary_loop, self.segments_in(cell));
         let own: Vec<[Vec3; 2]> = graph.segments().collect();
@@ -121,13 +122,13 @@ impl EdgeStore {
         Patches { divided: divided.map(|d| d.0), cone: Patch::cone(boundary_loop, apex) }
     }
 
-    /// Where a corner in a cell next to this one is nearer to the surface than any point of this.
+    /// The corner in an adjacent cell that is the apex of this cell's patch, if there is one.
     pub(super) fn neighbour_corners(&self, cell: Cell) -> Option<Vec3> {
         self.neighbour_corners.get(&cell.node).copied()
     }
 
-    /// The point over which the only patch of a cell becomes a cone: on the surface's edges there, if any; or `beyond`, where a
-    /// corner in a cell next to it is nearer. And the mean square of how far the cone is from the surface, and the edges from it.
+    /// The apex of the cone over the only loop of a cell, on a feature edge if there is one, or at `neighbour_corners` if that
+    /// is nearer; and the mean square of the distances of the cone from the surface and from the feature edges.
     pub(super) fn apex(
         &self,
         cell: Cell,
@@ -137,13 +138,13 @@ impl EdgeStore {
         self.best(cell, boundary_loop, self.segments_in(cell), neighbour_corners)
     }
 
-    /// The pieces of edges in a cell; none if there are too many.
+    /// The segments of feature edges in a cell; none if there are too many.
     fn segments_in(&self, cell: Cell) -> &[[Vec3; 2]] {
         let here = self.segments.get(&(cell.surface, cell.node));
         here.filter(|p| p.len() <= MOST).map_or(&[], |p| p)
     }
 
-    /// The apex where only some pieces of edges belong to the patch.
+    /// The best apex for some of the segments.
     fn best(
         &self,
         cell: Cell,
@@ -164,7 +165,7 @@ impl EdgeStore {
             let inside = self.corners.get(&(cell.surface, cell.node));
             tried.extend(inside.into_iter().flatten().map(|c| c.0));
         }
-        // An edge that runs through needs no other choice.
+        // A single edge that passes through leaves no other choice.
         if corners.len() == 2 && tried.len() == 1 && far(&tried[0]) < 0.1 * cell.grid.step {
             return (cell.within(tried[0]), 0.0);
         }

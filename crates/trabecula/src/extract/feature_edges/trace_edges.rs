@@ -1,4 +1,4 @@
-//! Where the edges of a surface run: which of them the grid shows, and the cells and faces that these pass.
+//! Tracing feature edges through the grid: which edges are kept, and which cells and faces they pass.
 
 use std::collections::HashMap;
 
@@ -8,27 +8,27 @@ use crate::extract::tile::Nodes;
 use geometry::feature_edges::Creases;
 use geometry::math::{Vec3, add, scale, sub};
 
-/// Straight edges that are this many steps long or more are shown, however little the surface turns there.
+/// Straight edges of at least this many grid steps are kept, whatever their angle.
 const LONG: f64 = 3.0;
-/// The turn from which on an edge is shown in any case, radians (25°): without it the surface is off by up to a tenth of a
-/// step.
+/// Edges of at least this angle are kept whatever their length, radians (25°). Without them the surface is off by up to a tenth
+/// of a grid step.
 const SHARP: f64 = 0.436;
 
-/// The nodes of a block and one more on every side, and how many there are before the block's.
+/// The node coordinates of a block and of one more node on every side, and the number of nodes before the block.
 pub(in crate::extract) struct PaddedNodes<'a> {
     pub axes: [&'a [f64]; 3],
     pub before: [isize; 3],
 }
 
 impl EdgeStore {
-    /// Follows the edges of a live surface through the cells of the block.
+    /// Traces the feature edges of a live surface through the cells of the block.
     pub fn trace_edges(&mut self, nodes: &Nodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
         for &i in segments {
             self.walk(nodes, padded, surface, of.segments[i as usize].ends);
         }
     }
 
-    /// Follows a piece of an edge through the cells of the block, and those around it.
+    /// Traces one segment through the cells of the block and those around it.
     fn walk(&mut self, nodes: &Nodes, padded: &PaddedNodes, surface: usize, [p, q]: [Vec3; 2]) {
         let along = sub(q, p);
         let mut stops = vec![0.0, 1.0];
@@ -59,7 +59,7 @@ impl EdgeStore {
         }
     }
 
-    /// Marks the nodes within two cells of one that an edge passes.
+    /// Marks the nodes within two cells of one that a feature edge passes.
     fn mark(&mut self, nodes: &Nodes, cell: [isize; 3]) {
         let reach = [0, 1, 2].map(|a| {
             let last = nodes.shape[a] as isize - 1;
@@ -74,14 +74,14 @@ impl EdgeStore {
         }
     }
 
-    /// Whether a piece of an edge of some surface lies within two cells of a node: contours that end on grid edges farther away
-    /// are all known in every tile that has these.
+    /// Whether a feature edge lies within two cells of a node. Contours that end on grid edges farther away are known to every
+    /// tile that has these edges.
     pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
         self.near[k * nodes.shape[1] + j] >> i & 1 == 1
     }
 }
 
-/// The cell between nodes that a position lies in.
+/// The cell between nodes that contains a position.
 pub(super) fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
     let mut cell = [0; 3];
     for a in 0..3 {
@@ -94,7 +94,7 @@ pub(super) fn cell_of(axes: [&[f64]; 3], p: Vec3) -> Option<[usize; 3]> {
     Some(cell)
 }
 
-/// The pieces of a surface's edges that the grid shows, by the numbers of the tiles that they come near.
+/// The segments of a surface's feature edges that are kept, by the tiles near which they pass.
 pub(in crate::extract) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usize, Vec<u32>> {
     let mut found: HashMap<usize, Vec<u32>> = HashMap::new();
     let tiles = grid.tiles();
@@ -105,7 +105,7 @@ pub(in crate::extract) fn by_tile(grid: &Grid, creases: &Creases) -> HashMap<usi
         }
         let range = [0, 1, 2].map(|a| {
             let axis = &grid.axes[a];
-            // The cells it lies in, and two more on either side: so far from its border a tile asks for edges.
+            // The cells it passes, and two more on either side: as far beyond its border does a tile need edges.
             let cell = |x: f64| axis.partition_point(|n| *n <= x).saturating_sub(1);
             let (low, high) = (cell(p[a].min(q[a])), cell(p[a].max(q[a])));
             let tile = |c: usize| (c / TILE).min(tiles[a] - 1);

@@ -9,8 +9,8 @@ use crate::extract::cube_table::{CASES, EDGES, MOST};
 use crate::extract::sampling_grid::{Grid, LocalSolid};
 use crate::extract::sign_words::{Signs, within};
 
-/// Lists the triangles of all plain cells of the block, halo included; and the plain cells next to feature ones, which
-/// `feature cell` fills in its own way.
+/// Lists the triangles of all plain cells of the block, halo included; and the plain cells adjacent to feature cells, which
+/// `feature_cells` fills.
 pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, own: &[Range<usize>; 3]) {
     let Scratch { signs, numbers, plain, edges, .. } = s;
     plain.triangles.clear();
