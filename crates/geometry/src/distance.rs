@@ -10,11 +10,13 @@ use crate::mesh::Mesh;
 use crate::repair::{self, Boundary, Repair, Repaired};
 
 mod normals;
-pub mod tree;
+pub mod triangle;
+pub mod triangle_bvh;
 pub mod winding;
 
 use normals::Normals;
-use tree::{Face, Feature, Hit, Tree};
+use triangle::{Feature, Triangle};
+use triangle_bvh::{Nearest, TriangleBvh};
 use winding::Winding;
 
 /// A position and its signed distance, where none is known: no comparison with it holds.
@@ -28,7 +30,7 @@ pub const REACH: f64 = 1.4;
 /// Distances to the (repaired) boundary are exact to rounding, negative inside.
 #[derive(Debug)]
 pub struct MeshDistance {
-    tree: Tree,
+    tree: TriangleBvh,
     normals: Normals,
     /// Decides the sign where the boundary is not one clean surface; none where it is everywhere.
     winding: Option<Winding>,
@@ -56,11 +58,11 @@ impl MeshDistance {
     }
 
     fn within(Boundary { mesh, pairs, done }: Boundary) -> Self {
-        let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
-        let (tree, order) = Tree::new(&faces);
+        let faces: Vec<Triangle> = (0..mesh.triangles.len()).map(|i| Triangle::new(mesh.corners(i))).collect();
+        let tree = TriangleBvh::new(&faces);
         let (normals, winding) = match pairs {
-            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, &order), None),
-            None => (Normals::of_pieces(&faces, &order), Some(Winding::new(&tree))),
+            Some(pairs) => (Normals::new(&mesh, &faces, &pairs, tree.order()), None),
+            None => (Normals::of_pieces(&faces, tree.order()), Some(Winding::new(&tree))),
         };
         MeshDistance { normals, winding, tree, mesh, repaired: done }
     }
@@ -81,8 +83,8 @@ impl MeshDistance {
     }
 
     /// The triangles, in the order of the tree.
-    pub fn faces(&self) -> &[Face] {
-        self.tree.faces()
+    pub fn triangles(&self) -> &[Triangle] {
+        self.tree.triangles()
     }
 
     /// Distances up to this (mm) are hidden by rounding.
@@ -91,7 +93,7 @@ impl MeshDistance {
     }
 
     /// The nearest triangle; `seed` is one that may be near.
-    pub fn nearest(&self, p: Vec3, seed: u32) -> Hit {
+    pub fn nearest(&self, p: Vec3, seed: u32) -> Nearest {
         self.tree.nearest(p, seed)
     }
 
@@ -100,7 +102,7 @@ impl MeshDistance {
     ///
     /// `known` is a position and its signed distance: where the two balls that hold no surface overlap, the sign is the
     /// same, and winding numbers need not be computed.
-    pub fn signed(&self, hit: &Hit, p: Vec3, known: (Vec3, f64)) -> f64 {
+    pub fn signed(&self, hit: &Nearest, p: Vec3, known: (Vec3, f64)) -> f64 {
         let d = hit.square.sqrt();
         let rounding = self.tree.rounding();
         if d <= rounding {
@@ -121,14 +123,19 @@ impl MeshDistance {
     }
 
     /// Gradient of the signed distance at a position whose nearest triangle is `hit` and whose signed distance is `d` (mm).
-    fn gradient(&self, hit: &Hit, d: f64) -> Vec3 {
+    fn gradient(&self, hit: &Nearest, d: f64) -> Vec3 {
         let outward = self.normals.outward(&self.tree, hit);
         match hit.feature {
             Feature::Face if !outward[0].is_nan() => outward,
-            _ if d == 0.0 && outward[0].is_nan() => self.tree.faces()[hit.triangle as usize].normal,
+            _ if d == 0.0 && outward[0].is_nan() => self.tree.triangles()[hit.triangle as usize].normal,
             _ if d == 0.0 => unit(outward),
             _ => scale(hit.away, 1.0 / d),
         }
+    }
+
+    /// Signed distance (mm) of a point.
+    pub fn value(&self, p: Vec3) -> f64 {
+        self.signed(&self.tree.nearest(p, 0), p, UNKNOWN)
     }
 
     /// Fills signed distances (mm) of points; fastest for points that follow each other closely.
@@ -157,78 +164,4 @@ impl MeshDistance {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-    use crate::mesh::samples::{icosphere, with};
-    use crate::random::random;
-    use tree::normal;
-
-    #[test]
-    fn the_seed_never_matters() {
-        let region = MeshDistance::new(icosphere(3, 1.0, 0.3), Repair::Auto).unwrap();
-        let mut seed = 3;
-        for _ in 0..500 {
-            let p = [0; 3].map(|_| random(&mut seed) * 1.5);
-            let any = ((random(&mut seed) + 1.0) * 640.0) as u32;
-            let (a, b) = (region.nearest(p, 0), region.nearest(p, any));
-            assert_eq!((a.square, a.triangle), (b.square, b.triangle));
-        }
-        // The centre of a regular body is equally far from every face.
-        let cube = MeshDistance::new(Mesh::cuboid([-1.0; 3], [1.0; 3]), Repair::Auto).unwrap();
-        for s in 0..12 {
-            assert_eq!(cube.nearest([0.0; 3], s).triangle, cube.nearest([0.0; 3], 0).triangle);
-        }
-    }
-
-    #[test]
-    fn nearest_points_of_a_triangle_by_sampling() {
-        let mut seed = 21;
-        for _ in 0..300 {
-            let corners = [0; 3].map(|_| [0; 3].map(|_| random(&mut seed)));
-            let face = Face { corners, normal: normal(corners) };
-            let p = [0; 3].map(|_| 2.0 * random(&mut seed));
-            let (square, away, _) = face.nearest(p);
-            assert!((square - dot(away, away)).abs() < 1e-14);
-            let n = 60;
-            let mut least = f64::INFINITY;
-            for i in 0..=n {
-                for j in 0..=n - i {
-                    let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                    let q = [0, 1, 2].map(|a| (1.0 - u - v) * corners[0][a] + u * corners[1][a] + v * corners[2][a]);
-                    least = least.min(norm(sub(p, q)));
-                }
-            }
-            // The samples are never nearer, and one of them lies within a step of the nearest point.
-            assert!(least >= square.sqrt() - 1e-12 && least <= square.sqrt() + 2.0 * 3f64.sqrt() * 2.0 / f64::from(n));
-        }
-    }
-
-    #[test]
-    fn winding_numbers_are_whole_and_the_tree_is_near_them() {
-        let mesh = with(icosphere(3, 2.0, 0.2), icosphere(2, 0.8, 0.0), true);
-        let faces: Vec<Face> = (0..mesh.triangles.len()).map(|i| Face::new(mesh.corners(i))).collect();
-        let (tree, _) = Tree::new(&faces);
-        let winding = Winding::new(&tree);
-        let mut seed = 6;
-        let mut worst = [0.0f64; 3];
-        for _ in 0..2000 {
-            let p = [0; 3].map(|_| random(&mut seed) * 2.6);
-            let plain: f64 = faces.iter().map(|f| winding::turn(f.corners, p)).sum();
-            assert!((plain - plain.round()).abs() < 1e-11, "{plain}");
-            for (w, reach) in worst.iter_mut().zip([2.0, 4.0, 8.0]) {
-                *w = w.max((winding.at(&tree, p, reach, |_| false) - plain).abs());
-            }
-        }
-        // Moments up to the second leave an error of the third: an eighth at twice the reach, at least.
-        assert!(worst[0] < 0.02 && worst[1] < worst[0] / 8.0 && worst[2] < worst[1] / 8.0, "{worst:?}");
-        // An open surface: the number is that of the plain sum there too.
-        let open: Vec<Face> = faces[..500].to_vec();
-        let (tree, _) = Tree::new(&open);
-        let winding = Winding::new(&tree);
-        for _ in 0..500 {
-            let p = [0; 3].map(|_| random(&mut seed) * 2.6);
-            let plain: f64 = open.iter().map(|f| winding::turn(f.corners, p)).sum();
-            assert!((winding.at(&tree, p, 2.0, |_| false) - plain).abs() < 0.02);
-        }
-    }
-}
+mod tests;

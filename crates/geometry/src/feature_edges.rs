@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::distance::tree::normal;
+use crate::distance::triangle::normal;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 use crate::repair::half_edges::{ends, halves};

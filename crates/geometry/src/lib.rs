@@ -2,6 +2,7 @@
 //!
 //! Lengths are mm; triangles are counter-clockwise seen from outside.
 
+pub mod bvh;
 pub mod distance;
 pub mod fault;
 pub mod feature_edges;

@@ -264,6 +264,12 @@ impl Aabb {
         self.min.iter().chain(&self.max).all(|v| v.is_finite())
     }
 
+    /// Whether two boxes have a point in common, faces included.
+    #[inline]
+    pub fn touches(&self, o: &Aabb) -> bool {
+        (0..3).all(|a| self.min[a] <= o.max[a] && o.min[a] <= self.max[a])
+    }
+
     /// Distance from `p` to the box, zero inside.
     #[inline]
     pub fn distance(&self, p: Vec3) -> f64 {

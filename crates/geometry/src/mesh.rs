@@ -10,8 +10,7 @@ mod intersect;
 pub mod samples;
 
 pub use edges::Edges;
-pub use intersect::{Tree as BoxTree, meet, near_pairs};
-pub use intersect::{is_embedded, self_intersections};
+pub use intersect::{is_embedded, meet, near_pairs, self_intersections};
 
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -288,3 +288,7 @@ fn closed(mesh: &Mesh) -> Result<(), Fault> {
         short(area)
     )))
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod laws;

@@ -24,16 +24,38 @@ pub fn unite(root: &mut [u32], a: u32, b: u32) -> bool {
     a != b
 }
 
+/// So many numbers, each its own.
+pub fn singles(count: usize) -> Vec<u32> {
+    (0..count as u32).collect()
+}
+
+/// The number of each member's set, in the order of their lowest members, and how many sets there are.
+pub fn labels(root: &mut [u32]) -> (Vec<u32>, usize) {
+    let mut label = vec![u32::MAX; root.len()];
+    let mut count = 0;
+    for i in 0..label.len() {
+        let r = find(root, i as u32) as usize;
+        if r == i {
+            label[i] = count;
+            count += 1;
+        } else {
+            label[i] = label[r];
+        }
+    }
+    (label, count as usize)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn numbers_go_to_the_lowest_of_their_own() {
-        let mut root: Vec<u32> = (0..6).collect();
+        let mut root = singles(6);
         assert!(unite(&mut root, 5, 3) && unite(&mut root, 1, 4) && unite(&mut root, 4, 5));
         assert!(!unite(&mut root, 1, 3));
         let found: Vec<u32> = (0..6).map(|v| find(&mut root, v)).collect();
         assert_eq!(found, [0, 1, 2, 1, 1, 1]);
+        assert_eq!(labels(&mut root), (found, 3));
     }
 }

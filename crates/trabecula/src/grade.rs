@@ -325,10 +325,7 @@ mod tests {
 
     fn samples(n: usize) -> impl Iterator<Item = f64> {
         let mut s = 12345u64;
-        (0..n).map(move |_| {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 53) as f64
-        })
+        (0..n).map(move |_| (geometry::random::random(&mut s) + 1.0) / 2.0)
     }
 
     #[test]

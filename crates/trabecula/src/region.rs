@@ -88,12 +88,7 @@ pub type Region = Arc<dyn Shape>;
 pub(crate) mod tests {
     use super::*;
     use geometry::math::{Vec3, add, norm, scale, sub};
-
-    /// A number in [-1, 1) from a linear congruential generator.
-    pub fn random(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
+    use geometry::random::random;
 
     fn point(seed: &mut u64, reach: f64) -> Vec3 {
         [0; 3].map(|_| random(seed) * reach)

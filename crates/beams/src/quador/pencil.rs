@@ -265,8 +265,7 @@ mod tests {
     use super::*;
 
     fn random(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (*seed >> 11) as f64 / (1u64 << 53) as f64
+        (geometry::random::random(seed) + 1.0) / 2.0
     }
 
     /// Pairs of balls, neither in the other.

@@ -10,8 +10,7 @@ pub(super) struct Random(pub u64);
 
 impl Random {
     pub(super) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        (geometry::random::random(&mut self.0) + 1.0) / 2.0
     }
 
     pub(super) fn direction(&mut self) -> Vec3 {

@@ -4,7 +4,8 @@
 //! Comput. Graph. 11 (2005) 243. The proof looks at nothing but the surface about the nearest point, so within a
 //! triangle it holds however the surface is elsewhere.
 
-use super::tree::{Face, Feature, Hit, Tree};
+use super::triangle::{Feature, Triangle};
+use super::triangle_bvh::{Nearest, TriangleBvh};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 use crate::repair::check::Pairs;
@@ -26,7 +27,7 @@ pub struct Normals {
 
 impl Normals {
     /// The normals of a closed mesh, whose half-edges `pairs` gives; `order` is that of the tree.
-    pub fn new(mesh: &Mesh, faces: &[Face], pairs: &Pairs, order: &[u32]) -> Normals {
+    pub fn new(mesh: &Mesh, faces: &[Triangle], pairs: &Pairs, order: &[u32]) -> Normals {
         let mut edges = vec![[[0.0; 3]; 3]; faces.len()];
         for [a, b] in pairs {
             let [a, b] = [*a as usize, *b as usize];
@@ -55,7 +56,7 @@ impl Normals {
     /// The normals of pieces that need not match: those of triangles that are not slivers, and none of edges and
     /// corners. Another piece may rest on those from the other side, so that the nearest point is on both; within a
     /// triangle only a line of places has such a point nearest.
-    pub fn of_pieces(faces: &[Face], order: &[u32]) -> Normals {
+    pub fn of_pieces(faces: &[Triangle], order: &[u32]) -> Normals {
         let sound = |i: &u32| {
             let [a, b, c] = faces[*i as usize].corners;
             let longest = [sub(b, a), sub(c, b), sub(a, c)].map(|e| dot(e, e));
@@ -66,11 +67,11 @@ impl Normals {
     }
 
     /// Outward normal (any length) at the nearest point; not numbers where there is none to trust.
-    pub fn outward(&self, tree: &Tree, hit: &Hit) -> Vec3 {
+    pub fn outward(&self, tree: &TriangleBvh, hit: &Nearest) -> Vec3 {
         let i = hit.triangle as usize;
         match hit.feature {
             Feature::Face if self.faces.get(i) == Some(&false) => NONE,
-            Feature::Face => tree.faces()[i].normal,
+            Feature::Face => tree.triangles()[i].normal,
             Feature::Edge(k) => self.edges.get(i).map_or(NONE, |e| e[usize::from(k)]),
             Feature::Corner(k) => self.corners.get(i).map_or(NONE, |c| c[usize::from(k)]),
         }

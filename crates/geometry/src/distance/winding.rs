@@ -10,7 +10,8 @@ use core::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::tree::{Face, Tree};
+use super::triangle::Triangle;
+use super::triangle_bvh::TriangleBvh;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Solid angle of a triangle seen from `p`, over 4π: positive where the normal points away from `p`.
@@ -89,7 +90,7 @@ struct Moments {
 }
 
 impl Moments {
-    fn of(faces: &[Face], bounds: &crate::math::Aabb) -> Moments {
+    fn of(faces: &[Triangle], bounds: &crate::math::Aabb) -> Moments {
         let mut area = 0.0;
         let mut middle = [0.0; 3];
         for f in faces {
@@ -248,18 +249,18 @@ pub struct Winding {
 
 impl Winding {
     /// Takes the moments of the nodes of `tree`, and puts those side by side that a query asks for together.
-    pub fn new(tree: &Tree) -> Winding {
+    pub fn new(tree: &TriangleBvh) -> Winding {
         let nodes = tree.nodes();
-        let mut range = vec![(0u32, 0u32); nodes.len()];
+        let mut range = vec![0..0; nodes.len()];
         for i in (0..nodes.len()).rev() {
             let n = &nodes[i];
-            range[i] = if n.count > 0 { (n.at, n.at + n.count) } else { (range[i + 1].0, range[n.at as usize].1) };
+            range[i] = n.items().unwrap_or_else(|| {
+                let [first, second] = n.children(i);
+                range[first].start..range[second].end
+            });
         }
-        let moments: Vec<Moments> = nodes
-            .par_iter()
-            .zip(&range)
-            .map(|(n, r)| Moments::of(&tree.faces()[r.0 as usize..r.1 as usize], &n.bounds))
-            .collect();
+        let moments: Vec<Moments> =
+            nodes.par_iter().zip(&range).map(|(n, r)| Moments::of(&tree.triangles()[r.clone()], &n.bounds)).collect();
         // The sets of each node, by their numbers in the tree; those that are parted have a node of their own.
         let mut sets: Vec<Vec<usize>> = vec![vec![0]];
         let mut out: Vec<Node> = Vec::new();
@@ -268,13 +269,14 @@ impl Winding {
             // The largest is parted first, so that sets side by side are about as large.
             while all.len() < WIDE {
                 let size = |k: &usize| moments[all[*k]].radius;
-                let parted = (0..all.len()).filter(|k| nodes[all[*k]].count == 0);
+                let parted = (0..all.len()).filter(|k| nodes[all[*k]].items().is_none());
                 let Some(k) = parted.max_by(|a, b| size(a).total_cmp(&size(b))) else {
                     break;
                 };
                 let i = all[k];
-                all[k] = i + 1;
-                all.push(nodes[i].at as usize);
+                let [first, second] = nodes[i].children(i);
+                all[k] = first;
+                all.push(second);
             }
             let mut node = Node {
                 center: [[0.0; WIDE]; 3],
@@ -291,12 +293,12 @@ impl Winding {
                 for (t, v) in node.terms.iter_mut().zip(m.in_radii()) {
                     t.0[k] = v;
                 }
-                node.count[k] = nodes[i].count;
-                if nodes[i].count > 0 {
-                    node.at[k] = nodes[i].at;
+                if let Some(items) = nodes[i].items() {
+                    node.at[k] = items.start as u32;
+                    node.count[k] = items.len() as u32;
                 } else {
                     node.at[k] = sets.len() as u32;
-                    sets.push(vec![i + 1, nodes[i].at as usize]);
+                    sets.push(nodes[i].children(i).to_vec());
                 }
             }
             out.push(node);
@@ -309,7 +311,7 @@ impl Winding {
     /// A set is replaced by its expansion where it is farther than `reach` times its radius, which leaves an error of
     /// the order of `reach`⁻³ times its share of the sphere. What is skipped must be within rounding of `p`, so that no
     /// replaced set holds it.
-    pub fn at(&self, tree: &Tree, p: Vec3, reach: f64, skip: impl Fn(u32) -> bool) -> f64 {
+    pub fn at(&self, tree: &TriangleBvh, p: Vec3, reach: f64, skip: impl Fn(u32) -> bool) -> f64 {
         let limit = (reach * reach) as f32;
         let mut angle = Angle { re: 1.0, im: 0.0, full: 0 };
         let mut sum = 0f64;
@@ -330,7 +332,7 @@ impl Winding {
                 }
                 for t in node.at[k]..node.at[k] + node.count[k] {
                     if !skip(t) {
-                        angle.add(sides(tree.faces()[t as usize].corners, p));
+                        angle.add(sides(tree.triangles()[t as usize].corners, p));
                     }
                 }
                 angle.rescale();
@@ -346,13 +348,13 @@ mod tests {
     use super::*;
     use crate::random::random;
 
-    fn plain(faces: &[Face], p: Vec3) -> f64 {
+    fn plain(faces: &[Triangle], p: Vec3) -> f64 {
         faces.iter().map(|f| turn(f.corners, p)).sum()
     }
 
-    fn some(count: usize, seed: &mut u64) -> Vec<Face> {
+    fn some(count: usize, seed: &mut u64) -> Vec<Triangle> {
         let mut point = || [0; 3].map(|_| random(seed));
-        (0..count).map(|_| Face::new([point(), point(), point()])).collect()
+        (0..count).map(|_| Triangle::new([point(), point(), point()])).collect()
     }
 
     /// The m-th term of 1/|r − x| has a gradient in x of at most m |x|^(m−1) / |r|^(m+1), so what three terms of the
@@ -364,9 +366,9 @@ mod tests {
             let scale_by = 10f64.powf(4.0 * random(&mut seed));
             let mut faces = some(5, &mut seed);
             for f in &mut faces {
-                *f = Face::new(f.corners.map(|p| scale(p, scale_by)));
+                *f = Triangle::new(f.corners.map(|p| scale(p, scale_by)));
             }
-            let (tree, _) = Tree::new(&faces);
+            let tree = TriangleBvh::new(&faces);
             let winding = Winding::new(&tree);
             let node = &winding.nodes[0];
             let center = node.center.map(|c| c[0]);
@@ -401,21 +403,21 @@ mod tests {
         for _ in 0..200 {
             // Nothing is far, so all goes through the product of complex numbers.
             let faces = some(60, &mut seed);
-            let (tree, _) = Tree::new(&faces);
+            let tree = TriangleBvh::new(&faces);
             let winding = Winding::new(&tree);
             for p in [[0.0; 3], faces[7].corners[0], [0; 3].map(|_| random(&mut seed))] {
                 let all = winding.at(&tree, p, 1e9, |_| false);
                 assert!((all - plain(&faces, p)).abs() < 1e-12, "{all}");
                 let without = winding.at(&tree, p, 1e9, |k| k == 3);
-                let one = turn(tree.faces()[3].corners, p);
+                let one = turn(tree.triangles()[3].corners, p);
                 assert!((without + one - all).abs() < 1e-12);
             }
         }
         // Twelve times about: whole turns are counted.
         let ball = crate::mesh::samples::icosphere(1, 1.0, 0.0);
-        let faces: Vec<Face> =
-            (0..12 * ball.triangles.len()).map(|i| Face::new(ball.corners(i % ball.triangles.len()))).collect();
-        let (tree, _) = Tree::new(&faces);
+        let faces: Vec<Triangle> =
+            (0..12 * ball.triangles.len()).map(|i| Triangle::new(ball.corners(i % ball.triangles.len()))).collect();
+        let tree = TriangleBvh::new(&faces);
         let all = Winding::new(&tree).at(&tree, [0.1, 0.2, 0.3], 1e9, |_| false);
         assert!((all - 12.0).abs() < 1e-12, "{all}");
     }

@@ -5,11 +5,9 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::exact::{drop_axis, orient2d, orient3d, plane_axis};
+use crate::bvh::{Bvh, Split};
 use crate::math::{Aabb, Vec3};
 use crate::mesh::{Mesh, degenerate};
-
-/// Triangles in a leaf of the tree.
-const LEAF: usize = 4;
 
 /// The number of pairs of triangles that meet elsewhere than in their common vertices or edge, or `limit` if there
 /// are at least so many.
@@ -18,22 +16,17 @@ const LEAF: usize = 4;
 /// other, a triangle given twice. Triangles without area are left out (`defects` counts them). Vertices are common
 /// when they have the same index.
 pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
-    let mut order: Vec<u32> =
-        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
-    let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| bounds(t.map(|v| mesh.vertices[v as usize]))).collect();
-    let Some(tree) = Tree::build(&boxes, &mut order) else {
-        return 0;
-    };
+    let (boxes, tree) = tree(mesh, 0.0);
     let found = AtomicUsize::new(0);
-    order.par_chunks(256).for_each(|part| {
+    tree.order().par_chunks(256).for_each(|part| {
         for &i in part {
             if found.load(Ordering::Relaxed) >= limit {
                 return;
             }
             let b = &boxes[i as usize];
-            tree.visit(b, &mut |range| {
-                for &j in &order[range] {
-                    if j > i && overlap(b, &boxes[j as usize]) && meet(mesh, i as usize, j as usize) {
+            tree.overlapping(b, |near| {
+                for &j in near {
+                    if j > i && b.touches(&boxes[j as usize]) && meet(mesh, i as usize, j as usize) {
                         found.fetch_add(1, Ordering::Relaxed);
                     }
                 }
@@ -47,7 +40,7 @@ pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
 pub fn is_embedded(mesh: &Mesh) -> bool {
     let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
     (0..boxes.len()).all(|i| {
-        let meets = |j| overlap(&boxes[i], &boxes[j]) && meet(mesh, i, j);
+        let meets = |j| boxes[i].touches(&boxes[j]) && meet(mesh, i, j);
         !degenerate(mesh, i) && !(0..i).any(meets)
     })
 }
@@ -55,22 +48,17 @@ pub fn is_embedded(mesh: &Mesh) -> bool {
 /// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
 /// same for any number of threads. Triangles without area are left out.
 pub fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) -> Option<T> + Sync) -> Vec<T> {
-    let mut order: Vec<u32> =
-        (0..mesh.triangles.len() as u32).into_par_iter().filter(|&i| !degenerate(mesh, i as usize)).collect();
-    let boxes: Vec<Aabb> =
-        (0..mesh.triangles.len()).into_par_iter().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
-    let Some(tree) = Tree::build(&boxes, &mut order) else {
-        return Vec::new();
-    };
-    let found: Vec<Vec<T>> = order
+    let (boxes, tree) = tree(mesh, margin);
+    let found: Vec<Vec<T>> = tree
+        .order()
         .par_chunks(256)
         .map(|part| {
             let mut found = Vec::new();
             for &i in part {
                 let b = &boxes[i as usize];
-                tree.visit(b, &mut |range| {
-                    let near = order[range].iter().filter(|j| **j > i);
-                    let touching = near.filter(|j| overlap(b, &boxes[**j as usize]));
+                tree.overlapping(b, |near| {
+                    let near = near.iter().filter(|j| **j > i);
+                    let touching = near.filter(|j| b.touches(&boxes[**j as usize]));
                     found.extend(touching.filter_map(|j| f(i as usize, *j as usize)));
                 });
             }
@@ -80,60 +68,17 @@ pub fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) ->
     found.into_iter().flatten().collect()
 }
 
+/// The boxes of all triangles, grown by `margin` (mm), and the tree over those of triangles with area.
+fn tree(mesh: &Mesh, margin: f64) -> (Vec<Aabb>, Bvh) {
+    let all = (0..mesh.triangles.len()).into_par_iter();
+    let boxes: Vec<Aabb> = all.clone().map(|i| bounds(mesh.corners(i)).grown(margin)).collect();
+    let items = all.filter(|&i| !degenerate(mesh, i)).map(|i| i as u32).collect();
+    let tree = Bvh::new(&boxes, items, Split::Median);
+    (boxes, tree)
+}
+
 fn bounds(corners: [Vec3; 3]) -> Aabb {
     corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
-}
-
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
-}
-
-/// A tree of boxes over a permutation of the triangles (or of whatever the boxes hold).
-pub struct Tree {
-    bounds: Aabb,
-    range: (usize, usize),
-    children: Option<Box<(Tree, Tree)>>,
-}
-
-impl Tree {
-    /// Builds the tree and sorts `order` into its leaves; `None` without triangles.
-    pub fn build(boxes: &[Aabb], order: &mut [u32]) -> Option<Tree> {
-        (!order.is_empty()).then(|| Tree::split(boxes, order, 0))
-    }
-
-    fn split(boxes: &[Aabb], order: &mut [u32], first: usize) -> Tree {
-        let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
-        let range = (first, first + order.len());
-        if order.len() <= LEAF {
-            return Tree { bounds, range, children: None };
-        }
-        let size = bounds.size();
-        let axis = (0..3).fold(0, |a, k| if size[k] > size[a] { k } else { a });
-        let key = |i: &u32| boxes[*i as usize].min[axis] + boxes[*i as usize].max[axis];
-        let half = order.len() / 2;
-        order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
-        let (left, right) = order.split_at_mut(half);
-        let children = if range.1 - range.0 > 4096 {
-            rayon::join(|| Tree::split(boxes, left, first), || Tree::split(boxes, right, first + half))
-        } else {
-            (Tree::split(boxes, left, first), Tree::split(boxes, right, first + half))
-        };
-        Tree { bounds, range, children: Some(Box::new(children)) }
-    }
-
-    /// Calls `leaf` with the span of every leaf whose box touches `b`.
-    pub fn visit(&self, b: &Aabb, leaf: &mut impl FnMut(core::ops::Range<usize>)) {
-        if !overlap(&self.bounds, b) {
-            return;
-        }
-        match &self.children {
-            None => leaf(self.range.0..self.range.1),
-            Some(c) => {
-                c.0.visit(b, leaf);
-                c.1.visit(b, leaf);
-            }
-        }
-    }
 }
 
 /// Whether triangles `i` and `j` meet elsewhere than in their common vertices or edge. Both have area.
@@ -314,10 +259,7 @@ mod tests {
     #[test]
     fn random_triangles_agree_with_all_pairs() {
         let mut s = 5u64;
-        let mut next = || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 61) as f64
-        };
+        let mut next = || (4.0 * (crate::random::random(&mut s) + 1.0)).floor();
         // Corners on a grid of 8³: touching, coplanar and repeated cases abound.
         let mut mesh = Mesh::default();
         for v in 0..300u32 {

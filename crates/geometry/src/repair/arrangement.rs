@@ -13,12 +13,14 @@
 
 use rayon::prelude::*;
 
-use super::half_edges::{Sets, halves, rises};
-use crate::distance::tree::{Face, Tree};
+use super::half_edges::{halves, rises};
+use crate::distance::triangle::Triangle;
+use crate::distance::triangle_bvh::TriangleBvh;
 use crate::distance::winding::Winding;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d, orient3d};
 use crate::mesh::{Mesh, near_pairs};
+use crate::union_find::{find, singles, unite};
 
 /// How two triangles meet.
 enum Meeting {
@@ -58,7 +60,7 @@ pub fn tolerance(mesh: &Mesh) -> f64 {
 pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
     let eta = tolerance(mesh);
     let n = mesh.triangles.len();
-    let faces: Vec<Face> = (0..n).map(|i| Face::new(mesh.corners(i))).collect();
+    let faces: Vec<Triangle> = (0..n).map(|i| Triangle::new(mesh.corners(i))).collect();
     let meetings = near_pairs(mesh, eta, |i, j| meeting(mesh, &faces, eta, i, j));
     let mut segments: Vec<Vec<[Vec3; 2]>> = vec![Vec::new(); n];
     let mut covers: Vec<Vec<u32>> = vec![Vec::new(); n];
@@ -78,10 +80,10 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
             }
         }
     }
-    let (tree, order) = Tree::new(&faces);
+    let tree = TriangleBvh::new(&faces);
     let winding = Winding::new(&tree);
     let mut place = vec![0u32; n];
-    for (k, i) in order.iter().enumerate() {
+    for (k, i) in tree.order().iter().enumerate() {
         place[*i as usize] = k as u32;
     }
     let looker = Looker { faces: &faces, tree: &tree, winding: &winding, place: &place, level: least as f64 - 0.5 };
@@ -132,10 +134,11 @@ fn steepest(n: Vec3) -> usize {
     (1..3).fold(0, |m, k| if n[k].abs() > n[m].abs() { k } else { m })
 }
 
-fn meeting(mesh: &Mesh, faces: &[Face], eta: f64, i: usize, j: usize) -> Option<Meeting> {
+fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Option<Meeting> {
     let (s, t) = (&faces[i], &faces[j]);
     let (p, q) = (s.corners, t.corners);
-    let off = |f: &Face, c: [Vec3; 3]| c.iter().fold(0.0f64, |m, v| m.max(dot(f.normal, sub(*v, f.corners[0])).abs()));
+    let off =
+        |f: &Triangle, c: [Vec3; 3]| c.iter().fold(0.0f64, |m, v| m.max(dot(f.normal, sub(*v, f.corners[0])).abs()));
     let numbers = (i as u32, j as u32);
     if off(s, q) <= eta || off(t, p) <= eta {
         let axis = steepest(s.normal);
@@ -180,7 +183,7 @@ fn apart(a: [[f64; 2]; 3], b: [[f64; 2]; 3], eta: f64) -> bool {
 
 /// The segment in which a triangle (corners `p`, vertices `v`, sides `signs`) meets the plane of `face`; the same
 /// bits from every triangle with that edge.
-fn on_plane(v: [u32; 3], p: [Vec3; 3], signs: [i8; 3], face: &Face) -> Option<[Vec3; 2]> {
+fn on_plane(v: [u32; 3], p: [Vec3; 3], signs: [i8; 3], face: &Triangle) -> Option<[Vec3; 2]> {
     let mut found: [Option<Vec3>; 2] = [None, None];
     let mut put = |x: Vec3| {
         let free = usize::from(found[0].is_some());
@@ -352,8 +355,8 @@ impl Partition {
 
 /// Looks at both sides of places on the triangles.
 struct Looker<'a> {
-    faces: &'a [Face],
-    tree: &'a Tree,
+    faces: &'a [Triangle],
+    tree: &'a TriangleBvh,
     winding: &'a Winding,
     /// Where each triangle stands in the tree.
     place: &'a [u32],
@@ -416,14 +419,14 @@ impl Looker<'_> {
     /// Which of the triangles that nothing cuts bound the solid: those of a patch do alike.
     fn patches(&self, mesh: &Mesh, whole: &impl Fn(usize) -> bool) -> Vec<bool> {
         let n = mesh.triangles.len();
-        let mut sets = Sets::new(n);
+        let mut root = singles(n);
         for edge in halves(mesh).chunk_by(|a, b| a.0 == b.0) {
             if let [a, b] = edge
                 && rises(mesh, a.1) != rises(mesh, b.1)
             {
                 let (a, b) = (a.1 / 3, b.1 / 3);
                 if whole(a as usize) && whole(b as usize) {
-                    sets.join(a, b);
+                    unite(&mut root, a, b);
                 }
             }
         }
@@ -434,7 +437,7 @@ impl Looker<'_> {
         // The largest triangle of a patch speaks for it.
         let mut largest: Vec<(u32, f64)> = vec![(u32::MAX, -1.0); n];
         for i in (0..n).filter(|i| whole(*i)) {
-            let r = sets.root(i as u32) as usize;
+            let r = find(&mut root, i as u32) as usize;
             if area(i) > largest[r].1 {
                 largest[r] = (i as u32, area(i));
             }
@@ -443,7 +446,7 @@ impl Looker<'_> {
             .par_iter()
             .map(|(i, _)| *i != u32::MAX && { self.piece_bounds(*i as usize, &self.faces[*i as usize].corners, &[]) })
             .collect();
-        (0..n).map(|i| decided[sets.root(i as u32) as usize]).collect()
+        (0..n).map(|i| decided[find(&mut root, i as u32) as usize]).collect()
     }
 
     /// The pieces of triangle `i` that bound the solid.

@@ -123,7 +123,7 @@ impl Rims {
                 }
                 if corners.contains(&a) && corners.contains(&b) {
                     rims.edges.insert((a.min(b), a.max(b)));
-                    rims.beyond.insert((b, a), crate::distance::tree::normal(mesh.corners(i)));
+                    rims.beyond.insert((b, a), crate::distance::triangle::normal(mesh.corners(i)));
                 }
             }
         }

@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use super::clean::flat;
-use super::half_edges::{Sets, components, halves, rises};
+use super::half_edges::{components, halves, rises};
 use crate::distance::winding::turn;
 use crate::fault::Fault;
 use crate::math::{cross, dot, norm, sub};
 use crate::mesh::Mesh;
+use crate::union_find::{labels, singles, unite};
 
 /// Pairs of half-edges (3 · triangle + corner where the edge begins) that are one edge.
 pub type Pairs = Vec<[u32; 2]>;
@@ -113,11 +114,11 @@ pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
 /// Whether a closed mesh (edges `pairs`) that does not cross itself is one body with cavities inside it.
 pub fn plain(mesh: &Mesh, pairs: &Pairs) -> bool {
     let thin = thin(mesh);
-    let mut sets = Sets::new(mesh.triangles.len());
+    let mut root = singles(mesh.triangles.len());
     for [a, b] in pairs {
-        sets.join(a / 3, b / 3);
+        unite(&mut root, a / 3, b / 3);
     }
-    let (number, count) = sets.numbers();
+    let (number, count) = labels(&mut root);
     let sums = bodies(mesh, &number, count);
     let mut solids = sums.iter().enumerate().filter(|(_, s)| s.0 > 0.0);
     let (Some((outer, _)), None) = (solids.next(), solids.next()) else {

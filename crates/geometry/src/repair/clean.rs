@@ -2,9 +2,11 @@
 
 use std::collections::HashSet;
 
-use super::half_edges::{Sets, ends, halves, open};
+use super::half_edges::{ends, halves, open};
+use crate::bvh::{Bvh, Split};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::{BoxTree, Mesh};
+use crate::mesh::Mesh;
+use crate::union_find::{find, singles, unite};
 
 /// Corners of open edges join over at most this share of the mesh's diagonal: seams that exporters leave are far
 /// narrower, and holes that matter are wider.
@@ -89,10 +91,10 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
 /// body, and with an odd number where a copy just ends. `others`: how many there are, copies not counted.
 fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
     let patches = Mesh { vertices: Vec::new(), triangles: alike };
-    let (sides, mut sets) = (halves(&patches), Sets::new(patches.triangles.len()));
+    let (sides, mut root) = (halves(&patches), singles(patches.triangles.len()));
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
         for other in &edge[1..] {
-            sets.join(edge[0].1 / 3, other.1 / 3);
+            unite(&mut root, edge[0].1 / 3, other.1 / 3);
         }
     }
     // Along each patch's rim, edges at which both copies go on less those at which one ends.
@@ -100,9 +102,9 @@ fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> Ha
     for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
         let (a, b) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
         let vote = if others(a, b).is_multiple_of(2) { 1 } else { -1 };
-        votes[sets.root(edge[0].1 / 3) as usize] += vote;
+        votes[find(&mut root, edge[0].1 / 3) as usize] += vote;
     }
-    let found = (0..patches.triangles.len()).filter(|i| votes[sets.root(*i as u32) as usize] > 0);
+    let found = (0..patches.triangles.len()).filter(|i| votes[find(&mut root, *i as u32) as usize] > 0);
     found.map(|i| patches.triangles[i]).collect()
 }
 
@@ -139,18 +141,18 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
         }
     });
     pairs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut sets = Sets::new(mesh.vertices.len());
+    let mut root = singles(mesh.vertices.len());
     for (_, a, b) in &pairs {
-        sets.join(*a, *b);
+        unite(&mut root, *a, *b);
     }
     let mut sum = vec![([0.0; 3], 0usize); mesh.vertices.len()];
     for &v in &rim {
-        let s = &mut sum[sets.root(v) as usize];
+        let s = &mut sum[find(&mut root, v) as usize];
         *s = (add(s.0, mesh.vertices[v as usize]), s.1 + 1);
     }
     let mut joined = mesh.clone();
     for t in &mut joined.triangles {
-        *t = t.map(|v| sets.root(v));
+        *t = t.map(|v| find(&mut root, v));
     }
     for (v, (s, n)) in joined.vertices.iter_mut().zip(&sum).filter(|(_, s)| s.1 > 1) {
         *v = scale(*s, 1.0 / *n as f64);
@@ -165,16 +167,9 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
 
 /// Calls `f` with every pair of boxes, one of each list, that touch.
 fn near(a: &[Aabb], b: &[Aabb], mut f: impl FnMut(usize, usize)) {
-    let mut order: Vec<u32> = (0..b.len() as u32).collect();
-    let Some(tree) = BoxTree::build(b, &mut order) else {
-        return;
-    };
-    for (i, box_) in a.iter().enumerate() {
-        tree.visit(box_, &mut |range| {
-            for &j in &order[range] {
-                f(i, j as usize);
-            }
-        });
+    let tree = Bvh::new(b, (0..b.len() as u32).collect(), Split::Median);
+    for (i, bounds) in a.iter().enumerate() {
+        tree.overlapping(bounds, |near| near.iter().for_each(|j| f(i, *j as usize)));
     }
 }
 

@@ -43,7 +43,7 @@ pub fn smoothed(
         (0..rim.len()).filter_map(|i| slopes[i].map(|n| ((rim[i], rim[(i + 1) % rim.len()]), n))).collect();
     let (mut fold, mut count) = (0.0, 0.0);
     for t in &patch {
-        let normal = crate::distance::tree::normal(t.map(|v| vertices[v as usize]));
+        let normal = crate::distance::triangle::normal(t.map(|v| vertices[v as usize]));
         for k in 0..3 {
             if let Some(n) = side.get(&(t[k], t[(k + 1) % 3])) {
                 fold += dot(normal, *n);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
+use crate::union_find;
 
 /// Half-edges (the edge's vertices, 3 · triangle + corner where it begins) in the order of their edges.
 pub fn halves(mesh: &Mesh) -> Vec<(u64, u32)> {
@@ -44,54 +45,12 @@ pub fn open(mesh: &Mesh) -> Vec<u32> {
     open
 }
 
-/// Sets that are joined pair by pair; the root of a set is its lowest member.
-pub struct Sets(Vec<u32>);
-
-impl Sets {
-    /// So many sets of one.
-    pub fn new(count: usize) -> Sets {
-        Sets((0..count as u32).collect())
-    }
-
-    /// The root of the set of `i`.
-    pub fn root(&mut self, mut i: u32) -> u32 {
-        let r = &mut self.0;
-        while r[i as usize] != i {
-            r[i as usize] = r[r[i as usize] as usize];
-            i = r[i as usize];
-        }
-        i
-    }
-
-    /// Makes the sets of `a` and `b` one.
-    pub fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-
-    /// The number of each member's set, in the order of their lowest members, and how many sets there are.
-    pub fn numbers(&mut self) -> (Vec<u32>, usize) {
-        let mut number = vec![u32::MAX; self.0.len()];
-        let mut count = 0;
-        for i in 0..number.len() {
-            let r = self.root(i as u32) as usize;
-            if r == i {
-                number[i] = count;
-                count += 1;
-            } else {
-                number[i] = number[r];
-            }
-        }
-        (number, count as usize)
-    }
-}
-
 /// Components: for each triangle the number of the set that edges (of however many triangles) join, and how many
 /// sets there are. Sets are numbered by their first triangles.
 pub fn components(mesh: &Mesh) -> (Vec<u32>, usize) {
-    let mut sets = Sets::new(mesh.triangles.len());
+    let mut root = union_find::singles(mesh.triangles.len());
     for pair in halves(mesh).windows(2).filter(|p| p[0].0 == p[1].0) {
-        sets.join(pair[0].1 / 3, pair[1].1 / 3);
+        union_find::unite(&mut root, pair[0].1 / 3, pair[1].1 / 3);
     }
-    sets.numbers()
+    union_find::labels(&mut root)
 }

@@ -1,7 +1,8 @@
 //! Which way triangles face: neighbours alike, bodies outwards, cavities kept.
 
 use super::half_edges::{components, halves, rises};
-use crate::distance::tree::{Face, Tree};
+use crate::distance::triangle::Triangle;
+use crate::distance::triangle_bvh::TriangleBvh;
 use crate::distance::winding::{Winding, turn};
 use crate::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
@@ -68,7 +69,7 @@ struct Body {
     bounds: Aabb,
     volume: f64,
     /// Made at the first question, for bodies of many triangles.
-    tree: Option<(Tree, Winding)>,
+    tree: Option<(TriangleBvh, Winding)>,
 }
 
 impl Body {
@@ -81,8 +82,8 @@ impl Body {
             return self.triangles.iter().map(|i| turn(corners(i), p)).sum::<f64>().abs() > 0.5;
         }
         let (tree, winding) = self.tree.get_or_insert_with(|| {
-            let faces: Vec<Face> = self.triangles.iter().map(|i| Face::new(corners(i))).collect();
-            let tree = Tree::new(&faces).0;
+            let faces: Vec<Triangle> = self.triangles.iter().map(|i| Triangle::new(corners(i))).collect();
+            let tree = TriangleBvh::new(&faces);
             let winding = Winding::new(&tree);
             (tree, winding)
         });

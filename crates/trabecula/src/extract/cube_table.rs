@@ -156,10 +156,7 @@ mod tests {
     #[test]
     fn no_pattern_crosses_itself_wherever_its_points_stand() {
         let mut seed = 1u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = || (geometry::random::random(&mut seed) + 1.0) / 2.0;
         for case in 1..255usize {
             for round in 0..300 {
                 let at: [f64; 12] = core::array::from_fn(|_| match round % 3 {

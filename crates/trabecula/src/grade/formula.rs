@@ -276,10 +276,7 @@ mod tests {
     #[test]
     fn bounds_hold_over_random_boxes() {
         let mut s = 3u64;
-        let mut next = || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut next = || (geometry::random::random(&mut s) + 1.0) / 2.0;
         for text in
             ["sin(x*y)/(2+cos(z))", "x^2 - y^3 + abs(z)^1.5", "mod(x, 0.7)*smoothstep(-1, 1, y)", "log(2+hypot(x,y))^2"]
         {

@@ -240,10 +240,7 @@ mod tests {
 
     fn noise(seed: u64) -> impl FnMut() -> f64 {
         let mut s = seed;
-        move || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
+        move || geometry::random::random(&mut s)
     }
 
     fn grid(shape: [usize; 3], size: Vec3) -> Grid {

@@ -424,10 +424,7 @@ mod tests {
 
     fn places() -> Vec<Vec3> {
         let mut s = 9u64;
-        let mut next = || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut next = || (geometry::random::random(&mut s) + 1.0) / 2.0;
         // In the box and about it.
         (0..500).map(|_| [-2.0 + 5.0 * next(), 3.5 * next(), 1.0 + 4.5 * next()]).collect()
     }

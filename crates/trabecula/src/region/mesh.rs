@@ -6,7 +6,7 @@ use super::{HalfSpace, Offset, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
-use geometry::distance::tree::Face;
+use geometry::distance::triangle::Triangle;
 use geometry::distance::{MeshDistance, UNKNOWN};
 use geometry::fault::Fault;
 use geometry::feature_edges::{Creases, creases};
@@ -48,7 +48,7 @@ impl MeshRegion {
         MeshRegion {
             bounds,
             volume: distance.mesh().volume(),
-            planes: [0, 1, 2].map(|axis| planes(distance.faces(), &bounds, axis)),
+            planes: [0, 1, 2].map(|axis| planes(distance.triangles(), &bounds, axis)),
             distance,
             creases: OnceLock::new(),
         }
@@ -68,7 +68,7 @@ impl MeshRegion {
 /// Coordinates at which flat faces normal to `axis` make up a hundredth of the bounds' largest side.
 ///
 /// Distances there are zero by `signed`, whichever triangle, edge or corner is found nearest.
-fn planes(faces: &[Face], bounds: &Aabb, axis: usize) -> Vec<f64> {
+fn planes(faces: &[Triangle], bounds: &Aabb, axis: usize) -> Vec<f64> {
     let flat = faces.iter().filter(|f| f.corners.iter().all(|p| p[axis] == f.corners[0][axis]));
     let mut areas: Vec<(f64, f64)> = flat
         .map(|f| {
@@ -208,7 +208,5 @@ impl Fill<'_> {
     }
 }
 
-#[cfg(test)]
-mod laws;
 #[cfg(test)]
 mod tests;

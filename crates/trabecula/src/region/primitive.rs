@@ -354,7 +354,8 @@ field!(Cuboid, Cylinder, Sphere, HalfSpace, Barrel, Tetrahedron);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::region::tests::{check_shape, random};
+    use crate::region::tests::check_shape;
+    use geometry::random::random;
     use std::sync::Arc;
 
     fn shapes() -> Vec<(&'static str, Arc<dyn Shape>)> {

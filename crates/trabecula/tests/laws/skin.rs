@@ -378,10 +378,7 @@ fn shape(kind: usize, r: f64, s: f64, t: f64) -> (Region, Depth) {
 #[test]
 fn the_field_is_membership_by_set_logic() {
     let mut seed = 7u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
+    let mut random = || geometry::random::random(&mut seed);
     for n in 0..200 {
         let (r, s, t) = (1.0 + 0.5 * random(), 0.4 * random(), 0.6 + 0.4 * random());
         let (region, depth) = shape(n % 5, r, s, t);

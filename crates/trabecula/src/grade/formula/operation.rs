@@ -335,8 +335,7 @@ mod tests {
     }
 
     fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (*state >> 11) as f64 / (1u64 << 53) as f64
+        (geometry::random::random(state) + 1.0) / 2.0
     }
 
     #[test]

@@ -6,7 +6,8 @@ use super::{MeshRegion, one_surface};
 use crate::field::{Block, Field};
 use crate::region::{HalfSpace, Offset, Region, Shape};
 use geometry::distance::UNKNOWN;
-use geometry::distance::tree::{Face, Hit, Tree};
+use geometry::distance::triangle::Triangle;
+use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
 
 /// Corners of a triangle on a plane may stand this far off it, as a share of the mesh's size: files hold coordinates in
@@ -20,19 +21,19 @@ const FACING: f64 = 1.0 - 1e-6;
 struct OpenMesh {
     whole: Arc<MeshRegion>,
     /// The triangles that are left.
-    rest: Tree,
+    rest: TriangleBvh,
     cuts: Vec<HalfSpace>,
 }
 
 /// The mesh without its triangles on the planes of `cuts`; `None` if there are none.
 pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {
     let off = OFF * norm(whole.bounds.size());
-    let on = |f: &Face, c: &HalfSpace| {
+    let on = |f: &Triangle, c: &HalfSpace| {
         dot(f.normal, c.normal()) >= FACING && f.corners.iter().all(|p| c.value(*p).abs() <= off)
     };
-    let mut rest = Vec::with_capacity(whole.distance.faces().len());
+    let mut rest = Vec::with_capacity(whole.distance.triangles().len());
     let mut used = vec![false; cuts.len()];
-    for f in whole.distance.faces() {
+    for f in whole.distance.triangles() {
         match cuts.iter().position(|c| on(f, c)) {
             Some(i) => used[i] = true,
             None => rest.push(*f),
@@ -44,13 +45,13 @@ pub(super) fn opened(whole: Arc<MeshRegion>, cuts: &[HalfSpace], found: &mut [bo
     found.iter_mut().zip(&used).for_each(|(f, used)| *f |= used);
     let here = cuts.iter().zip(used).filter(|(_, used)| *used);
     let cuts = here.map(|(c, _)| *c).collect();
-    let rest = Tree::new(&rest).0;
+    let rest = TriangleBvh::new(&rest);
     Some(Arc::new(OpenMesh { whole, rest, cuts }))
 }
 
 impl OpenMesh {
     /// The nearest triangle that is left, and the sign of the distance to it.
-    fn nearest(&self, p: Vec3, seeds: &mut [u32; 2]) -> (Hit, f64) {
+    fn nearest(&self, p: Vec3, seeds: &mut [u32; 2]) -> (Nearest, f64) {
         let hit = self.rest.nearest(p, seeds[0]);
         seeds[0] = hit.triangle;
         if self.cuts.iter().any(|c| c.value(p) >= 0.0) {
@@ -81,7 +82,7 @@ impl Field for OpenMesh {
             *g = if d > self.rest.rounding() {
                 scale(hit.away, sign / d)
             } else {
-                self.rest.faces()[hit.triangle as usize].normal
+                self.rest.triangles()[hit.triangle as usize].normal
             };
         }
     }

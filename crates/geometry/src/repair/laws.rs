@@ -1,21 +1,39 @@
 //! Laws of repair: damaged meshes against the solids that they were.
 
+use std::f64::consts::PI;
+
 use proptest::prelude::*;
 
 use super::*;
-use crate::region::tests::random;
-use crate::region::{Cuboid, Cylinder, Sphere, Union};
-use geometry::math::{Mat3, add, apply, rotation};
-use geometry::mesh::samples::{icosphere, with};
-use std::f64::consts::PI;
-use std::sync::Arc;
+use crate::distance::MeshDistance;
+use crate::math::{Mat3, Vec3, apply, rotation};
+use crate::mesh::samples::{icosphere, with};
+use crate::random::random;
 
-fn auto(mesh: Mesh) -> MeshRegion {
-    MeshRegion::new(mesh, Repair::Auto).unwrap()
+fn auto(mesh: Mesh) -> MeshDistance {
+    MeshDistance::new(mesh, Repair::Auto).unwrap()
 }
 
 fn refused(mesh: Mesh, repair: Repair) -> String {
-    MeshRegion::new(mesh, repair).unwrap_err().message
+    MeshDistance::new(mesh, repair).unwrap_err().message
+}
+
+/// The signed distance of the unit ball.
+fn ball(p: Vec3) -> f64 {
+    norm(p) - 1.0
+}
+
+/// The signed distance of a box.
+fn cuboid(lo: Vec3, hi: Vec3, p: Vec3) -> f64 {
+    let beyond = [0, 1, 2].map(|a| (lo[a] - p[a]).max(p[a] - hi[a]));
+    let deepest = beyond.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    norm(beyond.map(|d| d.max(0.0))) + deepest.min(0.0)
+}
+
+/// The signed distance of the cylinder of radius 1 about z from 0 to `height`.
+fn cylinder(height: f64, p: Vec3) -> f64 {
+    let (across, along) = (p[0].hypot(p[1]) - 1.0, (-p[2]).max(p[2] - height));
+    across.max(0.0).hypot(along.max(0.0)) + across.max(along).min(0.0)
 }
 
 fn moved(mut mesh: Mesh, m: &Mat3, by: Vec3) -> Mesh {
@@ -51,12 +69,12 @@ fn torus(n: u32, m: u32, big: f64, small: f64) -> Mesh {
 }
 
 /// Signs agree at random places farther than `margin` from the surface of `truth`, and the distance is 1-Lipschitz.
-fn agrees(name: &str, region: &MeshRegion, truth: &dyn Shape, margin: f64, reach: f64) {
+fn agrees(name: &str, region: &MeshDistance, truth: impl Fn(Vec3) -> f64, margin: f64, reach: f64) {
     let mut seed = 17;
     let mut last = ([0.0; 3], region.value([0.0; 3]));
     for _ in 0..4000 {
         let p = [0; 3].map(|_| random(&mut seed) * reach);
-        let (d, t) = (region.value(p), truth.value(p));
+        let (d, t) = (region.value(p), truth(p));
         if t.abs() > margin {
             assert_eq!(d < 0.0, t < 0.0, "{name}: {d} for {t} at {p:?}");
         }
@@ -69,7 +87,7 @@ fn agrees(name: &str, region: &MeshRegion, truth: &dyn Shape, margin: f64, reach
 }
 
 /// The distance is continuous about `center`: 1-Lipschitz between near places.
-fn continuous(name: &str, region: &MeshRegion, center: Vec3, reach: f64) {
+fn continuous(name: &str, region: &MeshDistance, center: Vec3, reach: f64) {
     let mut seed = 23;
     for _ in 0..4000 {
         let p = add(center, [0; 3].map(|_| random(&mut seed) * reach));
@@ -93,10 +111,10 @@ fn holes_are_closed_and_nothing_jumps_across() {
     let region = auto(mesh.clone());
     let done = region.repaired();
     assert!(done.holes == 3 && done.hole_share < 0.05, "{done:?}");
-    let got = region.volume().unwrap();
+    let got = region.mesh().volume();
     // Flat caps would lose 5 ‰.
     assert!((got / volume - 1.0).abs() < 3e-4, "{got} for {volume}");
-    agrees("hole", &region, &Sphere::new([0.0; 3], 1.0).unwrap(), 0.05, 1.3);
+    agrees("hole", &region, ball, 0.05, 1.3);
     continuous("hole", &region, [0.97, 0.0, 0.0], 0.4);
     let said = refused(mesh, Repair::Refuse);
     assert!(said.contains("open edges"), "{said}");
@@ -115,13 +133,11 @@ fn flat_holes_are_closed_flat() {
     }
     let region = auto(mesh);
     let polygon = 0.5 * f64::from(n) * (2.0 * PI / f64::from(n)).sin();
-    assert!((region.volume().unwrap() - 24.0 * polygon).abs() < 1e-10);
+    assert!((region.mesh().volume() - 24.0 * polygon).abs() < 1e-10);
     assert_eq!(region.repaired().holes, 2);
-    let mut planes = Vec::new();
-    region.planes(2, &mut planes);
-    assert_eq!(planes, [0.0, 24.0]);
-    let cylinder = Cylinder::new([0.0; 3], [0.0, 0.0, 1.0], 1.0, 24.0).unwrap();
-    agrees("tube", &region, &cylinder, 0.01, 2.0);
+    let used = region.mesh().triangles.iter().flatten();
+    assert!(used.map(|v| region.mesh().vertices[*v as usize][2]).all(|z| z == 0.0 || z == 24.0));
+    agrees("tube", &region, |p| cylinder(24.0, p), 0.01, 2.0);
 }
 
 #[test]
@@ -148,7 +164,7 @@ fn turned_and_doubled_triangles_leave_the_mesh_as_it_was() {
     let region = auto(mesh.clone());
     assert_eq!(region.repaired().turned, mesh.triangles.len().div_ceil(7));
     let near = |v: f64| (v - whole.volume()).abs() < 1e-12;
-    assert!(near(region.volume().unwrap()));
+    assert!(near(region.mesh().volume()));
     // All turned: one body inside out.
     let mut mesh = whole.clone();
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -163,11 +179,11 @@ fn turned_and_doubled_triangles_leave_the_mesh_as_it_was() {
     }
     let region = auto(mesh);
     assert_eq!(region.repaired().duplicates, 20);
-    assert!(near(region.volume().unwrap()));
+    assert!(near(region.mesh().volume()));
     // Everything from both sides.
     let mut mesh = whole.clone();
     mesh.triangles.extend(whole.triangles.iter().map(|[a, b, c]| [*a, *c, *b]));
-    assert!(near(auto(mesh).volume().unwrap()));
+    assert!(near(auto(mesh).mesh().volume()));
 }
 
 #[test]
@@ -183,14 +199,14 @@ fn cavities_are_kept_and_bodies_within_bodies_are_not() {
     let region = auto(mesh);
     assert_eq!((region.mesh(), region.repaired().bodies_turned), (&hollow, 2));
     let nested = auto(with(big(), small(), false));
-    assert_eq!(nested.volume().unwrap(), big().volume());
+    assert_eq!(nested.mesh().volume(), big().volume());
     assert_eq!(nested.repaired().inner, 320);
     // A ball in the cavity, turned as it likes.
     for out in [false, true] {
         let three = with(hollow.clone(), icosphere(1, 0.5, 0.0), out);
         let volume = hollow.volume() + icosphere(1, 0.5, 0.0).volume();
         let region = auto(three);
-        assert!((region.volume().unwrap() - volume).abs() < 1e-12);
+        assert!((region.mesh().volume() - volume).abs() < 1e-12);
         assert!(region.value([0.0; 3]) < 0.0 && region.value([0.7, 0.0, 0.0]) > 0.0);
     }
 }
@@ -220,7 +236,7 @@ fn overlapping_balls_are_united() {
         let lens = PI * (4.0 + d) * (2.0 - d).powi(2) / 12.0;
         let ideal = 8.0 / 3.0 * PI - lens;
         let lacking = icosphere(n, 1.0, 0.0).volume() / (4.0 / 3.0 * PI);
-        let got = region.volume().unwrap() / (ideal * lacking);
+        let got = region.mesh().volume() / (ideal * lacking);
         assert!((got - 1.0).abs() < 0.12 / 4f64.powi(n as i32), "{got}");
     }
 }
@@ -249,21 +265,19 @@ fn union_volume(boxes: &[(Vec3, Vec3)]) -> f64 {
 /// Boxes, perhaps flush, equal or touching, all turned alike so that flush faces are so but for rounding.
 fn boxes_agree(boxes: &[(Vec3, Vec3)], turn: &Mat3) {
     let mut mesh = Mesh::default();
-    let mut truth: Vec<crate::region::Region> = Vec::new();
     for (lo, hi) in boxes {
         mesh = with(mesh, Mesh::cuboid(*lo, *hi), false);
-        truth.push(Arc::new(Cuboid::new(*lo, *hi).unwrap()));
     }
     let by = [0.3, -0.2, 0.1];
     let region = auto(moved(mesh, turn, by));
     let want = union_volume(boxes);
-    let got = region.volume().unwrap();
+    let got = region.mesh().volume();
     assert!((got - want).abs() < 1e-8 * want, "{got} for {want}: {boxes:?}");
-    let truth = Union::new(truth).unwrap();
+    let truth = |p| boxes.iter().map(|(lo, hi)| cuboid(*lo, *hi, p)).fold(f64::INFINITY, f64::min);
     let mut seed = 77;
     for _ in 0..1500 {
         let p = [0; 3].map(|_| random(&mut seed) * 3.0);
-        let (t, d) = (truth.value(p), region.value(add(apply(turn, p), by)));
+        let (t, d) = (truth(p), region.value(add(apply(turn, p), by)));
         if t > 1e-9 {
             assert!((d - t).abs() < 1e-8, "{d} for {t} at {p:?}: {boxes:?}");
         } else if t < -1e-9 {
@@ -310,9 +324,9 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
         mesh = with(mesh, face, seed % 3 == 0);
     }
     let region = auto(mesh);
-    assert!((region.volume().unwrap() - 1.0).abs() < 1e-3);
+    assert!((region.mesh().volume() - 1.0).abs() < 1e-3);
     assert_eq!(region.repaired().holes, 0, "{:?}", region.repaired());
-    agrees("six faces", &region, &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(), 1e-3, 1.5);
+    agrees("six faces", &region, |p| cuboid([0.0; 3], [1.0; 3], p), 1e-3, 1.5);
 
     // A corner on a side that its neighbour does not have.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
@@ -322,8 +336,8 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     mesh.triangles[0] = [0, 2, 8];
     mesh.triangles.push([8, 2, 3]);
     let region = auto(mesh);
-    assert_eq!((region.volume(), region.repaired().split), (Some(1.0), 1));
-    assert!(region.distance.signed_by_normals());
+    assert_eq!((region.mesh().volume(), region.repaired().split), (1.0, 1));
+    assert!(region.signed_by_normals());
 
     // The same a hair off: a hole as thin as the hair.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
@@ -332,8 +346,8 @@ fn seams_corners_on_sides_and_slivers_are_closed() {
     mesh.triangles.push([8, 2, 3]);
     let region = auto(mesh);
     assert_eq!(region.repaired().holes, 1);
-    assert!((region.volume().unwrap() - 1.0).abs() < 1e-5);
-    agrees("hair", &region, &Cuboid::new([0.0; 3], [1.0; 3]).unwrap(), 1e-4, 1.5);
+    assert!((region.mesh().volume() - 1.0).abs() < 1e-5);
+    agrees("hair", &region, |p| cuboid([0.0; 3], [1.0; 3], p), 1e-4, 1.5);
 }
 
 #[test]
@@ -346,12 +360,12 @@ fn noise_that_folds_the_surface_is_cut_out() {
     }
     let region = auto(mesh.clone());
     assert!(region.repaired().crossings > 50, "{:?}", region.repaired());
-    assert!((region.volume().unwrap() / (4.0 / 3.0 * PI) - 1.0).abs() < 0.02);
-    agrees("noise", &region, &Sphere::new([0.0; 3], 1.0).unwrap(), 0.08, 1.3);
+    assert!((region.mesh().volume() / (4.0 / 3.0 * PI) - 1.0).abs() < 0.02);
+    agrees("noise", &region, ball, 0.08, 1.3);
     continuous("noise", &region, [0.9, 0.0, 0.0], 0.2);
     // Torn apart as well.
     let torn = auto(apart(&mesh));
-    assert!((torn.volume().unwrap() - region.volume().unwrap()).abs() < 1e-9);
+    assert!((torn.mesh().volume() - region.mesh().volume()).abs() < 1e-9);
 }
 
 #[test]
@@ -380,7 +394,7 @@ fn neither_order_nor_place_matters() {
     let by = [3.0, -1.0, 2.0];
     let turned = auto(moved(damaged(), &turn, by));
     for r in [&other, &turned] {
-        assert!((r.volume().unwrap() - one.volume().unwrap()).abs() < 1e-9);
+        assert!((r.mesh().volume() - one.mesh().volume()).abs() < 1e-9);
         assert_eq!(r.repaired().holes, one.repaired().holes);
         assert_eq!(r.repaired().crossings, one.repaired().crossings);
     }
@@ -399,12 +413,12 @@ fn degenerate_and_stray_triangles_go() {
     mesh.vertices.push([0.5, 0.0, 0.0]);
     mesh.triangles.extend([[0, 1, 8], [3, 3, 5]]);
     let region = auto(mesh);
-    assert_eq!((region.volume(), region.repaired().degenerate), (Some(1.0), 2));
+    assert_eq!((region.mesh().volume(), region.repaired().degenerate), (1.0, 2));
     // A flat fin on a side of the box encloses nothing.
     let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
     mesh.vertices.push([2.0, 0.5, 2.0]);
     mesh.triangles.extend([[7, 5, 8], [5, 7, 8]]);
-    assert!((auto(mesh).volume().unwrap() - 1.0).abs() < 1e-12);
+    assert!((auto(mesh).mesh().volume() - 1.0).abs() < 1e-12);
     for bad in [f64::NAN, f64::INFINITY] {
         let mut mesh = Mesh::cuboid([0.0; 3], [1.0; 3]);
         mesh.vertices[3][1] = bad;
@@ -461,9 +475,9 @@ proptest! {
             mesh = moved(mesh, &rotation(angles), [0.1, 0.2, 0.3]);
         }
         // What cannot be repaired is refused with its reason.
-        if let Ok(region) = MeshRegion::new(mesh.clone(), Repair::Auto) {
+        if let Ok(region) = MeshDistance::new(mesh.clone(), Repair::Auto) {
             continuous("anything", &region, [0.0; 3], 3.5);
         }
-        let _ = MeshRegion::new(mesh, Repair::Refuse);
+        let _ = MeshDistance::new(mesh, Repair::Refuse);
     }
 }

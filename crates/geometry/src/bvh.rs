@@ -1,0 +1,303 @@
+//! A bounding-volume hierarchy: a binary tree of axis-aligned boxes over anything that has a box.
+
+use core::ops::Range;
+
+use crate::math::{Aabb, Vec3, add};
+
+/// How the items of a node are divided between its children.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// At the median of the box centres along the longest side: built fastest, for one pass of overlap queries.
+    Median,
+    /// By the surface-area heuristic over bins: dearer to build, for many nearest-item queries.
+    ///
+    /// Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies (2007).
+    SurfaceArea,
+}
+
+impl Split {
+    /// Items of a leaf, at most.
+    fn leaf(self) -> usize {
+        match self {
+            Split::Median => 4,
+            Split::SurfaceArea => 6,
+        }
+    }
+}
+
+/// Bins of the surface-area heuristic.
+const BINS: usize = 16;
+/// Deeper than this, items are halved by number, so that the depth stays below 64 + 32.
+const DEEP: usize = 64;
+/// Deeper than the tree can be.
+const STACK: usize = 128;
+/// Subtrees of more items are built in parallel.
+const PARALLEL: usize = 4096;
+
+/// A node of the tree. The first child of a branch is the next node.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// The box of its items.
+    pub bounds: Aabb,
+    /// First item of a leaf (a position in the tree's order); how many nodes on the second child of a branch stands.
+    at: u32,
+    /// Items of a leaf, zero for a branch.
+    count: u32,
+}
+
+impl Node {
+    /// The positions of a leaf's items in the tree's order; `None` for a branch.
+    #[inline]
+    pub fn items(&self) -> Option<Range<usize>> {
+        (self.count > 0).then(|| self.at as usize..(self.at + self.count) as usize)
+    }
+
+    /// The children of branch `i`.
+    #[inline]
+    pub fn children(&self, i: usize) -> [usize; 2] {
+        [i + 1, i + self.at as usize]
+    }
+}
+
+/// The tree: nodes, each before its children, and the items in the order of its leaves.
+#[derive(Debug)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+}
+
+impl Bvh {
+    /// The tree over `items`, which index `boxes`. The same for any number of threads.
+    pub fn new(boxes: &[Aabb], mut items: Vec<u32>, split: Split) -> Bvh {
+        let mut nodes = Vec::with_capacity(items.len());
+        if !items.is_empty() {
+            build(boxes, &mut items, [0, 0], split, &mut nodes);
+        }
+        Bvh { nodes, order: items }
+    }
+
+    /// The nodes, each before its children; none without items.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The items in the order of the leaves.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Calls `visit` with the items of every leaf whose box touches `b`.
+    pub fn overlapping(&self, b: &Aabb, mut visit: impl FnMut(&[u32])) {
+        let mut stack = [0usize; STACK];
+        let mut top = usize::from(!self.nodes.is_empty());
+        while top > 0 {
+            top -= 1;
+            let mut i = stack[top];
+            while self.nodes[i].bounds.touches(b) {
+                let node = &self.nodes[i];
+                if let Some(items) = node.items() {
+                    visit(&self.order[items]);
+                    break;
+                }
+                let [first, second] = node.children(i);
+                stack[top] = second;
+                top += 1;
+                i = first;
+            }
+        }
+    }
+
+    /// Calls `visit` with the positions (in the tree's order) of the items of every leaf within a squared distance of `p`
+    /// (mm²), nearer children first. `limit` is that distance at first; `visit` gives what it is from then on.
+    #[inline]
+    pub fn nearest(&self, p: Vec3, mut limit: f64, mut visit: impl FnMut(Range<usize>) -> f64) {
+        let mut stack = [(0usize, 0.0f64); STACK];
+        let mut top = usize::from(!self.nodes.is_empty());
+        while top > 0 {
+            top -= 1;
+            let (mut i, near) = stack[top];
+            if near > limit {
+                continue;
+            }
+            loop {
+                let node = &self.nodes[i];
+                if let Some(items) = node.items() {
+                    limit = visit(items);
+                    break;
+                }
+                let [mut near, mut far] = node.children(i).map(|c| (c, square_distance(&self.nodes[c].bounds, p)));
+                if far.1 < near.1 {
+                    (near, far) = (far, near);
+                }
+                if far.1 <= limit {
+                    stack[top] = far;
+                    top += 1;
+                }
+                if near.1 > limit {
+                    break;
+                }
+                i = near.0;
+            }
+        }
+    }
+}
+
+/// The larger of two numbers that are not NaN: one instruction, unlike `f64::max`.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn square_distance(b: &Aabb, p: Vec3) -> f64 {
+    let mut square = 0.0;
+    for a in 0..3 {
+        let d = larger(larger(b.min[a] - p[a], p[a] - b.max[a]), 0.0);
+        square += d * d;
+    }
+    square
+}
+
+fn half_area(b: &Aabb) -> f64 {
+    let [x, y, z] = b.size();
+    if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
+}
+
+/// The longest side of a box; the first of equal ones.
+fn longest(b: &Aabb) -> usize {
+    let size = b.size();
+    (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m })
+}
+
+/// Appends the subtree of the items `order`, which stand from `first` on in the tree's order.
+fn build(boxes: &[Aabb], order: &mut [u32], [first, depth]: [usize; 2], split: Split, nodes: &mut Vec<Node>) {
+    let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
+    let here = nodes.len();
+    nodes.push(Node { bounds, at: first as u32, count: order.len() as u32 });
+    if order.len() <= split.leaf() {
+        return;
+    }
+    let middle = match split {
+        Split::Median => Some(halve(boxes, order, longest(&bounds))),
+        Split::SurfaceArea if depth < DEEP => divide(boxes, order),
+        Split::SurfaceArea => None,
+    }
+    .unwrap_or(order.len() / 2);
+    let parallel = order.len() > PARALLEL;
+    let (left, right) = order.split_at_mut(middle);
+    let [of_left, of_right] = [[first, depth + 1], [first + middle, depth + 1]];
+    if parallel {
+        let mut rest = Vec::new();
+        let make_left = || build(boxes, left, of_left, split, nodes);
+        rayon::join(make_left, || build(boxes, right, of_right, split, &mut rest));
+        nodes[here].at = (nodes.len() - here) as u32;
+        nodes.append(&mut rest);
+    } else {
+        build(boxes, left, of_left, split, nodes);
+        nodes[here].at = (nodes.len() - here) as u32;
+        build(boxes, right, of_right, split, nodes);
+    }
+    nodes[here].count = 0;
+}
+
+/// Orders the items so that the half with the lower box centres along an axis comes first; gives its number.
+fn halve(boxes: &[Aabb], order: &mut [u32], axis: usize) -> usize {
+    let key = |i: &u32| boxes[*i as usize].min[axis] + boxes[*i as usize].max[axis];
+    let half = order.len() / 2;
+    order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+    half
+}
+
+/// Orders the items so that those of the first child come first, and gives their number; `None` where no plane parts them.
+fn divide(boxes: &[Aabb], order: &mut [u32]) -> Option<usize> {
+    let middle = |i: u32| add(boxes[i as usize].min, boxes[i as usize].max);
+    let spread = order.iter().fold(Aabb::EMPTY, |b, i| b.with(middle(*i)));
+    let axis = longest(&spread);
+    let step = BINS as f64 / spread.size()[axis];
+    if !step.is_finite() {
+        return None;
+    }
+    let bin = |i: u32| (((middle(i)[axis] - spread.min[axis]) * step) as usize).min(BINS - 1);
+    let mut bins = [(Aabb::EMPTY, 0usize); BINS];
+    for i in order.iter() {
+        let b = &mut bins[bin(*i)];
+        *b = (b.0.union(boxes[*i as usize]), b.1 + 1);
+    }
+    let sweep = |from: &mut dyn Iterator<Item = usize>| {
+        let (mut b, mut n) = (Aabb::EMPTY, 0);
+        let mut cost = [0.0; BINS];
+        for i in from {
+            b = b.union(bins[i].0);
+            n += bins[i].1;
+            cost[i] = half_area(&b) * n as f64;
+        }
+        cost
+    };
+    let (left, right) = (sweep(&mut (0..BINS)), sweep(&mut (0..BINS).rev()));
+    // The first and last bins hold the extremes, so neither side is empty.
+    let cost = |cut: usize| left[cut - 1] + right[cut];
+    let cut = (2..BINS).fold(1, |best, i| if cost(i) < cost(best) { i } else { best });
+    order.sort_by_key(|i| bin(*i) >= cut);
+    Some(order.partition_point(|i| bin(*i) < cut))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::random;
+
+    fn boxes(n: usize) -> Vec<Aabb> {
+        let mut seed = 5;
+        let mut point = |reach: f64| [0; 3].map(|_| reach * random(&mut seed));
+        let mut one = || {
+            let p = point(1.0);
+            Aabb::EMPTY.with(p).with(add(p, point(0.05)))
+        };
+        (0..n).map(|_| one()).collect()
+    }
+
+    #[test]
+    fn queries_agree_with_all_boxes() {
+        for (n, split) in
+            [(0, Split::Median), (1, Split::SurfaceArea), (9000, Split::Median), (9000, Split::SurfaceArea)]
+        {
+            let boxes = boxes(n);
+            // Every third item is left out.
+            let items: Vec<u32> = (0..n as u32).filter(|i| i % 3 != 1).collect();
+            let tree = Bvh::new(&boxes, items.clone(), split);
+            let mut sorted = tree.order().to_vec();
+            sorted.sort_unstable();
+            assert_eq!(sorted, items);
+            let mut seed = 8;
+            for _ in 0..200 {
+                let p = [0; 3].map(|_| random(&mut seed));
+                let query = Aabb::EMPTY.with(p).grown(0.1);
+                let mut found: Vec<u32> = Vec::new();
+                let touches = |i: &&u32| boxes[**i as usize].touches(&query);
+                tree.overlapping(&query, |items| found.extend(items.iter().filter(touches)));
+                found.sort_unstable();
+                assert!(found.iter().eq(items.iter().filter(touches)));
+                let mut best = f64::INFINITY;
+                tree.nearest(p, best, |range| {
+                    for i in &tree.order()[range] {
+                        best = best.min(boxes[*i as usize].distance(p).powi(2));
+                    }
+                    best
+                });
+                let want = items.iter().map(|i| boxes[*i as usize].distance(p)).fold(f64::INFINITY, f64::min);
+                assert!((best.sqrt() - want).abs() < 1e-15 || best == want);
+            }
+        }
+    }
+
+    #[test]
+    fn equal_boxes_are_halved() {
+        let boxes = vec![Aabb { min: [0.0; 3], max: [1.0; 3] }; 5000];
+        for split in [Split::Median, Split::SurfaceArea] {
+            let tree = Bvh::new(&boxes, (0..5000).collect(), split);
+            let mut count = 0;
+            tree.overlapping(&boxes[0], |items| count += items.len());
+            assert_eq!(count, 5000);
+        }
+    }
+}
