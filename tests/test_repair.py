@@ -104,7 +104,7 @@ def test_nothing_but_degenerate_faces(tmp_path):
         refused(tmp_path, CORNERS, [FACES[0], FACES[0][::-1]]),
         refused(tmp_path, CORNERS * [1, 1, 0], FACES),
     ]
-    assert all("2 triangles: a solid has at least four" in s for s in said[:2])
+    assert all("2 triangles; a solid has at least 4" in s for s in said[:2])
     assert "holds no solid" in said[2] and "8 degenerate triangles" in said[2]
 
 

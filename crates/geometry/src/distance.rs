@@ -21,7 +21,7 @@ use winding::Winding;
 
 /// A position and its signed distance, where none is known: no comparison with it holds.
 pub const UNKNOWN: (Vec3, f64) = ([0.0; 3], f64::NAN);
-/// Sets of triangles farther off than so many of their radii are taken as a whole where the winding number decides the
+/// Sets of triangles farther off than this many of their radii are taken as a whole where the winding number decides the
 /// sign: for a closed surface it is then within a few hundredths of zero or one.
 pub const REACH: f64 = 1.4;
 
@@ -67,12 +67,12 @@ impl MeshDistance {
         MeshDistance { normals, winding, tree, mesh, repaired: done }
     }
 
-    /// The boundary that everything is taken from: the mesh given if it was clean, else the repaired one.
+    /// The boundary: the mesh given if it was clean, else the repaired one.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// What was repaired.
+    /// Counts of the repairs.
     pub fn repaired(&self) -> &Repaired {
         &self.repaired
     }

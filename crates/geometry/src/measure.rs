@@ -3,34 +3,34 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
-use crate::mesh::{Edges, Mesh, degenerate};
+use crate::mesh::{EdgeCounts, Mesh, degenerate};
 
-mod adjacency;
 mod cavity;
-mod quality;
+mod components;
+mod triangle_quality;
 
 pub use crate::mesh::{is_embedded, self_intersections};
-use adjacency::Bodies;
-pub use adjacency::non_manifold_vertices;
 pub use cavity::{Cavity, cavities};
-pub use quality::{Quality, quality};
+use components::Components;
+pub use components::non_manifold_vertices;
+pub use triangle_quality::{Quality, quality};
 
 /// Triangles per unit of parallel work; sums are taken in this order whatever the thread count.
 const CHUNK: usize = 1 << 16;
 
-/// What a closed mesh is.
+/// Volume, area and topology of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Size {
-    /// Enclosed volume, mm³. Of a mesh that is not closed: that of the cones over its triangles from the middle of its bounds,
-    /// which is near it where what is missing is small.
+    /// Enclosed volume, mm³. Of a mesh that is not closed: that of the cones over its triangles from the centre of its bounds,
+    /// which is near it where the gaps are small.
     pub volume: f64,
     /// Area, mm².
     pub area: f64,
     /// V − E + F, over the vertices that triangles use.
     pub euler: i64,
-    /// Solids: bodies (joined across edges; those that touch in a point or an edge are apart) of positive volume.
+    /// Solids: connected components (through edges; contact in a point or an edge does not connect) of positive volume.
     pub pieces: usize,
-    /// Closed voids inside solids: bodies of negative signed volume.
+    /// Closed voids inside solids: connected components of negative signed volume.
     pub cavities: usize,
     /// Whether every edge has exactly two triangles of opposite direction.
     pub closed: bool,
@@ -42,22 +42,22 @@ pub struct Size {
 ///
 /// Time and memory are linear in the mesh.
 pub fn size(mesh: &Mesh) -> Size {
-    let edges = Edges::count(mesh);
-    let bodies = Bodies::of(mesh);
-    let signed = match adjacency::apart(mesh) {
-        Some(apart) => Bodies::of(&apart).volumes(&apart),
-        None => bodies.volumes(mesh),
+    let edges = EdgeCounts::count(mesh);
+    let joined = Components::of(mesh);
+    let signed = match components::apart(mesh) {
+        Some(apart) => Components::of(&apart).volumes(&apart),
+        None => joined.volumes(mesh),
     };
-    let closed = edges.all == edges.sound && edges.loops == 0;
+    let closed = edges.all == edges.manifold && edges.loops == 0;
     let bounds = mesh.bounds();
     Size {
-        // The cones over an open body depend on where they meet: bodies that belong together need one place.
+        // The cones over an open component depend on their apex: components that belong together need one apex.
         volume: match closed {
             true => signed.iter().sum(),
             false => cones(mesh, scale(add(bounds.min, bounds.max), 0.5)),
         },
         area: area(mesh),
-        euler: bodies.vertices as i64 - edges.all as i64 + mesh.triangles.len() as i64,
+        euler: joined.vertices as i64 - edges.all as i64 + mesh.triangles.len() as i64,
         pieces: signed.iter().filter(|v| **v > 0.0).count(),
         cavities: signed.iter().filter(|v| **v < 0.0).count(),
         closed,
@@ -91,26 +91,26 @@ fn area(mesh: &Mesh) -> f64 {
     parts.iter().sum()
 }
 
-/// What is wrong with a mesh as the boundary of one solid.
+/// Defects of a mesh as the boundary of one solid.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Defects {
     /// Edges with one triangle.
     pub open_edges: usize,
     /// Edges with more than two triangles.
     pub crowded_edges: usize,
-    /// Edges with two triangles that run the same way (a flipped neighbour).
+    /// Edges with two triangles of the same direction (a flipped neighbour).
     pub flipped_edges: usize,
-    /// Triangles that repeat another one's vertices, in whatever order.
+    /// Triangles with the vertices of another one, in any order.
     pub duplicate_triangles: usize,
     /// Triangles with two equal vertices or zero area (decided exactly).
     pub degenerate_triangles: usize,
-    /// Connected bodies, joined by shared vertices.
+    /// Connected components, through shared vertices.
     pub bodies: usize,
 }
 
 /// Counts the defects of a mesh.
 pub fn defects(mesh: &Mesh) -> Defects {
-    let edges = Edges::count(mesh);
+    let edges = EdgeCounts::count(mesh);
     let mut keys = mesh.triangles.clone();
     keys.par_iter_mut().for_each(|t| t.sort_unstable());
     keys.par_sort_unstable();
@@ -120,7 +120,7 @@ pub fn defects(mesh: &Mesh) -> Defects {
         flipped_edges: edges.flipped,
         duplicate_triangles: keys.windows(2).filter(|w| w[0] == w[1]).count(),
         degenerate_triangles: (0..mesh.triangles.len()).into_par_iter().filter(|&i| degenerate(mesh, i)).count(),
-        bodies: Bodies::of(mesh).count,
+        bodies: Components::of(mesh).count,
     }
 }
 
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn touching_bodies_are_told_by_index_not_position() {
+    fn touching_components_differ_by_index_not_position() {
         let (a, b) = (cube([0.0; 3], 1.0), cube([1.0; 3], 1.0));
         let apart = join(&[a, b]);
         assert_eq!(size(&apart).pieces, 2);

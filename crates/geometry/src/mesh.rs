@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 
-mod edges;
+mod edge_counts;
 pub mod exact;
-mod intersect;
 pub mod samples;
+mod self_intersections;
 
-pub use edges::Edges;
-pub use intersect::{is_embedded, meet, near_pairs, self_intersections};
+pub use edge_counts::EdgeCounts;
+pub use self_intersections::{is_embedded, meet, near_pairs, self_intersections};
 
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,23 +76,23 @@ impl Mesh {
         largest * f64::from(f32::EPSILON)
     }
 
-    /// The mesh with vertices made one that differ by no more than single precision rounds, if it has open edges that this
-    /// closes: files that hold triangles by the places of their corners, as STL does, leave such edges.
+    /// The mesh with vertices merged that differ by no more than the rounding of single precision, if it has open edges that
+    /// this closes: files that store triangles by the positions of their corners, as STL does, leave such edges.
     ///
     /// Coordinates must be finite. Time and memory are linear in the mesh.
     pub fn joined_where_open(self) -> Mesh {
-        let open = Edges::count(&self).open;
+        let open = EdgeCounts::count(&self).open;
         if open == 0 {
             return self;
         }
         let joined = self.joined(self.single_rounding());
-        if Edges::count(&joined).open < open { joined } else { self }
+        if EdgeCounts::count(&joined).open < open { joined } else { self }
     }
 
-    /// The mesh with vertices closer than `tolerance` (mm) made one, triangles that collapse left out.
+    /// The mesh with vertices closer than `tolerance` (mm) merged, without the triangles that collapse.
     ///
-    /// A vertex goes to the first kept one within reach, in order. Coordinates must be finite; a tolerance that is
-    /// not above zero joins nothing.
+    /// A vertex is merged into the first kept one within the tolerance, in order. Coordinates must be finite; a tolerance that
+    /// is not above zero merges nothing.
     pub fn joined(&self, tolerance: f64) -> Mesh {
         if !(tolerance > 0.0 && tolerance.is_finite()) {
             return self.clone();

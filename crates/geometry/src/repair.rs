@@ -1,23 +1,23 @@
-//! From any triangles to one boundary: the order of the repairs, what they did, and when they are refused.
+//! From any triangles to the boundary of a solid: the order of the repairs, a report of them, and when they are refused.
 
 use crate::fault::Fault;
 use crate::math::{add, cross, norm, scale, sub};
 use crate::mesh::{Mesh, self_intersections};
 
 mod arrangement;
-mod cap;
-pub(crate) mod check;
-mod clean;
-mod fair;
+mod fairing;
 pub(crate) mod half_edges;
-mod orient;
+mod holes;
+mod orientation;
+mod stitch;
+pub(crate) mod validity;
 
-use check::Pairs;
+use validity::Pairs;
 
 /// Caps may make up this share of the repaired surface. A cap is a guess: at a tenth of the surface, over a hole a
 /// fifth of the part wide, it can be wrong by a tenth of that width, which is the size of a cell of most lattices.
 pub const CAPPED: f64 = 0.1;
-/// Faces that do not close by more than this share of the surface are refused.
+/// A surface with a larger gap than this share of its area is refused.
 const UNCLOSED: f64 = 1e-9;
 /// Crossing pairs are counted up to here.
 const MANY: usize = 1000;
@@ -25,31 +25,31 @@ const MANY: usize = 1000;
 /// Whether a broken mesh is repaired.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Repair {
-    /// It is, and what was done is told.
+    /// It is, and the repairs are reported.
     #[default]
     Auto,
-    /// It is refused, with what is wrong in numbers.
+    /// It is refused, with its defects in numbers.
     Refuse,
 }
 
-/// What a repair did. All zero for a mesh that was clean.
+/// Counts of repairs. All zero for a mesh that was clean.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Repaired {
-    /// Corners of open edges that were joined with others.
+    /// Vertices of open edges that were merged with others.
     pub joined: usize,
-    /// Open edges split at corners that lay on them.
+    /// Open edges split at vertices that lay on them.
     pub split: usize,
-    /// Triangles without area that were left out.
+    /// Triangles of zero area that were removed.
     pub degenerate: usize,
-    /// Triangles given more than once, or from both sides, that were left out.
+    /// Triangles given more than once, or in both orientations, that were removed.
     pub duplicates: usize,
-    /// Triangles turned to face as their neighbours do.
+    /// Triangles reversed to face as their neighbours do.
     pub turned: usize,
-    /// Bodies that were inside out and were turned.
+    /// Connected components that were inside out and were reversed.
     pub bodies_turned: usize,
     /// Holes that were capped.
     pub holes: usize,
-    /// Length of the rims of the holes, mm.
+    /// Length of the boundary loops of the holes, mm.
     pub hole_length: f64,
     /// Area of the caps, mm².
     pub hole_area: f64,
@@ -57,7 +57,7 @@ pub struct Repaired {
     pub hole_share: f64,
     /// Pairs of triangles that crossed or covered each other.
     pub crossings: usize,
-    /// Triangles left out whole because solid, or none, is on both sides: bodies within bodies.
+    /// Triangles removed because solid, or void, is on both sides: components within components.
     pub inner: usize,
 }
 
@@ -67,36 +67,36 @@ impl Repaired {
         *self == Repaired::default()
     }
 
-    /// What was done in one sentence with its numbers; `None` where nothing was.
+    /// The repairs in one sentence with their numbers; `None` where there were none.
     pub fn sentence(&self) -> Option<String> {
         let s = |n: usize, one: &str, more: &str| (n > 0).then(|| counted(n, one, more));
         let holes = s(self.holes, "hole capped", "holes capped").map(|h| {
             let [length, area] = [self.hole_length, self.hole_area].map(short);
             let share = short(100.0 * self.hole_share);
-            format!("{h} (rims {length} mm, caps {area} mm², {share} % of the surface)")
+            format!("{h} (boundary loops {length} mm, caps {area} mm², {share} % of the surface)")
         });
         let all = [
-            s(self.joined, "open corner joined", "open corners joined"),
-            s(self.split, "open edge split at a corner on it", "open edges split at corners on them"),
-            s(self.degenerate, "triangle without area left out", "triangles without area left out"),
-            s(self.duplicates, "duplicate triangle left out", "duplicate triangles left out"),
-            s(self.turned, "flipped triangle turned", "flipped triangles turned"),
-            s(self.bodies_turned, "body that was inside out turned", "bodies that were inside out turned"),
+            s(self.joined, "vertex of an open edge merged", "vertices of open edges merged"),
+            s(self.split, "open edge split at a vertex on it", "open edges split at vertices on them"),
+            s(self.degenerate, "triangle without area removed", "triangles without area removed"),
+            s(self.duplicates, "duplicate triangle removed", "duplicate triangles removed"),
+            s(self.turned, "flipped triangle reversed", "flipped triangles reversed"),
+            s(self.bodies_turned, "component that was inside out reversed", "components that were inside out reversed"),
             holes,
-            s(self.crossings, "crossing pair of triangles cut", "crossing pairs of triangles cut"),
-            s(self.inner, "triangle inside the solid left out", "triangles inside the solid left out"),
+            s(self.crossings, "intersecting pair of triangles cut", "intersecting pairs of triangles cut"),
+            s(self.inner, "triangle inside the solid removed", "triangles inside the solid removed"),
         ];
         let all: Vec<String> = all.into_iter().flatten().collect();
         (!all.is_empty()).then(|| format!("the mesh was repaired: {}", all.join(", ")))
     }
 }
 
-/// A number of things.
+/// A count with its noun.
 fn counted(n: usize, one: &str, more: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { more })
 }
 
-/// Three digits.
+/// A number to three digits.
 fn short(v: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return format!("{v}");
@@ -105,14 +105,14 @@ fn short(v: f64) -> String {
     format!("{v:.digits$}")
 }
 
-/// The boundary of a solid, and how it came about.
+/// The boundary of a solid, and the repairs that made it.
 pub struct Boundary {
-    /// Its triangles, which share their vertices where they meet.
+    /// Its triangles; adjacent ones share vertices.
     pub mesh: Mesh,
-    /// The pairs of its half-edges where it is a clean closed surface, as most are; else it is closed but for
-    /// rounding, in pieces that need not match.
+    /// The pairs of its half-edges where it is a closed manifold, as most are; else it is closed but for
+    /// rounding, of triangles that need not match along edges.
     pub pairs: Option<Pairs>,
-    /// What was done.
+    /// Counts of the repairs.
     pub done: Repaired,
 }
 
@@ -120,60 +120,60 @@ fn refuse(message: impl Into<String>) -> Fault {
     Fault::new("", message)
 }
 
-/// The boundary of what the mesh holds. A clean mesh comes back as it is.
+/// The boundary of the solid inside a mesh. A clean mesh comes back as it is.
 pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
-    check::numbers(&mesh)?;
+    validity::numbers(&mesh)?;
     let given = mesh.triangles.len();
-    let mut edges = check::edges(&mesh);
+    let mut edges = validity::edges(&mesh);
     if edges.is_err() {
         mesh = mesh.joined_where_open();
-        edges = check::edges(&mesh);
+        edges = validity::edges(&mesh);
     }
     let found = match edges {
         Ok(pairs) => {
             let crossing = self_intersections(&mesh, MANY);
             if crossing == 0 {
-                if check::plain(&mesh, &pairs) {
+                if validity::plain(&mesh, &pairs) {
                     let done = Repaired::default();
                     return Ok(Boundary { mesh, pairs: Some(pairs), done });
                 }
                 None
             } else {
                 let more = if crossing < MANY { "" } else { " or more" };
-                Some(format!("{crossing}{more} pairs of triangles that cross each other"))
+                Some(format!("{crossing}{more} intersecting pairs of triangles"))
             }
         }
         Err(found) => Some(found),
     };
     if let (Some(found), Repair::Refuse) = (&found, repair) {
         return Err(refuse(format!(
-            "the mesh of {given} triangles does not bound a solid: {found}; repair it, or let repair = \"auto\" do so"
+            "the mesh of {given} triangles does not bound a solid: {found}. Repair it, or set repair = \"auto\""
         )));
     }
     let mut done = Repaired::default();
     if found.is_some() {
-        done.degenerate = given - mesh.triangles.len() + clean::drop_degenerate(&mut mesh);
-        done.duplicates = clean::drop_duplicates(&mut mesh);
-        done.joined = clean::join_seams(&mut mesh);
+        done.degenerate = given - mesh.triangles.len() + stitch::drop_degenerate(&mut mesh);
+        done.duplicates = stitch::drop_duplicates(&mut mesh);
+        done.joined = stitch::join_seams(&mut mesh);
         if done.joined > 0 {
-            done.duplicates += clean::drop_duplicates(&mut mesh);
+            done.duplicates += stitch::drop_duplicates(&mut mesh);
         }
         let reach = mesh.single_rounding();
-        done.split = clean::split_at_corners(&mut mesh, reach);
-        done.turned = orient::face_alike(&mut mesh);
-        let caps = cap::close(&mut mesh);
+        done.split = stitch::split_at_corners(&mut mesh, reach);
+        done.turned = orientation::face_alike(&mut mesh);
+        let caps = holes::close(&mut mesh);
         (done.holes, done.hole_length, done.hole_area) = (caps.holes, caps.length, caps.area);
         let area = mesh.area();
         done.hole_share = if caps.area > 0.0 { caps.area / area } else { 0.0 };
         if mesh.triangles.is_empty() {
             return Err(refuse(format!(
-                "the mesh of {given} triangles holds no solid: none are left without those that have no area and those that lie on each other; found {}",
+                "the mesh of {given} triangles holds no solid: without degenerate and duplicate triangles none are left; found {}",
                 found.unwrap_or_default()
             )));
         }
         if done.hole_share > CAPPED {
             return Err(refuse(format!(
-                "the mesh of {given} triangles has {} with rims of {} mm; closing them took {} mm², {} % of the surface, and more than {} % would be guessing: found {}",
+                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from; found {}",
                 counted(caps.holes, "hole", "holes"),
                 short(caps.length),
                 short(caps.area),
@@ -182,23 +182,23 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
                 found.unwrap_or_default()
             )));
         }
-        clean::drop_degenerate(&mut mesh);
+        stitch::drop_degenerate(&mut mesh);
     }
-    done.bodies_turned = orient::face_out(&mut mesh);
-    check::thick(&mesh)?;
-    let clean = check::edges(&mesh).ok();
+    done.bodies_turned = orientation::face_out(&mut mesh);
+    validity::thick(&mesh)?;
+    let clean = validity::edges(&mesh).ok();
     let crosses = clean.is_none() || found.is_some() && self_intersections(&mesh, 1) > 0;
     let mut pairs = clean.filter(|_| !crosses);
-    let plain = pairs.as_ref().is_some_and(|p| check::plain(&mesh, p));
+    let plain = pairs.as_ref().is_some_and(|p| validity::plain(&mesh, p));
     let cut = (!plain).then(|| arrangement::boundary(&mesh, 1));
     if let Some(cut) = cut.filter(|c| !c.untouched) {
         let eta = arrangement::tolerance(&mesh);
         done.crossings = cut.pairs;
         done.inner = cut.inner;
-        mesh = settled(cut.mesh, eta)?;
-        // Only whole bodies were left out: what remains is as clean as it was.
+        mesh = stitched(cut.mesh, eta)?;
+        // Only whole components were removed: the rest is as clean as it was.
         pairs = match pairs {
-            Some(_) => check::edges(&mesh).ok(),
+            Some(_) => validity::edges(&mesh).ok(),
             None => None,
         };
     }
@@ -208,7 +208,7 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         let what = done.sentence().unwrap_or_default();
         let what = what.trim_start_matches("the mesh was repaired: ");
         return Err(refuse(format!(
-            "the mesh of {given} triangles does not bound a solid; repair = \"auto\" would do this: {what}"
+            "the mesh of {given} triangles does not bound a solid; with repair = \"auto\": {what}"
         )));
     }
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
@@ -220,19 +220,19 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     Ok(Boundary { mesh, pairs, done })
 }
 
-/// What cutting left, its pieces joined as far as they match.
-fn settled(cut: Mesh, eta: f64) -> Result<Mesh, Fault> {
+/// The result of cutting, merged where vertices match.
+fn stitched(cut: Mesh, eta: f64) -> Result<Mesh, Fault> {
     let mut mesh = cut.joined(4.0 * eta);
-    clean::drop_degenerate(&mut mesh);
-    clean::drop_duplicates(&mut mesh);
-    clean::split_at_corners(&mut mesh, 4.0 * eta);
-    clean::drop_degenerate(&mut mesh);
+    stitch::drop_degenerate(&mut mesh);
+    stitch::drop_duplicates(&mut mesh);
+    stitch::split_at_corners(&mut mesh, 4.0 * eta);
+    stitch::drop_degenerate(&mut mesh);
     closed(&mesh)?;
     Ok(mesh)
 }
 
-/// The boundary of where boundaries, those in `turned` from their other sides, wind at least `least` times in all; none
-/// where that holds nothing, or is not closed but for rounding.
+/// The boundary of the points about which boundaries, those in `turned` reversed, wind at least `least` times in all; `None`
+/// where there is no such point, or the result is not closed but for rounding.
 pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary> {
     let mut all = Mesh::default();
     let sides = of.iter().map(|m| (m, false));
@@ -243,19 +243,19 @@ pub fn combined(of: &[&Mesh], turned: &[&Mesh], least: usize) -> Option<Boundary
         let moved = mesh.triangles.iter().map(|t| side(t).map(|v| first + v));
         all.triangles.extend(moved);
     }
-    check::numbers(&all).ok()?;
+    validity::numbers(&all).ok()?;
     let eta = arrangement::tolerance(&all);
     let cut = arrangement::boundary(&all, least);
-    let mesh = if cut.untouched { cut.mesh } else { settled(cut.mesh, eta).ok()? };
+    let mesh = if cut.untouched { cut.mesh } else { stitched(cut.mesh, eta).ok()? };
     if mesh.triangles.len() < 4 || mesh.volume() <= 0.0 {
         return None;
     }
-    let pairs = check::edges(&mesh).ok();
+    let pairs = validity::edges(&mesh).ok();
     let pairs = pairs.filter(|_| self_intersections(&mesh, 1) == 0);
     Some(Boundary { mesh, pairs, done: Repaired::default() })
 }
 
-/// Refuses pieces that leave more open than rounding does: over a closed surface ∫ n dA is zero and ∫ x nᵀ dA is the
+/// Refuses a surface with a gap beyond rounding: over a closed surface ∫ n dA is zero and ∫ x nᵀ dA is the
 /// volume times one.
 fn closed(mesh: &Mesh) -> Result<(), Fault> {
     let o = mesh.bounds().center();
@@ -283,7 +283,7 @@ fn closed(mesh: &Mesh) -> Result<(), Fault> {
         return Ok(());
     }
     Err(refuse(format!(
-        "the mesh could not be made one boundary: after cutting it along {} triangles' crossings {gap:e} mm² of {} mm² do not close; repair it in the program it came from",
+        "the surface is not closed: after cutting {} triangles along their intersections a gap of {gap:e} mm² in {} mm² is left. Repair the mesh in the program it came from",
         mesh.triangles.len(),
         short(area)
     )))

@@ -3,10 +3,10 @@
 //! Edges are taken away one by one, in the order of what it costs by quadrics, each replaced by the vertex of least cost
 //! that keeps the volume. A collapse is done only if
 //!
-//! - the mesh stays closed and manifold: the ends have no common neighbours but the two corners beside the edge;
+//! - the mesh stays closed and manifold: the ends have no common neighbours but the two corners opposite the edge;
 //! - no new triangle is a needle, or folds;
 //! - sharp edges and borders of cuts stay: they are shortened along themselves, and where they meet nothing moves;
-//! - no point of the surface has moved farther than the tolerance from where it started (see `drift`: a proof, and so
+//! - no point of the surface has moved farther than the tolerance from where it started (see `deviation`: a proof, and so
 //!   a bound of the distance in both directions);
 //! - the new triangles meet no others, decided exactly for positions rounded to single precision.
 //!
@@ -22,18 +22,18 @@ use crate::mesh::Mesh;
 use crate::progress::{Progress, Stopped};
 use crate::surface_mesh::SurfaceMesh;
 
-mod drift;
-mod edges;
-mod links;
-mod near;
-mod quadric;
-mod queue;
-mod work;
+mod bucket_queue;
+mod collapse;
+mod deviation;
+mod error_quadric;
+mod half_edge_mesh;
+mod kept_edges;
+mod refit_tree;
 
-use links::{Links, NONE};
-use work::Work;
+use collapse::Simplification;
+use half_edge_mesh::{HalfEdgeMesh, NONE};
 
-/// Candidates between two looks at the progress.
+/// Candidates between two reports of progress.
 const STRIDE: u64 = 4096;
 
 /// How far a mesh is to be simplified. With both, whichever is reached first.
@@ -92,20 +92,20 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
     }
     let ordered = in_order(surface);
     let exact = &ordered.mesh.vertices;
-    let places: Vec<Vec3> = exact.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
-    let rounded = Mesh { vertices: places, triangles: ordered.mesh.triangles.clone() };
-    let links = sound(&rounded).map_err(Stopped::Refused)?;
-    let mut work = Work::new(links, rounded.vertices, exact, &ordered.cut, tolerance);
+    let positions: Vec<Vec3> = exact.iter().map(|p| p.map(|x| f64::from(x as f32) + 0.0)).collect();
+    let rounded = Mesh { vertices: positions, triangles: ordered.mesh.triangles.clone() };
+    let half_edges = sound(&rounded).map_err(Stopped::Refused)?;
+    let mut work = Simplification::new(half_edges, rounded.vertices, exact, &ordered.cut, tolerance);
     // Three candidates a vertex, and six more for each one that goes.
     let likely = 9 * before.0 as u64 / 2;
-    let mut looked = 0u64;
+    let mut tried = 0u64;
     while work.count > target && work.step().is_some() {
-        looked += 1;
-        if looked.is_multiple_of(STRIDE) {
+        tried += 1;
+        if tried.is_multiple_of(STRIDE) {
             let (done, total) = if target > 0 {
                 ((before.0 - work.count) as u64, (before.0 - target) as u64)
             } else {
-                (looked, likely.max(looked))
+                (tried, likely.max(tried))
             };
             if !progress.step(done, total) {
                 return Err(Stopped::Interrupted);
@@ -121,7 +121,7 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
 /// The tolerance and the number of triangles of a goal.
 fn checked(goal: &Goal) -> Result<(f64, usize), Fault> {
     if goal.tolerance.is_none() && goal.triangles.is_none() {
-        return Err(Fault::new("", "give a tolerance, a number of triangles, or both"));
+        return Err(Fault::new("", "no goal is set: give a tolerance (mm), a number of triangles, or both"));
     }
     let tolerance = goal.tolerance.unwrap_or(f64::INFINITY);
     if goal.tolerance.is_some_and(|t| !(t.is_finite() && t > 0.0)) {
@@ -137,8 +137,8 @@ fn checked(goal: &Goal) -> Result<(f64, usize), Fault> {
     Ok((tolerance, target))
 }
 
-/// The links of a mesh that keeps every promise; otherwise what is wrong with it.
-fn sound(mesh: &Mesh) -> Result<Links, Fault> {
+/// The half-edge structure of a valid mesh; otherwise its defects.
+fn sound(mesh: &Mesh) -> Result<HalfEdgeMesh, Fault> {
     let refuse = |what: String| {
         Err(Fault::new(
             "",
@@ -154,22 +154,21 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     for &v in mesh.triangles.iter().flatten() {
         used[v as usize] = true;
     }
-    let places: HashSet<[u64; 3]> =
+    let positions: HashSet<[u64; 3]> =
         (0..used.len()).filter(|v| used[*v]).map(|v| mesh.vertices[v].map(f64::to_bits)).collect();
     let n = used.iter().filter(|u| **u).count();
-    if places.len() < n {
-        return refuse(format!("{} that another vertex has too", counted(n - places.len(), "place")));
+    if positions.len() < n {
+        return refuse(format!("{} at the position of another vertex", counted(n - positions.len(), "duplicate")));
     }
-    let links = Links::new(mesh.triangles.clone(), mesh.vertices.len());
+    let half_edges = HalfEdgeMesh::new(mesh.triangles.clone(), mesh.vertices.len());
     let pinched = measure::non_manifold_vertices(mesh);
-    let (Some(links), 0) = (links, pinched) else {
+    let (Some(half_edges), 0) = (half_edges, pinched) else {
         let d = measure::defects(mesh);
         return refuse(format!(
-            "{} with one triangle, {} with more than two, {} with two of the same direction, {} where surfaces touch",
+            "{} with one triangle, {} with more than two, {} with two of the same direction, {pinched} non-manifold vertices",
             counted(d.open_edges, "edge"),
             d.crowded_edges,
             d.flipped_edges,
-            counted(pinched, "place")
         ));
     };
     const SHOWN: usize = 1000;
@@ -177,9 +176,11 @@ fn sound(mesh: &Mesh) -> Result<Links, Fault> {
     let flat = measure::defects(mesh).degenerate_triangles;
     if crossings > 0 || flat > 0 {
         let or_more = if crossings == SHOWN { " or more" } else { "" };
-        return refuse(format!("{crossings}{or_more} pairs of triangles that meet and {flat} triangles without area"));
+        return refuse(format!(
+            "{crossings}{or_more} intersecting pairs of triangles and {flat} triangles of zero area"
+        ));
     }
-    Ok(links)
+    Ok(half_edges)
 }
 
 /// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use, so that
@@ -233,10 +234,10 @@ fn spread(x: u64) -> u64 {
 }
 
 /// The triangles that are left.
-fn gathered(work: Work, cut: &[bool]) -> SurfaceMesh {
-    let mut names = vec![NONE; work.places.len()];
+fn gathered(work: Simplification, cut: &[bool]) -> SurfaceMesh {
+    let mut names = vec![NONE; work.positions.len()];
     let mut out = SurfaceMesh::default();
-    for (t, corners) in work.links.triangles.iter().enumerate() {
+    for (t, corners) in work.half_edges.triangles.iter().enumerate() {
         if corners[0] == NONE {
             continue;
         }
@@ -244,7 +245,7 @@ fn gathered(work: Work, cut: &[bool]) -> SurfaceMesh {
             let name = &mut names[v as usize];
             if *name == NONE {
                 *name = out.mesh.vertices.len() as u32;
-                out.mesh.vertices.push(work.places[v as usize]);
+                out.mesh.vertices.push(work.positions[v as usize]);
             }
             *name
         });

@@ -4,11 +4,11 @@ use crate::math::{Vec3, cross, dot, sub};
 use crate::mesh::Mesh;
 use crate::union_find::{find, unite};
 
-pub mod check;
-pub mod quality;
+pub mod conformity;
+pub mod tet_quality;
 
-pub use check::Checked;
-pub use quality::{Quality, SLIVER, Spread};
+pub use conformity::Checked;
+pub use tet_quality::{Quality, SLIVER, Spread};
 
 /// A cube as six tetrahedra around a diagonal; bit a of a corner's number says on which side it is along axis a.
 pub const CUBE: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
@@ -24,10 +24,10 @@ pub struct TetMesh {
     pub zones: Vec<u32>,
 }
 
-/// The faces of a tetrahedron by places in it, counter-clockwise seen from outside; face i lies opposite to node i.
+/// The faces of a tetrahedron by corner indices, counter-clockwise seen from outside; face i lies opposite to node i.
 pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// The edges of a tetrahedron by places in it; edge i lies opposite to edge 5 − i.
+/// The edges of a tetrahedron by corner indices; edge i lies opposite to edge 5 − i.
 pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Volume of a tetrahedron (mm³): (b − a) × (c − a) · (d − a) / 6.

@@ -12,7 +12,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
-use geometry::tetmesh::{TetMesh, check};
+use geometry::tetmesh::{TetMesh, conformity};
 
 mod cover;
 mod creases;
@@ -109,7 +109,7 @@ fn shaped(mut work: Work) -> TetMesh {
             features::features(&mut work, LEAST);
             creases::creases(&mut work, LEAST, round > 1);
             smooth::smooth(&mut work);
-            let clashes = check::clashes(&work.mesh.boundary());
+            let clashes = conformity::clashes(&work.mesh.boundary());
             if clashes.is_empty() {
                 break;
             }

@@ -8,7 +8,7 @@ use super::triangle::{Feature, Triangle};
 use super::triangle_bvh::{Nearest, TriangleBvh};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
-use crate::repair::check::Pairs;
+use crate::repair::validity::Pairs;
 
 /// No normal: comparisons with it do not hold.
 const NONE: Vec3 = [f64::NAN; 3];

@@ -1,41 +1,41 @@
-//! Closed voids: what powder or resin cannot leave.
+//! Closed voids: powder or resin cannot leave them.
 
 use rayon::prelude::*;
 
-use super::adjacency::{self, Bodies};
+use super::components::{self, Components};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::mesh::Mesh;
 
 /// A closed void in a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cavity {
-    /// What its surface encloses, mm³; solids that float in it are not taken off.
+    /// The volume inside its surface, mm³; solids that float in it are not subtracted.
     pub volume: f64,
-    /// A point in it, mm: as far from its walls as a few tries found.
+    /// A point in it, mm: the farthest from its surface of a few tried.
     pub point: Vec3,
     /// Its bounds, mm.
     pub bounds: Aabb,
 }
 
-/// Chords on which a point inside is looked for.
+/// Chords tried for a point inside.
 const TRIES: usize = 12;
 
 /// The closed voids of a mesh, the largest first. Time is linear in the mesh.
 pub fn cavities(mesh: &Mesh) -> Vec<Cavity> {
-    let apart = adjacency::apart(mesh);
+    let apart = components::apart(mesh);
     let mesh = apart.as_ref().unwrap_or(mesh);
-    let bodies = Bodies::of(mesh);
-    let volumes = bodies.volumes(mesh);
+    let joined = Components::of(mesh);
+    let volumes = joined.volumes(mesh);
     if volumes.iter().all(|v| *v >= 0.0) {
         return Vec::new();
     }
-    let (names, count) = (bodies.names(mesh), volumes.len());
-    let mut sides: Vec<Vec<u32>> = vec![Vec::new(); count];
+    let (labels, count) = (joined.labels(mesh), volumes.len());
+    let mut triangles: Vec<Vec<u32>> = vec![Vec::new(); count];
     let mut bounds = vec![Aabb::EMPTY; count];
-    for (i, name) in names.iter().enumerate() {
+    for (i, label) in labels.iter().enumerate() {
         let corners = mesh.corners(i);
-        bounds[*name] = corners.iter().fold(bounds[*name], |b, p| b.with(*p));
-        sides[*name].push(i as u32);
+        bounds[*label] = corners.iter().fold(bounds[*label], |b, p| b.with(*p));
+        triangles[*label].push(i as u32);
     }
     let within =
         |inner: &Aabb, outer: &Aabb| (0..3).all(|a| inner.min[a] >= outer.min[a] && inner.max[a] <= outer.max[a]);
@@ -43,13 +43,13 @@ pub fn cavities(mesh: &Mesh) -> Vec<Cavity> {
         .into_par_iter()
         .filter(|&i| volumes[i] < 0.0)
         .map(|i| {
-            // What may float in it stands in the way of a chord.
+            // Solids that float in it interrupt chords.
             let floating = (0..count).filter(|&j| volumes[j] > 0.0 && within(&bounds[j], &bounds[i]));
             let walls: Vec<[Vec3; 3]> = std::iter::once(i)
                 .chain(floating)
-                .flat_map(|j| sides[j].iter().map(|t| mesh.corners(*t as usize)))
+                .flat_map(|j| triangles[j].iter().map(|t| mesh.corners(*t as usize)))
                 .collect();
-            Cavity { volume: -volumes[i], point: inside(&walls, sides[i].len()), bounds: bounds[i] }
+            Cavity { volume: -volumes[i], point: inside(&walls, triangles[i].len()), bounds: bounds[i] }
         })
         .collect();
     found.sort_by(|a, b| b.volume.total_cmp(&a.volume));

@@ -1,14 +1,14 @@
 //! Triangles cut where others cross or cover them, and the pieces that bound the solid.
 //!
-//! The triangles come closed and oriented, so the winding number is whole everywhere off them; the solid is where it
+//! The triangles are closed and oriented, so the winding number is an integer everywhere off them; the solid is where it
 //! is one or more (or another number: that of the meshes, for what all of them hold). No piece of a triangle, cut along all
-//! that meets it, has that boundary crossing it, so one look at its middle decides it: it is kept where the number is
+//! that meets it, has that boundary crossing it, so its centroid decides it: it is kept where the number is
 //! below that one in front of it and not behind. This is the
 //! idea of Q. Zhou, E. Grinspun, D. Zorin and A. Jacobson, Mesh arrangements for solid geometry, ACM Trans. Graph. 35
-//! (2016) 39; the arithmetic differs. Whether triangles meet is decided exactly, places are rounded. A piece that
+//! (2016) 39; the arithmetic differs. Whether triangles meet is decided exactly, positions are rounded. A piece that
 //! rounding puts on the wrong side of a cut is as thin as the rounding, and no decision spreads from piece to piece,
 //! so errors stay as small as they are made. For the same reason pieces need not match their neighbours: each triangle
-//! is parted by the lines of its cuts (a binary space partition: H. Fuchs, Z. M. Kedem and B. F. Naylor, SIGGRAPH
+//! is divided by the lines of its cuts (a binary space partition: H. Fuchs, Z. M. Kedem and B. F. Naylor, SIGGRAPH
 //! 1980), which has no special cases.
 
 use rayon::prelude::*;
@@ -30,14 +30,14 @@ enum Meeting {
     Flat(u32, u32),
 }
 
-/// How far sets of triangles are, in their radii, to be taken as a whole: a look needs the nearest whole number.
+/// Sets of triangles farther off than this many of their radii are taken as a whole: the nearest integer decides.
 const REACH: f64 = 2.0;
-/// A number so near a whole one is sure.
+/// A winding number this near an integer is certain.
 const SURE: f64 = 0.05;
-/// Places of a piece that are looked at, at most, after its middle.
-const PLACES: usize = 6;
+/// Points of a piece that are tried, at most, after its centroid.
+const SAMPLES: usize = 6;
 
-/// What cutting gave.
+/// The result of cutting.
 pub struct Cut {
     /// The boundary of the solid.
     pub mesh: Mesh,
@@ -49,7 +49,7 @@ pub struct Cut {
     pub untouched: bool,
 }
 
-/// Two places closer than this are one, mm: above the rounding of all that is computed here.
+/// Two points closer than this are one, mm: above the rounding of all that is computed here.
 pub fn tolerance(mesh: &Mesh) -> f64 {
     let b = mesh.bounds();
     let largest = b.min.iter().chain(&b.max).fold(0.0f64, |m, x| m.max(x.abs()));
@@ -86,16 +86,17 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
     for (k, i) in tree.order().iter().enumerate() {
         place[*i as usize] = k as u32;
     }
-    let looker = Looker { faces: &faces, tree: &tree, winding: &winding, place: &place, level: least as f64 - 0.5 };
+    let classifier =
+        Classifier { faces: &faces, tree: &tree, winding: &winding, place: &place, level: least as f64 - 0.5 };
     let whole = |i: usize| segments[i].is_empty() && covers[i].is_empty();
-    let kept_whole = looker.patches(mesh, &whole);
+    let kept_whole = classifier.patches(mesh, &whole);
     let pieces: Vec<Vec<[Vec3; 3]>> = (0..n)
         .into_par_iter()
         .map(|i| {
             if whole(i) {
                 return Vec::new();
             }
-            looker.pieces(i, &segments[i], &covers[i], eta)
+            classifier.pieces(i, &segments[i], &covers[i], eta)
         })
         .collect();
     let mut out = Mesh { vertices: mesh.vertices.clone(), triangles: Vec::new() };
@@ -143,8 +144,8 @@ fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Opt
     if off(s, q) <= eta || off(t, p) <= eta {
         let axis = steepest(s.normal);
         let (p, q) = (p.map(|v| drop_axis(v, axis)), q.map(|v| drop_axis(v, axis)));
-        let parted = apart(p, q, eta) || apart(q, p, eta);
-        return (!parted).then_some(Meeting::Flat(numbers.0, numbers.1));
+        let separate = apart(p, q, eta) || apart(q, p, eta);
+        return (!separate).then_some(Meeting::Flat(numbers.0, numbers.1));
     }
     let common = mesh.triangles[i].iter().filter(|v| mesh.triangles[j].contains(v));
     if common.count() >= 2 {
@@ -172,16 +173,16 @@ fn meeting(mesh: &Mesh, faces: &[Triangle], eta: f64, i: usize, j: usize) -> Opt
     (low.0 < high.0).then_some(Meeting::Across(numbers.0, numbers.1, [low.1, high.1]))
 }
 
-/// Whether a side of triangle `a` has `b` beyond it, to within `eta`.
+/// Whether an edge of triangle `a` separates `b` from it, to within `eta`.
 fn apart(a: [[f64; 2]; 3], b: [[f64; 2]; 3], eta: f64) -> bool {
-    let way = f64::from(orient2d(a[0], a[1], a[2]));
+    let sign = f64::from(orient2d(a[0], a[1], a[2]));
     (0..3).any(|k| {
         let line = Line::through(a[k], a[(k + 1) % 3]);
-        b.iter().all(|p| way * line.side(*p) <= eta)
+        b.iter().all(|p| sign * line.side(*p) <= eta)
     })
 }
 
-/// The segment in which a triangle (corners `p`, vertices `v`, sides `signs`) meets the plane of `face`; the same
+/// The segment in which a triangle (corners `p`, vertices `v`, on the sides `signs`) meets the plane of `face`; the same
 /// bits from every triangle with that edge.
 fn on_plane(v: [u32; 3], p: [Vec3; 3], signs: [i8; 3], face: &Triangle) -> Option<[Vec3; 2]> {
     let mut found: [Option<Vec3>; 2] = [None, None];
@@ -237,13 +238,13 @@ impl Line {
     }
 }
 
-/// A part of a triangle: a convex polygon, or two parts and the line between.
+/// A part of a triangle: a convex polygon, or two parts and the line between them.
 enum Node {
     Leaf(Vec<Vec3>),
-    Parted(Line, u32, u32),
+    Divided(Line, u32, u32),
 }
 
-/// A triangle parted by lines.
+/// A triangle divided by lines (a binary space partition).
 struct Partition {
     nodes: Vec<Node>,
     /// The triangle.
@@ -258,7 +259,7 @@ impl Partition {
         drop_axis(p, self.axis)
     }
 
-    /// Parts every polygon that the segment crosses by the segment's line.
+    /// Divides every polygon that the segment crosses by the segment's line.
     fn add(&mut self, segment: [Vec3; 2]) {
         let ends = segment.map(|p| self.flat(p));
         let Some([a, b]) = self.clip(ends) else {
@@ -271,7 +272,7 @@ impl Partition {
                 continue;
             }
             match &self.nodes[i as usize] {
-                Node::Parted(by, left, right) => {
+                Node::Divided(by, left, right) => {
                     let (left, right) = (*left, *right);
                     let (sa, sb) = (by.side(a), by.side(b));
                     if sa.abs() <= self.eta && sb.abs() <= self.eta {
@@ -293,23 +294,23 @@ impl Partition {
                     if let Some((left, right)) = self.split(polygon, &line, segment) {
                         let first = self.nodes.len() as u32;
                         self.nodes.extend([Node::Leaf(left), Node::Leaf(right)]);
-                        self.nodes[i as usize] = Node::Parted(line, first, first + 1);
+                        self.nodes[i as usize] = Node::Divided(line, first, first + 1);
                     }
                 }
             }
         }
     }
 
-    /// The part of a segment within the triangle; none where it runs along a side.
+    /// The part of a segment within the triangle; `None` where it runs along an edge.
     fn clip(&self, [a, b]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
         let corners = self.outline;
-        let way = f64::from(orient2d(corners[0], corners[1], corners[2]));
+        let sign = f64::from(orient2d(corners[0], corners[1], corners[2]));
         let (mut from, mut to) = (0.0f64, 1.0f64);
         for k in 0..3 {
             let line = Line::through(corners[k], corners[(k + 1) % 3]);
-            let (sa, sb) = (way * line.side(a), way * line.side(b));
+            let (sa, sb) = (sign * line.side(a), sign * line.side(b));
             if sa <= self.eta && sb <= self.eta {
-                return None; // outside, or along the side
+                return None; // outside, or along the edge
             }
             if sa < 0.0 {
                 from = from.max(sa / (sa - sb));
@@ -353,32 +354,32 @@ impl Partition {
     }
 }
 
-/// Looks at both sides of places on the triangles.
-struct Looker<'a> {
+/// Decides which pieces of triangles bound the solid, by winding numbers on both sides of points on them.
+struct Classifier<'a> {
     faces: &'a [Triangle],
     tree: &'a TriangleBvh,
     winding: &'a Winding,
-    /// Where each triangle stands in the tree.
+    /// The position of each triangle in the order of the tree.
     place: &'a [u32],
-    /// Half-way up to the least number of the solid.
+    /// Half below the least winding number of the solid.
     level: f64,
 }
 
-impl Looker<'_> {
-    /// Whether a piece of triangle `i` bounds the solid. Where another triangle touches the place that is looked at,
-    /// as an edge may that only rests on this one, the number is not whole there and another place is tried.
+impl Classifier<'_> {
+    /// Whether a piece of triangle `i` bounds the solid. Where another triangle touches the point that is tried,
+    /// as an edge may that only rests on this one, the number is no integer there and another point is tried.
     fn piece_bounds(&self, i: usize, polygon: &[Vec3], covers: &[u32]) -> bool {
         let sum = polygon.iter().fold([0.0; 3], |s, p| add(s, *p));
         let middle = scale(sum, 1.0 / polygon.len() as f64);
         let (mut best, mut doubt) = self.bounds(i, middle, covers);
-        for (k, p) in polygon.iter().enumerate().take(PLACES) {
+        for (k, p) in polygon.iter().enumerate().take(SAMPLES) {
             if doubt < SURE {
                 break;
             }
             // Odd shares, so that no lattice of corners has its points there.
-            let share = 0.294_117 + 0.173_205 * k as f64 / PLACES as f64;
-            let place = add(middle, scale(sub(*p, middle), share));
-            let (bounds, off) = self.bounds(i, place, covers);
+            let share = 0.294_117 + 0.173_205 * k as f64 / SAMPLES as f64;
+            let sample = add(middle, scale(sub(*p, middle), share));
+            let (bounds, off) = self.bounds(i, sample, covers);
             if off < doubt {
                 (best, doubt) = (bounds, off);
             }
@@ -386,7 +387,7 @@ impl Looker<'_> {
         best
     }
 
-    /// Whether triangle `i` bounds the solid about `p`, a place on it, and how far the numbers there are from whole;
+    /// Whether triangle `i` bounds the solid about `p`, a point on it, and how far the winding numbers there are from integers;
     /// of several triangles that cover it there the one with the lowest number that faces out does.
     fn bounds(&self, i: usize, p: Vec3, covers: &[u32]) -> (bool, f64) {
         let normal = self.faces[i].normal;
@@ -473,7 +474,7 @@ impl Looker<'_> {
             }
             for k in 1..polygon.len().saturating_sub(1) {
                 let t = [polygon[0], polygon[k], polygon[k + 1]];
-                if !super::clean::flat(t) {
+                if !super::stitch::flat(t) {
                     out.push(t);
                 }
             }

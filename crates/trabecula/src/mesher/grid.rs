@@ -13,7 +13,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
-use geometry::tetmesh::quality::size_of;
+use geometry::tetmesh::tet_quality::size_of;
 
 /// Units of a node's whole coordinates in the edge of a cube: it can be halved so often.
 const UNIT: i32 = 1 << 12;
@@ -249,7 +249,7 @@ impl Grid {
             let message = format!(
                 "size is {} mm at {}; it must be greater than 0 in the region and near it",
                 number(wanted[0].min(least)),
-                geometry::tetmesh::check::place(middle)
+                geometry::tetmesh::conformity::place(middle)
             );
             return Err(Fault::new("size", message));
         }

@@ -1,7 +1,7 @@
 //! How good a tetrahedron is, while nodes are moved.
 
 use geometry::math::Vec3;
-use geometry::tetmesh::{quality::dihedral_cosines, volume};
+use geometry::tetmesh::{tet_quality::dihedral_cosines, volume};
 
 /// The least and the greatest dihedral angle (degrees) that cutting leaves in a lattice that is not bisected.
 ///

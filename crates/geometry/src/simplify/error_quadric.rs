@@ -4,7 +4,7 @@
 
 use crate::math::{Vec3, add, cross, dot, scale, sub};
 
-/// Directions in which the planes say next to nothing keep to the middle of the edge: this share of the mean
+/// In directions that the planes hardly constrain the minimum stays at the middle of the edge: this share of the mean
 /// eigenvalue is added to all.
 const STAY: f64 = 1e-3;
 
@@ -84,7 +84,7 @@ impl Quadric {
         (det > 0.0).then(|| Quadric { a: minors.map(|m| m / det), ..Quadric::default() })
     }
 
-    /// The place near `middle` where the value is least.
+    /// The position near `middle` where the value is least.
     pub fn least(&self, middle: Vec3) -> Vec3 {
         match self.inverse() {
             Some(i) => sub(middle, i.times(add(self.times(middle), self.b))),
@@ -92,7 +92,7 @@ impl Quadric {
         }
     }
 
-    /// The least place near `middle` on the plane g·x = s.
+    /// The least position near `middle` on the plane g·x = s.
     ///
     /// That plane keeps the volume: P. Lindstrom and G. Turk, Fast and memory efficient polygonal simplification, 1998.
     pub fn least_on(&self, middle: Vec3, g: Vec3, s: f64) -> Vec3 {
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_place_stays_in_its_middle() {
+    fn a_flat_patch_stays_in_its_middle() {
         let t = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 2.0, 1.0]];
         let q = Quadric::triangle(t);
         assert_eq!(q.area, 2.0);

@@ -1,11 +1,11 @@
 //! The mesh while edges are taken from it: what a collapse would do, whether it may, and doing it.
 
-use super::drift::{Drift, Patch};
-use super::edges;
-use super::links::{Links, NONE, next, prev};
-use super::near::{Bounds, Prism, Tree};
-use super::quadric::Quadric;
-use super::queue::{Candidate, Queue};
+use super::bucket_queue::{Candidate, Queue};
+use super::deviation::{Displacements, Patch};
+use super::error_quadric::Quadric;
+use super::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
+use super::kept_edges;
+use super::refit_tree::{Bounds, Prism, RefitTree};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Most triangles about a vertex.
@@ -15,36 +15,36 @@ const CROWD: usize = 48;
 const SHAPE: f64 = 0.05;
 /// Cosine of the most, 60 degrees, that new triangles turn about edges that are not sharp, unless it was more before.
 const BEND: f64 = 0.5;
-/// Kept edges hold their place by planes through them, upright on their triangles, of this times their length squared.
+/// Kept edges are held by planes through them, normal to their triangles, of this times their length squared.
 const HOLD: f64 = 10.0;
 /// Among collapses that cost nothing, short edges come first.
 const SHORT: f64 = 1e-8;
 
 /// A mesh in the course of being simplified.
-pub struct Work {
+pub struct Simplification {
     /// Positions: single-precision numbers, so that the file holds what was tested.
-    pub places: Vec<Vec3>,
-    /// Who touches whom.
-    pub links: Links,
+    pub positions: Vec<Vec3>,
+    /// Adjacency.
+    pub half_edges: HalfEdgeMesh,
     /// Triangles left.
     pub count: usize,
     tolerance: f64,
     kept: Vec<bool>,
     kept_at: Vec<u8>,
-    drift: Vec<Drift>,
+    displacements: Vec<Displacements>,
     /// How far kept edges have moved, by vertex, mm.
-    line: Vec<f32>,
+    kept_moved: Vec<f32>,
     quadrics: Vec<Quadric>,
     versions: Vec<u32>,
     queue: Queue,
-    tree: Tree,
-    /// Triangles when the tree was made.
-    planted: usize,
-    // What a candidate needs, kept to save allocations.
+    tree: RefitTree,
+    /// Triangles when the tree was built.
+    indexed: usize,
+    // Scratch of one candidate, kept to save allocations.
     mark: Vec<u32>,
     marked: u32,
-    rim: Vec<u32>,
-    rim_edges: Vec<u32>,
+    boundary: Vec<u32>,
+    boundary_edges: Vec<u32>,
     patch: Patch,
     prisms: Vec<Prism>,
     normals: Vec<Vec3>,
@@ -52,25 +52,31 @@ pub struct Work {
     stack: Vec<usize>,
 }
 
-/// What an edge may become.
+/// How an edge is to be collapsed.
 struct Plan {
-    /// Where, if that is not free.
+    /// The position, if it is not free.
     fixed: Option<Vec3>,
     cost: f64,
 }
 
-impl Work {
-    /// Starts from linked triangles; `exact` has the positions before they were rounded to `places`.
-    pub fn new(links: Links, places: Vec<Vec3>, exact: &[Vec3], cut: &[bool], tolerance: f64) -> Work {
-        let n = places.len();
-        let count = links.triangles.len();
-        let corners = |t: &[u32; 3]| t.map(|v| places[v as usize]);
-        let moved = |v: u32| sub(places[v as usize], exact[v as usize]);
-        let rounded = |t: &[u32; 3]| t.iter().fold(Drift::NONE, |d, v| d.with(moved(*v)));
-        let drift = links.triangles.iter().map(rounded).collect();
+impl Simplification {
+    /// Starts from linked triangles; `exact` has the positions before they were rounded to `positions`.
+    pub fn new(
+        half_edges: HalfEdgeMesh,
+        positions: Vec<Vec3>,
+        exact: &[Vec3],
+        cut: &[bool],
+        tolerance: f64,
+    ) -> Simplification {
+        let n = positions.len();
+        let count = half_edges.triangles.len();
+        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize]);
+        let moved = |v: u32| sub(positions[v as usize], exact[v as usize]);
+        let rounded = |t: &[u32; 3]| t.iter().fold(Displacements::NONE, |d, v| d.with(moved(*v)));
+        let displacements = half_edges.triangles.iter().map(rounded).collect();
         let mut quadrics = vec![Quadric::default(); n];
-        let kept = edges::kept(&links, &places, cut);
-        for (t, names) in links.triangles.iter().enumerate() {
+        let kept = kept_edges::kept(&half_edges, &positions, cut);
+        for (t, names) in half_edges.triangles.iter().enumerate() {
             let p = corners(names);
             let own = Quadric::triangle(p);
             let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
@@ -86,63 +92,63 @@ impl Work {
                 }
             }
         }
-        let tree = Tree::new(0, &[], |_| Bounds::of(&[]));
-        let kept_at = edges::count(&links, &kept, n);
-        let mut work = Work {
-            places,
-            links,
+        let tree = RefitTree::new(0, &[], |_| Bounds::of(&[]));
+        let kept_at = kept_edges::count(&half_edges, &kept, n);
+        let mut work = Simplification {
+            positions,
+            half_edges,
             count,
             tolerance,
             kept,
             kept_at,
-            drift,
-            line: vec![0.0; n],
+            displacements,
+            kept_moved: vec![0.0; n],
             quadrics,
             versions: vec![0; n],
             queue: Queue::new(),
             tree,
-            planted: 0,
+            indexed: 0,
             mark: vec![0; n.max(count)],
             marked: 0,
-            rim: Vec::new(),
-            rim_edges: Vec::new(),
+            boundary: Vec::new(),
+            boundary_edges: Vec::new(),
             patch: Patch::default(),
             prisms: Vec::new(),
             normals: Vec::new(),
             found: Vec::new(),
             stack: Vec::new(),
         };
-        work.plant();
+        work.rebuild_tree();
         for h in 0..3 * count as u32 {
-            if work.links.from(h) < work.links.to(h) {
+            if work.half_edges.from(h) < work.half_edges.to(h) {
                 work.push(h);
             }
         }
         work
     }
 
-    /// Makes the tree anew: the boxes of the present one have grown and hold what is gone.
-    fn plant(&mut self) {
-        let triangles = &self.links.triangles;
+    /// Rebuilds the tree: its boxes have grown and hold collapsed triangles.
+    fn rebuild_tree(&mut self) {
+        let triangles = &self.half_edges.triangles;
         let live = (0..triangles.len() as u32).filter(|t| triangles[*t as usize][0] != NONE);
         let live: Vec<u32> = live.collect();
-        let places = &self.places;
-        self.tree = Tree::new(triangles.len(), &live, |t| Bounds::of(&triangles[t].map(|v| places[v as usize])));
-        self.planted = live.len();
+        let positions = &self.positions;
+        self.tree =
+            RefitTree::new(triangles.len(), &live, |t| Bounds::of(&triangles[t].map(|v| positions[v as usize])));
+        self.indexed = live.len();
     }
 
     /// The most that a point of the surface may have moved, mm.
     pub fn deviation(&self) -> f64 {
-        let live = (0..self.drift.len()).filter(|t| self.links.is_live(3 * *t as u32));
-        live.fold(0.0, |m, t| f64::max(m, self.drift[t].longest()))
+        let live = (0..self.displacements.len()).filter(|t| self.half_edges.is_live(3 * *t as u32));
+        live.fold(0.0, |m, t| f64::max(m, self.displacements[t].longest()))
     }
 
-    /// Looks at the cheapest candidate and takes its edge away if nothing speaks against it. `None` when there is no
-    /// candidate left.
+    /// Takes the cheapest candidate and collapses its edge if every condition holds. `None` when no candidate is left.
     pub fn step(&mut self) -> Option<bool> {
         let c = self.queue.pop()?;
         let h = c.edge;
-        if !self.links.is_live(h) || self.stamp(h) != c.stamp {
+        if !self.half_edges.is_live(h) || self.stamp(h) != c.stamp {
             return Some(false);
         }
         let Some(plan) = self.plan(h) else {
@@ -151,17 +157,17 @@ impl Work {
         Some(self.attempt(h, &plan))
     }
 
-    fn place(&self, v: u32) -> Vec3 {
-        self.places[v as usize]
+    fn position(&self, v: u32) -> Vec3 {
+        self.positions[v as usize]
     }
 
     fn stamp(&self, h: u32) -> u32 {
-        self.versions[self.links.from(h) as usize].wrapping_add(self.versions[self.links.to(h) as usize])
+        self.versions[self.half_edges.from(h) as usize].wrapping_add(self.versions[self.half_edges.to(h) as usize])
     }
 
     fn push(&mut self, h: u32) {
         if let Some(plan) = self.plan(h) {
-            let edge = sub(self.place(self.links.to(h)), self.place(self.links.from(h)));
+            let edge = sub(self.position(self.half_edges.to(h)), self.position(self.half_edges.from(h)));
             let long = dot(edge, edge);
             let stamp = self.stamp(h);
             let cost = plan.cost + SHORT * long * long;
@@ -169,60 +175,60 @@ impl Work {
         }
     }
 
-    /// What the edge may become by the kept edges at its ends, and its cost by the quadrics.
+    /// The positions that the kept edges at its ends allow the edge, and its cost by the quadrics; `None` where it must stay.
     fn plan(&self, h: u32) -> Option<Plan> {
-        let (u, v) = (self.links.from(h), self.links.to(h));
+        let (u, v) = (self.half_edges.from(h), self.half_edges.to(h));
         let ends = [u, v].map(|w| self.kept_at[w as usize]);
         let along = self.kept[h as usize];
         let fixed = match ends {
             [0, 0] => None,
-            [_, 0] => Some(self.place(u)),
-            [0, _] => Some(self.place(v)),
+            [_, 0] => Some(self.position(u)),
+            [0, _] => Some(self.position(v)),
             _ if !along => return None,
-            // A vertex of the run itself: so the run stays on its curve, and faces beside it stay flat.
+            // A vertex of the run itself: so the run stays on its curve, and faces adjacent to it stay flat.
             [2, 2] => Some(self.better_end(h)),
-            [_, 2] => Some(self.place(u)),
-            [2, _] => Some(self.place(v)),
+            [_, 2] => Some(self.position(u)),
+            [2, _] => Some(self.position(v)),
             _ => return None,
         };
         let q = self.joint(h);
-        let place = fixed.unwrap_or_else(|| q.least(self.middle(h)));
-        let cost = q.at(place).max(0.0);
+        let position = fixed.unwrap_or_else(|| q.least(self.middle(h)));
+        let cost = q.at(position).max(0.0);
         // Its mean distance alone would exceed what is allowed.
         let hopeless = !along && cost > q.area * self.tolerance * self.tolerance;
         (!hopeless).then_some(Plan { fixed, cost })
     }
 
     fn joint(&self, h: u32) -> Quadric {
-        self.quadrics[self.links.from(h) as usize].plus(&self.quadrics[self.links.to(h) as usize])
+        self.quadrics[self.half_edges.from(h) as usize].plus(&self.quadrics[self.half_edges.to(h) as usize])
     }
 
     /// The end of the edge that costs less.
     fn better_end(&self, h: u32) -> Vec3 {
         let q = self.joint(h);
-        let (p, r) = (self.place(self.links.from(h)), self.place(self.links.to(h)));
+        let (p, r) = (self.position(self.half_edges.from(h)), self.position(self.half_edges.to(h)));
         if q.at(p) <= q.at(r) { p } else { r }
     }
 
     fn middle(&self, h: u32) -> Vec3 {
-        let (p, q) = (self.place(self.links.from(h)), self.place(self.links.to(h)));
+        let (p, q) = (self.position(self.half_edges.from(h)), self.position(self.half_edges.to(h)));
         scale(add(p, q), 0.5)
     }
 
-    /// Takes the edge away if the result keeps every promise.
+    /// Collapses the edge if the result keeps every guarantee.
     fn attempt(&mut self, h: u32, plan: &Plan) -> bool {
         if !self.gather(h) {
             return false;
         }
         let first = plan.fixed.unwrap_or_else(|| self.balanced(h));
         self.patch.w = first.map(|x| f64::from(x as f32) + 0.0);
-        let Some(line) = self.line_moved(h) else {
+        let Some(line) = self.kept_edge_moved(h) else {
             return false;
         };
         if !self.is_well_shaped() {
             return false;
         }
-        if !self.patch.carry(self.tolerance) {
+        if !self.patch.propagate(self.tolerance) {
             return false;
         }
         if !self.is_clear(h) {
@@ -232,60 +238,60 @@ impl Work {
         true
     }
 
-    /// Gathers the patch about the edge; false if the collapse would leave something that is no closed manifold.
+    /// Gathers the patch about the edge; false if the collapse would not leave a closed manifold.
     fn gather(&mut self, h: u32) -> bool {
-        let g = self.links.twin(h);
+        let g = self.half_edges.twin(h);
         // Two kept edges do not become one.
         let kept = |e: u32| self.kept[e as usize];
         if [h, g].iter().any(|e| kept(next(*e)) && kept(prev(*e))) {
             return false;
         }
         self.marked += 1;
-        let (rim, edges, patch) = (&mut self.rim, &mut self.rim_edges, &mut self.patch);
-        rim.clear();
+        let (boundary, edges, patch) = (&mut self.boundary, &mut self.boundary_edges, &mut self.patch);
+        boundary.clear();
         edges.clear();
-        patch.rim.clear();
+        patch.boundary.clear();
         patch.old.clear();
         for (start, end) in [(h, g), (g, h)] {
             // About the vertex that `start` leaves, from the corner left of it on.
-            let mut e = self.links.turned(start);
+            let mut e = self.half_edges.turned(start);
             let stop = next(end);
             while e != stop {
-                let r = self.links.to(e);
-                if self.mark[r as usize] == self.marked || rim.len() == CROWD {
+                let r = self.half_edges.to(e);
+                if self.mark[r as usize] == self.marked || boundary.len() == CROWD {
                     return false;
                 }
                 self.mark[r as usize] = self.marked;
-                rim.push(r);
+                boundary.push(r);
                 edges.push(next(e));
-                patch.rim.push(self.places[r as usize]);
-                patch.old.push(self.drift[(e / 3) as usize]);
-                e = self.links.turned(e);
+                patch.boundary.push(self.positions[r as usize]);
+                patch.old.push(self.displacements[(e / 3) as usize]);
+                e = self.half_edges.turned(e);
             }
             if start == h {
-                patch.turn = rim.len();
+                patch.turn = boundary.len();
             }
         }
-        patch.old.push(self.drift[(h / 3) as usize]);
-        patch.old.push(self.drift[(g / 3) as usize]);
-        patch.u = self.places[self.links.from(h) as usize];
-        patch.v = self.places[self.links.from(g) as usize];
-        rim.len() >= 3
+        patch.old.push(self.displacements[(h / 3) as usize]);
+        patch.old.push(self.displacements[(g / 3) as usize]);
+        patch.u = self.positions[self.half_edges.from(h) as usize];
+        patch.v = self.positions[self.half_edges.from(g) as usize];
+        boundary.len() >= 3
     }
 
-    /// The place of least cost among those that keep the volume.
+    /// The position of least cost among those that keep the volume.
     fn balanced(&self, h: u32) -> Vec3 {
         let p = &self.patch;
-        let o = p.rim[0];
-        let m = p.rim.len();
+        let o = p.boundary[0];
+        let m = p.boundary.len();
         let (u, v) = (sub(p.u, o), sub(p.v, o));
         let (mut g, mut six) = ([0.0; 3], 0.0);
         for i in 0..m {
-            let c = cross(sub(p.rim[i], o), sub(p.rim[(i + 1) % m], o));
+            let c = cross(sub(p.boundary[i], o), sub(p.boundary[(i + 1) % m], o));
             g = add(g, c);
             six += dot(if i < p.turn { u } else { v }, c);
         }
-        let y = sub(p.rim[p.turn], o);
+        let y = sub(p.boundary[p.turn], o);
         // The triangle u v x has x in the origin; v u y remains.
         six += dot(y, cross(v, u));
         let q = self.joint(h);
@@ -293,9 +299,9 @@ impl Work {
         let w = q.least_on(middle, g, six + dot(o, g));
         let (edge, off) = (sub(p.v, p.u), sub(w, middle));
         let mut w = if dot(off, off) <= dot(edge, edge) { w } else { middle };
-        // What is flat along an axis stays so to the last bit.
+        // A patch normal to an axis stays so to the last bit.
         for k in 0..3 {
-            if p.u[k] == p.v[k] && p.rim.iter().all(|r| r[k] == p.u[k]) {
+            if p.u[k] == p.v[k] && p.boundary.iter().all(|r| r[k] == p.u[k]) {
                 w[k] = p.u[k];
             }
         }
@@ -303,31 +309,31 @@ impl Work {
     }
 
     /// How far the run of kept edges through u and v has then moved in all; `None` if too far.
-    fn line_moved(&self, h: u32) -> Option<f32> {
-        let (u, v) = (self.links.from(h), self.links.to(h));
+    fn kept_edge_moved(&self, h: u32) -> Option<f32> {
+        let (u, v) = (self.half_edges.from(h), self.half_edges.to(h));
         if !self.kept[h as usize] {
-            return Some(self.line[u as usize].max(self.line[v as usize]));
+            return Some(self.kept_moved[u as usize].max(self.kept_moved[v as usize]));
         }
         let w = self.patch.w;
         let mut most = 0.0f64;
         for (a, b) in [(u, v), (v, u)] {
-            let p = self.place(a);
-            let beyond = |e: &u32| self.kept[*e as usize] && self.links.to(*e) != b;
+            let p = self.position(a);
+            let beyond = |e: &u32| self.kept[*e as usize] && self.half_edges.to(*e) != b;
             let mut off = f64::INFINITY;
-            for e in self.links.leaving(a).filter(beyond) {
-                off = off.min(from_segment(p, w, self.place(self.links.to(e))));
+            for e in self.half_edges.leaving(a).filter(beyond) {
+                off = off.min(from_segment(p, w, self.position(self.half_edges.to(e))));
             }
             most = most.max(if p == w { 0.0 } else { off });
         }
-        most = most.max(from_segment(w, self.place(u), self.place(v)));
-        let all = f64::from(self.line[u as usize].max(self.line[v as usize])) + most;
+        most = most.max(from_segment(w, self.position(u), self.position(v)));
+        let all = f64::from(self.kept_moved[u as usize].max(self.kept_moved[v as usize])) + most;
         (all <= self.tolerance).then_some(all as f32)
     }
 
     /// Whether the new triangles have a decent shape and do not fold.
     fn is_well_shaped(&mut self) -> bool {
         let p = &self.patch;
-        let m = p.rim.len();
+        let m = p.boundary.len();
         let after = |i: usize| if i + 1 == m { 0 } else { i + 1 };
         let shape = |[a, b, c]: [Vec3; 3]| {
             let (x, y, z) = (sub(b, a), sub(c, a), sub(c, b));
@@ -335,11 +341,11 @@ impl Work {
             let (sides, twice) = (dot(x, x) + dot(y, y) + dot(z, z), norm(n));
             (2.0 * 3f64.sqrt() * twice / sides, n, twice)
         };
-        let old = |i: usize| [if i < p.turn { p.u } else { p.v }, p.rim[i], p.rim[after(i)]];
+        let old = |i: usize| [if i < p.turn { p.u } else { p.v }, p.boundary[i], p.boundary[after(i)]];
         self.normals.clear();
         let mut worst = f64::INFINITY;
         for i in 0..m {
-            let (s, n, twice) = shape([p.w, p.rim[i], p.rim[after(i)]]);
+            let (s, n, twice) = shape([p.w, p.boundary[i], p.boundary[after(i)]]);
             if s.is_nan() || twice <= 0.0 {
                 return false;
             }
@@ -347,7 +353,7 @@ impl Work {
             self.normals.push(scale(n, 1.0 / twice));
         }
         if worst < SHAPE {
-            let ends = [[p.u, p.v, p.rim[0]], [p.v, p.u, p.rim[p.turn]]];
+            let ends = [[p.u, p.v, p.boundary[0]], [p.v, p.u, p.boundary[p.turn]]];
             let all = (0..m).map(old).chain(ends);
             let before = all.fold(f64::INFINITY, |b, t| b.min(shape(t).0));
             if worst <= before {
@@ -356,9 +362,9 @@ impl Work {
         }
         let mut bend = f64::INFINITY;
         for i in 0..m {
-            let e = self.rim_edges[i];
+            let e = self.boundary_edges[i];
             if !self.kept[e as usize] {
-                let outer = unit(self.normal(self.links.twin(e) / 3));
+                let outer = unit(self.normal(self.half_edges.twin(e) / 3));
                 bend = bend.min(dot(self.normals[i], outer));
             }
             if !self.is_kept_spoke(i) {
@@ -370,26 +376,26 @@ impl Work {
     }
 
     fn normal(&self, t: u32) -> Vec3 {
-        let [a, b, c] = self.links.triangles[t as usize].map(|v| self.places[v as usize]);
+        let [a, b, c] = self.half_edges.triangles[t as usize].map(|v| self.positions[v as usize]);
         cross(sub(b, a), sub(c, a))
     }
 
-    /// Whether the spoke to the rim's vertex `i` would be kept.
+    /// Whether the spoke to the boundary's vertex `i` would be kept.
     fn is_kept_spoke(&self, i: usize) -> bool {
-        let spoke = prev(self.rim_edges[i]);
-        // At the corners beside the edge two sides of the patch become one.
-        let other = if i == 0 || i == self.patch.turn { prev(self.links.twin(spoke)) } else { spoke };
+        let spoke = prev(self.boundary_edges[i]);
+        // At the two corners opposite the edge, two edges of the patch become one.
+        let other = if i == 0 || i == self.patch.turn { prev(self.half_edges.twin(spoke)) } else { spoke };
         self.kept[spoke as usize] || self.kept[other as usize]
     }
 
     /// The cosine of the sharpest turn about the edges of the patch that are not kept.
     fn bend_before(&self) -> f64 {
         let mut bend = 1.0f64;
-        for e in &self.rim_edges {
+        for e in &self.boundary_edges {
             let t = e - e % 3;
             for g in [t, t + 1, t + 2] {
                 if !self.kept[g as usize] {
-                    let other = self.links.twin(g) / 3;
+                    let other = self.half_edges.twin(g) / 3;
                     bend = bend.min(dot(unit(self.normal(t / 3)), unit(self.normal(other))));
                 }
             }
@@ -400,21 +406,21 @@ impl Work {
     /// Whether the fan meets no triangle outside the patch. Its own triangles are disjoint, being a graph.
     fn is_clear(&mut self, h: u32) -> bool {
         let p = &self.patch;
-        let m = p.rim.len();
-        let u = self.links.from(h);
+        let m = p.boundary.len();
+        let u = self.half_edges.from(h);
         self.prisms.clear();
         for i in 0..m {
             let j = if i + 1 == m { 0 } else { i + 1 };
-            self.prisms.push(Prism::new([u, self.rim[i], self.rim[j]], [p.w, p.rim[i], p.rim[j]]));
+            self.prisms.push(Prism::new([u, self.boundary[i], self.boundary[j]], [p.w, p.boundary[i], p.boundary[j]]));
         }
-        let mut all = Bounds::of(&p.rim);
+        let mut all = Bounds::of(&p.boundary);
         all.grow(&Bounds::of(&[p.w]));
         self.marked += 1;
-        for e in self.rim_edges.iter().chain(&[h, self.links.twin(h)]) {
+        for e in self.boundary_edges.iter().chain(&[h, self.half_edges.twin(h)]) {
             self.mark[(e / 3) as usize] = self.marked;
         }
         self.found.clear();
-        let (triangles, mark, marked) = (&self.links.triangles, &self.mark, self.marked);
+        let (triangles, mark, marked) = (&self.half_edges.triangles, &self.mark, self.marked);
         let found = &mut self.found;
         self.tree.visit(&all, &mut self.stack, |t| {
             if triangles[t as usize][0] != NONE && mark[t as usize] != marked {
@@ -422,51 +428,51 @@ impl Work {
             }
         });
         for &t in &self.found {
-            let names = self.links.triangles[t as usize];
-            let places = names.map(|v| self.places[v as usize]);
-            let bounds = Bounds::of(&places);
-            if all.meets(&bounds) && self.prisms.iter().any(|p| p.meets(names, places, &bounds)) {
+            let names = self.half_edges.triangles[t as usize];
+            let positions = names.map(|v| self.positions[v as usize]);
+            let bounds = Bounds::of(&positions);
+            if all.meets(&bounds) && self.prisms.iter().any(|p| p.meets(names, positions, &bounds)) {
                 return false;
             }
         }
         true
     }
 
-    /// Takes the edge away.
+    /// Collapses the edge.
     fn collapse(&mut self, h: u32, line: f32) {
-        let g = self.links.twin(h);
-        let (u, v) = (self.links.from(h), self.links.from(g));
-        let wings = [self.links.from(prev(h)), self.links.from(prev(g))];
-        // The sides of both triangles that become one are kept if one of them was.
+        let g = self.half_edges.twin(h);
+        let (u, v) = (self.half_edges.from(h), self.half_edges.from(g));
+        let wings = [self.half_edges.from(prev(h)), self.half_edges.from(prev(g))];
+        // Of each of the two collapsed triangles two edges become one, which is kept if one of them was.
         for e in [h, g] {
-            let (a, b) = (self.links.twin(next(e)), self.links.twin(prev(e)));
+            let (a, b) = (self.half_edges.twin(next(e)), self.half_edges.twin(prev(e)));
             let kept = self.kept[a as usize] || self.kept[b as usize];
             self.kept[a as usize] = kept;
             self.kept[b as usize] = kept;
         }
-        self.links.collapse(h);
+        self.half_edges.collapse(h);
         self.count -= 2;
 
-        self.places[u as usize] = self.patch.w;
-        self.line[u as usize] = line;
+        self.positions[u as usize] = self.patch.w;
+        self.kept_moved[u as usize] = line;
         self.quadrics[u as usize] = self.quadrics[u as usize].plus(&self.quadrics[v as usize]);
         let version = self.versions[u as usize].max(self.versions[v as usize]);
         self.versions[u as usize] = version + 1;
         for w in [u, wings[0], wings[1]] {
-            let kept = self.links.leaving(w).filter(|e| self.kept[*e as usize]);
+            let kept = self.half_edges.leaving(w).filter(|e| self.kept[*e as usize]);
             self.kept_at[w as usize] = kept.count().min(255) as u8;
         }
-        for i in 0..self.rim.len() {
-            let t = (self.rim_edges[i] / 3) as usize;
-            self.drift[t] = self.patch.new[i];
+        for i in 0..self.boundary.len() {
+            let t = (self.boundary_edges[i] / 3) as usize;
+            self.displacements[t] = self.patch.new[i];
             self.tree.grow(t, &self.prisms[i].bounds);
         }
-        if 4 * self.count < 3 * self.planted {
-            self.plant();
+        if 4 * self.count < 3 * self.indexed {
+            self.rebuild_tree();
         }
-        for i in 0..self.rim_edges.len() {
-            // The spoke that triangle i has in front of its rim edge.
-            self.push(prev(self.rim_edges[i]));
+        for i in 0..self.boundary_edges.len() {
+            // The spoke before the boundary edge of triangle i.
+            self.push(prev(self.boundary_edges[i]));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Which triangles are near a place, and whether two triangles meet.
 //!
 //! The tree is made once, over the triangles in the order of a space-filling curve. Triangles that a collapse changes
-//! keep their places in it, and the boxes above them grow.
+//! keep their positions in it, and the boxes above them grow.
 
 use crate::math::{Vec3, cross, dot, sub};
 use crate::mesh::{Mesh, is_embedded};
@@ -21,10 +21,10 @@ pub struct Bounds {
 impl Bounds {
     const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
-    /// The bounds of some places.
-    pub fn of(places: &[Vec3]) -> Bounds {
+    /// The bounds of points.
+    pub fn of(positions: &[Vec3]) -> Bounds {
         let mut b = Bounds::EMPTY;
-        for p in places {
+        for p in positions {
             for k in 0..3 {
                 b.min[k] = b.min[k].min(p[k] as f32);
                 b.max[k] = b.max[k].max(p[k] as f32);
@@ -33,7 +33,7 @@ impl Bounds {
         b
     }
 
-    /// Makes it hold `o`, too.
+    /// Extends the box to hold `o`.
     #[inline]
     pub fn grow(&mut self, o: &Bounds) {
         for k in 0..3 {
@@ -42,7 +42,7 @@ impl Bounds {
         }
     }
 
-    /// Whether they touch.
+    /// Whether the boxes touch, faces included.
     #[inline]
     pub fn meets(&self, o: &Bounds) -> bool {
         (0..3).all(|k| self.min[k] <= o.max[k] && o.min[k] <= self.max[k])
@@ -55,7 +55,7 @@ impl Bounds {
 }
 
 /// A complete binary tree of boxes; node i has the children 2i and 2i + 1, and the last level stands on the triangles.
-pub struct Tree {
+pub struct RefitTree {
     boxes: Vec<Bounds>,
     leaves: usize,
     /// The triangles under the leaves, four to each, and the leaf of each triangle.
@@ -63,9 +63,9 @@ pub struct Tree {
     leaf: Vec<u32>,
 }
 
-impl Tree {
+impl RefitTree {
     /// The tree of some of `n` triangles with the bounds `of(t)`.
-    pub fn new(n: usize, some: &[u32], of: impl Fn(usize) -> Bounds) -> Tree {
+    pub fn new(n: usize, some: &[u32], of: impl Fn(usize) -> Bounds) -> RefitTree {
         let leaves = some.len().div_ceil(LEAF).next_power_of_two();
         let mut boxes = vec![Bounds::EMPTY; 2 * leaves];
         let mut leaf = vec![0; n];
@@ -78,10 +78,10 @@ impl Tree {
             b.grow(&boxes[2 * i + 1]);
             boxes[i] = b;
         }
-        Tree { boxes, leaves, order: some.to_vec(), leaf }
+        RefitTree { boxes, leaves, order: some.to_vec(), leaf }
     }
 
-    /// Lets triangle `t` have the bounds `b`.
+    /// Extends the boxes above triangle `t` to hold `b`.
     pub fn grow(&mut self, t: usize, b: &Bounds) {
         let mut i = self.leaf[t] as usize;
         while i > 0 && !self.boxes[i].holds(b) {
@@ -111,43 +111,49 @@ impl Tree {
     }
 }
 
-/// A triangle with its planes: its own, and those upright on its sides.
+/// A triangle with its plane and those through its edges normal to it.
 pub struct Prism {
     names: [u32; 3],
-    places: [Vec3; 3],
+    positions: [Vec3; 3],
     normal: Vec3,
-    walls: [Vec3; 3],
+    sides: [Vec3; 3],
     /// Its bounds.
     pub bounds: Bounds,
 }
 
 impl Prism {
     /// The triangle with these corners.
-    pub fn new(names: [u32; 3], places: [Vec3; 3]) -> Prism {
-        let side = |k: usize| sub(places[(k + 1) % 3], places[k]);
+    pub fn new(names: [u32; 3], positions: [Vec3; 3]) -> Prism {
+        let side = |k: usize| sub(positions[(k + 1) % 3], positions[k]);
         let normal = cross(side(0), side(1));
-        Prism { names, places, normal, walls: [0, 1, 2].map(|k| cross(side(k), normal)), bounds: Bounds::of(&places) }
+        Prism {
+            names,
+            positions,
+            normal,
+            sides: [0, 1, 2].map(|k| cross(side(k), normal)),
+            bounds: Bounds::of(&positions),
+        }
     }
 
-    /// Whether another triangle meets this one elsewhere than in common corners or a common side. Exact: where no
-    /// plane keeps them certainly apart, integers decide.
-    pub fn meets(&self, names: [u32; 3], places: [Vec3; 3], bounds: &Bounds) -> bool {
+    /// Whether another triangle meets this one elsewhere than in common corners or a common edge. Exact: where no
+    /// plane separates them beyond rounding, exact predicates decide.
+    pub fn meets(&self, names: [u32; 3], positions: [Vec3; 3], bounds: &Bounds) -> bool {
         if !self.bounds.meets(bounds) {
             return false;
         }
         let shared = names.map(|n| self.names.iter().position(|m| *m == n));
-        !self.is_apart(shared, places) && self.crosses(names, places)
+        !self.is_apart(shared, positions) && self.crosses(names, positions)
     }
 
     /// Whether one of the planes has this triangle on one side and what the other does not share strictly on the other.
     ///
     /// A common corner lies on the plane and is its base, so that the two triangles are two cones with their tips
     /// there, and an angle between them that is larger than rounding can make.
-    fn is_apart(&self, shared: [Option<usize>; 3], places: [Vec3; 3]) -> bool {
+    fn is_apart(&self, shared: [Option<usize>; 3], positions: [Vec3; 3]) -> bool {
         let base = shared.iter().flatten().next().map_or(0, |k| *k);
-        let o = self.places[base];
+        let o = self.positions[base];
         let reach = if shared == [None; 3] {
-            let [a, b] = [1, 2].map(|k| sub(self.places[k], o));
+            let [a, b] = [1, 2].map(|k| sub(self.positions[k], o));
             dot(a, a).max(dot(b, b)).sqrt()
         } else {
             0.0
@@ -155,7 +161,7 @@ impl Prism {
         let beyond = |o: Vec3, plane: Vec3, sign: f64| {
             let long = CERTAIN * dot(plane, plane).sqrt();
             (0..3).filter(|k| shared[*k].is_none()).all(|k| {
-                let d = sub(places[k], o);
+                let d = sub(positions[k], o);
                 sign * dot(plane, d) > long * (dot(d, d).sqrt() + reach)
             })
         };
@@ -168,17 +174,17 @@ impl Prism {
         (0..3).any(|k| {
             let on = |s: &Option<usize>| s.is_none_or(|c| c == k || c == (k + 1) % 3);
             let start = if base == (k + 1) % 3 { base } else { k };
-            shared.iter().all(on) && beyond(self.places[start], self.walls[k], 1.0)
+            shared.iter().all(on) && beyond(self.positions[start], self.sides[k], 1.0)
         })
     }
 
     #[cold]
-    fn crosses(&self, names: [u32; 3], places: [Vec3; 3]) -> bool {
-        let mut pair = Mesh { vertices: self.places.to_vec(), triangles: vec![[0, 1, 2]] };
+    fn crosses(&self, names: [u32; 3], positions: [Vec3; 3]) -> bool {
+        let mut pair = Mesh { vertices: self.positions.to_vec(), triangles: vec![[0, 1, 2]] };
         let other = core::array::from_fn(|k| match self.names.iter().position(|n| *n == names[k]) {
             Some(c) => c as u32,
             None => {
-                pair.vertices.push(places[k]);
+                pair.vertices.push(positions[k]);
                 pair.vertices.len() as u32 - 1
             }
         });
@@ -229,7 +235,7 @@ mod tests {
             [[x, 0.0, 0.0], [x + 1.0, 1.0, 0.0]]
         };
         let all: Vec<u32> = (0..999).collect();
-        let mut tree = Tree::new(999, &all, |t| Bounds::of(&place(t)));
+        let mut tree = RefitTree::new(999, &all, |t| Bounds::of(&place(t)));
         tree.grow(5, &Bounds::of(&[[-50.0; 3]]));
         let mut found = Vec::new();
         let b = Bounds::of(&[[100.0, 0.0, 0.0], [103.0, 0.5, 0.0]]);

@@ -115,7 +115,7 @@ pub fn meet(mesh: &Mesh, i: usize, j: usize) -> bool {
     }
 }
 
-/// Whether the segment a b meets the triangle t (with area), ends and sides included.
+/// Whether the segment a b meets the triangle t (with area), ends and edges included.
 fn crosses(a: Vec3, b: Vec3, t: [Vec3; 3]) -> bool {
     let (sa, sb) = (orient3d(t[0], t[1], t[2], a), orient3d(t[0], t[1], t[2], b));
     if sa * sb > 0 {
@@ -125,7 +125,7 @@ fn crosses(a: Vec3, b: Vec3, t: [Vec3; 3]) -> bool {
         return plane_axis(t[0], t[1], t[2])
             .is_some_and(|axis| crosses_flat(drop_axis(a, axis), drop_axis(b, axis), t.map(|c| drop_axis(c, axis))));
     }
-    // The line meets the plane in one point, within the triangle unless it passes sides on different hands.
+    // The line meets the plane in one point, within the triangle unless it passes edges on different sides.
     let sides = [0, 1, 2].map(|k| orient3d(a, b, t[k], t[(k + 1) % 3]));
     !(sides.contains(&1) && sides.contains(&-1))
 }
@@ -190,7 +190,7 @@ mod tests {
         for (t, want, what) in [
             ([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [5.0, 5.0, 0.5]], 1, "an edge pierces"),
             ([[1.0, 1.0, 1.0], [1.0, 2.0, 1.0], [2.0, 1.0, 1.0]], 0, "above, parallel"),
-            ([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [5.0, 5.0, 0.5]], 0, "beside"),
+            ([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [5.0, 5.0, 0.5]], 0, "outside, in the plane's neighbourhood"),
             ([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]], 1, "a corner on the inside"),
             ([[2.0, 0.0, 0.0], [2.0, -1.0, 1.0], [2.0, -1.0, -1.0]], 1, "a corner on a side"),
             ([[2.0, 0.0, -1.0], [2.0, 0.0, 1.0], [2.0, -1.0, 0.0]], 1, "a side across a side"),

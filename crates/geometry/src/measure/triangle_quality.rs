@@ -1,4 +1,4 @@
-//! How well shaped the triangles of a mesh are.
+//! Angles and aspect ratios of triangles.
 
 use rayon::prelude::*;
 

@@ -1,9 +1,9 @@
-//! Whether a mesh is the boundary of a solid, and which triangles meet at its edges.
+//! Tests whether a mesh is the boundary of a solid, and the pairs of half-edges at its edges.
 
 use rayon::prelude::*;
 
-use super::clean::flat;
 use super::half_edges::{components, halves, rises};
+use super::stitch::flat;
 use crate::distance::winding::turn;
 use crate::fault::Fault;
 use crate::math::{cross, dot, norm, sub};
@@ -17,7 +17,7 @@ fn refuse(message: impl Into<String>) -> Fault {
     Fault::new("", message)
 }
 
-/// Gives the edges of a closed, oriented mesh, or says in numbers why it is none. The mesh has passed `numbers`.
+/// The edges of a closed, oriented mesh, or its defects in numbers. The mesh has passed `numbers`.
 pub fn edges(mesh: &Mesh) -> Result<Pairs, String> {
     let halves = halves(mesh);
     let forward = |h: u32| rises(mesh, h);
@@ -46,20 +46,27 @@ pub fn edges(mesh: &Mesh) -> Result<Pairs, String> {
 pub fn numbers(mesh: &Mesh) -> Result<(), Fault> {
     let count = mesh.vertices.len();
     if mesh.triangles.len() < 4 {
-        return Err(refuse(format!("{} triangles: a solid has at least four", mesh.triangles.len())));
+        return Err(refuse(format!("the mesh has {} triangles; a solid has at least 4", mesh.triangles.len())));
     }
     if mesh.triangles.len() > (u32::MAX / 3) as usize {
-        return Err(refuse(format!("{} triangles: at most {}", mesh.triangles.len(), u32::MAX / 3)));
+        return Err(refuse(format!(
+            "the mesh has {} triangles; at most {} are supported: simplify it first",
+            mesh.triangles.len(),
+            u32::MAX / 3
+        )));
     }
     if let Some(i) = mesh.triangles.iter().position(|t| t.iter().any(|v| *v as usize >= count)) {
-        return Err(refuse(format!("triangle {i} is {:?}, but there are {count} vertices", mesh.triangles[i])));
+        return Err(refuse(format!(
+            "triangle {i} has the vertices {:?}, but there are {count} (counted from 0)",
+            mesh.triangles[i]
+        )));
     }
     if let Some(i) = mesh.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        return Err(refuse(format!("vertex {i} at {:?} is not finite", mesh.vertices[i])));
+        return Err(refuse(format!("vertex {i} is at {:?}; coordinates must be finite", mesh.vertices[i])));
     }
     if mesh.bounds().size().iter().any(|s| !(s * s * s).is_finite()) {
         return Err(refuse(format!(
-            "the mesh is {:?} mm large: beyond what can be computed with",
+            "the mesh measures {:?} mm: its volume is not finite; scale the mesh down",
             mesh.bounds().size()
         )));
     }
@@ -81,13 +88,13 @@ fn degenerate(mesh: &Mesh) -> usize {
     (0..mesh.triangles.len()).filter(|&i| flat(mesh.corners(i))).count()
 }
 
-/// Signed volume and area of each body, `number` being the body of each triangle.
-fn bodies(mesh: &Mesh, number: &[u32], count: usize) -> Vec<(f64, f64)> {
+/// Signed volume and area of each component, `number` being the component of each triangle.
+fn volumes(mesh: &Mesh, number: &[u32], count: usize) -> Vec<(f64, f64)> {
     let center = mesh.bounds().center();
     let mut sums = vec![(0.0, 0.0); count];
-    for (i, body) in number.iter().enumerate() {
+    for (i, component) in number.iter().enumerate() {
         let [a, b, c] = mesh.corners(i).map(|p| sub(p, center));
-        let s = &mut sums[*body as usize];
+        let s = &mut sums[*component as usize];
         s.0 += dot(a, cross(b, c)) / 6.0;
         s.1 += norm(cross(sub(b, a), sub(c, a))) / 2.0;
     }
@@ -99,19 +106,19 @@ fn thin(mesh: &Mesh) -> f64 {
     1e-12 * norm(mesh.bounds().size())
 }
 
-/// Refuses a closed mesh none of whose bodies has volume.
+/// Refuses a closed mesh none of whose components has volume.
 pub fn thick(mesh: &Mesh) -> Result<(), Fault> {
     let thin = thin(mesh);
     let (number, count) = components(mesh);
-    let sums = bodies(mesh, &number, count);
+    let sums = volumes(mesh, &number, count);
     if sums.iter().any(|(v, area)| v.abs() > thin * area) {
         return Ok(());
     }
     let volume: f64 = sums.iter().map(|s| s.0.abs()).sum();
-    Err(refuse(format!("the mesh has the volume {volume:e} mm³: flat, not a solid")))
+    Err(refuse(format!("the volume of the mesh is {volume:e} mm³, zero to rounding: it is flat and bounds no solid")))
 }
 
-/// Whether a closed mesh (edges `pairs`) that does not cross itself is one body with cavities inside it.
+/// Whether a closed mesh (edges `pairs`) that does not cross itself is one component with cavities inside it.
 pub fn plain(mesh: &Mesh, pairs: &Pairs) -> bool {
     let thin = thin(mesh);
     let mut root = singles(mesh.triangles.len());
@@ -119,20 +126,20 @@ pub fn plain(mesh: &Mesh, pairs: &Pairs) -> bool {
         unite(&mut root, a / 3, b / 3);
     }
     let (number, count) = labels(&mut root);
-    let sums = bodies(mesh, &number, count);
+    let sums = volumes(mesh, &number, count);
     let mut solids = sums.iter().enumerate().filter(|(_, s)| s.0 > 0.0);
     let (Some((outer, _)), None) = (solids.next(), solids.next()) else {
         return false;
     };
-    let mut seen = vec![false; sums.len()];
+    let mut tested = vec![false; sums.len()];
     (0..number.len()).all(|i| {
         let b = number[i] as usize;
-        if seen[b] {
+        if tested[b] {
             return true;
         }
-        seen[b] = true;
+        tested[b] = true;
         let (volume, area) = sums[b];
-        // Where a cavity is, the other bodies wind once.
+        // About a cavity the other components wind once.
         let inside = |p| {
             let others = (0..number.len()).filter(|t| number[*t] as usize != b);
             others.map(|t| turn(mesh.corners(t), p)).sum::<f64>() > 0.5

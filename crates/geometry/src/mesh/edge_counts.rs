@@ -1,4 +1,4 @@
-//! The edges of a mesh, counted.
+//! Counts of the edges of a mesh.
 
 use rayon::prelude::*;
 
@@ -7,34 +7,34 @@ use super::Mesh;
 /// Vertices per unit of parallel work.
 const CHUNK: usize = 1 << 16;
 
-/// Edges by the number and direction of their triangles.
+/// Numbers of edges by the number and direction of their triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Edges {
+pub struct EdgeCounts {
     /// Distinct edges between different vertices.
     pub all: usize,
     /// Edges with two triangles of opposite direction.
-    pub sound: usize,
+    pub manifold: usize,
     /// Edges with one triangle.
     pub open: usize,
     /// Edges with more than two.
     pub crowded: usize,
     /// Edges with two of the same direction.
     pub flipped: usize,
-    /// Sides of triangles from a vertex to itself.
+    /// Half-edges from a vertex to itself.
     pub loops: usize,
 }
 
-impl Edges {
+impl EdgeCounts {
     /// Counts the edges of a mesh.
     ///
-    /// Every side is filed under its lower vertex: sides that run up from the left of that vertex's span, sides that
-    /// run down from its right, so that a direction costs no memory. Each span is then sorted on its own.
-    pub fn count(mesh: &Mesh) -> Edges {
+    /// Every half-edge is filed under its lower vertex: rising ones from the left of that vertex's span, falling ones from its
+    /// right, so that a direction costs no memory. Each span is then sorted on its own.
+    pub fn count(mesh: &Mesh) -> EdgeCounts {
         let n = mesh.vertices.len();
-        let sides = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let half_edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         let mut start = vec![0usize; n + 1];
         let mut loops = 0;
-        for (a, b) in sides() {
+        for (a, b) in half_edges() {
             if a == b {
                 loops += 1;
             } else {
@@ -46,7 +46,7 @@ impl Edges {
         }
         let mut other = vec![0u32; start[n]];
         let (mut ups, mut downs) = (vec![0u32; n], vec![0u32; n]);
-        for (a, b) in sides() {
+        for (a, b) in half_edges() {
             if a < b {
                 let v = a as usize;
                 other[start[v] + ups[v] as usize] = b;
@@ -68,7 +68,7 @@ impl Edges {
             rest = tail;
         }
         let counted = spans.into_par_iter().map(|(first, last, block)| {
-            let mut e = Edges::default();
+            let mut e = EdgeCounts::default();
             for v in first..last {
                 let span = &mut block[start[v] - start[first]..start[v + 1] - start[first]];
                 let (up, down) = span.split_at_mut(ups[v] as usize);
@@ -76,12 +76,12 @@ impl Edges {
             }
             e
         });
-        let mut all = counted.reduce(Edges::default, Edges::plus);
+        let mut all = counted.reduce(EdgeCounts::default, EdgeCounts::plus);
         all.loops = loops;
         all
     }
 
-    /// Counts the edges of one vertex from the far ends of its rising and falling sides.
+    /// Counts the edges of one vertex from the far ends of its rising and falling half-edges.
     fn merge(&mut self, up: &mut [u32], down: &mut [u32]) {
         up.sort_unstable();
         down.sort_unstable();
@@ -101,7 +101,7 @@ impl Edges {
             }
             self.all += 1;
             match (i - i0, j - j0) {
-                (1, 1) => self.sound += 1,
+                (1, 1) => self.manifold += 1,
                 (1, 0) | (0, 1) => self.open += 1,
                 (2, 0) | (0, 2) => self.flipped += 1,
                 _ => self.crowded += 1,
@@ -109,10 +109,10 @@ impl Edges {
         }
     }
 
-    fn plus(self, o: Edges) -> Edges {
-        Edges {
+    fn plus(self, o: EdgeCounts) -> EdgeCounts {
+        EdgeCounts {
             all: self.all + o.all,
-            sound: self.sound + o.sound,
+            manifold: self.manifold + o.manifold,
             open: self.open + o.open,
             crowded: self.crowded + o.crowded,
             flipped: self.flipped + o.flipped,

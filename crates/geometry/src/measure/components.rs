@@ -1,4 +1,4 @@
-//! What touches what in a mesh: fans about vertices, bodies.
+//! Connected components of a mesh, and fans of triangles about its vertices.
 
 use rayon::prelude::*;
 
@@ -6,19 +6,19 @@ use crate::math::{cross, dot, sub};
 use crate::mesh::Mesh;
 use crate::union_find::{find, unite};
 
-/// Bodies: sets of triangles joined through shared vertices.
-pub(super) struct Bodies {
-    /// Number of bodies.
+/// Connected components: sets of triangles joined through shared vertices.
+pub(super) struct Components {
+    /// Number of components.
     pub count: usize,
     /// Number of vertices that triangles use.
     pub vertices: usize,
-    /// For each vertex the lowest vertex of its body.
+    /// For each vertex the lowest vertex of its component.
     root: Vec<u32>,
 }
 
-impl Bodies {
-    /// Finds the bodies of a mesh.
-    pub(super) fn of(mesh: &Mesh) -> Bodies {
+impl Components {
+    /// Finds the components of a mesh.
+    pub(super) fn of(mesh: &Mesh) -> Components {
         let mut root: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
         let mut used = vec![false; root.len()];
         for &[a, b, c] in &mesh.triangles {
@@ -34,11 +34,11 @@ impl Bodies {
         }
         let vertices = used.iter().filter(|u| **u).count();
         let count = (0..root.len()).filter(|&v| used[v] && root[v] as usize == v).count();
-        Bodies { count, vertices, root }
+        Components { count, vertices, root }
     }
 
-    /// For each triangle the number of its body, in the order of `volumes`.
-    pub(super) fn names(&self, mesh: &Mesh) -> Vec<usize> {
+    /// For each triangle the number of its component, in the order of `volumes`.
+    pub(super) fn labels(&self, mesh: &Mesh) -> Vec<usize> {
         let mut slot = vec![usize::MAX; self.root.len()];
         let mut count = 0;
         let name = |t: &[u32; 3]| {
@@ -51,7 +51,7 @@ impl Bodies {
         mesh.triangles.iter().map(name).collect()
     }
 
-    /// Signed volume of each body (mm³), taken about a vertex of its own so that small bodies keep their digits.
+    /// Signed volume of each component (mm³), taken about a vertex of its own so that small ones keep their digits.
     pub(super) fn volumes(&self, mesh: &Mesh) -> Vec<f64> {
         let mut slot = vec![u32::MAX; self.root.len()];
         let mut sums: Vec<f64> = Vec::with_capacity(self.count);
@@ -70,13 +70,13 @@ impl Bodies {
     }
 }
 
-/// The number of vertices whose triangles form more than one fan (bodies or surfaces that touch in a point or edge).
+/// The number of vertices whose triangles form more than one fan (components or surfaces that touch in a point or edge).
 pub fn non_manifold_vertices(mesh: &Mesh) -> usize {
     pinched(mesh).len()
 }
 
-/// The mesh with a vertex of its own for every fan, so that bodies which touch in a point or an edge are apart; `None`
-/// where nothing does.
+/// The mesh with a vertex of its own for every fan, so that components which touch in a point or an edge are apart; `None`
+/// where none do.
 pub(super) fn apart(mesh: &Mesh) -> Option<Mesh> {
     let pinched = pinched(mesh);
     if pinched.is_empty() {

@@ -1,4 +1,4 @@
-//! Which triangle lies across which side: half-edges of a closed mesh, and the collapse of an edge among them.
+//! The half-edge structure of a closed mesh, and the collapse of an edge in it.
 //!
 //! Half-edge 3t + k runs from corner k of triangle t to the next one.
 
@@ -17,9 +17,9 @@ pub fn prev(h: u32) -> u32 {
     if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }
 
-/// Triangles of a closed, oriented, manifold mesh, linked across their sides. A triangle that is gone has the corners
+/// Triangles of a closed, oriented, manifold mesh, linked across their edges. A collapsed triangle has the corners
 /// [`NONE`].
-pub struct Links {
+pub struct HalfEdgeMesh {
     /// Corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// The other half-edge of each edge.
@@ -28,9 +28,9 @@ pub struct Links {
     out: Vec<u32>,
 }
 
-impl Links {
-    /// Links the triangles of `n` vertices; `None` if an edge has not exactly two triangles of opposite direction.
-    pub fn new(triangles: Vec<[u32; 3]>, n: usize) -> Option<Links> {
+impl HalfEdgeMesh {
+    /// HalfEdgeMesh the triangles of `n` vertices; `None` if an edge has not exactly two triangles of opposite direction.
+    pub fn new(triangles: Vec<[u32; 3]>, n: usize) -> Option<HalfEdgeMesh> {
         let origin = |h: usize| triangles[h / 3][h % 3];
         // Half-edges by their origin; a twin is found among those that leave its end.
         let mut start = vec![0u32; n + 1];
@@ -60,7 +60,7 @@ impl Links {
         }
         let whole = (0..sides).all(|h| twin[twin[h] as usize] == h as u32);
         let out = (0..n).map(|v| leaving.get(start[v] as usize).copied().unwrap_or(NONE)).collect();
-        whole.then_some(Links { triangles, twin, out })
+        whole.then_some(HalfEdgeMesh { triangles, twin, out })
     }
 
     /// The vertex that `h` leaves.
@@ -75,7 +75,7 @@ impl Links {
         self.from(next(h))
     }
 
-    /// The same edge the other way.
+    /// The half-edge of the same edge in the adjacent triangle.
     #[inline]
     pub fn twin(&self, h: u32) -> u32 {
         self.twin[h as usize]
@@ -110,9 +110,9 @@ impl Links {
         })
     }
 
-    /// Takes away the edge `h` and its two triangles: its ends become the vertex that `h` leaves.
+    /// Removes the edge `h` and its two triangles: its ends become the vertex that `h` leaves.
     ///
-    /// The caller has seen to it that the ends have no common neighbours but the two opposite corners, and that neither
+    /// The caller has checked that the ends have no common neighbours but the two opposite corners, and that neither
     /// of these has three triangles.
     pub fn collapse(&mut self, h: u32) {
         let g = self.twin(h);
@@ -158,13 +158,13 @@ mod tests {
 
     #[test]
     fn fans_go_round() {
-        let links = Links::new(octahedron(), 6).expect("closed");
+        let half_edges = HalfEdgeMesh::new(octahedron(), 6).expect("closed");
         for v in 0..6 {
-            let ends: Vec<u32> = links.leaving(v).map(|h| links.to(h)).collect();
+            let ends: Vec<u32> = half_edges.leaving(v).map(|h| half_edges.to(h)).collect();
             assert_eq!(ends.len(), 4);
-            for (i, h) in links.leaving(v).enumerate() {
-                assert_eq!((links.from(h), links.twin(links.twin(h))), (v, h));
-                assert_eq!(links.from(prev(h)), ends[(i + 1) % 4]);
+            for (i, h) in half_edges.leaving(v).enumerate() {
+                assert_eq!((half_edges.from(h), half_edges.twin(half_edges.twin(h))), (v, h));
+                assert_eq!(half_edges.from(prev(h)), ends[(i + 1) % 4]);
             }
         }
     }
@@ -172,18 +172,18 @@ mod tests {
     #[test]
     fn a_collapse_leaves_a_closed_mesh() {
         for h in 0..24 {
-            let mut links = Links::new(octahedron(), 6).expect("closed");
-            links.collapse(h);
-            let left: Vec<[u32; 3]> = links.triangles.iter().copied().filter(|t| t[0] != NONE).collect();
+            let mut half_edges = HalfEdgeMesh::new(octahedron(), 6).expect("closed");
+            half_edges.collapse(h);
+            let left: Vec<[u32; 3]> = half_edges.triangles.iter().copied().filter(|t| t[0] != NONE).collect();
             assert_eq!(left.len(), 6);
-            let fresh = Links::new(left, 6).expect("closed");
-            for v in (0..6).filter(|v| links.out[*v as usize] != NONE) {
-                let count = |l: &Links| {
+            let fresh = HalfEdgeMesh::new(left, 6).expect("closed");
+            for v in (0..6).filter(|v| half_edges.out[*v as usize] != NONE) {
+                let count = |l: &HalfEdgeMesh| {
                     let mut ends: Vec<u32> = l.leaving(v).map(|h| l.to(h)).collect();
                     ends.sort_unstable();
                     ends
                 };
-                assert_eq!(count(&links), count(&fresh));
+                assert_eq!(count(&half_edges), count(&fresh));
             }
         }
     }
@@ -197,7 +197,7 @@ mod tests {
         let mut twice = octahedron();
         twice.push([0, 1, 2]);
         for t in [open, flipped, twice] {
-            assert!(Links::new(t, 6).is_none());
+            assert!(HalfEdgeMesh::new(t, 6).is_none());
         }
     }
 }

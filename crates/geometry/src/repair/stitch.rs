@@ -1,4 +1,4 @@
-//! First repairs: what is written twice, what has no area, corners and sides that just miss each other.
+//! First repairs: duplicate and degenerate triangles, vertices and edges that just miss each other.
 
 use std::collections::HashSet;
 
@@ -8,10 +8,10 @@ use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 use crate::union_find::{find, singles, unite};
 
-/// Corners of open edges join over at most this share of the mesh's diagonal: seams that exporters leave are far
-/// narrower, and holes that matter are wider.
+/// Vertices of open edges merge over at most this share of the mesh's diagonal: seams that exporters leave are far
+/// narrower, and holes are wider.
 const SEAM: f64 = 1e-3;
-/// ... and over at most this share of the shortest edge at either corner, so that no triangle loses its shape.
+/// ... and over at most this share of the shortest edge at either vertex, so that no triangle loses its shape.
 const OF_EDGE: f64 = 0.2;
 
 /// Whether a triangle's normal is lost in the rounding of its coordinates' differences.
@@ -20,7 +20,7 @@ pub fn flat([a, b, c]: [Vec3; 3]) -> bool {
     norm(cross(u, v)) <= 4.0 * f64::EPSILON * norm(u) * norm(v)
 }
 
-/// Leaves out triangles without area; gives their number.
+/// Removes triangles of zero area; gives their number.
 pub fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
     let vertices = &mesh.vertices;
@@ -28,12 +28,11 @@ pub fn drop_degenerate(mesh: &mut Mesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Leaves out triangles given more than once; gives their number.
+/// Removes duplicate triangles; gives their number.
 ///
-/// Copies that face one way leave one, unless they are where two bodies have the same surface: each needs its own
-/// there. Copies that face both ways are either a wall drawn from both sides (one is left) or a partition between two
-/// bodies that meet there (none is left): a side of the wall has an odd number of other triangles, one of the
-/// partition an even number.
+/// Of copies of one orientation one is kept, unless two components share that surface: each needs its own there. Copies of
+/// both orientations are either a wall drawn from both sides (one is kept) or a partition between two components that meet
+/// there (none is kept): an edge of the wall has an odd number of other triangles, one of the partition an even number.
 pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     let sorted = |t: &[u32; 3]| {
         let mut s = *t;
@@ -57,21 +56,21 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
         let first = edges.partition_point(|e| e.0 < key);
         edges[first..].iter().take_while(|e| e.0 == key).count() - 1
     };
-    // The way most copies face, and how many do.
+    // The orientation of most copies, and their number.
     let most = |group: &[([u32; 3], u32)]| {
         let ups = group.iter().filter(|(_, i)| even(mesh.triangles[*i as usize]));
         let (ups, all) = (ups.count(), group.len());
         (2 * ups >= all, ups.max(all - ups))
     };
     let alike = all.chunk_by(|a, b| a.0 == b.0).filter(|g| most(g).1 > 1);
-    let of_two_bodies = of_two_bodies(alike.map(|g| g[0].0).collect(), others);
+    let of_two_components = of_two_components(alike.map(|g| g[0].0).collect(), others);
     let mut keep = vec![true; mesh.triangles.len()];
     for group in all.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
         group.iter().for_each(|(_, i)| keep[*i as usize] = false);
         let (up, count) = most(group);
         let [a, b, c] = group[0].0;
         let odd = [others(a, b), others(b, c), others(a, c)].iter().filter(|n| *n % 2 == 1).count();
-        let left = if of_two_bodies.contains(&group[0].0) {
+        let left = if of_two_components.contains(&group[0].0) {
             2
         } else {
             usize::from(count == group.len() || group.len() % 2 == 1 || odd >= 2)
@@ -85,11 +84,11 @@ pub fn drop_duplicates(mesh: &mut Mesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Of triangles with several copies that face one way, those that two bodies have in common.
+/// Of triangles with several copies of one orientation, those that two components have in common.
 ///
-/// A patch of them has edges along its rim with an even number of other triangles where both copies go on, each in its own
-/// body, and with an odd number where a copy just ends. `others`: how many there are, copies not counted.
-fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
+/// A patch of them has edges along its boundary with an even number of other triangles where both copies continue, each in
+/// its own component, and with an odd number where a copy just ends. `others`: their number, copies not counted.
+fn of_two_components(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> HashSet<[u32; 3]> {
     let patches = Mesh { vertices: Vec::new(), triangles: alike };
     let (sides, mut root) = (halves(&patches), singles(patches.triangles.len()));
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
@@ -97,7 +96,7 @@ fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> Ha
             unite(&mut root, edge[0].1 / 3, other.1 / 3);
         }
     }
-    // Along each patch's rim, edges at which both copies go on less those at which one ends.
+    // Along each patch's boundary, edges at which both copies continue minus those at which one ends.
     let mut votes = vec![0i64; patches.triangles.len()];
     for edge in sides.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() == 1) {
         let (a, b) = ((edge[0].0 >> 32) as u32, edge[0].0 as u32);
@@ -108,7 +107,7 @@ fn of_two_bodies(alike: Vec<[u32; 3]>, others: impl Fn(u32, u32) -> usize) -> Ha
     found.map(|i| patches.triangles[i]).collect()
 }
 
-/// Joins corners of open edges that lie close together, at their mean; gives the number of corners that went.
+/// Merges vertices of open edges that lie close together, at their mean; gives the number of vertices removed.
 pub fn join_seams(mesh: &mut Mesh) -> usize {
     let open_before = open(mesh);
     if open_before.is_empty() {
@@ -125,15 +124,15 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
     }
     let reach = SEAM * norm(mesh.bounds().size());
     let allowed = |v: u32| reach.min(OF_EDGE * shortest[v as usize]);
-    let mut rim: Vec<u32> = open_before.iter().flat_map(|h| ends(mesh, *h)).collect();
-    rim.sort_unstable();
-    rim.dedup();
+    let mut boundary: Vec<u32> = open_before.iter().flat_map(|h| ends(mesh, *h)).collect();
+    boundary.sort_unstable();
+    boundary.dedup();
     let boxes: Vec<Aabb> =
-        rim.iter().map(|v| Aabb::EMPTY.with(mesh.vertices[*v as usize]).grown(allowed(*v) / 2.0)).collect();
+        boundary.iter().map(|v| Aabb::EMPTY.with(mesh.vertices[*v as usize]).grown(allowed(*v) / 2.0)).collect();
     let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
     near(&boxes, &boxes, |i, j| {
         if i < j {
-            let (a, b) = (rim[i], rim[j]);
+            let (a, b) = (boundary[i], boundary[j]);
             let d = norm(sub(mesh.vertices[a as usize], mesh.vertices[b as usize]));
             if d <= allowed(a).min(allowed(b)) {
                 pairs.push((d, a, b));
@@ -146,7 +145,7 @@ pub fn join_seams(mesh: &mut Mesh) -> usize {
         unite(&mut root, *a, *b);
     }
     let mut sum = vec![([0.0; 3], 0usize); mesh.vertices.len()];
-    for &v in &rim {
+    for &v in &boundary {
         let s = &mut sum[find(&mut root, v) as usize];
         *s = (add(s.0, mesh.vertices[v as usize]), s.1 + 1);
     }
@@ -173,15 +172,15 @@ fn near(a: &[Aabb], b: &[Aabb], mut f: impl FnMut(usize, usize)) {
     }
 }
 
-/// Splits open edges at corners of other open edges that lie on them to within `tolerance` (mm): where a long side
-/// meets two short ones there is no hole but a corner that one of the triangles does not know. Gives their number.
+/// Splits open edges at vertices of other open edges that lie on them to within `tolerance` (mm): a T-junction, where a long
+/// edge meets two short ones, is no hole. Gives the number of splits.
 pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
     let sides = open(mesh);
-    let mut rim: Vec<u32> = sides.iter().flat_map(|h| ends(mesh, *h)).collect();
-    rim.sort_unstable();
-    rim.dedup();
+    let mut boundary: Vec<u32> = sides.iter().flat_map(|h| ends(mesh, *h)).collect();
+    boundary.sort_unstable();
+    boundary.dedup();
     let at = |v: u32| mesh.vertices[v as usize];
-    let points: Vec<Aabb> = rim.iter().map(|v| Aabb::EMPTY.with(at(*v))).collect();
+    let points: Vec<Aabb> = boundary.iter().map(|v| Aabb::EMPTY.with(at(*v))).collect();
     let boxes: Vec<Aabb> = sides
         .iter()
         .map(|h| {
@@ -189,10 +188,10 @@ pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
             Aabb::EMPTY.with(at(a)).with(at(b)).grown(tolerance)
         })
         .collect();
-    // Side, place along it, corner.
+    // Half-edge, position along it, vertex.
     let mut found: Vec<(u32, f64, u32)> = Vec::new();
     near(&boxes, &points, |i, j| {
-        let ([a, b], v) = (ends(mesh, sides[i]), rim[j]);
+        let ([a, b], v) = (ends(mesh, sides[i]), boundary[j]);
         if mesh.triangles[sides[i] as usize / 3].contains(&v) {
             return;
         }
@@ -226,7 +225,7 @@ pub fn split_at_corners(mesh: &mut Mesh, tolerance: f64) -> usize {
     done
 }
 
-/// The triangles of a triangle with corners on its sides.
+/// The triangles of a triangle with vertices on its edges.
 fn pieces_of(t: [u32; 3], lists: [Vec<u32>; 3], out: &mut Vec<[u32; 3]>) {
     let mut work = vec![(t, lists)];
     while let Some((t, mut lists)) = work.pop() {

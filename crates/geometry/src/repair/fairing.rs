@@ -1,7 +1,7 @@
-//! Caps as smooth as what is about them.
+//! Caps as smooth as the surface about them.
 //!
-//! A cap that goes on where the surface about it bends is refined to the spacing of its rim and then bent so that the
-//! squares of its Laplacians, those of the rim with the surface beyond included, are least: P. Liepa, Filling holes in
+//! A cap that continues a curved surface is refined to the spacing of its boundary and then bent so that the
+//! squares of its Laplacians, those of the boundary with the surface beyond included, are least: P. Liepa, Filling holes in
 //! meshes, Symp. Geometry Processing (2003) 200. A cap that meets the surface at an edge, as the end of a tube does,
 //! stays as it was triangulated, and so does one that is flat with it.
 
@@ -9,13 +9,13 @@ use std::collections::HashMap;
 
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 
-/// Loops of fewer corners are left as they are: there is nothing to bend.
+/// Loops of fewer vertices are not refined.
 const SMALL: usize = 7;
-/// The mean cosine of the fold at the rim of caps that are bent: from a degree to 60 degrees.
+/// The mean cosine of the fold at the boundary of caps that are bent: from a degree to 60 degrees.
 const BENT: core::ops::Range<f64> = 0.5..0.9998;
 /// Rounds of refinement, each of which may halve the spacing.
 const ROUNDS: usize = 12;
-/// A cap of more triangles per corner of its rim is not refined further.
+/// A cap of more triangles per corner of its boundary is not refined further.
 const FINE: usize = 60;
 /// A bent cap of more than this multiple of its area before has gone wrong.
 const BLOWN: f64 = 2.0;
@@ -27,20 +27,21 @@ pub struct About {
     pub joined: HashMap<u32, Vec<u32>>,
 }
 
-/// The cap `patch` of the loop `rim`, refined and bent if the surface about it is; `slopes` are the normals beyond
+/// The cap `patch` of the loop `boundary`, refined and bent if the surface about it is; `slopes` are the normals beyond
 /// the sides of the loop. New corners are appended to `vertices`.
 pub fn smoothed(
     vertices: &mut Vec<Vec3>,
-    rim: &[u32],
+    boundary: &[u32],
     patch: Vec<[u32; 3]>,
     slopes: &[Option<Vec3>],
     about: &About,
 ) -> Vec<[u32; 3]> {
-    if rim.len() < SMALL {
+    if boundary.len() < SMALL {
         return patch;
     }
-    let side: HashMap<(u32, u32), Vec3> =
-        (0..rim.len()).filter_map(|i| slopes[i].map(|n| ((rim[i], rim[(i + 1) % rim.len()]), n))).collect();
+    let side: HashMap<(u32, u32), Vec3> = (0..boundary.len())
+        .filter_map(|i| slopes[i].map(|n| ((boundary[i], boundary[(i + 1) % boundary.len()]), n)))
+        .collect();
     let (mut fold, mut count) = (0.0, 0.0);
     for t in &patch {
         let normal = crate::distance::triangle::normal(t.map(|v| vertices[v as usize]));
@@ -56,8 +57,8 @@ pub fn smoothed(
         return patch;
     }
     let first = vertices.len();
-    let fine = refined(vertices, rim, &patch);
-    bend(vertices, first, rim, &fine, about);
+    let fine = refined(vertices, boundary, &patch);
+    bend(vertices, first, boundary, &fine, about);
     let area = |v: &[Vec3], patch: &[[u32; 3]]| {
         let twice = patch.iter().map(|t| {
             let [a, b, c] = t.map(|i| v[i as usize]);
@@ -75,13 +76,13 @@ pub fn smoothed(
 
 /// Splits triangles at their middles while those are farther from the corners than the spacing there, and turns edges
 /// to be Delaunay after each round.
-fn refined(vertices: &mut Vec<Vec3>, rim: &[u32], patch: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let n = rim.len();
+fn refined(vertices: &mut Vec<Vec3>, boundary: &[u32], patch: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let n = boundary.len();
     let gap = |i: usize| {
-        let [a, b] = [i % n, (i + 1) % n].map(|k| vertices[rim[k] as usize]);
+        let [a, b] = [i % n, (i + 1) % n].map(|k| vertices[boundary[k] as usize]);
         norm(sub(a, b))
     };
-    let mut spacing: HashMap<u32, f64> = (0..n).map(|i| (rim[i], (gap(i) + gap(i + n - 1)) / 2.0)).collect();
+    let mut spacing: HashMap<u32, f64> = (0..n).map(|i| (boundary[i], (gap(i) + gap(i + n - 1)) / 2.0)).collect();
     let mut fine = patch.to_vec();
     for _ in 0..ROUNDS {
         let mut next = Vec::with_capacity(3 * fine.len());
@@ -158,9 +159,9 @@ fn relax(vertices: &[Vec3], fine: &mut [[u32; 3]]) -> usize {
     turned
 }
 
-/// Moves the corners from `first` on so that Σ|v − mean of neighbours|² over the cap and its rim is least, by conjugate
+/// Moves the corners from `first` on so that Σ|v − mean of neighbours|² over the cap and its boundary is least, by conjugate
 /// gradients on the normal equations.
-fn bend(vertices: &mut [Vec3], first: usize, rim: &[u32], fine: &[[u32; 3]], about: &About) {
+fn bend(vertices: &mut [Vec3], first: usize, boundary: &[u32], fine: &[[u32; 3]], about: &About) {
     let free = vertices.len() - first;
     if free == 0 {
         return;
@@ -176,7 +177,7 @@ fn bend(vertices: &mut [Vec3], first: usize, rim: &[u32], fine: &[[u32; 3]], abo
     let mut rows: Vec<(u32, Vec<u32>)> = joined.into_iter().collect();
     rows.sort_unstable_by_key(|r| r.0);
     for (v, near) in &mut rows {
-        if rim.contains(v) {
+        if boundary.contains(v) {
             near.extend(about.joined.get(v).into_iter().flatten());
         }
         near.sort_unstable();

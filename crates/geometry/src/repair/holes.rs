@@ -1,24 +1,24 @@
 //! Holes: the loops that open edges leave, and the triangles that close them.
 //!
 //! A hole is what the oriented triangles lack to be closed: for each edge the difference of the triangles that run
-//! along it one way and the other. These differences always form loops, whatever the mesh, so that the capped mesh
+//! along it in either direction. These differences always form loops, whatever the mesh, so that the capped mesh
 //! winds a whole number of times about every point. A loop is capped by the triangulation whose worst fold, then whose
 //! area, is least: G. Barequet and M. Sharir, Filling gaps in the boundary of a polyhedron, Comput. Aided Geom. Des. 12
 //! (1995) 207; P. Liepa, Filling holes in meshes, Symp. Geometry Processing (2003) 200.
 
 use std::collections::{HashMap, HashSet};
 
-use super::fair;
+use super::fairing;
 use super::half_edges::{halves, rises};
 use crate::math::{Vec3, cross, dot, norm, sub, unit};
 use crate::mesh::Mesh;
 
-/// Loops of more corners are parted by chords first: the search takes the cube of their number.
+/// Loops of more vertices are divided by chords first: the search takes the cube of their number.
 const LONG: usize = 160;
 /// Folds (1 − cos) closer than this count as equal, so that the area decides between them.
 const SAME_FOLD: f64 = 1e-6;
 
-/// What closed the holes.
+/// The caps of the holes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Caps {
     /// Loops closed.
@@ -36,15 +36,21 @@ pub fn close(mesh: &mut Mesh) -> Caps {
     if loops.is_empty() {
         return caps;
     }
-    let rims = Rims::of(mesh, &loops);
-    for rim in &loops {
-        let at = |i: usize| mesh.vertices[rim[i % rim.len()] as usize];
+    let surroundings = Surroundings::of(mesh, &loops);
+    for boundary in &loops {
+        let at = |i: usize| mesh.vertices[boundary[i % boundary.len()] as usize];
         caps.holes += 1;
-        caps.length += (0..rim.len()).map(|i| norm(sub(at(i + 1), at(i)))).sum::<f64>();
+        caps.length += (0..boundary.len()).map(|i| norm(sub(at(i + 1), at(i)))).sum::<f64>();
         let mut patch = Vec::new();
-        part(mesh, &rims, rim, &mut patch);
+        part(mesh, &surroundings, boundary, &mut patch);
         let first = mesh.triangles.len();
-        mesh.triangles.extend(fair::smoothed(&mut mesh.vertices, rim, patch, &rims.slopes(rim), &rims.about));
+        mesh.triangles.extend(fairing::smoothed(
+            &mut mesh.vertices,
+            boundary,
+            patch,
+            &surroundings.slopes(boundary),
+            &surroundings.about,
+        ));
         caps.area += (first..mesh.triangles.len())
             .map(|i| {
                 let [a, b, c] = mesh.corners(i);
@@ -55,7 +61,7 @@ pub fn close(mesh: &mut Mesh) -> Caps {
     caps
 }
 
-/// The loops, each as the corners that its cap must run along in this order, none twice.
+/// The boundary loops, each as the vertices that its cap must run along in this order, none twice.
 pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     let mut missing: Vec<(u32, u32)> = Vec::new();
     for edge in halves(mesh).chunk_by(|a, b| a.0 == b.0) {
@@ -67,7 +73,7 @@ pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     }
     missing.sort_unstable();
     let mut used = vec![false; missing.len()];
-    // A vertex has as many ways in as out, so a walk ends where it began.
+    // A vertex has as many missing edges in as out, so a walk ends where it began.
     let next = |v: u32, used: &mut [bool]| {
         let first = missing.partition_point(|e| e.0 < v);
         let i = (first..missing.len()).take_while(|i| missing[*i].0 == v).find(|i| !used[*i])?;
@@ -80,14 +86,14 @@ pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
         let mut on_path: HashMap<u32, usize> = [(start, 0)].into();
         while let Some(v) = path.last().and_then(|v| next(*v, &mut used)) {
             match on_path.get(&v) {
-                // Here a loop is whole: it is taken off, and the walk goes on from its corner.
+                // A loop is complete: it is taken off, and the walk goes on from its vertex.
                 Some(&i) => {
-                    let rim = path.split_off(i + 1);
-                    rim.iter().for_each(|w| {
+                    let boundary = path.split_off(i + 1);
+                    boundary.iter().for_each(|w| {
                         on_path.remove(w);
                     });
                     let mut whole = vec![v];
-                    whole.extend(rim);
+                    whole.extend(boundary);
                     found.push(whole);
                 }
                 None => {
@@ -100,53 +106,56 @@ pub fn loops(mesh: &Mesh) -> Vec<Vec<u32>> {
     found
 }
 
-/// What the triangulation must know of the mesh about the holes.
-struct Rims {
-    /// Edges between corners of rims, low to high.
+/// The mesh about the holes.
+struct Surroundings {
+    /// Edges between vertices of boundary loops, low to high.
     edges: HashSet<(u32, u32)>,
     /// For open edges, as the cap runs along them, the normal of the triangle beyond.
     beyond: HashMap<(u32, u32), Vec3>,
-    /// What the corners are joined to.
-    about: fair::About,
+    /// The neighbours of their vertices.
+    about: fairing::About,
 }
 
-impl Rims {
-    fn of(mesh: &Mesh, loops: &[Vec<u32>]) -> Rims {
+impl Surroundings {
+    fn of(mesh: &Mesh, loops: &[Vec<u32>]) -> Surroundings {
         let corners: HashSet<u32> = loops.iter().flatten().copied().collect();
-        let mut rims = Rims { edges: HashSet::new(), beyond: HashMap::new(), about: fair::About::default() };
+        let mut surroundings =
+            Surroundings { edges: HashSet::new(), beyond: HashMap::new(), about: fairing::About::default() };
         for (i, t) in mesh.triangles.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (t[k], t[(k + 1) % 3]);
                 if corners.contains(&a) {
-                    let joined = rims.about.joined.entry(a).or_default();
+                    let joined = surroundings.about.joined.entry(a).or_default();
                     joined.extend([b, t[(k + 2) % 3]]);
                 }
                 if corners.contains(&a) && corners.contains(&b) {
-                    rims.edges.insert((a.min(b), a.max(b)));
-                    rims.beyond.insert((b, a), crate::distance::triangle::normal(mesh.corners(i)));
+                    surroundings.edges.insert((a.min(b), a.max(b)));
+                    surroundings.beyond.insert((b, a), crate::distance::triangle::normal(mesh.corners(i)));
                 }
             }
         }
-        rims
+        surroundings
     }
 
-    /// Normals beyond the sides of a loop.
-    fn slopes(&self, rim: &[u32]) -> Vec<Option<Vec3>> {
-        (0..rim.len()).map(|i| self.beyond.get(&(rim[i], rim[(i + 1) % rim.len()])).copied()).collect()
+    /// Normals beyond the edges of a loop.
+    fn slopes(&self, boundary: &[u32]) -> Vec<Option<Vec3>> {
+        (0..boundary.len())
+            .map(|i| self.beyond.get(&(boundary[i], boundary[(i + 1) % boundary.len()])).copied())
+            .collect()
     }
 }
 
-/// Triangles that close a loop, parted by its narrowest chord while it is long.
-fn part(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
-    let mut work = vec![rim.to_vec()];
-    while let Some(rim) = work.pop() {
-        let n = rim.len();
+/// Triangles that close a loop, divided by its narrowest chord while it is long.
+fn part(mesh: &Mesh, surroundings: &Surroundings, boundary: &[u32], out: &mut Vec<[u32; 3]>) {
+    let mut work = vec![boundary.to_vec()];
+    while let Some(boundary) = work.pop() {
+        let n = boundary.len();
         if n <= LONG {
-            triangulate(mesh, rims, &rim, out);
+            triangulate(mesh, surroundings, &boundary, out);
             continue;
         }
-        // The chord that is shortest for the way along the rim that it saves; both parts keep a quarter.
-        let at = |i: usize| mesh.vertices[rim[i] as usize];
+        // The chord that is shortest relative to the length of boundary that it bridges; both parts keep a quarter.
+        let at = |i: usize| mesh.vertices[boundary[i] as usize];
         let mut along = vec![0.0; n + 1];
         for i in 0..n {
             along[i + 1] = along[i] + norm(sub(at((i + 1) % n), at(i)));
@@ -155,29 +164,29 @@ fn part(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
         let step = n.div_ceil(2000);
         for i in (0..n).step_by(step) {
             for j in (i + n / 4..n.min(i + n - n / 4 + 1)).step_by(step) {
-                let way = along[j] - along[i];
-                let saved = way.min(along[n] - way);
-                let cost = norm(sub(at(j), at(i))) / saved.max(f64::MIN_POSITIVE);
-                let new = !rims.edges.contains(&(rim[i].min(rim[j]), rim[i].max(rim[j])));
+                let length = along[j] - along[i];
+                let bridged = length.min(along[n] - length);
+                let cost = norm(sub(at(j), at(i))) / bridged.max(f64::MIN_POSITIVE);
+                let new = !surroundings.edges.contains(&(boundary[i].min(boundary[j]), boundary[i].max(boundary[j])));
                 if new && cost < best.0 {
                     best = (cost, i, j);
                 }
             }
         }
         let (_, i, j) = best;
-        work.push(rim[i..=j].to_vec());
-        work.push(rim[j..].iter().chain(&rim[..=i]).copied().collect());
+        work.push(boundary[i..=j].to_vec());
+        work.push(boundary[j..].iter().chain(&boundary[..=i]).copied().collect());
     }
 }
 
-/// The best triangulation of a loop of not too many corners.
-fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
-    let n = rim.len();
+/// The best triangulation of a loop of at most [`LONG`] vertices.
+fn triangulate(mesh: &Mesh, surroundings: &Surroundings, boundary: &[u32], out: &mut Vec<[u32; 3]>) {
+    let n = boundary.len();
     if n < 3 {
         return;
     }
-    let at: Vec<Vec3> = rim.iter().map(|v| mesh.vertices[*v as usize]).collect();
-    // Of the part from corner i to corner k (i < k): edges already taken, worst fold, area, and its middle corner.
+    let at: Vec<Vec3> = boundary.iter().map(|v| mesh.vertices[*v as usize]).collect();
+    // Of the part from vertex i to vertex k (i < k): edges that exist already, worst fold, area, and its middle vertex.
     #[derive(Clone, Copy)]
     struct Best {
         taken: u32,
@@ -187,14 +196,14 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
     }
     let nothing = Best { taken: 0, fold: 0.0, area: 0.0, middle: 0 };
     let mut table = vec![nothing; n * n];
-    let slope = |i: usize, k: usize| rims.beyond.get(&(rim[i], rim[k])).copied();
+    let slope = |i: usize, k: usize| surroundings.beyond.get(&(boundary[i], boundary[k])).copied();
     let sides: Vec<Option<Vec3>> = (0..n).map(|i| slope(i, (i + 1) % n)).collect();
     let mut normals = vec![[0.0; 3]; n * n];
     let fold = |a: Vec3, b: Option<Vec3>| b.map_or(0.0, |b| 1.0 - dot(a, b));
     for span in 2..n {
         for i in 0..n - span {
             let k = i + span;
-            let exists = rims.edges.contains(&(rim[i].min(rim[k]), rim[i].max(rim[k])));
+            let exists = surroundings.edges.contains(&(boundary[i].min(boundary[k]), boundary[i].max(boundary[k])));
             let taken = u32::from(exists && span + 1 < n);
             let mut best: Option<(Best, Vec3)> = None;
             for m in i + 1..k {
@@ -202,10 +211,10 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
                 let size = norm(area);
                 let facing = if size > 0.0 { unit(area) } else { [0.0; 3] };
                 let (left, right) = (&table[i * n + m], &table[m * n + k]);
-                let beside = |a: usize, b: usize| {
+                let beyond = |a: usize, b: usize| {
                     if b == a + 1 { sides[a] } else { Some(normals[a * n + b]) }
                 };
-                let mut worst = fold(facing, beside(i, m)).max(fold(facing, beside(m, k)));
+                let mut worst = fold(facing, beyond(i, m)).max(fold(facing, beyond(m, k)));
                 if span + 1 == n {
                     worst = worst.max(fold(facing, sides[n - 1]));
                 }
@@ -238,7 +247,7 @@ fn triangulate(mesh: &Mesh, rims: &Rims, rim: &[u32], out: &mut Vec<[u32; 3]>) {
     while let Some((i, k)) = work.pop() {
         if k > i + 1 {
             let m = table[i * n + k].middle as usize;
-            out.push([rim[i], rim[m], rim[k]]);
+            out.push([boundary[i], boundary[m], boundary[k]]);
             work.extend([(i, m), (m, k)]);
         }
     }

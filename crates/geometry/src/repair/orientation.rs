@@ -1,23 +1,23 @@
-//! Which way triangles face: neighbours alike, bodies outwards, cavities kept.
+//! Orientation of triangles: alike across edges, components outwards, cavities kept.
 
-use super::half_edges::{components, halves, rises};
+use super::half_edges::{self, halves, rises};
 use crate::distance::triangle::Triangle;
 use crate::distance::triangle_bvh::TriangleBvh;
 use crate::distance::winding::{Winding, turn};
 use crate::math::{Aabb, Vec3, cross, dot, norm, scale, sub};
 use crate::mesh::Mesh;
 
-/// Corners of a body at which it is asked whether another one holds it.
-const LOOKS: usize = 32;
-/// Bodies of more triangles are asked through a tree.
+/// Triangles of a component at whose centroids it is tested whether another one contains it.
+const SAMPLES: usize = 32;
+/// Components of more triangles are tested through a tree.
 const MANY: usize = 256;
 
 /// Makes the triangles of each patch (joined by edges of two triangles) face alike, as most of its area did; gives
-/// the number of triangles turned. Where a patch has one side only (a Möbius band) some edge stays as it was.
+/// the number of triangles reversed. Where a patch is not orientable (a Möbius band) some edge stays as it was.
 pub fn face_alike(mesh: &mut Mesh) -> usize {
     let halves = halves(mesh);
     let n = mesh.triangles.len();
-    // Per side of a triangle its neighbour, and whether the two face opposite ways.
+    // Per edge of a triangle its neighbour, and whether the two face opposite ways.
     let mut across = vec![(u32::MAX, false); 3 * n];
     for edge in halves.chunk_by(|a, b| a.0 == b.0) {
         if let [a, b] = edge {
@@ -63,16 +63,16 @@ pub fn face_alike(mesh: &mut Mesh) -> usize {
     flips.iter().filter(|f| **f).count()
 }
 
-/// One closed body of a mesh.
-struct Body {
+/// A connected component of a mesh.
+struct Component {
     triangles: Vec<u32>,
     bounds: Aabb,
     volume: f64,
-    /// Made at the first question, for bodies of many triangles.
+    /// Built at the first query, for components of many triangles.
     tree: Option<(TriangleBvh, Winding)>,
 }
 
-impl Body {
+impl Component {
     fn holds(&mut self, mesh: &Mesh, p: Vec3) -> bool {
         if self.bounds.distance(p) > 0.0 {
             return false;
@@ -91,40 +91,40 @@ impl Body {
     }
 }
 
-/// Turns bodies (sets joined by edges) that are inside out. A body within others keeps its sense against them, so
-/// that cavities stay, unless it would bound no solid and no cavity. Gives the number of bodies turned.
+/// Turns components (sets joined by edges) that are inside out. A component within others keeps its sense against them, so
+/// that cavities stay, unless it would bound no solid and no cavity. Gives the number of components turned.
 pub fn face_out(mesh: &mut Mesh) -> usize {
-    let (number, count) = components(mesh);
-    let mut bodies: Vec<Body> =
-        (0..count).map(|_| Body { triangles: Vec::new(), bounds: Aabb::EMPTY, volume: 0.0, tree: None }).collect();
+    let (number, count) = half_edges::components(mesh);
+    let mut components: Vec<Component> =
+        (0..count).map(|_| Component { triangles: Vec::new(), bounds: Aabb::EMPTY, volume: 0.0, tree: None }).collect();
     for (i, b) in (0..).zip(&number) {
-        let body = &mut bodies[*b as usize];
-        body.triangles.push(i);
-        body.bounds = mesh.corners(i as usize).iter().fold(body.bounds, |b, p| b.with(*p));
+        let component = &mut components[*b as usize];
+        component.triangles.push(i);
+        component.bounds = mesh.corners(i as usize).iter().fold(component.bounds, |b, p| b.with(*p));
     }
-    for body in &mut bodies {
-        let o = body.bounds.center();
+    for component in &mut components {
+        let o = component.bounds.center();
         let six = |i: &u32| {
             let [a, b, c] = mesh.corners(*i as usize).map(|p| sub(p, o));
             dot(a, cross(b, c))
         };
-        body.volume = body.triangles.iter().map(six).sum::<f64>() / 6.0;
+        component.volume = component.triangles.iter().map(six).sum::<f64>() / 6.0;
     }
-    // From the largest box down, a body comes after all that hold it.
-    let extent = |b: &Body| dot(b.bounds.size(), b.bounds.size());
+    // From the largest box down, a component comes after all that hold it.
+    let extent = |b: &Component| dot(b.bounds.size(), b.bounds.size());
     let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|a, b| extent(&bodies[*b]).total_cmp(&extent(&bodies[*a])).then(a.cmp(b)));
-    let any_out = bodies.iter().any(|b| b.volume < 0.0);
+    order.sort_by(|a, b| extent(&components[*b]).total_cmp(&extent(&components[*a])).then(a.cmp(b)));
+    let any_out = components.iter().any(|b| b.volume < 0.0);
     let mut flip = vec![false; count];
     for (rank, &i) in order.iter().enumerate() {
-        // Nothing stands inside out: nothing to ask.
+        // Where none is inside out there is nothing to test.
         let mut holders: Vec<usize> = Vec::new();
         if any_out {
             let inside = |outer: &Aabb, inner: &Aabb| {
                 (0..3).all(|k| outer.min[k] <= inner.min[k] && inner.max[k] <= outer.max[k])
             };
-            let step = bodies[i].triangles.len().div_ceil(LOOKS).max(1);
-            let looks: Vec<Vec3> = bodies[i]
+            let step = components[i].triangles.len().div_ceil(SAMPLES).max(1);
+            let samples: Vec<Vec3> = components[i]
                 .triangles
                 .iter()
                 .step_by(step)
@@ -134,18 +134,18 @@ pub fn face_out(mesh: &mut Mesh) -> usize {
                 })
                 .collect();
             for &j in &order[..rank] {
-                let within = inside(&bodies[j].bounds, &bodies[i].bounds);
-                if within && looks.iter().all(|p| bodies[j].holds(mesh, *p)) {
+                let within = inside(&components[j].bounds, &components[i].bounds);
+                if within && samples.iter().all(|p| components[j].holds(mesh, *p)) {
                     holders.push(j);
                 }
             }
         }
-        let sense = |j: usize, flip: &[bool]| (bodies[j].volume > 0.0) != flip[j];
+        let sense = |j: usize, flip: &[bool]| (components[j].volume > 0.0) != flip[j];
         let about = holders.iter().map(|&j| if sense(j, &flip) { 1 } else { -1 });
         let about: i32 = about.sum();
         // The nearest holder is the last: boxes shrink along the order.
         flip[i] = holders.last().is_some_and(|&j| flip[j]);
-        if bodies[i].volume != 0.0 && !sense(i, &flip) && about <= 0 {
+        if components[i].volume != 0.0 && !sense(i, &flip) && about <= 0 {
             flip[i] = !flip[i];
         }
     }

@@ -1,4 +1,4 @@
-//! How well shaped the tetrahedra of a mesh are.
+//! Dihedral angles, edge lengths and volumes of tetrahedra.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! Which edges are kept: sharp ones, and borders between the lattice's surface and cuts.
 
-use super::links::{Links, NONE, next, prev};
+use super::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
 use crate::math::{Vec3, add, cross, dot, norm, sub};
 
 /// Cosine of the turn, 30 degrees, from which an edge counts as sharp.
@@ -12,19 +12,19 @@ const SPECK: usize = 4;
 ///
 /// An edge is sharp if its two triangles turn by more than 30 degrees, and so do their surroundings, the triangles with
 /// their other neighbours: the normal of a sliver alone says little.
-pub fn kept(links: &Links, places: &[Vec3], cut: &[bool]) -> Vec<bool> {
+pub fn kept(half_edges: &HalfEdgeMesh, positions: &[Vec3], cut: &[bool]) -> Vec<bool> {
     let normal = |t: u32| {
-        let [a, b, c] = links.triangles[t as usize].map(|v| places[v as usize]);
+        let [a, b, c] = half_edges.triangles[t as usize].map(|v| positions[v as usize]);
         cross(sub(b, a), sub(c, a))
     };
     let turns = |a: Vec3, b: Vec3| dot(a, b) < SHARP * norm(a) * norm(b);
     let about = |h: u32| {
-        let sides = [next(h), prev(h)].map(|g| normal(links.twin(g) / 3));
+        let sides = [next(h), prev(h)].map(|g| normal(half_edges.twin(g) / 3));
         add(normal(h / 3), add(sides[0], sides[1]))
     };
-    let mut kept = vec![false; 3 * links.triangles.len()];
+    let mut kept = vec![false; 3 * half_edges.triangles.len()];
     for h in 0..kept.len() as u32 {
-        let g = links.twin(h);
+        let g = half_edges.twin(h);
         if h > g {
             continue;
         }
@@ -35,47 +35,48 @@ pub fn kept(links: &Links, places: &[Vec3], cut: &[bool]) -> Vec<bool> {
             kept[g as usize] = true;
         }
     }
-    drop_specks(links, cut, &mut kept);
+    drop_specks(half_edges, cut, &mut kept);
     kept
 }
 
-/// Lets go of short runs of sharp edges that end freely on both sides.
-fn drop_specks(links: &Links, cut: &[bool], kept: &mut [bool]) {
-    let kept_from = |kept: &[bool], v: u32| -> Vec<u32> { links.leaving(v).filter(|h| kept[*h as usize]).collect() };
+/// Releases short runs of sharp edges that end freely on both sides.
+fn drop_specks(half_edges: &HalfEdgeMesh, cut: &[bool], kept: &mut [bool]) {
+    let kept_from =
+        |kept: &[bool], v: u32| -> Vec<u32> { half_edges.leaving(v).filter(|h| kept[*h as usize]).collect() };
     for h in 0..kept.len() as u32 {
-        if !kept[h as usize] || kept_from(kept, links.from(h)).len() != 1 {
+        if !kept[h as usize] || kept_from(kept, half_edges.from(h)).len() != 1 {
             continue;
         }
         let mut run = vec![h];
         let mut end = h;
         let free = loop {
-            let on = kept_from(kept, links.to(end));
+            let on = kept_from(kept, half_edges.to(end));
             match on.len() {
                 1 => break true,
                 2 if run.len() < SPECK => {
-                    let back = links.twin(end);
+                    let back = half_edges.twin(end);
                     end = if on[0] == back { on[1] } else { on[0] };
                     run.push(end);
                 }
                 _ => break false,
             }
         };
-        let border = |h: &u32| cut[(h / 3) as usize] != cut[(links.twin(*h) / 3) as usize];
+        let border = |h: &u32| cut[(h / 3) as usize] != cut[(half_edges.twin(*h) / 3) as usize];
         if free && !run.iter().any(border) {
             for h in run {
                 kept[h as usize] = false;
-                kept[links.twin(h) as usize] = false;
+                kept[half_edges.twin(h) as usize] = false;
             }
         }
     }
 }
 
 /// How many kept edges end at each vertex.
-pub fn count(links: &Links, kept: &[bool], vertices: usize) -> Vec<u8> {
+pub fn count(half_edges: &HalfEdgeMesh, kept: &[bool], vertices: usize) -> Vec<u8> {
     let mut count = vec![0u8; vertices];
     for h in 0..kept.len() as u32 {
-        if kept[h as usize] && links.from(h) != NONE {
-            let c = &mut count[links.from(h) as usize];
+        if kept[h as usize] && half_edges.from(h) != NONE {
+            let c = &mut count[half_edges.from(h) as usize];
             *c = c.saturating_add(1);
         }
     }
