@@ -131,6 +131,15 @@ pub trait Loader {
     }
 }
 
+/// A loader for designs that refer to no files.
+pub struct NoFiles;
+
+impl Loader for NoFiles {
+    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        Err(format!("{path}: no folder is known to read it from; use a design file"))
+    }
+}
+
 /// Something in a design that is allowed but may not be meant.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
@@ -248,13 +257,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 
 /// The cell that a tree describes, as under the key `cell` of a lattice.
 pub fn cell(node: &Node) -> Result<Cell, DesignError> {
-    struct Nothing;
-    impl Loader for Nothing {
-        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-            Err(format!("{path}: a cell from a file needs a design that says where the file is"))
-        }
-    }
-    Ok(cell::cell(&read::cell_in(node)?, "cell", &Nothing)?.1)
+    Ok(cell::cell(&read::cell_in(node)?, "cell", &NoFiles)?.1)
 }
 
 impl Built {

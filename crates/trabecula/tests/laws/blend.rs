@@ -6,7 +6,7 @@ use geometry::math::{Aabb, Interval, Vec3};
 use geometry::progress::Silent;
 use trabecula::blend::{Blend, By, Constituent, Phases, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
-use trabecula::design::{Design, Loader};
+use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Sigmoid};
@@ -188,14 +188,8 @@ fn any_number_of_fields_takes_part() {
 /// counted on one cell.
 #[test]
 fn lattices_pass_into_beams_with_their_fractions() {
-    struct Nothing;
-    impl Loader for Nothing {
-        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-            Err(path.to_string())
-        }
-    }
     let text = "schema = 1\n[region.box]\nsize = [64, 36, 36]\n[beams.a]\ncell = \"octet\"\nradius = 0.45\nmap.affine.wavelength = 5";
-    let built = Design::from_toml(text).expect("text").build(&Nothing).expect("built");
+    let built = Design::from_toml(text).expect("text").build(&NoFiles).expect("built");
     let beams = built.beams[0].1.field();
     let mut cell = window([0.0; 3], 0.0, 40_000);
     for (i, p) in cell.iter_mut().enumerate() {
@@ -227,17 +221,11 @@ fn lattices_pass_into_beams_with_their_fractions() {
 /// fraction that its tetrahedra have, all the same one.
 #[test]
 fn what_lies_beyond_the_region_is_not_counted() {
-    struct Nothing;
-    impl Loader for Nothing {
-        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-            Err(path.to_string())
-        }
-    }
     let text = "schema = 1\n[region.box]\nsize = [24, 12, 12]\n\
         [lattice.a]\ncell.tet.name = \"diamond\"\npart = \"lower\"\nmap.tets.size = 3\nlevel.fraction = 0.3\n\
         [lattice.b]\ncell = \"gyroid\"\npart = \"upper\"\nmap.affine.wavelength = 4\nlevel.fraction = 0.3\n\
         [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[-12, 0.0], [12, 1]] }";
-    let built = Design::from_toml(text).expect("text").build(&Nothing).expect("built");
+    let built = Design::from_toml(text).expect("text").build(&NoFiles).expect("built");
     let blend = built.blend.expect("blend").blend;
     for y in [-5.9, 0.0, 5.9] {
         let points: Vec<Vec3> =

@@ -6,7 +6,7 @@ use geometry::math::{Aabb, Vec3};
 use geometry::progress::Silent;
 use trabecula::blend::{Blend, By, Constituent, Weights};
 use trabecula::cell::{Cell, Part, Series, named};
-use trabecula::design::{Design, Loader};
+use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade};
@@ -127,18 +127,12 @@ fn gradients_blocks_and_bounds_agree_with_values() {
 /// Walls over tetrahedra that are thinner than two steps of the grid keep both their faces and so their volume, in a blend too.
 #[test]
 fn thin_walls_over_tetrahedra_are_kept() {
-    struct Nothing;
-    impl Loader for Nothing {
-        fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-            Err(path.to_string())
-        }
-    }
     let text = "schema = 1\n[region.box]\nsize = [9, 4, 4]\n\
         [lattice.a]\ncell.tet.name = \"diamond\"\npart = \"sheet\"\nmap.tets.size = 3\nlevel.fraction = 0.15\n\
         [lattice.b]\ncell = \"gyroid\"\npart = \"sheet\"\nmap.affine.wavelength = 4\nlevel.fraction = 0.15\n\
         [blend]\nbetween = [\"a\", \"b\"]\nweight.linear = { along = [1, 0, 0], stops = [[0, 0], [4, 1]] }";
     let design = Design::from_toml(text).expect("text");
-    let built = design.build(&Nothing).expect("built");
+    let built = design.build(&NoFiles).expect("built");
     let points: Vec<Vec3> = even(300_000).map(|u| [9.0 * u[0], 4.0 * u[1], 4.0 * u[2]]).collect();
     let mut v = vec![0.0; points.len()];
     // In the tetrahedra, which leave out a little of the box.
