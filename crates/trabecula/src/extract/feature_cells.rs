@@ -240,7 +240,7 @@ impl FeatureCells<'_> {
     /// points that single precision mixes them up. Where that happens in a cell, the surfaces are perturbed at its nodes by far
     /// less than a grid step, and the cells there are cut again.
     pub fn all(&mut self, own: &[Range<usize>; 3]) {
-        let fitted = |c: &[usize; 3]| self.edges.is_fitted(self.nodes, *c);
+        let fitted = |c: &[usize; 3]| self.edges.claims.is_fitted(self.nodes, *c);
         let cells = self.signs.feature_cells().filter(|c| !fitted(c));
         let cells: Vec<[usize; 3]> = cells.collect();
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));

@@ -19,6 +19,7 @@
 //! Graph. Forum 24 (2005) 537.
 
 mod boundary_loops;
+mod cell_claims;
 mod cell_faces;
 mod contours;
 mod double_crossings;
@@ -39,48 +40,39 @@ use crate::field::Field;
 use geometry::math::{Vec3, add, dot, scale, sub};
 
 use super::sampling_grid::{Grid, LocalSolid};
-use super::sign_words::{Signs, bits};
+use super::sign_words::Signs;
 use super::tile::Nodes;
 use super::vertex_id::VertexId;
+use cell_claims::{CellClaims, OtherSurfaces, decides};
 pub(super) use contours::Contour;
 pub(super) use fitted_cells::DividedFaces;
 use trace_edges::cell_of;
-pub(super) use trace_edges::{PaddedNodes, by_tile};
+pub(super) use trace_edges::{PaddedNodes, TracedEdges, by_tile};
 
 /// A feature edge that passes a grid edge within this distance may pierce a face without a contour, in multiples of the least
 /// distance of points from nodes. A wedge of 15° whose tip is as far beyond a grid edge crosses it in two points too near to
 /// keep.
 const NEAR_EDGE: f64 = 8.0;
 
-/// Feature edges in the cells of a block, and the points and contours made from them. Filled in three steps: `trace_edges`,
-/// `claim` and `claim_fitted`, `find`; read-only afterwards.
+/// Feature edges in the cells of a block, and the contours made from them. Filled in three steps: `traced`, `claims`, then
+/// `find`; read-only afterwards.
 #[derive(Default)]
 pub(super) struct EdgeStore {
-    /// For each row of cells: those that are filled from their boundary loops.
-    pub cells: Vec<u64>,
-    /// Those of them where the surface meets others, and which surface that is.
-    fitted: Vec<u64>,
-    fitted_to: Option<usize>,
-    /// The surface with feature edges, by the lowest node of the cell.
-    pub surface: FxHashMap<usize, usize>,
+    pub traced: TracedEdges,
+    pub claims: CellClaims,
     /// The contours of cell faces, by the lowest node of the face and the axis normal to it.
-    faces: FxHashMap<(usize, usize), Vec<Contour>>,
+    contours: FxHashMap<(usize, usize), Vec<Contour>>,
     /// Both crossings of grid edges that a surface crosses twice, by the surface, the lower node and the axis; the lower point
     /// first.
     double_crossings: FxHashMap<(usize, usize, usize), [Vec3; 2]>,
     /// Positions of contour corners and double crossings.
     points: FxHashMap<VertexId, Vec3>,
-    /// Points where feature edges of live surfaces pierce cell faces: surface, face, position.
-    pierced: Vec<(usize, (usize, usize), Vec3)>,
-    /// Segments of feature edges in cells, by the surface and the lowest node of the cell.
-    segments: FxHashMap<(usize, usize), Vec<[Vec3; 2]>>,
-    /// Points where feature edges end, meet or bend, and the number of edges there; keyed likewise.
+    /// Points where feature edges end, meet or bend, and the number of edges there, by the surface and the lowest node of the
+    /// cell.
     corners: FxHashMap<(usize, usize), Vec<(Vec3, usize)>>,
     /// A corner of the surface in an adjacent cell that the patch of this cell has as its apex, by the lowest node of this
     /// cell.
     neighbour_corners: FxHashMap<usize, Vec3>,
-    /// For each row of nodes: those within two cells of a feature edge.
-    near: Vec<u64>,
 }
 
 /// One surface in a block, with all that its contours depend on.
@@ -99,36 +91,23 @@ pub(super) struct SurfaceContext<'a, P: Fn(usize, usize) -> Option<Vec3>> {
 
 impl EdgeStore {
     pub fn clear(&mut self, shape: [usize; 3]) {
-        self.cells.clear();
-        self.cells.resize(shape[1] * shape[2], 0);
-        self.fitted_to = None;
-        self.fitted.clear();
-        self.fitted.resize(shape[1] * shape[2], 0);
-        self.surface.clear();
-        self.faces.clear();
+        self.traced.clear(shape);
+        self.claims.clear(shape);
+        self.contours.clear();
         self.double_crossings.clear();
         self.points.clear();
-        self.pierced.clear();
-        self.segments.clear();
         self.corners.clear();
         self.neighbour_corners.clear();
-        self.near.clear();
-        self.near.resize(shape[1] * shape[2], 0);
     }
 
     /// Whether a live surface has feature edges here.
     pub fn has(&self, surface: usize) -> bool {
-        self.pierced.iter().any(|p| p.0 == surface) || self.surface.values().any(|f| *f == surface)
-    }
-
-    /// Whether any cell is filled from its boundary loops.
-    pub fn any(&self) -> bool {
-        !self.surface.is_empty()
+        self.traced.pierced.iter().any(|p| p.0 == surface) || self.claims.surface.values().any(|f| *f == surface)
     }
 
     /// The ends of all contours.
     pub fn contour_ends(&self) -> impl Iterator<Item = VertexId> {
-        let contours = self.faces.values().flatten();
+        let contours = self.contours.values().flatten();
         contours.flat_map(|c| [c.from, c.to])
     }
 
@@ -137,39 +116,22 @@ impl EdgeStore {
         self.points.get(&key).copied()
     }
 
-    /// Claims the feature cells in which a surface with feature edges is the only one: the sampled values near feature edges
-    /// say little of the position of the surface, so such cells are filled from their boundary loops.
-    pub fn claim(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
-        let featured: Vec<[usize; 3]> = signs.feature_cells().collect();
-        for cell in featured {
-            let [i, j, k] = cell;
-            let (row, node) = (k * nodes.shape[1] + j, nodes.index(cell));
-            let crossed = !matches!(signs.corners(surface, i, j, k), 0 | 0xff);
-            if crossed && decides(local, signs, surface, cell) {
-                signs.featured[row] &= !(1 << i);
-                signs.plain[surface][row] |= 1 << i;
-                self.cells[row] |= 1 << i;
-                self.surface.insert(node, surface);
-            }
-        }
-    }
-
     /// Makes the contours of a surface whose feature edges were traced.
     pub fn find<P: Fn(usize, usize) -> Option<Vec3>>(&mut self, context: &SurfaceContext<P>) {
         let nodes = context.nodes;
         let of = &context.grid.surfaces[context.local.live[context.surface]].creases;
         if context.is_fitted() {
-            let own = self.segments.keys().filter(|p| p.0 == context.surface);
+            let own = self.traced.segments.keys().filter(|p| p.0 == context.surface);
             let cells: Vec<usize> = own.map(|p| p.1).collect();
             self.find_double_crossings(context, cells);
         }
         // In the order of the segments, where several pierce one face.
         let mut at: FxHashMap<(usize, usize), Vec<Vec3>> = FxHashMap::default();
-        for (_, face, p) in self.pierced.iter().filter(|p| p.0 == context.surface) {
+        for (_, face, p) in self.traced.pierced.iter().filter(|p| p.0 == context.surface) {
             at.entry(*face).or_default().push(context.inside(*face, *p));
         }
         // Faces whose four grid edges are all crossed.
-        for &node in self.surface.iter().filter(|f| *f.1 == context.surface).map(|f| f.0) {
+        for &node in self.claims.surface.iter().filter(|f| *f.1 == context.surface).map(|f| f.0) {
             for axis in 0..3 {
                 at.entry((node, axis)).or_default();
                 at.entry((node + nodes.stride[axis], axis)).or_default();
@@ -192,17 +154,16 @@ impl EdgeStore {
             let mut cell = nodes.at(face.0);
             for _ in 0..2 {
                 if context.is_sole_surface(cell) {
-                    self.cells[cell[2] * nodes.shape[1] + cell[1]] |= 1 << cell[0];
-                    self.surface.insert(nodes.index(cell), context.surface);
+                    self.claims.add(nodes, cell, context.surface);
                 }
                 cell[face.1] = cell[face.1].wrapping_sub(1);
             }
             for c in &contours {
                 self.points.extend(c.via.iter().copied());
             }
-            self.faces.insert(face, contours);
+            self.contours.insert(face, contours);
         }
-        if self.any() {
+        if self.claims.any() {
             for p in &of.corners {
                 if let Some(cell) = cell_of(nodes.axes, p.0) {
                     let here = (context.surface, nodes.index(cell));
@@ -263,7 +224,7 @@ impl EdgeStore {
                 continue;
             };
             let untouched = || context.is_sole_surface(cell) && context.untouched(cell);
-            if count < 3 || self.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
+            if count < 3 || self.claims.cells[cell[2] * nodes.shape[1] + cell[1]] >> cell[0] & 1 == 1 || !untouched() {
                 continue;
             }
             let faces = (0..3).flat_map(|a| [(a, false), (a, true)]);
@@ -342,64 +303,6 @@ impl<P: Fn(usize, usize) -> Option<Vec3>> SurfaceContext<'_, P> {
     }
 }
 
-/// Signs of all other surfaces at the corners of a cell.
-struct OtherSurfaces<'a> {
-    local: &'a LocalSolid,
-    cell: [usize; 3],
-    own: u64,
-    negative: u64,
-    varies: u64,
-}
-
-impl<'a> OtherSurfaces<'a> {
-    fn of(local: &'a LocalSolid, signs: &Signs, surface: usize, [i, j, k]: [usize; 3]) -> OtherSurfaces<'a> {
-        let (mut varies, mut negative) = (0u64, 0u64);
-        for f in (0..local.live.len()).filter(|f| *f != surface) {
-            match signs.corners(f, i, j, k) {
-                0 => {}
-                0xff => negative |= 1 << f,
-                _ => varies |= 1 << f,
-            }
-        }
-        OtherSurfaces { local, cell: [i, j, k], own: 1 << surface, negative, varies }
-    }
-
-    fn is_solid(&self, mask: u64) -> bool {
-        let [i, j, k] = self.cell;
-        let live = self.local.live.len();
-        let sign = |f: usize| match f.checked_sub(live) {
-            Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
-            None => mask >> f,
-        };
-        self.local.tree.solid(&sign) & 1 == 1
-    }
-
-    /// Whether this surface decides what is solid, whatever the others do. The CSG tree is monotone, so two cases cover all.
-    fn always_decides(&self) -> bool {
-        self.each_case(|without, with| with && !without)
-    }
-
-    /// Whether it decides in neither of the two cases.
-    fn never_decides(&self) -> bool {
-        self.each_case(|without, with| with == without)
-    }
-
-    fn each_case(&self, is: impl Fn(bool, bool) -> bool) -> bool {
-        let cases = [self.negative, self.negative | self.varies];
-        cases.iter().all(|n| is(self.is_solid(*n), self.is_solid(n | self.own)))
-    }
-
-    /// Whether the cell contains no surface at all.
-    fn is_dead(&self) -> bool {
-        self.is_solid(self.negative) == self.is_solid(self.negative | self.varies | self.own)
-    }
-}
-
-/// Whether a surface would be the only one in a cell if it crossed the cell, whatever the other surfaces do there.
-fn decides(local: &LocalSolid, signs: &Signs, surface: usize, cell: [usize; 3]) -> bool {
-    OtherSurfaces::of(local, signs, surface, cell).always_decides()
-}
-
 /// The point of a segment nearest to another point.
 fn nearest([p, q]: [Vec3; 2], to: Vec3) -> Vec3 {
     let along = sub(q, p);
@@ -427,19 +330,4 @@ fn within(grid: &Grid, axis: &[f64], at: usize, x: f64) -> f64 {
     let (low, high) = (axis[at], axis[at + 1]);
     let margin = grid.margin * (high - low);
     x.clamp(low + margin, high - margin)
-}
-
-/// Those of some cells that are filled from their boundary loops, with their surfaces.
-pub(super) fn cells(edges: &EdgeStore, nodes: &Nodes, own: &[std::ops::Range<usize>; 3]) -> Vec<([usize; 3], usize)> {
-    let ny = nodes.shape[1];
-    let mut found = Vec::new();
-    for (row, w) in edges.cells.iter().enumerate() {
-        for i in bits(*w) {
-            let cell = [i, row % ny, row / ny];
-            if (0..3).all(|a| own[a].contains(&cell[a])) {
-                found.push((cell, edges.surface[&nodes.index(cell)]));
-            }
-        }
-    }
-    found
 }

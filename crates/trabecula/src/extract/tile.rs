@@ -28,7 +28,7 @@ use crate::field::Block;
 use geometry::math::Vec3;
 
 use super::feature_cells::{FeatureCells, FeatureMesh};
-use super::feature_edges::{self, DividedFaces, EdgeStore, SurfaceContext};
+use super::feature_edges::{DividedFaces, EdgeStore, SurfaceContext};
 use super::planar_caps;
 use super::sampling_grid::{Grid, GridPlane, LocalSolid, TILE};
 use super::sign_words::{Signs, below, bits, negative};
@@ -265,7 +265,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
         v.t = v.t.clamp(margin, 1.0 - margin);
         v.at(&nodes, f64::from(v.t))
     }));
-    let snapped = s.edges.any() && s.signs.has_features();
+    let snapped = s.edges.claims.any() && s.signs.has_features();
     if snapped {
         // Contours are grid-aligned between the points that stay.
         let (mut features, vertices, _) = features(s, grid, &local, &nodes);
@@ -307,7 +307,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
             let wanted = wanted.get_or_insert_with(|| {
                 let known = local.live.iter().filter(|f| grid.surfaces[**f].cut).count();
                 let mut wanted = s.signs.wanted(local, known);
-                s.edges.wanted(nodes, &mut wanted);
+                s.edges.traced.wanted(nodes, &mut wanted);
                 wanted
             });
             surface.field.fill_where(block, wanted, out);
@@ -323,7 +323,7 @@ fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, 
     for (surface, &id) in local.live.iter().enumerate() {
         if let Some(segments) = grid.creases(id, tile) {
             let of = &grid.surfaces[id].creases;
-            s.edges.trace_edges(nodes, &padded, of, surface, segments);
+            s.edges.traced.trace(nodes, &padded, of, surface, segments);
         }
     }
 }
@@ -332,12 +332,12 @@ fn trace_edges(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, 
 fn claim_cells(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes) {
     for (surface, &id) in local.live.iter().enumerate() {
         if grid.has_creases(id) {
-            s.edges.claim(local, &mut s.signs, nodes, surface);
+            s.edges.claims.claim_sole(local, &mut s.signs, nodes, surface);
         }
     }
     for (surface, &id) in local.live.iter().enumerate() {
         if grid.fitted == Some(id) {
-            s.edges.claim_fitted(local, &mut s.signs, nodes, surface);
+            s.edges.claims.claim_fitted(local, &mut s.signs, nodes, &s.edges.traced, surface);
         }
     }
 }
@@ -402,7 +402,7 @@ fn snap(features: &mut FeatureCells, vertices: &[Vertex]) {
 /// Adds all that marching cubes does not make: feature and fitted cells, the seams around them, and caps.
 fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: &[Range<usize>; 3]) {
     let featured = s.signs.has_features();
-    if !featured && local.grid_planes.is_empty() && !s.edges.any() {
+    if !featured && local.grid_planes.is_empty() && !s.edges.claims.any() {
         s.extra.clear();
         return;
     }
@@ -415,8 +415,8 @@ fn finish(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &Nodes, own: 
     for &(cell, surface) in seams {
         features.seam(cell, surface);
     }
-    for (cell, surface) in feature_edges::cells(features.edges, nodes, own) {
-        if features.edges.is_fitted(nodes, cell) {
+    for (cell, surface) in features.edges.claims.own(nodes, own) {
+        if features.edges.claims.is_fitted(nodes, cell) {
             features.fitted(cell, surface);
         } else {
             features.fill_edge_cell(cell, surface);

@@ -81,7 +81,7 @@ impl FeatureCells<'_> {
                 }));
                 continue;
             }
-            if let Some(contours) = self.edges.faces.get(&(low, axis)) {
+            if let Some(contours) = self.edges.contours.get(&(low, axis)) {
                 steps.extend(contours.iter().map(|c| Step {
                     from: if upper { c.from } else { c.to },
                     via: if upper {

@@ -82,10 +82,10 @@ impl FeatureCells<'_> {
     pub fn divide_faces(&mut self, own: &[Range<usize>; 3]) {
         let ny = self.nodes.shape[1];
         let mine = |c: &[usize; 3]| (0..3).all(|a| own[a].contains(&c[a]));
-        for row in 0..self.edges.fitted.len() {
-            for i in bits(self.edges.fitted[row]) {
+        for row in 0..self.edges.claims.fitted.len() {
+            for i in bits(self.edges.claims.fitted[row]) {
                 let cell = [i, row % ny, row / ny];
-                let surface = self.edges.surface[&self.nodes.index(cell)];
+                let surface = self.edges.claims.surface[&self.nodes.index(cell)];
                 for (axis, upper) in [0, 1, 2].into_iter().flat_map(|a| [(a, false), (a, true)]) {
                     let mut across = cell;
                     across[axis] = across[axis].wrapping_add(if upper { 1 } else { usize::MAX });
@@ -192,7 +192,7 @@ impl FeatureCells<'_> {
         boundary: &[(usize, Option<bool>)],
     ) -> Vec<Vec<usize>> {
         let edges = self.edges;
-        if let Some(contours) = edges.faces.get(&face) {
+        if let Some(contours) = edges.contours.get(&face) {
             let mut via = 0;
             let mut all = Vec::with_capacity(contours.len());
             for c in contours {

@@ -9,7 +9,6 @@
 //! points inside a face or a cell their values lie between those of the nodes around. So no surface appears where an adjacent
 //! cell does not expect it.
 
-use std::borrow::Cow;
 use std::rc::Rc;
 
 use rustc_hash::FxHashMap;
@@ -17,9 +16,6 @@ use rustc_hash::FxHashMap;
 use super::cell_faces::{CellFace, Corner};
 use super::{EdgeStore, OtherSurfaces, SurfaceContext};
 use crate::extract::feature_cells::FeatureCells;
-use crate::extract::sampling_grid::LocalSolid;
-use crate::extract::sign_words::Signs;
-use crate::extract::tile::Nodes;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::Vec3;
 
@@ -61,61 +57,6 @@ impl DividedFaces {
 }
 
 impl EdgeStore {
-    /// Claims the feature cells in which a surface with feature edges meets others.
-    pub fn claim_fitted(&mut self, local: &LocalSolid, signs: &mut Signs, nodes: &Nodes, surface: usize) {
-        self.fitted_to = Some(surface);
-        let mixed = |signs: &Signs, [i, j, k]: [usize; 3]| !matches!(signs.corners(surface, i, j, k), 0 | 0xff);
-        let mut found: Vec<[usize; 3]> = signs.feature_cells().collect();
-        found.retain(|c| mixed(signs, *c));
-        for &(_, node) in self.segments.keys().filter(|p| p.0 == surface) {
-            let cell = nodes.at(node);
-            let others = OtherSurfaces::of(local, signs, surface, cell);
-            if !mixed(signs, cell) && others.varies != 0 && !others.always_decides() && !others.never_decides() {
-                found.push(cell);
-            }
-        }
-        for cell in found {
-            let [i, j, k] = cell;
-            let row = k * nodes.shape[1] + j;
-            for plain in &mut signs.plain {
-                plain[row] &= !(1 << i);
-            }
-            signs.plain[surface][row] |= 1 << i;
-            signs.featured[row] |= 1 << i;
-            self.cells[row] |= 1 << i;
-            self.fitted[row] |= 1 << i;
-            self.surface.insert(nodes.index(cell), surface);
-        }
-    }
-
-    /// Whether a cell is fitted.
-    pub fn is_fitted(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
-        self.fitted[k * nodes.shape[1] + j] >> i & 1 == 1
-    }
-
-    /// For each row of cells: those that place the vertices of a surface on their grid edges by linear interpolation.
-    pub fn features<'a>(&self, signs: &'a Signs, surface: usize) -> Cow<'a, [u64]> {
-        if self.fitted_to != Some(surface) {
-            return Cow::Borrowed(&signs.featured);
-        }
-        let rows = signs.featured.iter().zip(&self.fitted);
-        Cow::Owned(rows.map(|(k, f)| k & !f).collect())
-    }
-
-    /// Adds the nodes around feature edges to those where the other surfaces are sampled.
-    pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
-        for &(_, node) in self.segments.keys() {
-            let [i, j, k] = nodes.at(node);
-            let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);
-            let row = around(i, 0).fold(0, |w, i| w | 1u64 << i);
-            for k in around(k, 2) {
-                for j in around(j, 1) {
-                    wanted[k * nodes.shape[1] + j] |= row;
-                }
-            }
-        }
-    }
-
     /// Whether the cell can use extra points on its faces and edges.
     pub(super) fn takes_extra_points<P: Fn(usize, usize) -> Option<Vec3>>(
         &self,
@@ -126,7 +67,7 @@ impl EdgeStore {
             return true;
         }
         let dead = || OtherSurfaces::of(context.local, context.signs, context.surface, cell).is_dead();
-        context.is_fitted() && (self.is_fitted(context.nodes, cell) || dead())
+        context.is_fitted() && (self.claims.is_fitted(context.nodes, cell) || dead())
     }
 }
 

@@ -140,7 +140,7 @@ impl EdgeStore {
 
     /// The segments of feature edges in a cell; none if there are too many.
     fn segments_in(&self, cell: Cell) -> &[[Vec3; 2]] {
-        let here = self.segments.get(&(cell.surface, cell.node));
+        let here = self.traced.segments.get(&(cell.surface, cell.node));
         here.filter(|p| p.len() <= MOST).map_or(&[], |p| p)
     }
 

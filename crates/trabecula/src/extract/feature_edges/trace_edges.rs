@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::EdgeStore;
+use rustc_hash::FxHashMap;
+
 use crate::extract::sampling_grid::{Grid, TILE};
 use crate::extract::tile::Nodes;
 use geometry::feature_edges::Creases;
@@ -20,9 +21,28 @@ pub(in crate::extract) struct PaddedNodes<'a> {
     pub before: [isize; 3],
 }
 
-impl EdgeStore {
+/// The feature edges of a block's live surfaces, cell by cell.
+#[derive(Default)]
+pub(in crate::extract) struct TracedEdges {
+    /// Points where feature edges pierce cell faces: surface, face, position.
+    pub(super) pierced: Vec<(usize, (usize, usize), Vec3)>,
+    /// Segments of feature edges in cells, by the surface and the lowest node of the cell.
+    pub(super) segments: FxHashMap<(usize, usize), Vec<[Vec3; 2]>>,
+    /// For each row of nodes: those within two cells of a feature edge.
+    near: Vec<u64>,
+}
+
+impl TracedEdges {
+    /// Forgets all edges, for a block of this shape.
+    pub(super) fn clear(&mut self, shape: [usize; 3]) {
+        self.pierced.clear();
+        self.segments.clear();
+        self.near.clear();
+        self.near.resize(shape[1] * shape[2], 0);
+    }
+
     /// Traces the feature edges of a live surface through the cells of the block.
-    pub fn trace_edges(&mut self, nodes: &Nodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
+    pub fn trace(&mut self, nodes: &Nodes, padded: &PaddedNodes, of: &Creases, surface: usize, segments: &[u32]) {
         for &i in segments {
             self.walk(nodes, padded, surface, of.segments[i as usize].ends);
         }
@@ -78,6 +98,20 @@ impl EdgeStore {
     /// tile that has these edges.
     pub fn are_near(&self, nodes: &Nodes, [i, j, k]: [usize; 3]) -> bool {
         self.near[k * nodes.shape[1] + j] >> i & 1 == 1
+    }
+
+    /// Adds the nodes around feature edges to those where the other surfaces are sampled.
+    pub fn wanted(&self, nodes: &Nodes, wanted: &mut [u64]) {
+        for &(_, node) in self.segments.keys() {
+            let [i, j, k] = nodes.at(node);
+            let around = |x: usize, a: usize| x.saturating_sub(1)..(x + 3).min(nodes.shape[a]);
+            let row = around(i, 0).fold(0, |w, i| w | 1u64 << i);
+            for k in around(k, 2) {
+                for j in around(j, 1) {
+                    wanted[k * nodes.shape[1] + j] |= row;
+                }
+            }
+        }
     }
 }
 

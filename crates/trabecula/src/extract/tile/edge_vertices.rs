@@ -16,7 +16,7 @@ pub(super) fn list_vertices(s: &mut Scratch, nodes: &Nodes) {
     numbers.resize_with(signs.negative.len(), Numbers::default);
     let any_feature = signs.has_features();
     for (surface, numbers) in numbers.iter_mut().enumerate() {
-        let features = if any_feature { Some(edges.features(signs, surface)) } else { None };
+        let features = if any_feature { Some(edges.claims.features(signs, surface)) } else { None };
         list_surface(signs, numbers, vertices, nodes, surface, features.as_deref());
     }
 }

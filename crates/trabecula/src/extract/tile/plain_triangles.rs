@@ -20,7 +20,7 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, o
     for (surface, numbers) in numbers.iter().enumerate().take(local.live.len()) {
         let kind = if grid.surfaces[local.live[surface]].cut { Kind::Cut } else { Kind::Lattice };
         let before = plain.triangles.len();
-        list_patches(signs, &edges.cells, numbers, surface, own, kind, plain);
+        list_patches(signs, &edges.claims.cells, numbers, surface, own, kind, plain);
         plain.counts.push(plain.triangles.len() - before);
     }
 }

@@ -52,7 +52,7 @@ pub(super) fn balance(s: &mut Scratch, grid: &Grid, local: &LocalSolid, nodes: &
             let node = v.node.map(usize::from);
             let on_border =
                 (0..3).filter(|a| *a != usize::from(v.axis)).any(|a| node[a] == own[a].start || node[a] == own[a].end);
-            if on_border && creased[usize::from(v.surface)] && s.edges.are_near(nodes, node) {
+            if on_border && creased[usize::from(v.surface)] && s.edges.traced.are_near(nodes, node) {
                 *m = (0.0, 0.0);
             }
         }
