@@ -14,7 +14,7 @@ use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Unio
 use trabecula::solid::Solid;
 use trabecula::surface_maker::{Components, Islands, Options, SurfaceMaker};
 
-use crate::common::{ball, check, lattice, meshed, solid, stl, stream};
+use crate::common::{ball, cases, check, lattice, meshed, solid, stl, stream};
 
 const WAVELENGTH: [f64; 3] = [1.0, 1.1, 0.9];
 
@@ -238,7 +238,7 @@ fn region(kind: usize, r: f64, s: f64, t: f64) -> Region {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(40) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any cell, part, fraction, orientation and region, however coarse the grid.
     #[test]

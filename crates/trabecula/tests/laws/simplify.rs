@@ -17,7 +17,7 @@ use trabecula::grade::Grade;
 use trabecula::lattice::Level;
 use trabecula::region::{Cuboid, Cylinder, Region};
 
-use crate::common::{ball, check, drawn, lattice_at, region, solid};
+use crate::common::{ball, cases, check, drawn, lattice_at, region, solid};
 
 fn cube(edge: f64) -> Region {
     Arc::new(Cuboid::new([0.0; 3], [edge; 3]).expect("box"))
@@ -266,7 +266,7 @@ fn what_cannot_be_done_is_refused_with_numbers() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(32) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any cell, part, fraction, orientation and region, however coarse the grid and however large the tolerance.
     #[test]

@@ -18,7 +18,7 @@ use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegio
 use trabecula::skin::skin;
 use trabecula::solid::Solid;
 
-use crate::common::{ball, check, check_both, cuboid, drawn, lattice};
+use crate::common::{ball, cases, check, check_both, cuboid, drawn, lattice};
 
 /// A lattice with nothing solid.
 struct Nothing;
@@ -439,7 +439,7 @@ fn the_field_is_membership_by_set_logic() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(48) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any region, skin, opening, zone and lattice, however coarse the grid.
     #[test]

@@ -17,6 +17,8 @@ use trabecula::map::{Affine, Map};
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;
 
+use crate::common::cases;
+
 fn series(name: &str) -> Series {
     Series::new(named(name).expect(name).terms()).expect(name)
 }
@@ -223,7 +225,7 @@ fn fractions_are_those_of_the_field() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(10))]
+    #![proptest_config(ProptestConfig::with_cases(cases(10) as u32))]
 
     /// No value in a box lies outside its bound, and points and gradients give the same values.
     #[test]
