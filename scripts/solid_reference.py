@@ -10,126 +10,8 @@ cubes of a fine grid (scipy labels them). Where a number is known in closed form
 import argparse
 
 import numpy as np
-from cell_reference import formula, waves
+from corpus_solids import CLOSED, SOLIDS
 from scipy import ndimage
-
-TAU = 2 * np.pi
-
-
-def rotation(x, y, z):
-    """Rx Ry Rz, degrees."""
-    (sx, cx), (sy, cy), (sz, cz) = ((np.sin(a), np.cos(a)) for a in np.radians((x, y, z)))
-    rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return rx @ ry @ rz
-
-
-def seen(name, p, matrix, offset=(0, 0, 0)):
-    """The named cell at phases matrix (p - offset)."""
-    u = [sum(matrix[i][k] * (p[k] - offset[k]) for k in range(3)) for i in range(3)]
-    return formula(name, *map(waves, u))
-
-
-def box(p, low, high):
-    """A function with the sign of the distance to a box."""
-    parts = [np.maximum(low[k] - p[k], p[k] - high[k]) for k in range(3)]
-    return np.maximum(np.maximum(parts[0], parts[1]), parts[2])
-
-
-def ball(p, centre, radius):
-    """Distance to a sphere."""
-    return np.sqrt(sum((p[k] - centre[k]) ** 2 for k in range(3))) - radius
-
-
-def tube(p, radius, low, high):
-    """A function with the sign of the distance to an upright cylinder."""
-    return np.maximum(np.hypot(p[0], p[1]) - radius, np.maximum(low - p[2], p[2] - high))
-
-
-def ramp(s, s0, v0, s1, v1):
-    """Linear between two stops, constant beyond."""
-    return v0 + (v1 - v0) * np.clip((s - s0) / (s1 - s0), 0, 1)
-
-
-def lens(p):
-    """The ball of radius 9 about (0, 0, -4) above z = -1, grown by 0.5 as min and max do it."""
-    return np.maximum(ball(p, (0, 0, -4), 9), -1 - p[2]) - 0.5
-
-
-def iso(n):
-    """Scaling by 1/n."""
-    return np.eye(3) / n
-
-
-SHEAR = np.array([[1, 0, -np.tan(np.radians(20))], [0, 1, 0], [0, 0, 1]])
-MOVED = (0.3, 0.7, 1.1)
-T30 = 0.463951958  # gyroid, sheet, fraction 0.30: corpus/cells.toml
-D35 = 0.365449953  # diamond, f >= t, fraction 0.35: the sheet of fraction 0.3 has this half-level, and V(-t) = 0.35
-
-# name: (bounds, region, lattice), negative inside
-SOLIDS = {
-    "lamellae": (
-        ((-5,) * 3, (5,) * 3),
-        lambda p: box(p, (-5,) * 3, (5,) * 3),
-        lambda p: np.cos(TAU * (p[0] - 0.3) / 5) + 0 * p[1] * p[2],
-    ),
-    "gyroid_half": (
-        ((-5,) * 3, (5,) * 3),
-        lambda p: box(p, (-5,) * 3, (5,) * 3),
-        lambda p: seen("gyroid", p, iso(5), MOVED),
-    ),
-    "gyroid_sheet_30": (
-        ((0,) * 3, (10,) * 3),
-        lambda p: box(p, (0,) * 3, (10,) * 3),
-        lambda p: np.abs(seen("gyroid", p, iso(5), MOVED)) - T30,
-    ),
-    "diamond_upper_porous": (
-        ((0,) * 3, (12, 10, 8)),
-        lambda p: box(p, (0,) * 3, (12, 10, 8)),
-        lambda p: D35 - seen("diamond", p, np.diag([1 / 6, 1 / 5, 1 / 4]), MOVED),
-    ),
-    "primitive_cavities": (
-        ((-2.5,) * 3, (7.5,) * 3),
-        lambda p: box(p, (-2.5,) * 3, (7.5,) * 3),
-        lambda p: seen("primitive", p, iso(5)) - 2.5,
-    ),
-    "primitive_blobs": (
-        ((-2.5,) * 3, (7.5,) * 3),
-        lambda p: box(p, (-2.5,) * 3, (7.5,) * 3),
-        lambda p: 2.5 - seen("primitive", p, iso(5)),
-    ),
-    "iwp_ball": (
-        ((-5, -4, -3), (7, 8, 9)),
-        lambda p: ball(p, (1, 2, 3), 6),
-        lambda p: np.abs(seen("iwp", p, iso(5) @ rotation(10, 20, 30).T, (0.5, -0.25, 1.0))) - 0.9,
-    ),
-    "spartan_cylinder": (
-        ((-6, -6, -4), (6, 6, 5)),
-        lambda p: tube(p, 6, -4, 5),
-        lambda p: seen("gyroid_mirrored", p, rotation(20, 35, 50).T @ np.diag([1 / 4, 1 / 5, 1 / 6])) - 0.25,
-    ),
-    "linear_slab": (
-        ((0,) * 3, (20, 8, 8)),
-        lambda p: box(p, (0,) * 3, (20, 8, 8)),
-        lambda p: np.abs(seen("gyroid", p, iso(4), MOVED)) - ramp(p[0], 2, 0.2, 18, 0.9),
-    ),
-    "depth_ball": (
-        ((-7,) * 3, (7,) * 3),
-        lambda p: ball(p, (0,) * 3, 7),
-        lambda p: np.abs(seen("primitive", p, iso(5))) - ramp(-ball(p, (0,) * 3, 7), 0, 0.9, 4, 0.3),
-    ),
-    "formula_ring": (
-        ((-9, -9, 0), (9, 9, 5)),
-        lambda p: np.maximum(tube(p, 9, 0, 5), -tube(p, 4, -1, 6)),
-        lambda p: np.abs(seen("diamond", p, iso(5))) - (0.4 + 0.1 * np.sin(p[0] / 3)),
-    ),
-    "skewed_lens": (
-        ((-9.5, -9.5, -1.5), (9.5, 9.5, 5.5)),
-        lens,
-        lambda p: -seen("neovius", p, iso(6) @ SHEAR),
-    ),
-}
 
 
 def sweep(bounds, region, lattice, axis, n, samples):
@@ -199,12 +81,16 @@ def topology(bounds, region, lattice, n):
 def main():
     """Print the numbers."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("names", nargs="*", default=list(SOLIDS))
+    options.add_argument("names", nargs="*", default=[*SOLIDS, *CLOSED])
     options.add_argument("--lines", type=int, default=200)
     options.add_argument("--samples", type=int, default=400)
     options.add_argument("--grid", type=int, default=200)
     a = options.parse_args()
     for name in a.names:
+        if name in CLOSED:
+            numbers = zip(("volume", "area"), CLOSED[name](), strict=False)
+            print(f"[{name}]", *(f"{key} = {value:.6f}" for key, value in numbers), "", sep="\n", flush=True)
+            continue
         solid = SOLIDS[name]
         sweeps = [sweep(*solid, axis, a.lines, a.samples) for axis in range(3)]
         volumes = [v for v, _ in sweeps]

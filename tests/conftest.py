@@ -1,6 +1,12 @@
 """Designs that several tests use."""
 
+import contextlib
+import io
+import signal
+import warnings
+
 import pytest
+from trabecula import cli
 
 CUBE = """schema = 1
 units = "mm"
@@ -22,3 +28,18 @@ def cube(tmp_path):
     path = tmp_path / "cube.toml"
     path.write_text(CUBE)
     return path
+
+
+def in_process(*words, status=0):
+    """What the command prints, without the start of another process."""
+    signals = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    handlers = {which: signal.getsignal(which) for which in signals}
+    out, err = io.StringIO(), io.StringIO()
+    try:
+        with warnings.catch_warnings(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            found = cli.main([str(word) for word in words])
+    finally:
+        for which, handler in handlers.items():
+            signal.signal(which, handler)
+    assert found == status, err.getvalue()
+    return out.getvalue()
