@@ -1,8 +1,11 @@
-//! Grey pictures: PNG (ISO/IEC 15948), and the plain part of TIFF 6.0, of which a file may hold many.
+//! Grey pictures: PNG, and TIFF, of which a file may hold many (crates `png` and `tiff`).
 
-use std::io::Read;
+use std::io::{Cursor, ErrorKind};
 
-use flate2::read::ZlibDecoder;
+use png::{ColorType, DecodingError};
+use tiff::TiffError;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
 
 use crate::fault::Fault;
 
@@ -21,11 +24,11 @@ pub struct Picture {
 /// The pictures in a file: one in a PNG, one or more in a TIFF. What kind it is its first bytes say.
 ///
 /// # Errors
-/// Neither of the two, colours, interlaced or tiled pixels, a packing that is not read here, too few bytes.
+/// Neither of the two, colours, a compression that is not read here, too few bytes.
 pub fn read_pictures(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
     match bytes.get(..4) {
-        Some(b"\x89PNG") => Ok(vec![png(bytes)?]),
-        Some(b"II*\0" | b"MM\0*") => tiff(bytes),
+        Some(b"\x89PNG") => Ok(vec![read_png(bytes)?]),
+        Some(b"II*\0" | b"MM\0*") => read_tiff(bytes),
         _ => Err(fault("neither a PNG nor a TIFF picture")),
     }
 }
@@ -34,21 +37,13 @@ fn fault(message: impl Into<String>) -> Fault {
     Fault::new("", message)
 }
 
-fn cut() -> Fault {
+fn truncated() -> Fault {
     fault("the file ends early: truncated")
 }
 
-fn pixels(size: [usize; 2]) -> Result<usize, Fault> {
+fn check_size(size: [usize; 2]) -> Result<usize, Fault> {
     let all = size[0].checked_mul(size[1]).filter(|n| *n > 0 && *n <= MOST);
-    all.ok_or_else(|| fault(format!("a picture of {} × {} pixels", size[0], size[1])))
-}
-
-/// What is packed, no more than `most` bytes of it.
-fn unpacked(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
-    let mut out = Vec::new();
-    let read = ZlibDecoder::new(packed).take(most as u64).read_to_end(&mut out);
-    read.map_err(|e| fault(format!("its pixels do not unpack: {e}")))?;
-    if out.len() < most { Err(cut()) } else { Ok(out) }
+    all.ok_or_else(|| fault(format!("a picture of {} × {} pixels; 1 to {MOST} are read", size[0], size[1])))
 }
 
 /// The numbers of a row of samples of some bits, the highest first.
@@ -65,7 +60,7 @@ fn samples(row: &[u8], bits: usize, count: usize) -> Vec<f64> {
     (0..count).map(one).collect()
 }
 
-/// Grey of a pixel of several channels: the first, if those of a colour agree; the last of two or four is how opaque it is.
+/// Grey of a pixel of several channels: the first, if those of a colour agree; the last of two or four is the opacity.
 fn grey(row: &[f64], channels: usize) -> Result<Vec<f64>, Fault> {
     let each = row.chunks_exact(channels).map(|p| {
         let colours = &p[..channels - usize::from(channels.is_multiple_of(2))];
@@ -75,199 +70,134 @@ fn grey(row: &[f64], channels: usize) -> Result<Vec<f64>, Fault> {
     each.collect()
 }
 
-fn png(bytes: &[u8]) -> Result<Picture, Fault> {
-    let (mut at, mut header, mut packed) = (8, None, Vec::new());
-    loop {
-        let head = bytes.get(at..at + 8).ok_or_else(cut)?;
-        let long = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
-        let data = bytes.get(at + 8..).and_then(|b| b.get(..long)).ok_or_else(cut)?;
-        match &head[4..] {
-            b"IHDR" => header = Some(data),
-            b"IDAT" => packed.extend_from_slice(data),
-            b"IEND" => break,
-            _ => {}
-        }
-        at += long + 12;
+fn png_fault(e: DecodingError) -> Fault {
+    match e {
+        DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => truncated(),
+        e => fault(format!("a PNG that cannot be read: {e}")),
     }
-    let h = header.filter(|h| h.len() >= 13).ok_or_else(cut)?;
-    let side = |i: usize| u32::from_be_bytes([h[i], h[i + 1], h[i + 2], h[i + 3]]) as usize;
-    let (size, bits) = ([side(0), side(4)], usize::from(h[8]));
-    let channels = match h[9] {
-        0 => 1,
-        2 => 3,
-        4 => 2,
-        6 => 4,
-        _ => {
-            return Err(fault("a picture with a palette of colours; a grade needs grey ones"));
-        }
-    };
-    if h[12] != 0 {
-        return Err(fault("an interlaced PNG; save it without interlacing"));
+}
+
+fn read_png(bytes: &[u8]) -> Result<Picture, Fault> {
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: MOST });
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let mut reader = decoder.read_info().map_err(png_fault)?;
+    let info = reader.info();
+    let size = [info.width as usize, info.height as usize];
+    let (colour, bits) = (info.color_type, info.bit_depth as usize);
+    if colour == ColorType::Indexed {
+        return Err(fault("a picture with a palette of colours; a grade needs grey ones"));
     }
-    if ![1, 2, 4, 8, 16].contains(&bits) {
-        return Err(fault(format!("a PNG of {bits} bits")));
-    }
-    pixels(size)?;
-    let wide = (size[0] * channels * bits).div_ceil(8);
-    let back = (channels * bits).div_ceil(8);
-    let mut all = unpacked(&packed, (wide + 1) * size[1])?;
-    let (mut above, mut values) = (vec![0u8; wide], Vec::new());
-    for line in all.chunks_exact_mut(wide + 1) {
-        let (kind, row) = (line[0], &mut line[1..]);
-        for i in 0..wide {
-            let left = if i < back { 0 } else { row[i - back] };
-            let corner = if i < back { 0 } else { above[i - back] };
-            let guess = match kind {
-                0 => 0,
-                1 => left,
-                2 => above[i],
-                3 => ((u16::from(left) + u16::from(above[i])) / 2) as u8,
-                4 => nearest(left, above[i], corner),
-                _ => return Err(fault(format!("a PNG row with filter {kind}"))),
-            };
-            row[i] = row[i].wrapping_add(guess);
-        }
+    check_size(size)?;
+    let mut data = vec![0; reader.output_buffer_size().ok_or_else(truncated)?];
+    let frame = reader.next_frame(&mut data).map_err(png_fault)?;
+    reader.finish().map_err(png_fault)?;
+    let channels = colour.samples();
+    let mut values = Vec::with_capacity(size[0] * size[1]);
+    for row in data.chunks_exact(frame.line_size) {
         values.extend(grey(&samples(row, bits, size[0] * channels), channels)?);
-        above.copy_from_slice(row);
     }
     Ok(Picture { size, values })
 }
 
-/// Paeth's guess: of left, above and corner the one nearest to left + above − corner.
-fn nearest(left: u8, above: u8, corner: u8) -> u8 {
-    let [a, b, c] = [left, above, corner].map(i16::from);
-    let off = |v: i16| (a + b - c - v).abs();
-    if off(a) <= off(b) && off(a) <= off(c) {
-        left
-    } else if off(b) <= off(c) {
-        above
-    } else {
-        corner
+fn tiff_fault(e: TiffError) -> Fault {
+    match e {
+        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => truncated(),
+        e => fault(format!("a TIFF that cannot be read: {e}")),
     }
 }
 
-/// The numbers of a TIFF file in its own order of bytes.
-struct Tiff<'a> {
-    bytes: &'a [u8],
-    little: bool,
+type Tiff<'a> = Decoder<Cursor<&'a [u8]>>;
+
+fn open_tiff(bytes: &[u8]) -> Result<Tiff<'_>, Fault> {
+    let mut limits = Limits::default();
+    (limits.decoding_buffer_size, limits.intermediate_buffer_size) = (8 * MOST, 8 * MOST);
+    limits.ifd_value_size = bytes.len();
+    Ok(Decoder::new(Cursor::new(bytes)).map_err(tiff_fault)?.with_limits(limits))
 }
 
-impl Tiff<'_> {
-    fn number(&self, at: usize, long: usize) -> Result<usize, Fault> {
-        let b = self.bytes.get(at..at + long).ok_or_else(cut)?;
-        let next = |n: usize, b: &u8| n << 8 | usize::from(*b);
-        Ok(if self.little { b.iter().rev().fold(0, next) } else { b.iter().fold(0, next) })
-    }
-
-    /// The numbers of an entry of a directory.
-    fn entry(&self, at: usize) -> Result<Vec<usize>, Fault> {
-        let long = match self.number(at + 2, 2)? {
-            3 => 2,
-            4 => 4,
-            _ => 1,
+/// A copy in which white-is-zero pictures are black-is-zero ones: the numbers are wanted as they stand in the file.
+fn as_black_is_zero(bytes: &[u8]) -> Result<Vec<u8>, Fault> {
+    let mut copy = bytes.to_vec();
+    let mut file = open_tiff(bytes)?;
+    let little = bytes[0] == b'I';
+    loop {
+        let at = file.ifd_pointer().map_or(0, |p| p.0 as usize);
+        let two = |at: usize| {
+            let b = bytes.get(at..at + 2).map_or([0; 2], |b| [b[0], b[1]]);
+            if little { u16::from_le_bytes(b) } else { u16::from_be_bytes(b) }
         };
-        let count = self.number(at + 4, 4)?;
-        if count > self.bytes.len() {
-            return Err(cut());
-        }
-        let from = if count * long <= 4 { at + 8 } else { self.number(at + 8, 4)? };
-        (0..count).map(|i| self.number(from + i * long, long)).collect()
-    }
-}
-
-fn tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
-    let file = Tiff { bytes, little: bytes[0] == b'I' };
-    let (mut next, mut seen, mut out) = (file.number(4, 4)?, Vec::new(), Vec::new());
-    while next != 0 {
-        if seen.contains(&next) {
-            return Err(fault("a TIFF whose pictures go round in a ring"));
-        }
-        seen.push(next);
-        let count = file.number(next, 2)?;
-        let tag = |wanted: usize| -> Result<Option<Vec<usize>>, Fault> {
-            for i in 0..count {
-                let at = next + 2 + 12 * i;
-                if file.number(at, 2)? == wanted {
-                    return file.entry(at).map(Some);
-                }
-            }
-            Ok(None)
-        };
-        let one = |wanted: usize, usual: usize| -> Result<usize, Fault> {
-            Ok(tag(wanted)?.and_then(|v| v.first().copied()).unwrap_or(usual))
-        };
-        let size = [one(256, 0)?, one(257, 0)?];
-        let all = pixels(size)?;
-        let (bits, packing, channels) = (one(258, 1)?, one(259, 1)?, one(277, 1)?);
-        let (format, step) = (one(339, 1)?, one(317, 1)?);
-        if channels != 1 || one(262, 1)? > 1 {
-            return Err(fault("a TIFF in colours; a grade needs grey ones"));
-        }
-        let known = match format {
-            1 | 2 => [8, 16, 32].contains(&bits),
-            3 => [32, 64].contains(&bits),
-            _ => false,
-        };
-        if !known {
-            return Err(fault(format!(
-                "a TIFF of {bits} bits (sample format {format}); whole numbers of 8, 16 or 32 bits and floating ones of 32 \
-                 or 64 are read"
-            )));
-        }
-        if step != 1 && !(step == 2 && format < 3) {
-            return Err(fault(format!("a TIFF with predictor {step}; save it without one")));
-        }
-        let Some(starts) = tag(273)? else {
-            return Err(fault("a TIFF in tiles; save it in strips"));
-        };
-        let lengths = tag(279)?.unwrap_or_default();
-        let (rows, wide) = (one(278, size[1])?.clamp(1, size[1]), size[0] * bits / 8);
-        let mut values = Vec::with_capacity(all);
-        for (i, start) in starts.iter().enumerate() {
-            let here = rows.min(size[1].saturating_sub(i * rows)) * wide;
-            let long = lengths.get(i).copied().unwrap_or(here);
-            let packed = bytes.get(*start..).and_then(|b| b.get(..long)).ok_or_else(cut)?;
-            let strip = match packing {
-                1 => packed.get(..here).ok_or_else(cut)?.to_vec(),
-                8 | 32946 => unpacked(packed, here)?,
-                other => {
-                    return Err(fault(format!("a TIFF with compression {other}; save it without one, or deflated")));
-                }
-            };
-            for row in strip.chunks_exact(wide) {
-                values.extend(tiff_row(row, bits, format, file.little, step == 2));
+        let entries = (0..usize::from(two(at))).map(|i| at + 2 + 12 * i);
+        for entry in entries.filter(|e| two(*e) == Tag::PhotometricInterpretation.to_u16()) {
+            // The number is of two bytes (type 3) or four.
+            let wide = if two(entry + 2) == 3 { 2 } else { 4 };
+            if let Some(value) = copy.get_mut(entry + 8..entry + 8 + wide)
+                && value.iter().all(|b| *b == 0)
+            {
+                value[if little { 0 } else { wide - 1 }] = 1;
             }
         }
-        if values.len() != all {
-            return Err(cut());
+        if !file.more_images() {
+            return Ok(copy);
         }
-        out.push(Picture { size, values });
-        next = file.number(next + 2 + 12 * count, 4)?;
+        file.next_image().map_err(tiff_fault)?;
     }
-    if out.is_empty() { Err(fault("a TIFF without pictures")) } else { Ok(out) }
 }
 
-fn tiff_row(row: &[u8], bits: usize, format: usize, little: bool, steps: bool) -> Vec<f64> {
-    let mut last = 0u64;
-    let each = row.chunks_exact(bits / 8).map(|b| {
-        let mut v = 0u64;
-        for i in 0..b.len() {
-            v = v << 8 | u64::from(b[if little { b.len() - 1 - i } else { i }]);
+/// Refuses pictures whose pixels lie beyond the end of the file: the last bytes of a packed strip are a checksum.
+fn check_ends(file: &mut Tiff, most: usize) -> Result<(), Fault> {
+    for (starts, counts) in [(Tag::StripOffsets, Tag::StripByteCounts), (Tag::TileOffsets, Tag::TileByteCounts)] {
+        let mut numbers =
+            |tag| Ok::<Vec<u64>, Fault>(file.find_tag_unsigned_vec(tag).map_err(tiff_fault)?.unwrap_or_default());
+        let (starts, counts) = (numbers(starts)?, numbers(counts)?);
+        if starts.iter().zip(counts).any(|(start, count)| start.saturating_add(count) > most as u64) {
+            return Err(truncated());
         }
-        if steps {
-            v = v.wrapping_add(last) & (u64::MAX >> (64 - bits));
-            last = v;
+    }
+    Ok(())
+}
+
+fn read_tiff(bytes: &[u8]) -> Result<Vec<Picture>, Fault> {
+    let bytes = as_black_is_zero(bytes)?;
+    let mut file = open_tiff(&bytes)?;
+    let mut pictures = Vec::new();
+    loop {
+        check_ends(&mut file, bytes.len())?;
+        pictures.push(tiff_picture(&mut file)?);
+        if !file.more_images() {
+            return Ok(pictures);
         }
-        match (format, bits) {
-            (3, 32) => f64::from(f32::from_bits(v as u32)),
-            (3, _) => f64::from_bits(v),
-            (2, 8) => f64::from(v as u8 as i8),
-            (2, 16) => f64::from(v as u16 as i16),
-            (2, _) => f64::from(v as u32 as i32),
-            _ => v as f64,
-        }
-    });
-    each.collect()
+        file.next_image().map_err(tiff_fault)?;
+    }
+}
+
+fn tiff_picture(file: &mut Tiff) -> Result<Picture, Fault> {
+    let (width, height) = file.dimensions().map_err(tiff_fault)?;
+    let size = [width as usize, height as usize];
+    check_size(size)?;
+    let tiff::ColorType::Gray(bits) = file.colortype().map_err(tiff_fault)? else {
+        return Err(fault("a TIFF in colours; a grade needs grey ones"));
+    };
+    if bits < 8 {
+        return Err(fault(format!("a TIFF of {bits} bits; 8, 16, 32 and 64 are read")));
+    }
+    fn wide<T: Copy>(v: Vec<T>, f: impl Fn(T) -> f64) -> Vec<f64> {
+        v.into_iter().map(f).collect()
+    }
+    let values = match file.read_image().map_err(tiff_fault)? {
+        DecodingResult::U8(v) => wide(v, f64::from),
+        DecodingResult::U16(v) => wide(v, f64::from),
+        DecodingResult::U32(v) => wide(v, f64::from),
+        DecodingResult::U64(v) => wide(v, |x| x as f64),
+        DecodingResult::I8(v) => wide(v, f64::from),
+        DecodingResult::I16(v) => wide(v, f64::from),
+        DecodingResult::I32(v) => wide(v, f64::from),
+        DecodingResult::I64(v) => wide(v, |x| x as f64),
+        DecodingResult::F16(v) => wide(v, f64::from),
+        DecodingResult::F32(v) => wide(v, f64::from),
+        DecodingResult::F64(v) => v,
+    };
+    Ok(Picture { size, values })
 }
 
 #[cfg(test)]
@@ -368,7 +298,12 @@ mod tests {
         // The offset of the next picture is that of the first.
         let at = 8 + 2 + 12 * 8;
         ring[at] = 8;
-        assert!(read_pictures(&ring).expect_err("ring").message.contains("ring"));
+        assert!(read_pictures(&ring).expect_err("ring").message.contains("cycle"));
+        // White as zero: the numbers are those of the file.
+        let at = 8 + 2 + 12 * 4 + 8;
+        let mut white = odd;
+        white[at] = 0;
+        assert_eq!(read_pictures(&white).expect("white").first().map(|p| p.values.clone()), Some(vec![1.0; 6]));
         assert!(read_pictures(b"GIF89a").is_err() && read_pictures(b"").is_err());
     }
 }
