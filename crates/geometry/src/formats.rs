@@ -21,6 +21,7 @@ mod threemf;
 mod vti;
 mod vtk;
 mod vtu;
+mod xml;
 
 pub use elements::Elements;
 pub use npy::{read_npy, write_npy};

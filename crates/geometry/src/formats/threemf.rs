@@ -5,14 +5,15 @@
 use std::io::{self, Write};
 
 use super::number::{push_f32, push_u32};
+use super::xml::escaped;
 use super::{Metadata, in_order, invalid};
 use crate::mesh::Mesh;
 
 mod deflate;
+mod package;
 mod read;
-pub(super) mod xml;
-mod zip;
 
+use package::{Entry, Piece};
 pub use read::read;
 
 const MODEL: &str = "3D/3dmodel.model";
@@ -36,17 +37,17 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
     if mesh.vertices.len() >= i32::MAX as usize || mesh.triangles.len() >= i32::MAX as usize {
         return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
-    let mut model = zip::Entry::new(MODEL);
+    let mut model = Entry::new(MODEL);
     let mut head = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{CORE}\" \
          xmlns:trabecula=\"urn:trabecula:design\">\n"
     );
     let facts = [("Title", &meta.title), ("Application", &meta.application), ("trabecula:Design", &meta.design)];
     for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
-        head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", xml::escaped(text)));
+        head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text)));
     }
     head.push_str("<resources>\n<object id=\"1\" type=\"model\">\n<mesh>\n<vertices>\n");
-    model.push(zip::deflate(head.as_bytes()));
+    model.push(Piece::of(head.as_bytes()));
     let points = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
         for p in &mesh.vertices[r] {
@@ -59,14 +60,14 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
             push_f32(&mut text, z);
             text.extend_from_slice(b"\"/>\n");
         }
-        zip::deflate_rows(&text)
+        Piece::of(&text)
     };
     let mut put = |piece| {
         model.push(piece);
         Ok(())
     };
     in_order(mesh.vertices.len(), 1 << 14, points, &mut put)?;
-    put(zip::deflate(b"</vertices>\n<triangles>\n"))?;
+    put(Piece::of(b"</vertices>\n<triangles>\n"))?;
     let faces = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 56);
         for [a, b, c] in &mesh.triangles[r] {
@@ -78,14 +79,14 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
             push_u32(&mut text, *c);
             text.extend_from_slice(b"\"/>\n");
         }
-        zip::deflate_rows(&text)
+        Piece::of(&text)
     };
     in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)?;
     let tail = "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
-    put(zip::deflate(tail.as_bytes()))?;
-    let mut types = zip::Entry::new("[Content_Types].xml");
-    types.push(zip::deflate(TYPES.as_bytes()));
-    let mut relations = zip::Entry::new("_rels/.rels");
-    relations.push(zip::deflate(RELATIONS.as_bytes()));
-    zip::write(&[types, relations, model], zip::LIMIT, out)
+    put(Piece::of(tail.as_bytes()))?;
+    let mut types = Entry::new("[Content_Types].xml");
+    types.push(Piece::of(TYPES.as_bytes()));
+    let mut relations = Entry::new("_rels/.rels");
+    relations.push(Piece::of(RELATIONS.as_bytes()));
+    package::write(&[types, relations, model], package::LIMIT, out)
 }

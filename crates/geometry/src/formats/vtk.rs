@@ -4,11 +4,15 @@
 
 mod legacy;
 
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::Read;
+
+use quick_xml::events::{BytesStart, Event};
 
 use super::elements::Elements;
 use super::text::shown;
-use super::threemf::xml::{Event, Scanner, attribute};
+use super::xml::{Scanner, attribute};
 use crate::fault::Fault;
 use crate::math::Vec3;
 
@@ -76,6 +80,7 @@ struct Raw<'a> {
 }
 
 /// How the numbers of a file are laid down.
+#[derive(Default)]
 struct Layout<'a> {
     big: bool,
     wide: bool,
@@ -88,107 +93,36 @@ fn find(bytes: &[u8], what: &[u8]) -> Option<usize> {
     bytes.windows(what.len()).position(|w| w == what)
 }
 
+/// What the elements before the appended data say.
+struct File<'a> {
+    layout: Layout<'a>,
+    kind: String,
+    extent: Option<[i64; 6]>,
+    origin: Vec3,
+    step: Vec3,
+    pieces: usize,
+    points: usize,
+    cells: usize,
+    section: String,
+    arrays: Vec<Raw<'a>>,
+}
+
 fn xml(bytes: &[u8]) -> Result<Data, Fault> {
-    let appended = find(bytes, b"<AppendedData");
-    // What comes after may be raw bytes and is no XML.
-    let head = &bytes[..appended.unwrap_or(bytes.len())];
-    let mut layout = Layout { big: false, wide: false, zlib: false, appended: None };
-    if let Some(at) = appended {
-        let rest = &bytes[at..];
-        let end = find(rest, b">").ok_or_else(|| fault("the file ends early: truncated"))?;
-        let base64 = attribute(&rest[13..end], "encoding").is_some_and(|e| &*e == b"base64");
-        let from = find(&rest[end..], b"_").ok_or_else(|| fault("the appended data are missing"))?;
-        layout.appended = Some((&rest[end + from + 1..], base64));
-    }
-    let mut scanner = Scanner::of(head, "VTK file");
-    let (mut section, mut raw): (String, Vec<Raw>) = (String::new(), Vec::new());
-    let (mut kind, mut extent, mut origin, mut step) = (String::new(), None, [0.0; 3], [1.0; 3]);
-    let (mut points, mut cells) = (0, 0);
-    let (mut root, mut pieces) = (false, 0);
-    let text = |of: &[u8], name: &str| attribute(of, name).map(|v| String::from_utf8_lossy(&v).into_owned());
-    let three = |of: &[u8], name: &str| -> Result<Option<Vec3>, Fault> {
-        let Some(t) = text(of, name) else {
-            return Ok(None);
-        };
-        let v: Vec<f64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-        v.try_into().map(Some).map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
-    };
-    loop {
-        let event = match scanner.next() {
-            Ok(Some(e)) => e,
-            Ok(None) => break,
-            // The root has no end before the appended data.
-            Err(_) if appended.is_some() => break,
-            Err(e) => return Err(e),
-        };
-        let Event::Start { name, attributes, .. } = event else {
-            continue;
-        };
-        match name {
-            b"VTKFile" => {
-                root = true;
-                kind = text(attributes, "type").unwrap_or_default();
-                layout.big = text(attributes, "byte_order").as_deref() == Some("BigEndian");
-                layout.wide = text(attributes, "header_type").as_deref() == Some("UInt64");
-                layout.zlib = match text(attributes, "compressor").as_deref() {
-                    None => false,
-                    Some("vtkZLibDataCompressor") => true,
-                    Some(other) => {
-                        return Err(fault(format!("compressed by {other}; save it compressed by zlib or not at all")));
-                    }
-                };
-                if kind != "ImageData" && kind != "UnstructuredGrid" {
-                    return Err(fault(format!(
-                        "a VTK file of {kind}; ImageData (vti) and UnstructuredGrid (vtu) are read"
-                    )));
-                }
-            }
-            b"ImageData" => {
-                origin = three(attributes, "Origin")?.unwrap_or(origin);
-                step = three(attributes, "Spacing")?.unwrap_or(step);
-                let t = text(attributes, "WholeExtent").unwrap_or_default();
-                let v: Vec<i64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-                extent = <[i64; 6]>::try_from(v).ok();
-            }
-            b"Piece" => {
-                pieces += 1;
-                let number = |n: &str| text(attributes, n).and_then(|t| t.parse().ok()).unwrap_or(0usize);
-                (points, cells) = (number("NumberOfPoints"), number("NumberOfCells"));
-            }
-            b"PointData" | b"CellData" | b"Points" | b"Cells" => {
-                section = String::from_utf8_lossy(name).into_owned();
-            }
-            b"DataArray" => {
-                let from = scanner.at();
-                let end = find(&head[from..], b"<").map_or(head.len(), |e| from + e);
-                raw.push(Raw {
-                    name: text(attributes, "Name").unwrap_or_default(),
-                    kind: text(attributes, "type").unwrap_or_default(),
-                    components: text(attributes, "NumberOfComponents").and_then(|t| t.parse().ok()).unwrap_or(1),
-                    format: text(attributes, "format").unwrap_or_else(|| "ascii".into()),
-                    offset: text(attributes, "offset").and_then(|t| t.parse().ok()).unwrap_or(0),
-                    text: &head[from..end],
-                    section: section.clone(),
-                });
-            }
-            _ => {}
-        }
-    }
-    if !root {
+    let file = File::read(bytes)?;
+    if file.kind.is_empty() {
         return Err(fault("no VTK file: it begins neither with \"# vtk\" nor has an element VTKFile"));
     }
-    if pieces != 1 {
-        return Err(fault(format!("a file of {pieces} pieces; save it as one")));
+    if file.pieces != 1 {
+        return Err(fault(format!("a file of {} pieces; save it as one", file.pieces)));
     }
-    let mut arrays = Vec::new();
-    let (mut place, mut connectivity, mut offsets, mut types) = (None, None, None, None);
-    for r in &raw {
-        let values = decode(r, &layout).map_err(|f| fault(format!("array \"{}\": {}", r.name, f.message)))?;
+    let (mut arrays, mut grid) = (Vec::new(), HashMap::new());
+    for r in &file.arrays {
+        let values = decode(r, &file.layout).map_err(|f| fault(format!("array \"{}\": {}", r.name, f.message)))?;
         match (r.section.as_str(), r.name.as_str()) {
-            ("Points", _) => place = Some(values),
-            ("Cells", "connectivity") => connectivity = Some(values),
-            ("Cells", "offsets") => offsets = Some(values),
-            ("Cells", "types") => types = Some(values),
+            ("Points", _) => drop(grid.insert("points", values)),
+            ("Cells", "connectivity") => drop(grid.insert("connectivity", values)),
+            ("Cells", "offsets") => drop(grid.insert("offsets", values)),
+            ("Cells", "types") => drop(grid.insert("cell types", values)),
             ("PointData" | "CellData", _) => arrays.push(Array {
                 name: r.name.clone(),
                 of_cells: r.section == "CellData",
@@ -198,31 +132,140 @@ fn xml(bytes: &[u8]) -> Result<Data, Fault> {
             _ => {}
         }
     }
-    let shape = if kind == "ImageData" {
-        let e = extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
-        let nodes = core::array::from_fn(|a| (e[2 * a + 1] - e[2 * a] + 1).clamp(1, 1 << 40) as usize);
-        points = nodes.iter().product();
-        cells = nodes.iter().map(|n| n.saturating_sub(1).max(1)).product();
-        Shape::Image { origin: core::array::from_fn(|a| origin[a] + e[2 * a] as f64 * step[a]), step, nodes }
-    } else {
-        let missing = |what: &str| fault(format!("the grid has no {what}"));
-        let place = place.ok_or_else(|| missing("points"))?;
-        let (connectivity, offsets, types) = (
-            connectivity.ok_or_else(|| missing("connectivity"))?,
-            offsets.ok_or_else(|| missing("offsets"))?,
-            types.ok_or_else(|| missing("cell types"))?,
-        );
-        if place.len() != 3 * points || types.len() != cells || offsets.len() != cells {
+    let (shape, points, cells) = if file.kind == "ImageData" { file.image()? } else { file.mesh(grid)? };
+    check(&arrays, points, cells)?;
+    Ok(Data { shape, arrays })
+}
+
+fn text(tag: &BytesStart, name: &str) -> Option<String> {
+    attribute(tag, name).map(Cow::into_owned)
+}
+
+fn number(tag: &BytesStart, name: &str) -> Option<usize> {
+    attribute(tag, name).and_then(|t| t.parse().ok())
+}
+
+fn three(tag: &BytesStart, name: &str) -> Result<Option<Vec3>, Fault> {
+    let Some(t) = attribute(tag, name) else {
+        return Ok(None);
+    };
+    let v: Vec<f64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    v.try_into().map(Some).map_err(|_| fault(format!("{name} = \"{t}\" is not three numbers")))
+}
+
+impl<'a> File<'a> {
+    fn read(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
+        let start = find(bytes, b"<AppendedData");
+        // What comes after may be raw bytes and is no XML.
+        let head = &bytes[..start.unwrap_or(bytes.len())];
+        let mut file = File {
+            layout: Layout::default(),
+            kind: String::new(),
+            extent: None,
+            origin: [0.0; 3],
+            step: [1.0; 3],
+            pieces: 0,
+            points: 0,
+            cells: 0,
+            section: String::new(),
+            arrays: Vec::new(),
+        };
+        let (mut buffer, mut scanner) = (Vec::new(), Scanner::new(head, "VTK file"));
+        loop {
+            match scanner.next(&mut buffer) {
+                Ok(Event::Start(tag)) => file.element(&tag, &head[scanner.at()..])?,
+                Ok(Event::Empty(tag)) => file.element(&tag, b"")?,
+                Ok(Event::Eof) => break,
+                Ok(_) => {}
+                // The root has no end before the appended data.
+                Err(_) if start.is_some() => break,
+                Err(e) => return Err(e),
+            }
+        }
+        if let Some(at) = start {
+            let rest = &bytes[at..];
+            let end = find(rest, b">").ok_or_else(|| fault("the file ends early: truncated"))?;
+            let base64 = find(&rest[..end], b"base64").is_some();
+            let from = find(&rest[end..], b"_").ok_or_else(|| fault("the appended data are missing"))?;
+            file.layout.appended = Some((&rest[end + from + 1..], base64));
+        }
+        Ok(file)
+    }
+
+    /// Takes in an element; `rest` is what follows its tag.
+    fn element(&mut self, tag: &BytesStart, rest: &'a [u8]) -> Result<(), Fault> {
+        match tag.name().into_inner() {
+            "VTKFile" => {
+                self.kind = text(tag, "type").unwrap_or_default();
+                self.layout.big = attribute(tag, "byte_order").is_some_and(|o| o == "BigEndian");
+                self.layout.wide = attribute(tag, "header_type").is_some_and(|t| t == "UInt64");
+                self.layout.zlib = match text(tag, "compressor").as_deref() {
+                    None => false,
+                    Some("vtkZLibDataCompressor") => true,
+                    Some(other) => {
+                        return Err(fault(format!("compressed by {other}; save it compressed by zlib or not at all")));
+                    }
+                };
+                if self.kind != "ImageData" && self.kind != "UnstructuredGrid" {
+                    let kind = &self.kind;
+                    return Err(fault(format!(
+                        "a VTK file of {kind}; ImageData (vti) and UnstructuredGrid (vtu) are read"
+                    )));
+                }
+            }
+            "ImageData" => {
+                self.origin = three(tag, "Origin")?.unwrap_or(self.origin);
+                self.step = three(tag, "Spacing")?.unwrap_or(self.step);
+                let t = text(tag, "WholeExtent").unwrap_or_default();
+                let v: Vec<i64> = t.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+                self.extent = <[i64; 6]>::try_from(v).ok();
+            }
+            "Piece" => {
+                self.pieces += 1;
+                self.points = number(tag, "NumberOfPoints").unwrap_or(0);
+                self.cells = number(tag, "NumberOfCells").unwrap_or(0);
+            }
+            section @ ("PointData" | "CellData" | "Points" | "Cells") => self.section = section.to_string(),
+            "DataArray" => self.arrays.push(Raw {
+                name: text(tag, "Name").unwrap_or_default(),
+                kind: text(tag, "type").unwrap_or_default(),
+                components: number(tag, "NumberOfComponents").unwrap_or(1),
+                format: text(tag, "format").unwrap_or_else(|| "ascii".into()),
+                offset: number(tag, "offset").unwrap_or(0),
+                text: &rest[..find(rest, b"<").unwrap_or(rest.len())],
+                section: self.section.clone(),
+            }),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The grid of an image, with the numbers of its nodes and cells.
+    fn image(&self) -> Result<(Shape, usize, usize), Fault> {
+        let e = self.extent.ok_or_else(|| fault("the image has no WholeExtent of six numbers"))?;
+        let along = |a: usize| e[2 * a + 1].saturating_sub(e[2 * a]).saturating_add(1).clamp(1, 1 << 40) as usize;
+        let nodes: [usize; 3] = core::array::from_fn(along);
+        let cells = nodes.map(|n| n.saturating_sub(1).max(1));
+        let product = |n: [usize; 3]| n.into_iter().fold(1, usize::saturating_mul);
+        let origin = core::array::from_fn(|a| self.origin[a] + e[2 * a] as f64 * self.step[a]);
+        Ok((Shape::Image { origin, step: self.step, nodes }, product(nodes), product(cells)))
+    }
+
+    /// The elements of an unstructured grid, with the numbers of its points and cells.
+    fn mesh(&self, mut grid: HashMap<&str, Vec<f64>>) -> Result<(Shape, usize, usize), Fault> {
+        let mut take = |what: &str| grid.remove(what).ok_or_else(|| fault(format!("the grid has no {what}")));
+        let (place, connectivity) = (take("points")?, take("connectivity")?);
+        let (offsets, types) = (take("offsets")?, take("cell types")?);
+        let (points, cells) = (self.points, self.cells);
+        if points.checked_mul(3) != Some(place.len()) || types.len() != cells || offsets.len() != cells {
             return Err(fault(format!(
                 "the grid says {points} points and {cells} cells, and has {} and {}",
                 place.len() / 3,
                 types.len()
             )));
         }
-        Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?)
-    };
-    check(&arrays, points, cells)?;
-    Ok(Data { shape, arrays })
+        Ok((Shape::Mesh(Elements::of_numbers(&place, &connectivity, &offsets, &types)?), points, cells))
+    }
 }
 
 /// Refuses arrays that do not have a tuple for each point or cell.

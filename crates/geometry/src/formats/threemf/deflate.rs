@@ -152,18 +152,20 @@ impl Tokens {
     }
 }
 
-/// Number of equal bytes from `a` and from `b` > `a` on.
+/// Number of equal bytes from `a` and from `b` > `a` on; counting ends soon after `LONGEST`.
 #[inline]
 fn common(text: &[u8], a: usize, b: usize) -> usize {
     let word = |i: usize| text.get(i..i + 8).and_then(|w| w.try_into().ok()).map(u64::from_le_bytes);
     let mut n = 0;
-    while let (Some(x), Some(y)) = (word(a + n), word(b + n)) {
+    while n < LONGEST
+        && let (Some(x), Some(y)) = (word(a + n), word(b + n))
+    {
         if x != y {
             return n + (x ^ y).trailing_zeros() as usize / 8;
         }
         n += 8;
     }
-    while b + n < text.len() && text[a + n] == text[b + n] {
+    while n < LONGEST && b + n < text.len() && text[a + n] == text[b + n] {
         n += 1;
     }
     n

@@ -1,14 +1,19 @@
 //! Reading of 3MF: what the build items place, in millimetres.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+
+use quick_xml::events::{BytesStart, Event};
+use zip::ZipArchive;
+use zip::result::ZipError;
 
 use super::MODEL;
-use super::xml::{Event, Scanner, attribute, required};
-use super::zip::Archive;
 use crate::fault::{Fault, counted};
 use crate::formats::join::Joiner;
 use crate::formats::text::{parse, shown};
+use crate::formats::xml::{Scanner, attribute, attribute_where};
 use crate::math::{Mat3, Vec3, add, apply, determinant, scale};
 use crate::mesh::Mesh;
 
@@ -57,13 +62,77 @@ struct Model {
     items: Vec<Use>,
 }
 
+/// What all files of an archive may inflate to: a multiple of the archive's size, and a constant. Meshes come to ten times.
+const MOST: (u64, u64) = (100, 1 << 24);
+
+fn fault(message: impl Into<String>) -> Fault {
+    Fault::new("", message)
+}
+
+/// An archive in memory.
+struct Package<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    /// Numbers of the files by name: small letters, no leading slash.
+    names: HashMap<String, usize>,
+    size: usize,
+    /// Bytes that may yet be inflated.
+    left: u64,
+}
+
+fn plain(name: &str) -> String {
+    name.trim_start_matches('/').to_ascii_lowercase()
+}
+
+impl<'a> Package<'a> {
+    fn open(bytes: &'a [u8]) -> Result<Self, Fault> {
+        let size = bytes.len();
+        let zip = ZipArchive::new(Cursor::new(bytes))
+            .map_err(|_| fault(format!("no ZIP directory in {size} bytes: truncated or not 3MF")))?;
+        let mut names = HashMap::new();
+        for i in 0..zip.len() {
+            if let Some(Ok(name)) = zip.name_for_index(i) {
+                names.entry(plain(&name)).or_insert(i);
+            }
+        }
+        Ok(Package { zip, names, size, left: MOST.0 * size as u64 + MOST.1 })
+    }
+
+    /// What `parse` makes of a file of the archive as it is inflated; its size and checksum are checked.
+    fn file<T>(&mut self, name: &str, parse: impl FnOnce(&mut dyn BufRead) -> Result<T, Fault>) -> Result<T, Fault> {
+        let index =
+            *self.names.get(&plain(name)).ok_or_else(|| fault(format!("the archive holds no \"{name}\": not 3MF")))?;
+        let file = self.zip.by_index(index).map_err(|e| match e {
+            ZipError::UnsupportedArchive(ZipError::PASSWORD_REQUIRED) => {
+                fault(format!("\"{name}\" is encrypted: save the file without a password"))
+            }
+            ZipError::CompressionMethodNotSupported(m) => {
+                fault(format!("\"{name}\" is packed by method {m}: only 0 and 8 (deflate) are read"))
+            }
+            e => fault(format!("\"{name}\" is damaged or truncated: {e}")),
+        })?;
+        let size = file.size();
+        self.left = self.left.checked_sub(size).ok_or_else(|| {
+            let (of, most) = (self.size, MOST.0);
+            fault(format!("\"{name}\" inflates to {size} bytes, from an archive of {of}: more than {most} times as much is no mesh"))
+        })?;
+        let mut content = BufReader::with_capacity(1 << 16, file.take(size + 1));
+        let parsed = parse(&mut content);
+        // The checksum is known at the end. A damaged file is called so, whatever its text seemed to say.
+        io::copy(&mut content, &mut io::sink()).map_err(|e| fault(format!("\"{name}\" is damaged: {e}")))?;
+        if content.into_inner().limit() != 1 {
+            return Err(fault(format!("\"{name}\" does not inflate to {size} bytes: damaged")));
+        }
+        parsed
+    }
+}
+
 /// Reads the objects that the build places (supports left out), joined to one mesh in mm.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let archive = Archive::new(bytes)?;
-    let root = archive.file("_rels/.rels").ok().and_then(|r| target(&r));
-    let root = root.or_else(|| archive.names().find(|n| n.to_ascii_lowercase().ends_with(".model")).map(String::from));
-    let root = root.unwrap_or_else(|| MODEL.to_string());
-    let main = model(&archive.file(&root)?)?;
+    let mut package = Package::open(bytes)?;
+    let root = package.file("_rels/.rels", |text| Ok(target(text))).ok().flatten();
+    let models = || package.names.iter().filter(|n| n.0.ends_with(".model")).min_by_key(|n| n.1).map(|n| n.0.clone());
+    let root = root.or_else(models).unwrap_or_else(|| MODEL.to_string());
+    let main = package.file(&root, model)?;
     if main.items.is_empty() {
         return Err(Fault::new(
             "",
@@ -76,7 +145,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     files.insert(String::new(), main);
     while let Some(path) = waiting.pop() {
         if let Entry::Vacant(place) = files.entry(path) {
-            let part = model(&archive.file(place.key())?)?;
+            let part = package.file(place.key(), model)?;
             waiting.extend(outside(&part));
             place.insert(part);
         }
@@ -91,16 +160,19 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
 }
 
 /// The path of the model from the package's relationships.
-fn target(relations: &[u8]) -> Option<String> {
-    let mut s = Scanner::new(relations);
-    while let Ok(Some(event)) = s.next() {
-        if let Event::Start { attributes, .. } = event
-            && attribute(attributes, "Type").is_some_and(|t| t.ends_with(b"/3dmodel"))
-        {
-            return Some(String::from_utf8_lossy(&attribute(attributes, "Target")?).into_owned());
+fn target(relations: &mut dyn BufRead) -> Option<String> {
+    let (mut buffer, mut s) = (Vec::new(), Scanner::new(relations, "relationships"));
+    loop {
+        match s.next(&mut buffer).ok()? {
+            Event::Start(tag) | Event::Empty(tag) => {
+                if attribute(&tag, "Type").is_some_and(|t| t.ends_with("/3dmodel")) {
+                    return Some(attribute(&tag, "Target")?.into_owned());
+                }
+            }
+            Event::Eof => return None,
+            _ => {}
         }
     }
-    None
 }
 
 /// Other files that a model's components and items name.
@@ -149,83 +221,96 @@ impl Placing<'_> {
     }
 }
 
+/// A model file as it is read.
+#[derive(Default)]
+struct Parsing {
+    model: Model,
+    /// What stands before the core's element names: empty, or "c:" and the like. Extensions have another.
+    prefix: Option<String>,
+    object: Option<(u32, Object)>,
+}
+
+type Source<'a> = Scanner<&'a mut dyn BufRead>;
+
 /// Parses one model file.
-fn model(bytes: &[u8]) -> Result<Model, Fault> {
-    let mut s = Scanner::new(bytes);
-    let mut model = Model::default();
-    let mut prefix: &[u8] = b"";
-    let mut started = false;
-    let mut object: Option<(u32, Object)> = None;
-    while let Some(event) = s.next()? {
-        let (name, attributes, empty) = match event {
-            Event::Start { name, attributes, empty } => (name, attributes, empty),
-            Event::End { name } => (name, &[][..], true),
-        };
-        if !started {
-            started = true;
-            let Some(p) = name.strip_suffix(b"model") else {
-                return Err(s.fault(format!("the root is {}, not a 3MF model", shown(name))));
-            };
-            prefix = p;
-            model.unit = unit(&s, attributes)?;
-            continue;
-        }
-        // Elements of extensions carry another prefix than the core's.
-        let Some(local) = name.strip_prefix(prefix) else {
-            continue;
-        };
-        if matches!(event, Event::End { .. }) || (local == b"object" && empty) {
-            if local == b"object"
-                && let Some((id, o)) = object.take()
-            {
-                check(&s, id, &o)?;
-                model.objects.insert(id, o);
+fn model(text: &mut dyn BufRead) -> Result<Model, Fault> {
+    let (mut buffer, mut s) = (Vec::new(), Scanner::new(text, "3MF model"));
+    let mut parsing = Parsing::default();
+    loop {
+        match s.next(&mut buffer)? {
+            Event::Start(tag) => parsing.start(&s, &tag)?,
+            Event::Empty(tag) => {
+                parsing.start(&s, &tag)?;
+                parsing.end(&s, tag.name().into_inner())?;
             }
-            continue;
-        }
-        match (local, &mut object) {
-            (b"object", None) => {
-                let support =
-                    attribute(attributes, "type").is_some_and(|t| matches!(&*t, b"support" | b"solidsupport"));
-                object = Some((required(&s, attributes, "id")?, Object { support, ..Object::default() }));
-            }
-            (b"vertex", Some((_, o))) => o.vertices.push(vertex(&s, attributes)?),
-            (b"triangle", Some((_, o))) => {
-                let index = |n| required(&s, attributes, n);
-                o.triangles.push([index("v1")?, index("v2")?, index("v3")?]);
-            }
-            (b"component", Some((_, o))) => o.components.push(using(&s, attributes)?),
-            (b"item", None) => model.items.push(using(&s, attributes)?),
+            Event::End(tag) => parsing.end(&s, tag.name().into_inner())?,
+            Event::Eof if parsing.prefix.is_none() => return Err(s.fault("no XML: truncated or not 3MF")),
+            Event::Eof => return Ok(parsing.model),
             _ => {}
         }
     }
-    if !started {
-        return Err(s.fault("no XML: truncated or not 3MF"));
-    }
-    Ok(model)
 }
 
-fn unit(s: &Scanner, attributes: &[u8]) -> Result<f64, Fault> {
-    let name = attribute(attributes, "unit").unwrap_or(b"millimeter"[..].into());
+impl Parsing {
+    fn start(&mut self, s: &Source, tag: &BytesStart) -> Result<(), Fault> {
+        let name = tag.name().into_inner();
+        let Some(prefix) = &self.prefix else {
+            let Some(prefix) = name.strip_suffix("model") else {
+                return Err(s.fault(format!("the root is {}, not a 3MF model", shown(name.as_bytes()))));
+            };
+            self.prefix = Some(prefix.to_string());
+            self.model.unit = unit(s, tag)?;
+            return Ok(());
+        };
+        match (name.strip_prefix(prefix.as_str()), &mut self.object) {
+            (Some("object"), None) => {
+                let support = attribute(tag, "type").is_some_and(|t| matches!(&*t, "support" | "solidsupport"));
+                self.object = Some((s.required(tag, "id")?, Object { support, ..Object::default() }));
+            }
+            (Some("vertex"), Some((_, o))) => o.vertices.push(vertex(s, tag)?),
+            (Some("triangle"), Some((_, o))) => {
+                o.triangles.push([s.required(tag, "v1")?, s.required(tag, "v2")?, s.required(tag, "v3")?]);
+            }
+            (Some("component"), Some((_, o))) => o.components.push(using(s, tag)?),
+            (Some("item"), None) => self.model.items.push(using(s, tag)?),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, s: &Source, name: &str) -> Result<(), Fault> {
+        let prefix = self.prefix.as_deref().unwrap_or_default();
+        if name.strip_prefix(prefix) == Some("object")
+            && let Some((id, o)) = self.object.take()
+        {
+            check(s, id, &o)?;
+            self.model.objects.insert(id, o);
+        }
+        Ok(())
+    }
+}
+
+fn unit(s: &Source, tag: &BytesStart) -> Result<f64, Fault> {
+    let name = attribute(tag, "unit").unwrap_or("millimeter".into());
     Ok(match &*name {
-        b"micron" => 0.001,
-        b"millimeter" => 1.0,
-        b"centimeter" => 10.0,
-        b"inch" => 25.4,
-        b"foot" => 304.8,
-        b"meter" => 1000.0,
+        "micron" => 0.001,
+        "millimeter" => 1.0,
+        "centimeter" => 10.0,
+        "inch" => 25.4,
+        "foot" => 304.8,
+        "meter" => 1000.0,
         _ => {
             let known = "micron, millimeter, centimeter, inch, foot, meter";
-            return Err(s.fault(format!("the unit {} is none of {known}", shown(&name))));
+            return Err(s.fault(format!("the unit {} is none of {known}", shown(name.as_bytes()))));
         }
     })
 }
 
 /// A vertex, in single precision as the format's other readers hold it.
-fn vertex(s: &Scanner, attributes: &[u8]) -> Result<Vec3, Fault> {
+fn vertex(s: &Source, tag: &BytesStart) -> Result<Vec3, Fault> {
     let mut p = [f64::NAN; 3];
     for (a, name) in ["x", "y", "z"].iter().enumerate() {
-        let v: f32 = required(s, attributes, name)?;
+        let v: f32 = s.required(tag, name)?;
         if !v.is_finite() {
             return Err(s.fault(format!("{name} = {v} is not finite")));
         }
@@ -234,12 +319,12 @@ fn vertex(s: &Scanner, attributes: &[u8]) -> Result<Vec3, Fault> {
     Ok(p)
 }
 
-fn using(s: &Scanner, attributes: &[u8]) -> Result<Use, Fault> {
+fn using(s: &Source, tag: &BytesStart) -> Result<Use, Fault> {
     let mut placement = Placement::NONE;
-    if let Some(text) = attribute(attributes, "transform") {
-        let v: Option<Vec<f64>> = super::super::text::words(&text).map(parse::<f64>).collect();
+    if let Some(text) = attribute(tag, "transform") {
+        let v: Option<Vec<f64>> = text.split_ascii_whitespace().map(|w| parse(w.as_bytes())).collect();
         let v = v.filter(|v| v.len() == 12 && v.iter().all(|x| x.is_finite()));
-        let v = v.ok_or_else(|| s.fault(format!("the transform {} is not twelve numbers", shown(&text))))?;
+        let v = v.ok_or_else(|| s.fault(format!("the transform {} is not twelve numbers", shown(text.as_bytes()))))?;
         // Rows of the file multiply row vectors: its columns are ours.
         for i in 0..3 {
             placement.m[i] = [v[i], v[3 + i], v[6 + i]];
@@ -247,12 +332,11 @@ fn using(s: &Scanner, attributes: &[u8]) -> Result<Use, Fault> {
         }
     }
     // The production extension's path, under whatever prefix.
-    let path = super::xml::attributes(attributes).find(|(n, _)| n.ends_with(b":path"));
-    let path = path.map(|(_, v)| String::from_utf8_lossy(v).into_owned()).unwrap_or_default();
-    Ok(Use { path, id: required(s, attributes, "objectid")?, placement })
+    let path = attribute_where(tag, |n| n.ends_with(":path")).map(Cow::into_owned).unwrap_or_default();
+    Ok(Use { path, id: s.required(tag, "objectid")?, placement })
 }
 
-fn check(s: &Scanner, id: u32, o: &Object) -> Result<(), Fault> {
+fn check(s: &Source, id: u32, o: &Object) -> Result<(), Fault> {
     let count = o.vertices.len();
     match o.triangles.iter().position(|t| t.iter().any(|v| *v as usize >= count)) {
         Some(i) => {
@@ -265,17 +349,22 @@ fn check(s: &Scanner, id: u32, o: &Object) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{write, zip};
+    use super::super::package::{self, Entry, Piece};
+    use super::super::write;
     use super::*;
     use crate::formats::Metadata;
     use crate::formats::tests::{refuses_damage, tetrahedron};
 
-    fn pack(model: &str) -> Vec<u8> {
-        let mut entry = zip::Entry::new(MODEL);
-        entry.push(zip::deflate(model.as_bytes()));
+    fn archive(entries: &[Entry]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        zip::write(&[entry], zip::LIMIT, &mut bytes).unwrap();
+        package::write(entries, package::LIMIT, &mut bytes).unwrap();
         bytes
+    }
+
+    fn pack(model: &str) -> Vec<u8> {
+        let mut entry = Entry::new(MODEL);
+        entry.push(Piece::of(model.as_bytes()));
+        archive(&[entry])
     }
 
     const SHAPE: &str = "<mesh><vertices><vertex z=\"0\" x='0' y=\"0\"/><vertex x=\"1\" y=\"0\" z=\"0\" /><vertex x=\"0\" y=\"1\" \
@@ -342,5 +431,40 @@ mod tests {
             let fault = read(&pack(&text)).unwrap_err();
             assert!(fault.message.contains(word), "{fault} ({word})");
         }
+    }
+
+    #[test]
+    fn blanks_without_end_are_refused_before_they_are_made() {
+        let mut long = Entry::new("blanks");
+        let blanks = vec![b'\n'; 1 << 20];
+        (0..60).for_each(|_| long.push(Piece::of(&blanks)));
+        let mut short = Entry::new("some");
+        (0..9).for_each(|_| short.push(Piece::of(&blanks)));
+        let bytes = archive(&[long, short]);
+        let mut package = Package::open(&bytes).unwrap();
+        let message = package.file("blanks", |_| Ok(())).unwrap_err().message;
+        assert!(message.contains("62914560") && message.contains("100 times"), "{message}");
+        // What is inflated twice counts twice.
+        assert!((0..99).any(|_| package.file("some", |_| Ok(())).is_err()));
+    }
+
+    #[test]
+    fn a_damaged_file_is_called_so() {
+        let good = pack(&format!("<model><resources><object id=\"1\">{SHAPE}</object></resources></model>"));
+        let name = |e: Fault| e.message;
+        // The checksum of the central directory.
+        let at = good.windows(4).position(|w| w == 0x0201_4b50u32.to_le_bytes()).unwrap() + 16;
+        let mut bad = good.clone();
+        bad[at] ^= 1;
+        assert!(name(read(&bad).unwrap_err()).contains("damaged"));
+        // A size that is one more than there is.
+        let mut bad = good.clone();
+        bad[at + 8] = bad[at + 8].wrapping_add(1);
+        assert!(name(read(&bad).unwrap_err()).contains("damaged"));
+        // A directory that claims 65535 files.
+        let mut bad = good.clone();
+        let end = bad.len() - 22;
+        bad[end + 8..end + 12].fill(0xff);
+        assert!(read(&bad).is_err());
     }
 }
