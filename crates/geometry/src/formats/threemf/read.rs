@@ -164,10 +164,10 @@ fn target(relations: &mut dyn BufRead) -> Option<String> {
     let (mut buffer, mut s) = (Vec::new(), Scanner::new(relations, "relationships"));
     loop {
         match s.next(&mut buffer).ok()? {
-            Event::Start(tag) | Event::Empty(tag) => {
-                if attribute(&tag, "Type").is_some_and(|t| t.ends_with("/3dmodel")) {
-                    return Some(attribute(&tag, "Target")?.into_owned());
-                }
+            Event::Start(tag) | Event::Empty(tag)
+                if attribute(&tag, "Type").is_some_and(|t| t.ends_with("/3dmodel")) =>
+            {
+                return Some(attribute(&tag, "Target")?.into_owned());
             }
             Event::Eof => return None,
             _ => {}
