@@ -265,7 +265,7 @@ def test_a_thousand_million_hubs_are_checked_at_once():
     # Equal cylinders of radius x on a simple cubic graph: π x² ΣL − 8√2 x³ for each node, but for the ends.
     exact = 1e9 * (3 * math.pi * 0.2**2 - 8 * math.sqrt(2) * 0.2**3)
     assert report["volume"] == pytest.approx(exact, rel=2e-3)
-    with pytest.raises(lt.DesignError, match="beams would fill the region's bounds; at most 10000000 are made"):
+    with pytest.raises(lt.DesignError, match="beams are needed to fill the region's bounds; the maximum is 10000000"):
         built(lt.region.box(size=[1000, 1000, 1000]), cell="sc", map=lt.map.affine(wavelength=1), radius=0.2)
 
 
@@ -317,13 +317,13 @@ CASES = [
     (but(OWN, radius=None), "", ["no node has a radius"]),
     (but(OWN, map=GOOD["map"]), "map", ["a map belongs to a cell"]),
     (but(OWN, nodes="missing.csv"), "nodes", ["missing.csv"]),
-    (but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4), "radius", ["the beam from", "holds the hub"]),
-    (but(OWN, profile="cylinder", hub={"formula": "0.5 + x/20"}), "profile", ["cylinder needs hubs of one radius"]),
+    (but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4), "radius", ["the beam from", "contains the other hub"]),
+    (but(OWN, profile="cylinder", hub={"formula": "0.5 + x/20"}), "profile", ["cylinder needs hubs of equal radius"]),
     (but(OWN, nodes=[[x + 50, y, z] for x, y, z in SQUARE]), "trim", ["no beam lies in the region"]),
     (but(PATTERN, trim="drop"), "trim", ["leave trim out"]),
     (but(PATTERN, radius={"formula": "1 + x"}), "radius", ["one number"]),
-    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 1, 0, 0, 0]]}), "pattern.struts[0]", ["no node 1"]),
-    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 0, 40]]}), "pattern.struts", ["no strut has both its ends"]),
+    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 1, 0, 0, 0]]}), "pattern.struts[0]", ["unknown node 1"]),
+    (but(PATTERN, pattern=SWIRL | {"struts": [[0, 0, 40]]}), "pattern.struts", ["no strut has both ends"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": []}), "pattern.repeat", ["one to three steps"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 0}]}), "pattern.repeat[0].count", ["from 1 to"]),
     (but(PATTERN, pattern=SWIRL | {"repeat": [{"count": 200, "scale": 0.5}]}), "pattern.repeat[0].scale", ["times as large"]),
@@ -492,7 +492,7 @@ def test_beams_that_cross_without_a_node_are_told():
         solid = lt.Design(region=BOX, beams=lt.Beams(**apart)).build()
     report = told(solid)
     assert report["collisions"] == 1 and report["volume"] is None
-    with pytest.raises(ValueError, match="runs into beam 1"):
+    with pytest.raises(ValueError, match="intersects beam 1"):
         solid.quadors().volume()
     with pytest.raises(ValueError, match="without a common node"):
         solid.mesh(chord=0.05)

@@ -105,7 +105,7 @@ def test_planes_and_points_that_are_none_are_refused(octet, quadors):
         ({}, "give z"),
         ({"z": 1, "point": [0, 0, 0]}, "not both"),
         ({"z": math.nan}, "position"),
-        ({"point": [0, 0, 0], "normal": [0, 0, 0]}, "no direction"),
+        ({"point": [0, 0, 0], "normal": [0, 0, 0]}, "not all zero"),
     ]:
         with pytest.raises(ValueError, match=words):
             quadors.slice(**arguments)
@@ -175,6 +175,6 @@ def test_a_pattern_too_large_to_be_written_out_is_refused():
     given = {"nodes": [[0, 0, 0]], "struts": [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0]], "repeat": steps}
     solid = lt.Design(region=BOX, beams=lt.Beams(pattern=given, radius=0.2)).build()
     for ask in (lambda: solid.quadors("core"), lambda: solid.mesh(chord=0.01)):
-        with pytest.raises(ValueError, match="written out hub by hub, up to"):
+        with pytest.raises(ValueError, match="expand it hub by hub, up to"):
             ask()
     assert solid.field([[5, 5, 5]]) < 0

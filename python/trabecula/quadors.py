@@ -93,7 +93,7 @@ class Quadors:
         to its left and right, and rational quadratic Bézier ``points`` (k, 3, 3) with ``weights`` (k,). ``faces``: the
         ``beams`` that shape each (none the ball, one its own surface, two a fillet, more a corner), its ``quadric`` as a
         symmetric 4 × 4 matrix, negative inside, ``loops`` of (arc, forward) with the face to the left, and the beam whose
-        ``rim`` bounds it too. ``patches``: exact biquadratic ``points`` (3, 3, 3) and ``weights`` (3, 3) over ``range``
+        ``end_circle`` bounds it too. ``patches``: exact biquadratic ``points`` (3, 3, 3) and ``weights`` (3, 3) over ``range``
         ((s, s), (t, t)), and ``loops`` of sides in space (``points``, ``weights``) and in (s, t) (``parameters``,
         ``parameter_weights``), with the ``arcs`` that they are part of. ``unpatched``: faces left out of them.
         """

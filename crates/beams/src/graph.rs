@@ -1,60 +1,60 @@
-//! Beams as a graph: hub balls, and beams between them.
+//! Graphs of beams: hub balls and the beams that join them; unit cells, wireframes, radii, tables.
 
 mod catalogue;
-mod check;
-mod clean;
+mod clean_up;
+mod graph_checks;
 mod radii;
-mod table;
+mod tables;
 mod trim;
-mod wire;
+mod wireframe;
 
-pub use catalogue::{Link, Net, Unit, catalogue, named};
-pub use clean::Cleaned;
-pub use radii::place;
-pub use radii::{Radii, sized};
-pub use table::{Nodes, nodes, struts};
+pub use catalogue::{PeriodicBeam, PeriodicGraph, UnitCell, catalogue, named};
+pub use clean_up::Cleaned;
+pub use radii::position_text;
+pub use radii::{Radii, with_radii};
+pub use tables::{Nodes, nodes, struts};
 pub use trim::{Trim, Trimmed};
-pub use wire::{Facts, Wire};
+pub use wireframe::{Wireframe, WireframeReport};
 
 use geometry::math::Vec3;
 
-/// Most struts of a frame: beyond it the memory goes into gigabytes.
-pub const MOST: f64 = 1e7;
+/// Maximum number of struts of a wireframe; above it memory reaches gigabytes.
+pub const MAX_STRUTS: f64 = 1e7;
 
-/// A hub: a ball that beams meet in.
+/// A hub: the ball in which beams meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hub {
-    /// Its centre (mm).
+    /// Centre, mm.
     pub center: Vec3,
-    /// Its radius (mm).
+    /// Radius, mm; positive and finite.
     pub radius: f64,
 }
 
-/// Which of the quadrics of revolution tangent to both hubs a beam is.
+/// Selects one quadric of revolution from the pencil of quadrics tangent to both hubs of a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Profile {
-    /// The one with this radius at mid length (mm).
+    /// The quadric with this radius at mid length, mm.
     Mid(f64),
-    /// The cone; a cylinder between equal hubs.
+    /// The common tangent cone; a cylinder between equal hubs.
     Cone,
-    /// The cylinder between equal hubs.
+    /// The cylinder; only between equal hubs.
     Cylinder,
-    /// The one whose thinnest place has this radius (mm).
+    /// The quadric with this minimum radius, mm.
     Waist(f64),
-    /// By the parameter of the pencil.
+    /// The quadric of this pencil parameter λ.
     Lambda(f64),
 }
 
 /// A beam between two hubs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// Its hubs.
+    /// Indices of its two hubs.
     pub ends: [u32; 2],
     /// Its profile.
     pub profile: Profile,
 }
 
-/// A graph of beams.
+/// A graph of hubs and beams.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
     /// The hubs.

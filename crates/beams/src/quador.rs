@@ -1,7 +1,27 @@
-//! Lattices of quadors: hub balls joined by beams that are quadrics of revolution, and filleted by quadrics.
+//! Quador lattices: hub balls joined by beams that are quadrics of revolution, with quadric fillets.
 //!
-//! Everything is made of pieces of quadrics that meet in planes, so a point is classified, a ray is cast and a slice is cut
-//! in closed form. The mathematics follows Cirak and Sabin, *Adding quadric fillets to quador lattice structures* (2019).
+//! The solid consists of pieces of quadrics that meet in planes, so point membership, ray intersection and plane slices
+//! have closed forms. Source: F. Cirak and M. Sabin, *Adding quadric fillets to quador lattice structures*, arXiv
+//! 1908.06974 (2019), here "the note".
+//!
+//! | symbol | meaning | name in the code |
+//! |---|---|---|
+//! | r, c | radius and centre of a hub ball | `Hub::radius`, `Quadors::center` |
+//! | L | distance between the two hub centres of a beam | `Pencil::length` |
+//! | λ | parameter of the pencil of quadrics tangent to both balls | `Pencil::lambda` |
+//! | d | distance of the contact plane from the hub centre | `Pencil::contact`, `HalfBeam::contact` |
+//! | ρ² = A z² + B z + C | squared radius of a beam at z on its axis | `Pencil::meridian`, `HalfBeam::meridian` |
+//! | S = x·x − r² | quadratic form of a ball | `Hub::value` |
+//! | G = √λ (n·x − d) | affine function of a half-beam, which is S ≤ G² | `HalfBeam::g` |
+//! | N(G) | smooth union of the G²; a hub is S ≤ N | `Hub::smooth_union` |
+//! | τ | fillet parameter of a pair of half-beams, (β − α)/(β + α) | `Fillet::Tau` |
+//! | α, β | fillet parameters of the note, αβ = ¼ | `Fillet::Alpha`, `Fillet::Beta` |
+//! | t | blend parameter of a half-beam, τᵢⱼ = tᵢ tⱼ | `HalfBeam::blend` |
+//!
+//! Planes of a half-beam along its axis, from the centre: the *contact plane* with the circle where it touches the
+//! ball, the *split plane* between the parts of the two hubs, with the *end circle*, and the *cut plane* up to which
+//! the hub's formula is evaluated. Half-beams are numbered within their hub; a *label* is the set of half-beams that
+//! determine the surface at a point, as a bit mask.
 
 use rayon::prelude::*;
 
@@ -9,50 +29,61 @@ use crate::graph::Graph;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, scale, sub};
 
-pub mod bezier;
-mod classes;
-pub mod closest;
-pub mod collide;
+mod bezier;
+mod boundary_form;
+mod box_index;
+mod closest;
+mod collisions;
 pub mod complex;
-pub mod drawn;
+mod conic;
 mod facets;
-mod field;
 mod foot;
-pub mod hub;
-mod index;
-pub mod integral;
-mod mesh;
-pub mod patch;
-pub mod pencil;
-pub mod quadric;
-pub mod query;
-mod rule;
-mod sheet;
+mod gauss;
+mod hub;
+mod hub_classes;
+mod hub_mesh;
+mod hub_quadric;
+mod integral;
+mod pencil;
+mod quador_field;
+mod rational_patch;
+mod rays;
 pub mod slice;
+mod tessellation;
 
-use hub::{Affine, Hub, Stub};
-use index::Index;
-use pencil::Pencil;
+pub use bezier::Bezier;
+pub use closest::{Closest, ClosestPoints};
+pub use collisions::Collision;
+pub use hub::{HalfBeam, Hub};
+pub use hub_quadric::Quadric;
+pub use integral::MassProperties;
+pub use pencil::Pencil;
+pub use rational_patch::{Patch, TrimCurve, homogeneous_matrix};
+pub use rays::Hit;
+pub use tessellation::{Measures, Tessellation};
 
-/// How large the fillets are.
+use box_index::BoxIndex;
+use hub::AffineFunction;
+
+/// Size of the fillets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fillet {
-    /// Beams meet in creases.
+    /// No fillets: beams meet in creases.
     None,
-    /// As large as each hub allows.
+    /// The largest fillets that fit each hub.
     Auto,
-    /// By τ in [0, 1): nearly 1 is a small fillet.
+    /// By τ in [0, 1): the closer to 1, the smaller the fillet.
     Tau(f64),
-    /// By α in (0, ½]: growing α grows the fillet; τ = (1 − 4α²)/(1 + 4α²).
+    /// By α in (0, ½]: the larger α, the larger the fillet; τ = (1 − 4α²)/(1 + 4α²).
     Alpha(f64),
-    /// By β = 1/(4α), from ½ on.
+    /// By β = 1/(4α), at least ½.
     Beta(f64),
-    /// By the least radius wanted in the middle of a crotch, mm.
+    /// By the minimum radius of curvature in the middle of a crotch, mm.
     Radius(f64),
 }
 
 impl Fillet {
-    /// τ that is asked for of all pairs, if it is given.
+    /// τ requested for all pairs, if one is.
     fn tau(self) -> Option<f64> {
         match self {
             Fillet::Tau(t) => Some(t),
@@ -63,95 +94,97 @@ impl Fillet {
     }
 
     fn check(self) -> Result<(), Fault> {
-        let refuse = |name: &str, v: f64, range: &str| {
-            Err(Fault::new("fillet", format!("{name} {} makes no fillet: it must lie {range}", number(v))))
+        let refuse = |found: f64, rule: &str, unit: &str| {
+            Err(Fault::new("fillet", format!("{rule}, found {}{unit}", number(found))))
         };
         match self {
-            Fillet::Tau(t) if !(0.0..1.0).contains(&t) => refuse("tau", t, "from 0 up to, not including, 1"),
-            Fillet::Alpha(a) if !(a > 0.0 && a <= 0.5) => refuse("alpha", a, "above 0 and up to 0.5"),
-            Fillet::Beta(b) if !(b >= 0.5 && b.is_finite()) => refuse("beta", b, "from 0.5 on"),
-            Fillet::Radius(r) if !(r > 0.0 && r.is_finite()) => refuse("a radius of", r, "above zero, mm"),
+            Fillet::Tau(t) if !(0.0..1.0).contains(&t) => refuse(t, "tau must be in [0, 1)", ""),
+            Fillet::Alpha(a) if !(a > 0.0 && a <= 0.5) => refuse(a, "alpha must be in (0, 0.5]", ""),
+            Fillet::Beta(b) if !(b >= 0.5 && b.is_finite()) => refuse(b, "beta must be at least 0.5 and finite", ""),
+            Fillet::Radius(r) if !(r > 0.0 && r.is_finite()) => {
+                refuse(r, "fillet radius must be positive and finite", " mm")
+            }
             _ => Ok(()),
         }
     }
 }
 
-/// Greatest t² that fillets are given: beyond it a fillet is a crease to any eye and any file.
-const TAU_MOST: f64 = 0.999;
-/// How far towards the split plane, from the contact plane, fillets may reach.
-const REACH: f64 = 0.95;
+/// Maximum t² of fillets: a fillet above it cannot be distinguished from a crease.
+const MAX_TAU: f64 = 0.999;
+/// Fraction of the distance from contact plane to split plane that fillets may occupy.
+const FILLET_REACH: f64 = 0.95;
 
-/// A ball with its place in the list of stubs.
+/// A hub ball with its range of half-beams.
 #[derive(Clone, Debug)]
 struct Ball {
     center: Vec3,
     radius: f64,
     first: usize,
     last: usize,
-    /// Bounds of its part with stubs up to their cuts, in space.
+    /// Bounds of its part with half-beams up to their cut planes, mm.
     bounds: Aabb,
-    /// Bound of half the second derivative of N.
-    bend: f64,
+    /// Upper bound of half the second derivative of N.
+    curvature: f64,
 }
 
-/// What a hub could not be given.
+/// A hub whose fillets are smaller than requested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shortfall {
-    /// The hub.
+    /// Index of the hub.
     pub hub: usize,
-    /// The fillet's radius in the tightest crotch that was achieved, mm (zero in creases).
+    /// Fillet radius achieved in the tightest crotch, mm (0 in creases).
     pub radius: f64,
-    /// The greatest τ of its pairs.
+    /// Maximum τ of its pairs.
     pub tau: f64,
 }
 
-/// Two beams of a hub that still overlap where the first is parted from its other hub: closed forms do not hold there.
+/// Two beams of a hub that still overlap at the split plane of the first: closed forms are not valid there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
-    /// The hub.
+    /// Index of the hub.
     pub hub: usize,
-    /// The beams.
+    /// Indices of the beams.
     pub beams: [u32; 2],
 }
 
-/// A lattice of quadors.
+/// A quador lattice: the solid of a graph of beams.
 #[derive(Clone, Debug)]
 pub struct Quadors {
     balls: Vec<Ball>,
-    stubs: Vec<Stub>,
+    half_beams: Vec<HalfBeam>,
     pencils: Vec<Pencil>,
     ends: Vec<[u32; 2]>,
     sharp: bool,
-    /// The radius by which squares are made lengths, mm.
+    /// Typical radius by which squared values are converted to lengths, mm.
     scale: f64,
-    /// Values above this are not told apart, mm.
+    /// Upper limit of field values, mm.
     cap: f64,
-    index: Index,
+    index: BoxIndex,
     shortfalls: Vec<Shortfall>,
     overlaps: Vec<Overlap>,
 }
 
 impl Quadors {
-    /// Builds the beams of a graph and joins them.
+    /// Builds the beams of a graph and their fillets.
     ///
     /// # Errors
-    /// What is wrong with a hub, a beam or the fillet, by its place in the graph: `beams[3].profile`.
+    /// An invalid hub, beam or fillet, with its path in the graph, such as `beams[3].profile`.
     pub fn new(graph: &Graph, fillet: Fillet) -> Result<Quadors, Fault> {
         fillet.check()?;
         if graph.hubs.is_empty() {
-            return Err(Fault::new("", "a graph without hubs has no solid: give at least one"));
+            return Err(Fault::new("", "the graph has no hubs: give at least one"));
         }
         for (i, h) in graph.hubs.iter().enumerate() {
             if !h.center.iter().all(|v| v.is_finite()) {
                 return Err(Fault::new(
                     format!("hubs[{i}]"),
-                    "its centre is not a position: give three finite numbers, mm",
+                    format!("centre must be three finite numbers (mm), found {:?}", h.center),
                 ));
             }
             if !(h.radius > 0.0 && h.radius.is_finite()) {
                 return Err(Fault::new(
                     format!("hubs[{i}]"),
-                    format!("a hub of radius {} mm is no ball: give a finite number above zero", number(h.radius)),
+                    format!("hub radius must be positive and finite, found {} mm", number(h.radius)),
                 ));
             }
         }
@@ -166,7 +199,7 @@ impl Quadors {
                     return Err(Fault::new(
                         at(),
                         format!(
-                            "it names hub {}, there are {}, numbered from 0",
+                            "unknown hub {}: the graph has {}, numbered from 0",
                             b.ends[0].max(b.ends[1]),
                             counted(graph.hubs.len(), "hub")
                         ),
@@ -176,26 +209,26 @@ impl Quadors {
             })
             .collect::<Result<_, _>>()?;
         let ends: Vec<[u32; 2]> = graph.beams.iter().map(|b| b.ends).collect();
-        let (mut firsts, stubs) = stubs(graph, &pencils);
+        let (mut firsts, half_beams) = half_beams(graph, &pencils);
         let mut out = Quadors {
             balls: Vec::new(),
-            scale: typical(pencils.iter().map(|p| p.squared(p.length / 2.0).max(0.0).sqrt()))
-                .unwrap_or_else(|| typical(graph.hubs.iter().map(|h| h.radius)).unwrap_or(1.0)),
+            scale: median(pencils.iter().map(|p| p.radius_squared(p.length / 2.0).max(0.0).sqrt()))
+                .unwrap_or_else(|| median(graph.hubs.iter().map(|h| h.radius)).unwrap_or(1.0)),
             cap: 0.0,
             sharp: fillet == Fillet::None,
-            stubs,
+            half_beams,
             pencils,
             ends,
-            index: Index::default(),
+            index: BoxIndex::default(),
             shortfalls: Vec::new(),
             overlaps: Vec::new(),
         };
-        out.cap = match typical(out.pencils.iter().map(|p| p.length)) {
+        out.cap = match median(out.pencils.iter().map(|p| p.length)) {
             Some(l) => (l / 4.0).max(out.scale),
             None => 2.0 * out.scale,
         };
-        firsts.push(out.stubs.len());
-        let mut rest = &mut out.stubs[..];
+        firsts.push(out.half_beams.len());
+        let mut rest = &mut out.half_beams[..];
         let mut of = Vec::with_capacity(graph.hubs.len());
         for w in firsts.windows(2) {
             let (here, after) = rest.split_at_mut(w[1] - w[0]);
@@ -206,10 +239,10 @@ impl Quadors {
         let made: Vec<(Ball, Option<Shortfall>, Vec<Overlap>)> = of
             .into_par_iter()
             .enumerate()
-            .map(|(i, stubs)| {
+            .map(|(i, half_beams)| {
                 let h = &graph.hubs[i];
-                let (shortfall, overlaps) = round(i, h.radius, stubs, fillet);
-                let hub = Hub { radius: h.radius, stubs, sharp };
+                let (shortfall, overlaps) = solve_blends(i, h.radius, half_beams, fillet);
+                let hub = Hub { radius: h.radius, half_beams, sharp };
                 let local = hub.bounds();
                 let bounds = Aabb {
                     min: geometry::math::add(h.center, local.min),
@@ -217,7 +250,7 @@ impl Quadors {
                 };
                 let (first, last) = (firsts[i], firsts[i + 1]);
                 (
-                    Ball { center: h.center, radius: h.radius, first, last, bounds, bend: hub.bend() },
+                    Ball { center: h.center, radius: h.radius, first, last, bounds, curvature: hub.curvature_bound() },
                     shortfall,
                     overlaps,
                 )
@@ -228,7 +261,7 @@ impl Quadors {
             out.shortfalls.extend(shortfall);
             out.overlaps.extend(overlaps);
         }
-        out.index = Index::new(out.balls.iter().map(|b| b.bounds.grown(out.cap)));
+        out.index = BoxIndex::new(out.balls.iter().map(|b| b.bounds.grown(out.cap)));
         Ok(out)
     }
 
@@ -237,7 +270,7 @@ impl Quadors {
         self.balls.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no hubs.
     pub fn is_empty(&self) -> bool {
         self.balls.is_empty()
     }
@@ -245,10 +278,10 @@ impl Quadors {
     /// A hub, in its own frame.
     pub fn hub(&self, i: usize) -> Hub<'_> {
         let b = &self.balls[i];
-        Hub { radius: b.radius, stubs: &self.stubs[b.first..b.last], sharp: self.sharp }
+        Hub { radius: b.radius, half_beams: &self.half_beams[b.first..b.last], sharp: self.sharp }
     }
 
-    /// A hub's centre, mm.
+    /// Centre of a hub, mm.
     pub fn center(&self, i: usize) -> Vec3 {
         self.balls[i].center
     }
@@ -263,12 +296,12 @@ impl Quadors {
         &self.pencils[beam]
     }
 
-    /// Hubs whose fillets are smaller than asked for.
+    /// Hubs whose fillets are smaller than requested.
     pub fn shortfalls(&self) -> &[Shortfall] {
         &self.shortfalls
     }
 
-    /// Beams that overlap too far for closed forms.
+    /// Pairs of beams that overlap too far for closed forms.
     pub fn overlaps(&self) -> &[Overlap] {
         &self.overlaps
     }
@@ -278,21 +311,21 @@ impl Quadors {
         self.balls.iter().fold(Aabb::EMPTY, |b, ball| b.union(ball.bounds))
     }
 
-    /// The fillets' radius in the tightest crotch of a hub, mm: zero in creases, infinite where nothing is hollow.
+    /// Fillet radius in the tightest crotch of a hub, mm: 0 in creases, infinite without a concave crotch.
     pub fn fillet_radius(&self, hub: usize) -> f64 {
-        tightest(&self.hub(hub))
+        min_fillet_radius(&self.hub(hub))
     }
 
     /// # Errors
-    /// The first overlap, as what forbids an exact answer.
-    fn exact(&self) -> Result<(), Fault> {
+    /// The first overlap, which excludes closed forms.
+    fn require_closed_forms(&self) -> Result<(), Fault> {
         match self.overlaps.first() {
             None => Ok(()),
             Some(o) => Err(Fault::new(
                 format!("hubs[{}]", o.hub),
                 format!(
-                    "beams {} and {} leave it so close together that they still overlap halfway along ({} in all): there is no closed \
-                 form for that; make them thinner, merge them, or use the field",
+                    "beams {} and {} overlap at mid length ({} in all), so there is no closed form: make them thinner, merge them, or \
+                     use the field",
                     o.beams[0],
                     o.beams[1],
                     counted(self.overlaps.len(), "such pair")
@@ -302,15 +335,15 @@ impl Quadors {
     }
 }
 
-/// The middle one of some lengths.
-fn typical(lengths: impl Iterator<Item = f64>) -> Option<f64> {
+/// The median of the positive lengths.
+fn median(lengths: impl Iterator<Item = f64>) -> Option<f64> {
     let mut all: Vec<f64> = lengths.filter(|v| *v > 0.0).collect();
     let middle = all.len() / 2;
     (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The stubs of all hubs, hub by hub and beam by beam, and where each hub's begin.
-fn stubs(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<Stub>) {
+/// The half-beams of all hubs, sorted by hub and beam; and the first index of each hub.
+fn half_beams(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<HalfBeam>) {
     let mut firsts = vec![0usize; graph.hubs.len() + 1];
     for e in graph.beams.iter().flat_map(|b| b.ends) {
         firsts[e as usize + 1] += 1;
@@ -328,43 +361,49 @@ fn stubs(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<Stub>) {
         }
     }
     firsts.pop();
-    let stubs = order
+    let half_beams = order
         .into_iter()
         .map(|(beam, end)| {
             let (p, ends) = (&pencils[beam as usize], graph.beams[beam as usize].ends);
-            // The axis is computed once for both ends, so that they are opposite to the bit.
+            // The axis is computed once for both ends, so that they are opposite to the last bit.
             let along = sub(graph.hubs[ends[1] as usize].center, graph.hubs[ends[0] as usize].center);
             let toward = if end == 0 { 1.0 } else { -1.0 };
             let axis = scale(along, toward / p.length);
-            let steep = p.lambda.sqrt();
+            let root_lambda = p.lambda.sqrt();
             let contact = p.contact(end);
             let split = if end == 0 { p.split() } else { p.length - p.split() };
-            // Followed halfway on to where the other ball takes over.
+            // Halfway from the split plane to the contact plane of the other ball.
             let cut = (split + p.length - p.contact(1 - end)) / 2.0;
-            Stub {
+            HalfBeam {
                 beam,
                 end,
                 axis,
-                g: Affine { a: scale(axis, steep), b: -steep * contact },
+                g: AffineFunction { a: scale(axis, root_lambda), b: -root_lambda * contact },
                 contact,
-                section: p.section(end),
+                meridian: p.meridian(end),
                 split,
                 cut: cut.max(split),
-                share: 0.0,
+                blend: 0.0,
                 weight: 1.0,
             }
         })
         .collect();
-    (firsts, stubs)
+    (firsts, half_beams)
 }
 
-/// Gives the stubs of a hub their t.
+/// Sets the blend parameters t of the half-beams of a hub.
 ///
-/// Reach asks t_i t_j ≥ the least τ of each pair. `t_i = √(max_j τ_ij)` always does; what slack that leaves is taken up by all
-/// stubs alike, half of the least slack of each at a time, so that the order of beams does not matter.
-fn round(index: usize, radius: f64, stubs: &mut [Stub], fillet: Fillet) -> (Option<Shortfall>, Vec<Overlap>) {
-    let n = stubs.len();
-    let hub = Hub { radius, stubs, sharp: fillet == Fillet::None };
+/// For fillets to end before the split planes, t_i t_j must be at least the minimum τ of each pair. `t_i = √(max_j
+/// τ_ij)` always satisfies this. The remaining slack is removed from all half-beams simultaneously, half of the minimum
+/// slack of each per iteration, so that the order of beams has no effect.
+fn solve_blends(
+    index: usize,
+    radius: f64,
+    half_beams: &mut [HalfBeam],
+    fillet: Fillet,
+) -> (Option<Shortfall>, Vec<Overlap>) {
+    let n = half_beams.len();
+    let hub = Hub { radius, half_beams, sharp: fillet == Fillet::None };
     let mut least = vec![0.0f64; n * n];
     let mut overlaps = Vec::new();
     for i in 0..n {
@@ -372,19 +411,19 @@ fn round(index: usize, radius: f64, stubs: &mut [Stub], fillet: Fillet) -> (Opti
             if i == j {
                 continue;
             }
-            let s = &hub.stubs[i];
-            let early = hub.least_tau(i, j, s.contact + REACH * (s.split - s.contact));
-            let tau = if early < TAU_MOST { early } else { hub.least_tau(i, j, s.split).max(TAU_MOST) };
+            let s = &hub.half_beams[i];
+            let tau_early = hub.min_tau(i, j, s.contact + FILLET_REACH * (s.split - s.contact));
+            let tau = if tau_early < MAX_TAU { tau_early } else { hub.min_tau(i, j, s.split).max(MAX_TAU) };
             if tau >= 1.0 || s.split <= s.contact {
-                overlaps.push(Overlap { hub: index, beams: [s.beam, hub.stubs[j].beam] });
+                overlaps.push(Overlap { hub: index, beams: [s.beam, hub.half_beams[j].beam] });
             }
-            let tau = if tau.is_nan() { 1.0 } else { tau.clamp(0.0, TAU_MOST) };
+            let tau = if tau.is_nan() { 1.0 } else { tau.clamp(0.0, MAX_TAU) };
             least[i * n + j] = least[i * n + j].max(tau);
             least[j * n + i] = least[j * n + i].max(tau);
         }
     }
     if fillet == Fillet::None {
-        stubs.iter_mut().for_each(|s| s.share = 1.0);
+        half_beams.iter_mut().for_each(|s| s.blend = 1.0);
         return (None, overlaps);
     }
     let mut t: Vec<f64> = (0..n).map(|i| (0..n).map(|j| least[i * n + j]).fold(0.0, f64::max).sqrt()).collect();
@@ -399,35 +438,35 @@ fn round(index: usize, radius: f64, stubs: &mut [Stub], fillet: Fillet) -> (Opti
             t[i] *= if slack[i] > 0.0 { slack[i].sqrt() } else { 0.0 };
         }
     }
-    let wanted = match fillet {
+    let requested = match fillet {
         Fillet::Radius(r) => {
-            let pairs = hub.neighbours();
-            pairs.iter().map(|&(i, j)| tau_of(&hub, i, j, r)).fold(TAU_MOST, f64::min)
+            let pairs = hub.adjacent_pairs();
+            pairs.iter().map(|&(i, j)| tau_for_radius(&hub, i, j, r)).fold(MAX_TAU, f64::min)
         }
         _ => fillet.tau().unwrap_or(0.0),
     };
-    let short = fillet != Fillet::Auto && t.iter().any(|t| t * t > wanted * (1.0 + 1e-12) + 1e-15);
-    for (s, t) in stubs.iter_mut().zip(&t) {
-        s.set_share(t.max(wanted.min(TAU_MOST).sqrt()));
+    let short = fillet != Fillet::Auto && t.iter().any(|t| t * t > requested * (1.0 + 1e-12) + 1e-15);
+    for (s, t) in half_beams.iter_mut().zip(&t) {
+        s.set_blend(t.max(requested.min(MAX_TAU).sqrt()));
     }
-    let hub = Hub { radius, stubs, sharp: false };
+    let hub = Hub { radius, half_beams, sharp: false };
     let shortfall = short.then(|| {
-        let shares = || stubs.iter().map(|s| s.share);
-        let most = shares().fold(0.0, f64::max);
-        Shortfall { hub: index, radius: tightest(&hub), tau: most * most }
+        let blends = || half_beams.iter().map(|s| s.blend);
+        let most = blends().fold(0.0, f64::max);
+        Shortfall { hub: index, radius: min_fillet_radius(&hub), tau: most * most }
     });
     let shortfall = match fillet {
-        // A slack elsewhere in the hub may have left every crotch as wide as asked.
+        // Slack elsewhere in the hub may still leave every crotch as wide as requested.
         Fillet::Radius(r) => shortfall.filter(|s| s.radius < r * (1.0 - 1e-9)),
         _ => shortfall,
     };
     (shortfall, overlaps)
 }
 
-/// τ for which the crotch of two stubs has the radius r; the radius falls as τ grows.
-fn tau_of(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
+/// τ at which the crotch of two half-beams has radius r; the radius decreases as τ increases.
+fn tau_for_radius(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
     let at = |tau: f64| hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1);
-    let (mut lo, mut hi) = (0.0, TAU_MOST);
+    let (mut lo, mut hi) = (0.0, MAX_TAU);
     if at(hi) >= r {
         return hi;
     }
@@ -438,16 +477,16 @@ fn tau_of(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
     lo
 }
 
-/// The radius in the tightest crotch of a hub.
-fn tightest(hub: &Hub) -> f64 {
+/// Fillet radius in the tightest crotch of a hub, mm.
+fn min_fillet_radius(hub: &Hub) -> f64 {
     if hub.sharp {
-        return if hub.neighbours().is_empty() { f64::INFINITY } else { 0.0 };
+        return if hub.adjacent_pairs().is_empty() { f64::INFINITY } else { 0.0 };
     }
     let of = |(i, j): (usize, usize)| {
-        let tau = hub.stubs[i].share * hub.stubs[j].share;
+        let tau = hub.half_beams[i].blend * hub.half_beams[j].blend;
         hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1)
     };
-    hub.neighbours().into_iter().map(of).fold(f64::INFINITY, f64::min)
+    hub.adjacent_pairs().into_iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

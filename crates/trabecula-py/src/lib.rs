@@ -120,14 +120,14 @@ mod _core {
     /// each node, Maxwell's count, and the length of all beams in a cell with edges as the aspect says.
     #[pyfunction]
     fn beam_cells() -> PyResult<Vec<BeamCell>> {
-        let told = |u: &beams::graph::Unit| {
-            let net = u.net().map_err(crate::error::fault)?;
-            let links = net.beams.iter().map(|b| (b.ends, b.shift)).collect();
-            let length = net.lengths(u.aspect).iter().sum();
-            let (valences, maxwell) = (net.valences(), net.maxwell());
-            Ok((u.name, u.title, u.group, u.aspect, net.nodes, links, valences, maxwell, length))
+        let row = |u: &beams::graph::UnitCell| {
+            let graph = u.graph().map_err(crate::error::fault)?;
+            let beams_of_cell = graph.beams.iter().map(|b| (b.ends, b.shift)).collect();
+            let length = graph.lengths(u.aspect).iter().sum();
+            let (valences, maxwell) = (graph.valences(), graph.maxwell());
+            Ok((u.name, u.title, u.group, u.aspect, graph.nodes, beams_of_cell, valences, maxwell, length))
         };
-        beams::graph::catalogue().iter().map(told).collect()
+        beams::graph::catalogue().iter().map(row).collect()
     }
 
     /// What a named cell can tell: its range, and for each part the fractions in which it is one piece in space.

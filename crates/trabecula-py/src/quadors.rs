@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use beams::quador::Quadors as Core;
-use beams::quador::bezier::Bezier;
-use beams::quador::patch::matrix;
 use beams::quador::slice::{Plane, Slice as Cut};
+use beams::quador::{Bezier, Quadors as Core, homogeneous_matrix};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -46,10 +44,10 @@ fn curves<'py, const D: usize>(py: Python<'py>, of: &[Bezier<D>]) -> PyResult<Cu
     Ok((flat.into_pyarray(py).reshape([of.len(), 3, D])?, weights.into_pyarray(py)))
 }
 
-/// The beams that a set of stubs belongs to.
-fn beams(core: &Core, hub: usize, stubs: u64) -> Vec<u32> {
-    let all = core.hub(hub).stubs.iter().enumerate();
-    all.filter(|(i, _)| *i < 64 && stubs >> i & 1 == 1).map(|(_, s)| s.beam).collect()
+/// The beams that a set of half-beams belongs to.
+fn beams(core: &Core, hub: usize, label: u64) -> Vec<u32> {
+    let all = core.hub(hub).half_beams.iter().enumerate();
+    all.filter(|(i, _)| *i < 64 && label >> i & 1 == 1).map(|(_, s)| s.beam).collect()
 }
 
 #[pymethods]
@@ -68,7 +66,7 @@ impl Quadors {
 
     /// The volume of the whole, mm³.
     fn volume(&self, py: Python<'_>) -> PyResult<f64> {
-        run(py, None, None, |_| self.quadors.sole_volume())?.map_err(error::fault)
+        run(py, None, None, |_| self.quadors.checked_volume())?.map_err(error::fault)
     }
 
     /// Whether points (n, 3) are in the solid.
@@ -118,7 +116,7 @@ impl Quadors {
     fn closest<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Feet<'py>> {
         let points = self::points(&points)?;
         let feet = run(py, None, None, |_| {
-            let nearest = self.quadors.nearest();
+            let nearest = self.quadors.closest_points();
             let each = points.par_iter().with_min_len(16);
             each.map(|p| nearest.closest(*p)).collect::<Result<Vec<_>, _>>()
         })?
@@ -177,10 +175,10 @@ impl Quadors {
         for f in &complex.faces {
             let it = PyDict::new(py);
             it.set_item("beams", beams(core, hub, f.label))?;
-            let flat: Vec<f64> = matrix(&f.quadric, [0.0; 3]).into_iter().flatten().collect();
+            let flat: Vec<f64> = homogeneous_matrix(&f.quadric, [0.0; 3]).into_iter().flatten().collect();
             it.set_item("quadric", flat.into_pyarray(py).reshape([4, 4])?)?;
             it.set_item("loops", f.loops.clone())?;
-            it.set_item("rim", f.rim.map(|s| of.stubs[s as usize].beam))?;
+            it.set_item("end_circle", f.end_circle.map(|s| of.half_beams[s as usize].beam))?;
             faces.append(it)?;
         }
         d.set_item("faces", faces)?;
@@ -189,7 +187,7 @@ impl Quadors {
         for p in &made {
             let it = PyDict::new(py);
             it.set_item("face", p.face)?;
-            let (net, weights) = p.net();
+            let (net, weights) = p.control_net();
             let flat: Vec<f64> = net.into_iter().flatten().flatten().collect();
             it.set_item("points", flat.into_pyarray(py).reshape([3, 3, 3])?)?;
             let flat: Vec<f64> = weights.into_iter().flatten().collect();

@@ -200,7 +200,7 @@ impl Solid {
         match self.built.beams.iter().find(|b| b.0 == name) {
             Some((_, Beams::Truss(truss))) => Ok(Quadors { quadors: truss.quadors.clone() }),
             Some((_, Beams::Pattern(laid))) => {
-                let written = run(py, None, None, |_| laid.written())?;
+                let written = run(py, None, None, |_| laid.expand())?;
                 let written = written.map_err(|f| error::fault(f.under(&format!("beams.{name}"))))?;
                 Ok(Quadors { quadors: written.into() })
             }

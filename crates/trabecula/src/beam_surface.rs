@@ -29,34 +29,39 @@ impl BeamSurface {
 impl SurfaceMaker for BeamSurface {
     fn mesh(&self, options: &Options, _: &dyn Progress) -> Result<Made, Stopped> {
         Self::check(options)?;
-        let drawn = self.0.drawn(options.resolution).map_err(Stopped::Refused)?;
-        let mesh = drawn.mesh().map_err(Stopped::Refused)?;
-        let figures = drawn.figures();
-        let components = Components { count: figures.pieces as u64, euler: figures.euler, ..Components::default() };
+        let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;
+        let mesh = tessellation.mesh().map_err(Stopped::Refused)?;
+        let measures = tessellation.measures();
+        let components =
+            Components { count: measures.components as u64, euler: measures.euler, ..Components::default() };
         let surface = SurfaceMesh { cut: vec![false; mesh.triangles.len()], mesh };
-        Ok(Made { surface, components, error: Some(drawn.error()) })
+        Ok(Made { surface, components, error: Some(tessellation.error()) })
     }
 
     /// Only distinct hubs are held in memory.
     fn stream_stl(&self, options: &Options, mut out: &mut dyn Store, _: &dyn Progress) -> Result<Summary, Stopped> {
         Self::check(options)?;
-        let drawn = self.0.drawn(options.resolution).map_err(Stopped::Refused)?;
-        let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| drawn.hub(i).for_each(put);
-        formats::write_stl_pieces(drawn.triangles(), drawn.hubs(), hub, &mut out).map_err(Stopped::Io)?;
-        let figures = drawn.figures();
+        let tessellation = self.0.tessellation(options.resolution).map_err(Stopped::Refused)?;
+        let hub = |i: usize, put: &mut dyn FnMut([[f64; 3]; 3])| tessellation.hub(i).for_each(put);
+        formats::write_stl_pieces(tessellation.triangles(), tessellation.hubs(), hub, &mut out).map_err(Stopped::Io)?;
+        let measures = tessellation.measures();
         Ok(Summary {
-            triangles: figures.triangles as u64,
-            volume: figures.volume,
-            area_lattice: figures.area,
+            triangles: measures.triangles as u64,
+            volume: measures.volume,
+            area_lattice: measures.area,
             area_cut: 0.0,
-            components: Components { count: figures.pieces as u64, euler: figures.euler, ..Components::default() },
-            error: Some(drawn.error()),
+            components: Components {
+                count: measures.components as u64,
+                euler: measures.euler,
+                ..Components::default()
+            },
+            error: Some(tessellation.error()),
         })
     }
 
     /// Estimated from some of the distinct hubs, at a coarser chord error if need be.
     fn estimate(&self, chord: f64) -> Result<Estimate, Fault> {
-        let [triangles, held] = self.0.expected(chord)?;
+        let [triangles, held] = self.0.estimated_triangles(chord)?;
         Ok(Estimate {
             cells: [0; 3],
             triangles,

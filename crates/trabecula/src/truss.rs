@@ -1,29 +1,29 @@
-//! A graph of beams in a region, as a field, and how it came about.
+//! Beams in a region: their graph, their field, and statistics of how the graph was made.
 
 use std::sync::Arc;
 
-mod field;
-mod fill;
+mod beam_fields;
+mod fill_region;
 
-pub use fill::{expected, fill};
+pub use fill_region::fill;
 
 use crate::implicit::Implicit;
-use beams::graph::{Cleaned, Facts, Graph, Trimmed};
-use beams::pattern::Laid;
+use beams::graph::{Cleaned, Graph, Trimmed, WireframeReport};
+use beams::pattern::PatternField;
+use beams::quador::Collision;
 use beams::quador::Quadors;
-use beams::quador::collide::Collision;
 
-/// Beams as they fill a region.
+/// The beams of a design.
 #[derive(Clone)]
 pub enum Beams {
-    /// A graph.
+    /// An explicit graph.
     Truss(Arc<Truss>),
-    /// A program of repeats.
-    Pattern(Arc<Laid>),
+    /// A pattern of repeats.
+    Pattern(Arc<PatternField>),
 }
 
 impl Beams {
-    /// The solid.
+    /// The solid as an implicit function.
     pub fn field(&self) -> Arc<dyn Implicit> {
         match self {
             Beams::Truss(t) => t.quadors.clone(),
@@ -31,7 +31,7 @@ impl Beams {
         }
     }
 
-    /// A length to which grids are fitted, mm.
+    /// Length scale for grids, mm.
     pub fn wavelength(&self) -> f64 {
         match self {
             Beams::Truss(t) => t.wavelength,
@@ -40,29 +40,30 @@ impl Beams {
     }
 }
 
-/// Beams in a region.
+/// A graph of beams in a region.
 #[derive(Clone, Debug)]
 pub struct Truss {
     /// The graph.
     pub graph: Graph,
     /// Its solid.
     pub quadors: Arc<Quadors>,
-    /// The unit cell that it was made of, if it was.
+    /// The unit cell it was made from, if any.
     pub cell: Option<&'static str>,
-    /// A length to which grids are fitted, mm: the least wavelength of the map, or the mean length of struts.
+    /// Length scale for grids, mm: the minimum wavelength of the map, or the mean strut length.
     pub wavelength: f64,
-    /// What is told of the frame.
-    pub facts: Facts,
-    /// Least and greatest of the hubs' fillets in their tightest places (mm), of hubs inside the region; none without.
+    /// Statistics of the wireframe.
+    pub report: WireframeReport,
+    /// Minimum and maximum fillet radius in the tightest crotches of hubs inside the region, mm; `None` without
+    /// fillets.
     pub fillet: Option<[f64; 2]>,
-    /// Whether all of it lies in the region.
+    /// Whether all beams lie inside the region.
     pub whole: bool,
-    /// What was taken out of it.
+    /// Counts of the clean-up.
     pub cleaned: Cleaned,
-    /// What was trimmed.
+    /// Counts of the trim.
     pub trimmed: Trimmed,
-    /// Nodes inside the region with a single strut.
+    /// Number of nodes inside the region with a single strut.
     pub dangling: usize,
-    /// Beams that meet in the region without a common hub.
+    /// Beams that intersect inside the region without a common hub.
     pub collisions: Vec<Collision>,
 }

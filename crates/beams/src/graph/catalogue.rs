@@ -1,7 +1,5 @@
-//! Unit cells of beams: each a space group and a few beams, whose images under the group are all the others.
-//!
-//! So a cell is a line or two of data, its symmetry holds by construction, and what is told of it (nodes, valence,
-//! lengths, Maxwell's count) is computed.
+//! Catalogue of unit cells. Each is a space group and a few generating beams; the orbit under the group gives all
+//! beams, so the symmetry holds by construction. Node counts, valences, lengths and Maxwell's count are computed.
 
 use std::collections::BTreeSet;
 
@@ -9,63 +7,63 @@ use geometry::fault::Fault;
 use geometry::math::{Vec3, norm, sub};
 use geometry::symmetry::{Group, Operation};
 
-/// A unit cell by name.
+/// A unit cell of the catalogue.
 #[derive(Clone, Copy, Debug)]
-pub struct Unit {
+pub struct UnitCell {
     /// Name in designs.
     pub name: &'static str,
-    /// What it is usually called, or what it looks like.
+    /// Common name or description.
     pub title: &'static str,
-    /// Its space group.
+    /// Space group symbol.
     pub group: &'static str,
-    /// Beams whose images under the group are all beams: two ends each, in cell edges.
+    /// Generating beams: two end points each, in cell edges.
     pub beams: &'static [[Vec3; 2]],
-    /// Cell edges (of any length) in whose ratio it has its usual shape.
+    /// Ratio of the cell edges at which the cell has its regular shape.
     pub aspect: Vec3,
 }
 
-/// A unit cell on the torus: nodes, and beams that may end in other cells.
+/// A periodic graph: nodes in one unit cell, and beams that may end in adjacent cells.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Net {
-    /// Places of the nodes in the cell, in [0, 1).
+pub struct PeriodicGraph {
+    /// Node positions in the cell, in [0, 1).
     pub nodes: Vec<Vec3>,
     /// The beams, each once.
-    pub beams: Vec<Link>,
+    pub beams: Vec<PeriodicBeam>,
 }
 
-/// A beam of a unit cell, from a node in the cell to one in the cell at `shift`.
+/// A beam of a periodic graph, from a node in the cell to a node in the cell at offset `shift`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Link {
-    /// The nodes.
+pub struct PeriodicBeam {
+    /// Node indices.
     pub ends: [usize; 2],
-    /// Where the second node's cell lies.
+    /// Cell offset of the second node.
     pub shift: [i32; 3],
 }
 
 const O: Vec3 = [0.0; 3];
 const EVEN: Vec3 = [1.0; 3];
-/// Edges of a rectangle that holds two hexagons.
+/// Edge ratio of a rectangle that holds two regular hexagons.
 const HEXAGONAL: Vec3 = [1.0, 1.732_050_807_568_877_2, 1.0];
-/// Half of the diagonal of a face and of the cell, and an edge.
+/// Half face diagonals, half body diagonal, cell edges.
 const FACE: [Vec3; 2] = [O, [0.5, 0.5, 0.0]];
 const SIDE: [Vec3; 2] = [O, [0.5, 0.0, 0.5]];
 const BODY: [Vec3; 2] = [O, [0.5, 0.5, 0.5]];
 const EDGE: [Vec3; 2] = [O, [1.0, 0.0, 0.0]];
 const UP: [Vec3; 2] = [O, [0.0, 0.0, 1.0]];
 
-const fn cubic(name: &'static str, title: &'static str, group: &'static str, beams: &'static [[Vec3; 2]]) -> Unit {
-    Unit { name, title, group, beams, aspect: EVEN }
+const fn cubic(name: &'static str, title: &'static str, group: &'static str, beams: &'static [[Vec3; 2]]) -> UnitCell {
+    UnitCell { name, title, group, beams, aspect: EVEN }
 }
 
-/// 1 / (2 + √2): the cut of a truncated cube.
+/// 1 / (2 + √2): edge fraction cut off a truncated cube.
 const CUT: f64 = 0.292_893_218_813_452_5;
 /// (½ − (1 + √2) s / 2, ½ − s / 2), s = 1 / (1 + 2√2): a truncated cuboctahedron of edge s.
 const GREAT: [f64; 2] = [0.184_699_031_259_064_85, 0.369_398_062_518_129_7];
-/// 108^(−1/3): dodecahedra and tetrakaidecahedra with plane faces and equal volumes.
+/// 108^(−1/3): Weaire–Phelan cells with plane faces and equal volumes.
 const WP: f64 = 0.209_986_841_649_145_5;
 
 /// The catalogue.
-static CATALOGUE: [Unit; 23] = [
+static CATALOGUE: [UnitCell; 23] = [
     cubic("sc", "simple cubic", "Pm-3m", &[EDGE]),
     cubic("bcc", "body-centred cubic", "Im-3m", &[BODY]),
     cubic("bccz", "body-centred cubic with beams along z through every node", "I4/mmm", &[BODY, UP]),
@@ -136,7 +134,7 @@ static CATALOGUE: [Unit; 23] = [
         "I4/mmm",
         &[[[0.0, 0.0, -0.35], [0.0, 0.0, 0.35]], [[0.0, 0.0, 0.35], [0.5, 0.5, 0.15]]],
     ),
-    Unit {
+    UnitCell {
         aspect: HEXAGONAL,
         ..cubic(
             "hexagonal_prism",
@@ -149,65 +147,68 @@ static CATALOGUE: [Unit; 23] = [
             ],
         )
     },
-    Unit { aspect: HEXAGONAL, ..cubic("triangular_prism", "triangular prisms in layers", "Cmmm", &[EDGE, FACE, UP]) },
+    UnitCell {
+        aspect: HEXAGONAL,
+        ..cubic("triangular_prism", "triangular prisms in layers", "Cmmm", &[EDGE, FACE, UP])
+    },
 ];
 
-/// All unit cells by name.
-pub fn catalogue() -> &'static [Unit] {
+/// All unit cells.
+pub fn catalogue() -> &'static [UnitCell] {
     &CATALOGUE
 }
 
 /// The unit cell of this name.
-pub fn named(name: &str) -> Option<&'static Unit> {
+pub fn named(name: &str) -> Option<&'static UnitCell> {
     CATALOGUE.iter().find(|u| u.name == name)
 }
 
-/// How near two places are the same, in cell edges: roundings of the table, far below any beam.
-const SAME: f64 = 1e-9;
+/// Distance below which two positions are equal, in cell edges: above the rounding of the table, far below any beam.
+const POSITION_TOLERANCE: f64 = 1e-9;
 
-impl Unit {
-    /// The cell on the torus.
+impl UnitCell {
+    /// The periodic graph of the cell.
     ///
     /// # Errors
-    /// None for the cells of the catalogue: a group that does not exist.
-    pub fn net(&self) -> Result<Net, Fault> {
-        Ok(Net::spread(&Group::named(self.group)?.operations, self.beams))
+    /// None for the cells of the catalogue: only an unknown group symbol fails.
+    pub fn graph(&self) -> Result<PeriodicGraph, Fault> {
+        Ok(PeriodicGraph::orbit(&Group::named(self.group)?.operations, self.beams))
     }
 }
 
-impl Net {
-    /// All images of some beams under operations.
-    fn spread(operations: &[Operation], beams: &[[Vec3; 2]]) -> Net {
+impl PeriodicGraph {
+    /// The orbit of some beams under the operations of a group.
+    fn orbit(operations: &[Operation], beams: &[[Vec3; 2]]) -> PeriodicGraph {
         let mut nodes: Vec<Vec3> = Vec::new();
-        let mut links = BTreeSet::new();
+        let mut beams_found = BTreeSet::new();
         for beam in beams {
             for op in operations {
                 let [a, b] = beam.map(|p| op.apply(p)).map(|p| {
-                    let cell = p.map(|v| (v + SAME).floor());
-                    let place = sub(p, cell);
-                    let known = nodes.iter().position(|n| norm(sub(*n, place)) < 2.0 * SAME);
+                    let cell = p.map(|v| (v + POSITION_TOLERANCE).floor());
+                    let position = sub(p, cell);
+                    let known = nodes.iter().position(|n| norm(sub(*n, position)) < 2.0 * POSITION_TOLERANCE);
                     let node = known.unwrap_or_else(|| {
-                        nodes.push(place.map(|v| v.max(0.0)));
+                        nodes.push(position.map(|v| v.max(0.0)));
                         nodes.len() - 1
                     });
                     (node, cell.map(|v| v as i32))
                 });
                 let shift: [i32; 3] = core::array::from_fn(|i| b.1[i] - a.1[i]);
-                let there = Link { ends: [a.0, b.0], shift };
-                let back = Link { ends: [b.0, a.0], shift: shift.map(|s| -s) };
-                links.insert(there.max(back));
+                let forward = PeriodicBeam { ends: [a.0, b.0], shift };
+                let backward = PeriodicBeam { ends: [b.0, a.0], shift: shift.map(|s| -s) };
+                beams_found.insert(forward.max(backward));
             }
         }
-        Net { nodes, beams: links.into_iter().collect() }
+        PeriodicGraph { nodes, beams: beams_found.into_iter().collect() }
     }
 
-    /// The vector along a beam, in cell edges.
-    pub fn along(&self, link: &Link) -> Vec3 {
-        let [a, b] = link.ends.map(|n| self.nodes[n]);
-        core::array::from_fn(|i| b[i] - a[i] + f64::from(link.shift[i]))
+    /// Vector from the first to the second node of a beam, in cell edges.
+    pub fn vector(&self, beam: &PeriodicBeam) -> Vec3 {
+        let [a, b] = beam.ends.map(|n| self.nodes[n]);
+        core::array::from_fn(|i| b[i] - a[i] + f64::from(beam.shift[i]))
     }
 
-    /// How many beams meet in each node.
+    /// Number of beams at each node.
     pub fn valences(&self) -> Vec<usize> {
         let mut count = vec![0; self.nodes.len()];
         for end in self.beams.iter().flat_map(|b| b.ends) {
@@ -216,17 +217,17 @@ impl Net {
         count
     }
 
-    /// Lengths of the beams in a cell with these edges.
+    /// Lengths of the beams in a cell with these edges, in their unit.
     pub fn lengths(&self, edges: Vec3) -> Vec<f64> {
-        let length = |l: &Link| {
-            let v = self.along(l);
+        let length = |l: &PeriodicBeam| {
+            let v = self.vector(l);
             norm(core::array::from_fn(|i| v[i] * edges[i]))
         };
         self.beams.iter().map(length).collect()
     }
 
-    /// Maxwell's count for each cell: beams less three for each node. Negative: the frame with free joints has mechanisms,
-    /// so its beams bend; zero and above it may be stretched only.
+    /// Maxwell's count of one cell: beams − 3 nodes. Negative: the pin-jointed frame has mechanisms, so the lattice is
+    /// bending dominated; zero or above, it may be stretching dominated.
     pub fn maxwell(&self) -> i64 {
         self.beams.len() as i64 - 3 * self.nodes.len() as i64
     }
@@ -236,7 +237,7 @@ impl Net {
 mod tests {
     use super::*;
 
-    /// Nodes, beams, valences present, Maxwell's count, and total length in edges of the cell (aspect applied).
+    /// Nodes, beams, distinct valences, and total beam length in cell edges (aspect applied).
     const KNOWN: [(&str, usize, usize, &[usize], f64); 23] = [
         ("sc", 1, 3, &[6], 3.0),
         ("bcc", 2, 8, &[8], 6.928_203_230),
@@ -266,15 +267,15 @@ mod tests {
     #[test]
     fn cells_are_what_they_are_known_as() {
         for unit in catalogue() {
-            let net = unit.net().expect("a group");
-            let mut present = net.valences();
+            let graph = unit.graph().expect("a group");
+            let mut present = graph.valences();
             present.sort_unstable();
             present.dedup();
-            let total: f64 = net.lengths(unit.aspect).iter().sum();
-            assert!(net.beams.iter().flat_map(|b| b.shift).all(|s| s.abs() <= 1));
+            let total: f64 = graph.lengths(unit.aspect).iter().sum();
+            assert!(graph.beams.iter().flat_map(|b| b.shift).all(|s| s.abs() <= 1));
             let known = KNOWN.iter().find(|k| k.0 == unit.name).expect("known");
             assert_eq!(
-                (net.nodes.len(), net.beams.len(), present.as_slice()),
+                (graph.nodes.len(), graph.beams.len(), present.as_slice()),
                 (known.1, known.2, known.3),
                 "{} {total}",
                 unit.name

@@ -1,45 +1,45 @@
-//! Radii for a wire frame: how thick its struts are, and how large the balls that they meet in.
+//! Radii for a wireframe: beam radii and hub radii.
 
-use super::wire::Wire;
+use super::wireframe::Wireframe;
 use super::{Beam, Graph, Hub, Profile};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, add, scale};
 
-/// How thick beams are; `V` is a length that may vary.
+/// Radius rules for beams and hubs; `V` is a length that may vary in space.
 #[derive(Clone)]
 pub struct Radii<V> {
-    /// Radius of a beam at mid length (mm), taken there; none if the hubs decide.
+    /// Beam radius at mid length (mm), evaluated there; `None` if the hubs decide.
     pub radius: Option<V>,
-    /// Radius of hubs (mm), taken at their centres; none for the largest radius of the beams that meet there.
+    /// Hub radius (mm), evaluated at the centres; `None` for the largest radius of the incident beams.
     pub hub: Option<V>,
-    /// What beams are; none for the quadric with the radius at mid length, or where there is none the cone.
+    /// Beam profile; `None` for the quadric with the given mid-length radius, or the cone if there is no such radius.
     pub profile: Option<Profile>,
 }
 
-/// A graph of a frame: `values` fills a length that varies at points (mm), `own` are the radii of its
-/// nodes (NaN where none is given, empty if none is), which come first.
+/// The graph of a wireframe. `values` evaluates a varying length at points (mm); `own` are node radii that take
+/// precedence (NaN where none is given, empty if none at all).
 ///
 /// # Errors
-/// A node without a radius of its own where no radius is given; a radius that is not positive, with its place.
-pub fn sized<V>(
-    wire: &Wire,
+/// A node without any radius; a radius that is not positive and finite, with its position.
+pub fn with_radii<V>(
+    wireframe: &Wireframe,
     own: &[f64],
     radii: &Radii<V>,
     values: impl Fn(&V, &[Vec3], &mut [f64]),
 ) -> Result<Graph, Fault> {
     let lengths = |v: &V, points: &[Vec3], key| lengths(|out| values(v, points, out), points, key);
-    let middles: Vec<Vec3> = (wire.struts.iter())
+    let middles: Vec<Vec3> = (wireframe.struts.iter())
         .map(|s| {
-            let [a, b] = s.map(|n| wire.nodes[n as usize]);
+            let [a, b] = s.map(|n| wireframe.nodes[n as usize]);
             scale(add(a, b), 0.5)
         })
         .collect();
-    let thick = radii.radius.as_ref().map(|v| lengths(v, &middles, "radius")).transpose()?;
+    let beam_radii = radii.radius.as_ref().map(|v| lengths(v, &middles, "radius")).transpose()?;
     let mut sizes = match &radii.hub {
-        Some(v) => lengths(v, &wire.nodes, "hub")?,
+        Some(v) => lengths(v, &wireframe.nodes, "hub")?,
         None => {
-            let mut most = vec![f64::NAN; wire.nodes.len()];
-            for (s, r) in wire.struts.iter().zip(thick.iter().flatten()) {
+            let mut most = vec![f64::NAN; wireframe.nodes.len()];
+            for (s, r) in wireframe.struts.iter().zip(beam_radii.iter().flatten()) {
                 for n in s {
                     most[*n as usize] = most[*n as usize].max(*r);
                 }
@@ -54,33 +54,33 @@ pub fn sized<V>(
         return Err(Fault::new(
             "radius",
             format!(
-                "the node at {} has no radius of its own, and no radius of beams is given; give one",
-                place(wire.nodes[n])
+                "no radius for the node at {}: give one for the node, for hubs or for beams",
+                position_text(wireframe.nodes[n])
             ),
         ));
     }
     let hub = |(center, radius): (&Vec3, f64)| Hub { center: *center, radius };
     let beam = |(i, ends): (usize, &[u32; 2])| Beam {
         ends: *ends,
-        profile: match (radii.profile, &thick) {
+        profile: match (radii.profile, &beam_radii) {
             (Some(profile), _) => profile,
-            (None, Some(thick)) => Profile::Mid(thick[i]),
+            (None, Some(beam_radii)) => Profile::Mid(beam_radii[i]),
             (None, None) => Profile::Cone,
         },
     };
     Ok(Graph {
-        hubs: wire.nodes.iter().zip(sizes).map(hub).collect(),
-        beams: wire.struts.iter().enumerate().map(beam).collect(),
+        hubs: wireframe.nodes.iter().zip(sizes).map(hub).collect(),
+        beams: wireframe.struts.iter().enumerate().map(beam).collect(),
     })
 }
 
-/// A place in a sentence.
-pub fn place(p: Vec3) -> String {
+/// A position as text for messages.
+pub fn position_text(p: Vec3) -> String {
     let [x, y, z] = p.map(number);
     format!("({x}, {y}, {z}) mm")
 }
 
-/// A length that varies, at the points.
+/// A varying length at points, checked to be positive and finite.
 fn lengths(values: impl Fn(&mut [f64]), points: &[Vec3], key: &str) -> Result<Vec<f64>, Fault> {
     let mut out = vec![0.0; points.len()];
     values(&mut out);
@@ -88,9 +88,10 @@ fn lengths(values: impl Fn(&mut [f64]), points: &[Vec3], key: &str) -> Result<Ve
         Some(i) => Err(Fault::new(
             key,
             format!(
-                "{key} is {} mm at {}; it must be a finite number greater than 0",
+                "{} radius must be positive and finite, found {} mm at {}",
+                if key == "hub" { "hub" } else { "beam" },
                 number(out[i]),
-                place(points[i])
+                position_text(points[i])
             ),
         )),
         None => Ok(out),

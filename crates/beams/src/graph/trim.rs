@@ -1,91 +1,98 @@
-//! A wire frame cut to a region.
+//! Trimming of a wireframe to a region.
 
 use rayon::prelude::*;
 
-use super::wire::Wire;
+use super::wireframe::Wireframe;
 use crate::Values;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
-/// What becomes of struts that leave the region.
+/// Treatment of struts that leave the region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trim {
-    /// They stay, and are cut by the region's surface.
+    /// They stay; the region's surface cuts their solid.
     #[default]
     Cut,
-    /// They go.
+    /// They are removed.
     Drop,
-    /// They end on the surface.
+    /// They are shortened to end on the surface.
     Snap,
 }
 
-/// What was trimmed.
+/// Counts of a trim.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Trimmed {
-    /// Struts that have no part in the region.
+    /// Struts outside the region.
     pub outside: usize,
-    /// Struts left out because they leave the region.
+    /// Struts removed because they leave the region.
     pub dropped: usize,
-    /// Struts that were shortened to the surface.
+    /// Struts shortened to the surface.
     pub snapped: usize,
 }
 
-/// What becomes of a strut.
-enum Fate {
-    Stays,
+/// Result for one strut.
+enum Outcome {
+    Kept,
     Outside,
     Dropped,
-    /// From the node inside it goes so far towards the other.
+    /// From the inside node, this fraction of the length remains.
     Shortened([u32; 2], f64),
 }
 
-/// Nodes whose distance is taken at once.
+/// Nodes evaluated per batch.
 const BATCH: usize = 1024;
-/// Steps along a strut at least: beyond it a bay of the region is overlooked.
-const STEPS: f64 = 256.0;
-/// How near the surface (of the strut's length) a crossing is found.
-const NEAR: f64 = 1e-10;
+/// Minimum number of steps along a strut: narrower concavities of the region are missed.
+const MIN_STEPS: f64 = 256.0;
+/// Tolerance of a surface crossing, as a fraction of the strut's length.
+const TOLERANCE: f64 = 1e-10;
 
 impl Trim {
-    /// Trims a frame to a region, given by its signed distance (steeper nowhere than 1). Struts within `reach` (mm) of
-    /// the region, a ball's radius, count as having a part in it. Ends within `slack` (mm) outside count as inside.
-    /// `radii` of the nodes, if not empty, is kept in step.
-    pub fn apply(self, wire: &mut Wire, region: Values, reach: f64, slack: f64, radii: &mut Vec<f64>) -> Trimmed {
-        let mut depth = vec![0.0; wire.nodes.len()];
-        let pieces = depth.par_chunks_mut(BATCH).zip(wire.nodes.par_chunks(BATCH));
+    /// Trims a wireframe to a region given by its signed distance (Lipschitz bound 1). Struts within `reach` (mm, the
+    /// largest hub radius) of the region are not outside. Ends up to `slack` (mm) outside count as inside. `radii` of
+    /// the nodes, unless empty, is kept parallel.
+    pub fn apply(
+        self,
+        wireframe: &mut Wireframe,
+        region: Values,
+        reach: f64,
+        slack: f64,
+        radii: &mut Vec<f64>,
+    ) -> Trimmed {
+        let mut depth = vec![0.0; wireframe.nodes.len()];
+        let pieces = depth.par_chunks_mut(BATCH).zip(wireframe.nodes.par_chunks(BATCH));
         pieces.for_each(|(d, p)| region(p, d));
         let inside = |n: u32| depth[n as usize] <= slack;
-        let at = |s: &[u32; 2]| s.map(|n| wire.nodes[n as usize]);
-        let fate = |s: &[u32; 2]| {
+        let at = |s: &[u32; 2]| s.map(|n| wireframe.nodes[n as usize]);
+        let outcome = |s: &[u32; 2]| {
             let ends = s.map(inside);
             match self {
-                Trim::Cut if ends.contains(&true) => Fate::Stays,
-                Trim::Cut if least(region, at(s), reach) <= reach => Fate::Stays,
-                Trim::Cut => Fate::Outside,
-                Trim::Drop | Trim::Snap if ends == [true; 2] => match leaves(region, at(s), slack) {
-                    None => Fate::Stays,
-                    Some(_) => Fate::Dropped,
+                Trim::Cut if ends.contains(&true) => Outcome::Kept,
+                Trim::Cut if min_distance(region, at(s), reach) <= reach => Outcome::Kept,
+                Trim::Cut => Outcome::Outside,
+                Trim::Drop | Trim::Snap if ends == [true; 2] => match exit_parameter(region, at(s), slack) {
+                    None => Outcome::Kept,
+                    Some(_) => Outcome::Dropped,
                 },
-                Trim::Drop => Fate::Dropped,
-                Trim::Snap if ends == [false; 2] => Fate::Outside,
+                Trim::Drop => Outcome::Dropped,
+                Trim::Snap if ends == [false; 2] => Outcome::Outside,
                 Trim::Snap => {
                     let from = if ends[0] { *s } else { [s[1], s[0]] };
-                    // The far end is outside, so it leaves.
-                    Fate::Shortened(from, leaves(region, at(&from), slack).unwrap_or(1.0))
+                    // The far end is outside, so a crossing exists.
+                    Outcome::Shortened(from, exit_parameter(region, at(&from), slack).unwrap_or(1.0))
                 }
             }
         };
-        let fates: Vec<Fate> = wire.struts.par_iter().map(fate).collect();
+        let outcomes: Vec<Outcome> = wireframe.struts.par_iter().map(outcome).collect();
         let mut done = Trimmed::default();
-        let mut struts = Vec::with_capacity(wire.struts.len());
-        for (s, fate) in wire.struts.iter().zip(fates) {
-            match fate {
-                Fate::Stays => struts.push(*s),
-                Fate::Outside => done.outside += 1,
-                Fate::Dropped => done.dropped += 1,
-                Fate::Shortened([from, to], t) => {
-                    let [a, b] = [from, to].map(|n| wire.nodes[n as usize]);
-                    struts.push([from, wire.nodes.len() as u32]);
-                    wire.nodes.push(add(a, scale(sub(b, a), t)));
+        let mut struts = Vec::with_capacity(wireframe.struts.len());
+        for (s, outcome) in wireframe.struts.iter().zip(outcomes) {
+            match outcome {
+                Outcome::Kept => struts.push(*s),
+                Outcome::Outside => done.outside += 1,
+                Outcome::Dropped => done.dropped += 1,
+                Outcome::Shortened([from, to], t) => {
+                    let [a, b] = [from, to].map(|n| wireframe.nodes[n as usize]);
+                    struts.push([from, wireframe.nodes.len() as u32]);
+                    wireframe.nodes.push(add(a, scale(sub(b, a), t)));
                     if !radii.is_empty() {
                         let [a, b] = [from, to].map(|n| radii[n as usize]);
                         radii.push(a + t * (b - a));
@@ -94,8 +101,8 @@ impl Trim {
                 }
             }
         }
-        wire.struts = struts;
-        wire.keep(radii);
+        wireframe.struts = struts;
+        wireframe.drop_isolated(radii);
         done
     }
 }
@@ -106,34 +113,34 @@ fn value_at(field: Values, p: Vec3) -> f64 {
     v[0]
 }
 
-/// The least distance along a segment, or some distance not above `enough`.
-fn least(region: Values, [a, b]: [Vec3; 2], enough: f64) -> f64 {
+/// The minimum distance along a segment, or some distance not above `enough`.
+fn min_distance(region: Values, [a, b]: [Vec3; 2], enough: f64) -> f64 {
     let along = sub(b, a);
     let length = norm(along);
-    let (mut t, mut least) = (0.0, f64::INFINITY);
+    let (mut t, mut min_distance) = (0.0, f64::INFINITY);
     while t < 1.0 {
         let d = value_at(region, add(a, scale(along, t)));
-        least = least.min(d);
-        if least <= enough {
+        min_distance = min_distance.min(d);
+        if min_distance <= enough {
             break;
         }
-        // Nothing nearer than this within the distance that is missing.
-        t += ((d - enough) / length).max(1.0 / STEPS);
+        // By the Lipschitz bound no point before this step is within `enough`.
+        t += ((d - enough) / length).max(1.0 / MIN_STEPS);
     }
-    least
+    min_distance
 }
 
-/// How far along a segment (0 to 1) that begins inside it first leaves the region, by more than `slack`.
-fn leaves(region: Values, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
+/// Parameter (0 to 1) at which a segment that begins inside first leaves the region by more than `slack`.
+fn exit_parameter(region: Values, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
     let along = sub(b, a);
     let length = norm(along);
     let value = |t: f64| value_at(region, add(a, scale(along, t)));
     let mut t = 0.0;
     while t < 1.0 {
-        let next = (t + (-value(t) / length).max(1.0 / STEPS)).min(1.0);
+        let next = (t + (-value(t) / length).max(1.0 / MIN_STEPS)).min(1.0);
         if value(next) > slack {
             let (mut low, mut high) = (t, next);
-            while high - low > NEAR {
+            while high - low > TOLERANCE {
                 let middle = 0.5 * (low + high);
                 if value(middle) > 0.0 {
                     high = middle;
@@ -152,9 +159,9 @@ fn leaves(region: Values, [a, b]: [Vec3; 2], slack: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn comb() -> Wire {
+    fn comb() -> Wireframe {
         let nodes = (-6..=6).map(|i| [f64::from(i), 0.5, 0.0]).collect();
-        Wire { nodes, struts: (0..12).map(|i| [i, i + 1]).collect() }
+        Wireframe { nodes, struts: (0..12).map(|i| [i, i + 1]).collect() }
     }
 
     #[test]

@@ -1,164 +1,173 @@
-//! Faces in triangles whose corners lie on the surface.
+//! Triangulation of a hub's faces, with vertices on the surface.
 //!
-//! A hub is seen whole from its centre, so its surface is a height over the sphere of directions. Triangles that turn the
-//! right way seen from there, and together go once round it, cannot meet but where they share corners. So a face's outline
-//! is cut ear by ear on the sphere, where a turn is the sign of det(a, b, c), and a side is halved by the place on the surface
-//! above its middle, which turns nothing round. Places on a seam are preferred where they turn nothing round either.
+//! A hub is star-shaped about its centre, so its surface is a radial function over the sphere of directions. Triangles
+//! that are positively oriented seen from the centre and together cover the sphere once can meet in common vertices and
+//! edges only. A face's boundary polygon is therefore triangulated by ear clipping on the sphere, where orientation is
+//! the sign of det(a, b, c), and edges are bisected at the surface point above their midpoint, which inverts no
+//! triangle. Points on a seam are preferred where they invert none either.
 
 use std::collections::HashMap;
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
-use super::complex::{Arc, Complex, MERGE};
+use super::complex::{Arc, COLLAPSE_LENGTH, Complex};
 use super::hub::Hub;
-use cover::strip;
+use ear_clipping::strip;
 
-mod cover;
-mod finer;
+mod ear_clipping;
+mod refinement;
 
-/// What a side of a triangle lies on.
+/// The curve that an edge approximates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Side {
-    /// An arc, between two of its angles: that of the point of lower number first.
+enum EdgeCurve {
+    /// An arc between two of its angles; that of the lower-numbered vertex first.
     Arc(u32, f64, f64),
-    /// A rim, which is not divided.
+    /// An end circle, which is not subdivided.
     Rim,
 }
 
-/// An arc that lies where an earlier one does.
+/// An arc that coincides with an earlier one.
 #[derive(Clone, Copy, Debug)]
-struct Twin {
+struct CoincidentArc {
     of: u32,
-    /// Whether both have the same direction.
+    /// Whether both have the same orientation.
     same: bool,
-    /// The face between them.
+    /// The face of zero width between them.
     face: usize,
 }
 
-/// Triangles on the surface of a hub.
+/// A triangulation of the surface of a hub.
 pub(super) struct Facets<'a> {
     hub: &'a Hub<'a>,
     complex: &'a Complex,
-    /// Places: those of rims first.
+    /// Vertices: those of end circles first.
     pub points: Vec<Vec3>,
-    /// Triangles, counter-clockwise from outside.
+    /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// The face of each.
+    /// The face of each triangle.
     faces: Vec<u32>,
-    /// Sides that are not inside a face.
-    sides: HashMap<[u32; 2], Side>,
-    /// The triangle to the left of each directed side.
-    left: HashMap<[u32; 2], u32>,
-    /// Triangles that nobody has looked at since they changed.
-    fresh: Vec<u32>,
-    /// How far they may be from the surface, mm.
+    /// Edges on the boundary of a face.
+    boundary: HashMap<[u32; 2], EdgeCurve>,
+    /// The triangle on the left of each directed edge.
+    left_of: HashMap<[u32; 2], u32>,
+    /// Triangles changed since they were last checked.
+    changed: Vec<u32>,
+    /// Chord error, mm.
     chord: f64,
 }
 
-/// The sign of a turn on the sphere, and six times the volume under a triangle.
+/// Orientation of a triangle seen from the centre, and six times the volume below it.
 #[inline]
-fn turn(a: Vec3, b: Vec3, c: Vec3) -> f64 {
+fn orientation(a: Vec3, b: Vec3, c: Vec3) -> f64 {
     dot(a, cross(b, c))
 }
 
-fn key(a: u32, b: u32) -> [u32; 2] {
+fn edge_key(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The solid angle of a triangle at the centre.
-fn angle([a, b, c]: [Vec3; 3]) -> f64 {
+/// The solid angle of a triangle at the centre, sr.
+fn solid_angle([a, b, c]: [Vec3; 3]) -> f64 {
     let (a, b, c) = (unit(a), unit(b), unit(c));
-    2.0 * turn(a, b, c).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+    2.0 * orientation(a, b, c).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
 }
 
-/// How far seams turn between their points at most, radians: less where outlines that coarse would cross.
-const TURNS: [f64; 6] = [1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
-/// The share of the chord error that the chords of seams and rims take: what runs between their points takes the rest.
-pub(super) const TAKEN: f64 = 0.75;
-/// Places at which the curvature of a seam is looked at.
-const PLACES: usize = 32;
+/// Maximum turning angle of seams between vertices, radians: reduced until boundary polygons do not intersect
+/// themselves.
+const MAX_TURNING: [f64; 6] = [1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
+/// Fraction of the chord error allowed for edges on seams and end circles; edges inside faces use the rest.
+pub(super) const SEAM_SHARE: f64 = 0.75;
+/// Number of samples of a seam's curvature.
+const SAMPLES: usize = 32;
 
 impl<'a> Facets<'a> {
-    /// A hub's faces in few triangles, to be made finer up to a chord error, given the points of its rims, stub by stub; `None` if
-    /// an outline crosses itself.
-    pub fn new(hub: &'a Hub<'a>, complex: &'a Complex, rims: &[Vec<Vec3>], chord: f64) -> Option<Facets<'a>> {
-        TURNS.iter().find_map(|&turn| Facets::drawn(hub, complex, rims, (chord, turn)))
-    }
-
-    fn drawn(
+    /// A coarse triangulation of a hub's faces, given the vertices of its end circles by half-beam; to be refined to a
+    /// chord error. `None` if a boundary polygon intersects itself.
+    pub(super) fn new(
         hub: &'a Hub<'a>,
         complex: &'a Complex,
-        rims: &[Vec<Vec3>],
+        end_circles: &[Vec<Vec3>],
+        chord: f64,
+    ) -> Option<Facets<'a>> {
+        MAX_TURNING.iter().find_map(|&turn| Facets::coarse(hub, complex, end_circles, (chord, turn)))
+    }
+
+    fn coarse(
+        hub: &'a Hub<'a>,
+        complex: &'a Complex,
+        end_circles: &[Vec<Vec3>],
         (chord, turns): (f64, f64),
     ) -> Option<Facets<'a>> {
         let mut out = Facets {
             hub,
             complex,
-            points: rims.iter().flatten().copied().collect(),
+            points: end_circles.iter().flatten().copied().collect(),
             triangles: Vec::new(),
             faces: Vec::new(),
-            sides: HashMap::new(),
-            left: HashMap::new(),
-            fresh: Vec::new(),
+            boundary: HashMap::new(),
+            left_of: HashMap::new(),
+            changed: Vec::new(),
             chord,
         };
-        let mut firsts = Vec::with_capacity(rims.len());
+        let mut firsts = Vec::with_capacity(end_circles.len());
         let mut first = 0u32;
-        for rim in rims {
-            let n = rim.len() as u32;
+        for end_circle in end_circles {
+            let n = end_circle.len() as u32;
             firsts.push(first);
             for k in 0..n {
-                out.sides.insert(key(first + k, first + (k + 1) % n), Side::Rim);
+                out.boundary.insert(edge_key(first + k, first + (k + 1) % n), EdgeCurve::Rim);
             }
             first += n;
         }
-        let twins = out.twins();
-        let chains = out.chains(turns, &twins);
+        let coincident_arcs = out.coincident_arcs();
+        let polylines = out.polylines(turns, &coincident_arcs);
         for (number, face) in complex.faces.iter().enumerate() {
-            if twins.iter().flatten().any(|t| t.face == number) {
+            if coincident_arcs.iter().flatten().any(|t| t.face == number) {
                 continue;
             }
-            let made = match face.rim {
-                Some(stub) => {
-                    let (stub, first) = (stub as usize, firsts[stub as usize]);
-                    let ring: Vec<u32> = (0..rims[stub].len() as u32).map(|k| first + k).collect();
-                    let inner = walk(&chains, face.loops.first()?);
-                    let strip = strip(hub.stubs[stub].axis, &out.points, &inner, &ring);
+            let made = match face.end_circle {
+                Some(half_beam) => {
+                    let (half_beam, first) = (half_beam as usize, firsts[half_beam as usize]);
+                    let ring: Vec<u32> = (0..end_circles[half_beam].len() as u32).map(|k| first + k).collect();
+                    let inner = loop_vertices(&polylines, face.loops.first()?);
+                    let strip = strip(hub.half_beams[half_beam].axis, &out.points, &inner, &ring);
                     let turned = |t: &[u32; 3]| {
                         let [a, b, c] = out.corners(*t);
-                        turn(a, b, c) <= 0.0
+                        orientation(a, b, c) <= 0.0
                     };
                     if strip.iter().any(turned) {
-                        // Where a fillet reaches far along the stub its azimuths say too little.
-                        out.joined(vec![inner, ring.into_iter().rev().collect()], face)?
+                        // Where a fillet reaches far along the half-beam, azimuths do not determine a triangulation.
+                        out.connected(vec![inner, ring.into_iter().rev().collect()], face)?
                     } else {
                         strip
                     }
                 }
-                None => out.outlined(&chains, face)?,
+                None => out.bounded(&polylines, face)?,
             };
             for t in made {
                 if t[0] != t[1] && t[1] != t[2] && t[2] != t[0] {
-                    out.put(t, number as u32);
+                    out.push_triangle(t, number as u32);
                 }
             }
         }
-        // Once round, less what is behind the rims.
-        let mut round = 0.0;
+        // The solid angle is 4π minus that behind the end circles.
+        let mut total_angle = 0.0;
         for t in &out.triangles {
             let t = out.corners(*t);
-            if turn(t[0], t[1], t[2]) <= 0.0 {
+            if orientation(t[0], t[1], t[2]) <= 0.0 {
                 return None;
             }
-            round += angle(t);
+            total_angle += solid_angle(t);
         }
-        for (rim, s) in rims.iter().zip(hub.stubs) {
-            round += (0..rim.len()).map(|k| angle([s.axis, rim[k], rim[(k + 1) % rim.len()]]).abs()).sum::<f64>();
+        for (end_circle, s) in end_circles.iter().zip(hub.half_beams) {
+            total_angle += (0..end_circle.len())
+                .map(|k| solid_angle([s.axis, end_circle[k], end_circle[(k + 1) % end_circle.len()]]).abs())
+                .sum::<f64>();
         }
-        if (round - 4.0 * core::f64::consts::PI).abs() > 1e-6 {
+        if (total_angle - 4.0 * core::f64::consts::PI).abs() > 1e-6 {
             return None;
         }
-        out.settle();
+        out.flip_all();
         Some(out)
     }
 
@@ -166,78 +175,79 @@ impl<'a> Facets<'a> {
         t.map(|i| self.points[i as usize])
     }
 
-    fn put(&mut self, t: [u32; 3], face: u32) {
+    fn push_triangle(&mut self, t: [u32; 3], face: u32) {
         let number = self.triangles.len() as u32;
         self.triangles.push(t);
         self.faces.push(face);
-        self.set(number, t);
+        self.set_triangle(number, t);
     }
 
-    fn set(&mut self, number: u32, t: [u32; 3]) {
+    fn set_triangle(&mut self, number: u32, t: [u32; 3]) {
         self.triangles[number as usize] = t;
-        self.fresh.push(number);
+        self.changed.push(number);
         for k in 0..3 {
-            self.left.insert([t[k], t[(k + 1) % 3]], number);
+            self.left_of.insert([t[k], t[(k + 1) % 3]], number);
         }
     }
 
-    /// For each arc an earlier one in the same place, if there is: both bound a face without width, such as the fillet between
-    /// equal cylinders that run straight on, whose other side has none.
-    fn twins(&self) -> Vec<Option<Twin>> {
+    /// For each arc an earlier one that coincides with it, if any: both bound a face of zero width, such as the fillet
+    /// between equal collinear cylinders on the side without other beams.
+    fn coincident_arcs(&self) -> Vec<Option<CoincidentArc>> {
         let arcs = &self.complex.arcs;
-        let mut twins = vec![None; arcs.len()];
+        let mut coincident_arcs = vec![None; arcs.len()];
         for (number, face) in self.complex.faces.iter().enumerate() {
             let walked = face.loops.concat();
-            let (&[(a, there), (b, back)], None) = (&walked[..], face.rim) else {
+            let (&[(a, there), (b, back)], None) = (&walked[..], face.end_circle) else {
                 continue;
             };
             let (earlier, later) = (a.min(b), a.max(b));
-            let place = |arc: u32, t: f64| {
+            let point_on = |arc: u32, t: f64| {
                 let conic = &arcs[arc as usize].conic;
                 conic.at(t * conic.end)
             };
-            // Walked there and back: if both have the same direction, one of them is walked against it.
+            // Traversed there and back: if both have the same orientation, one is traversed backwards.
             let same = there != back;
-            let near = |p: Vec3, q: Vec3| norm(sub(p, q)) < MERGE * self.hub.radius;
+            let near = |p: Vec3, q: Vec3| norm(sub(p, q)) < COLLAPSE_LENGTH * self.hub.radius;
             let closed = face.loops.len() == 2;
-            let twin = [0.0, 0.25, 0.5].into_iter().all(|t| {
-                let both = [earlier, later].map(|arc| [t, 1.0 - t].map(|t| place(arc, t)));
+            let coincident = [0.0, 0.25, 0.5].into_iter().all(|t| {
+                let both = [earlier, later].map(|arc| [t, 1.0 - t].map(|t| point_on(arc, t)));
                 let [[p, q], [r, s]] = both;
                 if closed {
-                    // Those begin anywhere: on one quadric, about one centre, in one plane.
-                    let center = |arc: u32| add(place(arc, 0.0), place(arc, 0.5));
+                    // Closed arcs may start anywhere: they coincide if they have the same centre and plane.
+                    let center = |arc: u32| add(point_on(arc, 0.0), point_on(arc, 0.5));
                     let plane = &arcs[earlier as usize].plane;
                     let off = (dot(plane.a, r) + plane.b).abs() / norm(plane.a);
-                    near(scale(center(earlier), 0.5), scale(center(later), 0.5)) && off < MERGE * self.hub.radius
+                    near(scale(center(earlier), 0.5), scale(center(later), 0.5))
+                        && off < COLLAPSE_LENGTH * self.hub.radius
                 } else if same {
                     near(p, r) && near(q, s)
                 } else {
                     near(p, s) && near(q, r)
                 }
             });
-            if a != b && twin {
-                twins[later as usize] = Some(Twin { of: earlier, same, face: number });
+            if a != b && coincident {
+                coincident_arcs[later as usize] = Some(CoincidentArc { of: earlier, same, face: number });
             }
         }
-        twins
+        coincident_arcs
     }
 
-    /// Points along each arc, both ends included.
-    fn chains(&mut self, turns: f64, twins: &[Option<Twin>]) -> Vec<Vec<u32>> {
+    /// The vertices along each arc, both ends included.
+    fn polylines(&mut self, turns: f64, coincident_arcs: &[Option<CoincidentArc>]) -> Vec<Vec<u32>> {
         let arcs = &self.complex.arcs;
-        let mut stands: Vec<u32> = (0..self.complex.vertices.len() as u32).collect();
-        for (arc, twin) in arcs.iter().zip(twins) {
-            let Some(twin) = twin else { continue };
-            let of = arcs[twin.of as usize].ends;
+        let mut representative: Vec<u32> = (0..self.complex.vertices.len() as u32).collect();
+        for (arc, coincident) in arcs.iter().zip(coincident_arcs) {
+            let Some(coincident) = coincident else { continue };
+            let of = arcs[coincident.of as usize].ends;
             for k in 0..2 {
-                let both = [arc.ends[k], of[if twin.same { k } else { 1 - k }]];
-                let [p, q] = both.map(|v| stands[v as usize]);
-                let all = stands.iter_mut().filter(|s| **s == p.max(q));
+                let both = [arc.ends[k], of[if coincident.same { k } else { 1 - k }]];
+                let [p, q] = both.map(|v| representative[v as usize]);
+                let all = representative.iter_mut().filter(|s| **s == p.max(q));
                 all.for_each(|s| *s = p.min(q));
             }
         }
-        let mut vertices: Vec<u32> = Vec::with_capacity(stands.len());
-        for (v, of) in self.complex.vertices.iter().zip(&stands) {
+        let mut vertices: Vec<u32> = Vec::with_capacity(representative.len());
+        for (v, of) in self.complex.vertices.iter().zip(&representative) {
             vertices.push(match vertices.get(*of as usize) {
                 Some(point) => *point,
                 None => {
@@ -246,51 +256,51 @@ impl<'a> Facets<'a> {
                 }
             });
         }
-        let mut chains: Vec<Vec<u32>> = Vec::with_capacity(self.complex.arcs.len());
+        let mut polylines: Vec<Vec<u32>> = Vec::with_capacity(self.complex.arcs.len());
         for (number, a) in arcs.iter().enumerate() {
-            if let Some(twin) = twins[number] {
-                let mut chain = chains[twin.of as usize].clone();
-                if !twin.same {
-                    chain.reverse();
+            if let Some(coincident) = coincident_arcs[number] {
+                let mut polyline = polylines[coincident.of as usize].clone();
+                if !coincident.same {
+                    polyline.reverse();
                 }
-                chains.push(chain);
+                polylines.push(polyline);
                 continue;
             }
             let [from, last] = a.ends.map(|v| vertices[v as usize]);
-            let mut chain = vec![from];
+            let mut polyline = vec![from];
             let mut before = 0.0;
-            for to in self.steps(a, turns) {
+            for to in self.division(a, turns) {
                 let point = if to == a.conic.end {
                     last
                 } else {
                     self.points.push(a.conic.at(to));
                     self.points.len() as u32 - 1
                 };
-                let (p, q) = ((chain[chain.len() - 1], before), (point, to));
+                let (p, q) = ((polyline[polyline.len() - 1], before), (point, to));
                 let (p, q) = if p.0 < q.0 { (p, q) } else { (q, p) };
-                let side = Side::Arc(number as u32, p.1, q.1);
-                self.sides.insert([p.0, q.0], side);
-                chain.push(point);
+                let side = EdgeCurve::Arc(number as u32, p.1, q.1);
+                self.boundary.insert([p.0, q.0], side);
+                polyline.push(point);
                 before = to;
             }
-            chains.push(chain);
+            polylines.push(polyline);
         }
-        chains
+        polylines
     }
 
-    /// Where an arc is divided, its end included: evenly in the root of the curvature that takes chords off the surface, and so that it
-    /// turns no further than told from one to the next.
-    fn steps(&self, arc: &Arc, turns: f64) -> Vec<f64> {
+    /// The parameters at which an arc is divided, its end included: uniform in the integral of the square root of
+    /// normal curvature, with a limited turning angle.
+    fn division(&self, arc: &Arc, turns: f64) -> Vec<f64> {
         let conic = &arc.conic;
         let at = |k: usize| {
-            let (x, dx) = conic.with_slope(conic.end * k as f64 / PLACES as f64);
+            let (x, dx) = conic.with_derivative(conic.end * k as f64 / SAMPLES as f64);
             (x, unit(dx))
         };
-        // A chord of length s is κs²/8 off.
-        let per = 1.0 / (8.0 * TAKEN * self.chord).sqrt();
-        let mut sums = [0.0; PLACES + 1];
+        // A chord of length s has sagitta κs²/8.
+        let per = 1.0 / (8.0 * SEAM_SHARE * self.chord).sqrt();
+        let mut sums = [0.0; SAMPLES + 1];
         let mut from = at(0);
-        for k in 1..=PLACES {
+        for k in 1..=SAMPLES {
             let to = at(k);
             let (by, bend) = (norm(sub(to.0, from.0)), sub(to.1, from.1));
             let up = unit(self.hub.gradient(scale(add(from.0, to.0), 0.5)).1);
@@ -298,30 +308,30 @@ impl<'a> Facets<'a> {
             sums[k] = sums[k - 1] + off.max(norm(bend) / turns);
             from = to;
         }
-        let whole = sums[PLACES];
-        // What closes on itself is three sides at least.
+        let whole = sums[SAMPLES];
+        // A closed arc needs at least three edges.
         let least = if arc.ends[0] == arc.ends[1] { 3.0 } else { 1.0 };
         let n = (whole - 1e-6).ceil().max(least) as usize;
         let mut k = 1;
         let inner = (1..n).map(|i| {
             let want = whole * i as f64 / n as f64;
-            while k < PLACES && sums[k] < want {
+            while k < SAMPLES && sums[k] < want {
                 k += 1;
             }
             let part = (want - sums[k - 1]) / (sums[k] - sums[k - 1]);
-            conic.end * (k as f64 - 1.0 + part) / PLACES as f64
+            conic.end * (k as f64 - 1.0 + part) / SAMPLES as f64
         });
         inner.chain([conic.end]).collect()
     }
 }
 
-/// The points of a loop as it is walked, without the last, which is the first.
-fn walk(chains: &[Vec<u32>], walked: &[(u32, bool)]) -> Vec<u32> {
+/// The vertices of a loop in order, the first not repeated.
+fn loop_vertices(polylines: &[Vec<u32>], walked: &[(u32, bool)]) -> Vec<u32> {
     let mut out = Vec::new();
     for &(arc, forward) in walked {
-        let chain = &chains[arc as usize];
-        let n = chain.len() - 1;
-        out.extend((0..n).map(|k| chain[if forward { k } else { n - k }]));
+        let polyline = &polylines[arc as usize];
+        let n = polyline.len() - 1;
+        out.extend((0..n).map(|k| polyline[if forward { k } else { n - k }]));
     }
     out
 }

@@ -1,58 +1,58 @@
-//! Where the distance from a point to a quadric is stationary.
+//! Feet of perpendiculars from a point to a quadric: stationary points of the distance.
 //!
-//! At a foot x of p on Q(x) = xᵀMx + 2 b·x + c = 0, p − x is along the slope: (1 + μM) x = p − μb. Along M's own axes that is
-//! xᵢ = (pᵢ − μbᵢ)/(1 + μmᵢ). The feet that can be nearest are found by the sign of 1 + μM; `all` finds every one. Each is then brought
-//! to the last digit by Newton's method.
+//! At a foot x of p on Q(x) = xᵀMx + 2 b·x + c = 0, p − x is parallel to the gradient: (1 + μM) x = p − μb. In the
+//! principal axes of M, xᵢ = (pᵢ − μbᵢ)/(1 + μmᵢ). Feet that can be closest are found by the sign of 1 + μM; `all_feet`
+//! finds every one. Newton's method refines each to rounding.
 
 use geometry::math::{Mat3, Vec3, add, apply, dot, eigen, norm, root, scale, sub, transpose, unit};
 
-use super::quadric::Quadric;
+use super::hub_quadric::Quadric;
 
-mod all;
+mod all_feet;
 
-pub(super) use all::feet_on_arc;
+pub(super) use all_feet::feet_on_conic;
 
-/// A quadric along its own axes.
+/// A quadric in its principal axes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axes {
-    /// The axes, rows.
-    turn: Mat3,
+pub(super) struct PrincipalAxes {
+    /// The axes, as rows.
+    axes: Mat3,
     m: Vec3,
     b: Vec3,
     c: f64,
 }
 
-/// A foot along the axes of its quadric.
+/// A foot in the principal axes of its quadric.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Foot {
     p: Vec3,
     x: Vec3,
     mu: f64,
-    /// How far it is from p.
-    pub away: f64,
+    /// Distance from p, mm.
+    pub distance: f64,
 }
 
-/// 1 + μm below which a foot is not told from a circle of them.
+/// Minimum of 1 + μm, below which a foot cannot be separated from a circle of feet.
 const DEGENERATE: f64 = 1e-5;
 
-impl Axes {
-    pub(super) fn new(q: &Quadric) -> Axes {
-        let (m, turn) = eigen(&q.m);
-        Axes { turn, m, b: apply(&turn, q.b), c: q.c }
+impl PrincipalAxes {
+    pub(super) fn new(q: &Quadric) -> PrincipalAxes {
+        let (m, axes) = eigen(&q.m);
+        PrincipalAxes { axes, m, b: apply(&axes, q.b), c: q.c }
     }
 
     fn value(&self, x: Vec3) -> f64 {
         self.c + (0..3).map(|i| x[i] * (self.m[i] * x[i] + 2.0 * self.b[i])).sum::<f64>()
     }
 
-    fn half_slope(&self, x: Vec3) -> Vec3 {
+    fn half_gradient(&self, x: Vec3) -> Vec3 {
         [0, 1, 2].map(|i| self.m[i] * x[i] + self.b[i])
     }
 
-    /// x(μ), Q there, its derivative, and the least 1 + μm.
+    /// x(μ), [Q, dQ/dμ] there, and the minimum of 1 + μm.
     #[inline]
-    fn along(&self, p: Vec3, mu: f64) -> (Vec3, [f64; 2], f64) {
-        let (mut value, mut slope, mut near) = (self.c, 0.0, f64::INFINITY);
+    fn on_curve(&self, p: Vec3, mu: f64) -> (Vec3, [f64; 2], f64) {
+        let (mut value, mut slope, mut min_factor) = (self.c, 0.0, f64::INFINITY);
         let mut x = [0.0; 3];
         for i in 0..3 {
             let (m, b) = (self.m[i], self.b[i]);
@@ -62,16 +62,17 @@ impl Axes {
             value += x[i] * (m * x[i] + 2.0 * b);
             let g = (m * p[i] + b) * over;
             slope -= 2.0 * g * g * over;
-            near = near.min(w);
+            min_factor = min_factor.min(w);
         }
-        (x, [value, slope], near)
+        (x, [value, slope], min_factor)
     }
 
-    /// The nearest of all feet of p; `None` where it is not told from others.
+    /// The nearest foot of p; `None` where it cannot be separated from others.
     ///
-    /// Where 1 + μM is positive Q(x(μ)) falls, so it has one root at most, and the nearest foot is there (Moré 1993).
+    /// Where 1 + μM is positive definite, Q(x(μ)) decreases, so it has at most one root, and this is the nearest foot
+    /// (Moré 1993).
     pub(super) fn nearest(&self, p: Vec3) -> Option<Foot> {
-        let p = apply(&self.turn, p);
+        let p = apply(&self.axes, p);
         let size = self.m.iter().fold(0.0f64, |a, m| a.max(m.abs()));
         let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
         for m in self.m {
@@ -83,8 +84,8 @@ impl Axes {
         }
         let mut mu = 0.0;
         for _ in 0..40 {
-            let (_, [value, slope], near) = self.along(p, mu);
-            if near < DEGENERATE {
+            let (_, [value, slope], min_factor) = self.on_curve(p, mu);
+            if min_factor < DEGENERATE {
                 return None;
             }
             if value > 0.0 {
@@ -94,8 +95,8 @@ impl Axes {
             }
             let step = -value / slope;
             let next = mu + step;
-            // Newton's steps square: the next one is below the last digit.
-            if step.abs() * size <= 1e-9 * near {
+            // Newton's method converges quadratically: the next step is below rounding.
+            if step.abs() * size <= 1e-9 * min_factor {
                 return Some(self.foot(p, next));
             }
             mu = if next > low && next < high {
@@ -109,14 +110,16 @@ impl Axes {
         None
     }
 
-    /// The other feet of p within a distance from which the distance grows on all sides; `false` where they are not told apart.
+    /// Appends the other local minima of the distance from p, closer than `within` (mm); `false` where they cannot be
+    /// separated.
     ///
-    /// There 1 + μM is positive across g, so it has one negative eigenvalue at most, −t of the greatest or the least m, and
-    /// gᵀ(1 + μM)⁻¹g ≤ 0, which is where Q(x(μ)) rises: with γ = Mp + b and w = 1 + μm, t³ Σ γᵢ²/wᵢ³ of the two others grows with
-    /// t, so this is from t = 0 up to some t, and Q has one root there at most. As |x − p| ≥ |γ|(1 + t)/(|m| t) small t are too far.
+    /// At such a foot 1 + μM is positive on the tangent plane, so it has at most one negative eigenvalue, −t of the
+    /// largest or the smallest m, and gᵀ(1 + μM)⁻¹g ≤ 0, where Q(x(μ)) increases: with γ = Mp + b and w = 1 + μm, t³ Σ
+    /// γᵢ²/wᵢ³ over the two others increases with t, so this is an interval from t = 0, with at most one root of Q. As
+    /// |x − p| ≥ |γ|(1 + t)/(|m| t), small t are too far.
     pub(super) fn others(&self, p: Vec3, within: f64, out: &mut Vec<Foot>) -> bool {
-        let p = apply(&self.turn, p);
-        let gamma = self.half_slope(p);
+        let p = apply(&self.axes, p);
+        let gamma = self.half_gradient(p);
         let size = dot(p, p) + self.c.abs();
         for k in 0..3 {
             let m = self.m[k];
@@ -131,9 +134,9 @@ impl Axes {
                 return false;
             }
             let mu = |t: f64| -(1.0 + t) / m;
-            // Of Q's sign at t = 0 there is no root before where it changes, or where Q falls.
+            // While Q has the sign it has at t = 0 and does not decrease, the root lies ahead.
             let before = |t: f64| {
-                let (_, [value, slope], _) = self.along(p, mu(t));
+                let (_, [value, slope], _) = self.on_curve(p, mu(t));
                 (slope >= 0.0).then_some((value > 0.0) == (m > 0.0))
             };
             if low >= end || before(low) != Some(true) {
@@ -147,15 +150,15 @@ impl Axes {
                     Some(true) => low = t,
                     Some(false) => {
                         let ends = [mu(low).min(mu(t)), mu(low).max(mu(t))];
-                        let near = [0.0, 4.0 * f64::EPSILON];
-                        let at = root(ends, mu(t), true, near, |mu| self.along(p, mu).1);
+                        let min_factor = [0.0, 4.0 * f64::EPSILON];
+                        let at = root(ends, mu(t), true, min_factor, |mu| self.on_curve(p, mu).1);
                         out.push(self.foot(p, at));
                         break;
                     }
                 }
                 if high - low <= 1e-9 * high {
-                    // Q may touch zero.
-                    if self.along(p, mu(low)).1[0].abs() < 1e-6 * size {
+                    // A double root is possible.
+                    if self.on_curve(p, mu(low)).1[0].abs() < 1e-6 * size {
                         return false;
                     }
                     break;
@@ -166,26 +169,26 @@ impl Axes {
     }
 
     fn foot(&self, p: Vec3, mu: f64) -> Foot {
-        let x = self.along(p, mu).0;
-        let away = norm(sub(x, p));
-        Foot { p, x, mu, away }
+        let x = self.on_curve(p, mu).0;
+        let distance = norm(sub(x, p));
+        Foot { p, x, mu, distance }
     }
 
-    /// A foot brought to the last digit, where it lies in space.
-    pub(super) fn place(&self, foot: &Foot) -> Option<Vec3> {
-        let x = self.polished(foot.p, foot.x, foot.mu)?;
-        Some(apply(&transpose(&self.turn), x))
+    /// A foot refined to rounding, in space; `None` if the refinement fails.
+    pub(super) fn refined(&self, foot: &Foot) -> Option<Vec3> {
+        let x = self.newton(foot.p, foot.x, foot.mu)?;
+        Some(apply(&transpose(&self.axes), x))
     }
 
-    /// Newton's method on x − p + μ(Mx + b) = 0, Q(x) = 0; `None` if it does not lead there.
-    fn polished(&self, p: Vec3, mut x: Vec3, mut mu: f64) -> Option<Vec3> {
+    /// Newton's method on x − p + μ(Mx + b) = 0, Q(x) = 0; `None` if it does not converge.
+    fn newton(&self, p: Vec3, mut x: Vec3, mut mu: f64) -> Option<Vec3> {
         let size = norm(p) + norm(x);
         for round in 0..6 {
-            let g = self.half_slope(x);
+            let g = self.half_gradient(x);
             let off = [0, 1, 2].map(|i| x[i] - p[i] + mu * g[i]);
             let q = self.value(x);
-            let near = norm(off) <= 1e-13 * size && q.abs() <= 1e-13 * size * norm(g);
-            if near || round == 5 {
+            let min_factor = norm(off) <= 1e-13 * size && q.abs() <= 1e-13 * size * norm(g);
+            if min_factor || round == 5 {
                 return (norm(off) <= 1e-8 * size && q.abs() <= 1e-10 * size * norm(g)).then_some(x);
             }
             let mut rows = [[0.0; 5]; 4];
@@ -197,7 +200,7 @@ impl Axes {
             }
             rows[3][4] = -q;
             let Some(step) = solve(rows) else {
-                // All of a circle is as near: this place of it is as good as any, once it is on the quadric.
+                // A whole circle is equally close: any of its points serves, once it is on the quadric.
                 let along = scale(g, -q / (2.0 * dot(g, g)));
                 x = add(x, along);
                 continue;
@@ -209,7 +212,7 @@ impl Axes {
     }
 }
 
-/// The solution of four linear equations; `None` if they are dependent but for rounding.
+/// The solution of four linear equations; `None` if they are dependent within rounding.
 fn solve(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     let largest = rows.iter().flat_map(|r| &r[..4]).fold(0.0f64, |a, v| a.max(v.abs()));
     for c in 0..4 {
@@ -233,7 +236,7 @@ fn solve(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     Some(x)
 }
 
-/// A direction out of the solid at a foot on a crease: away from the point within.
-pub(super) fn away(from: Vec3, to: Vec3) -> Vec3 {
+/// The direction from a point in the solid to its foot on a crease.
+pub(super) fn outward(from: Vec3, to: Vec3) -> Vec3 {
     unit(sub(to, from))
 }

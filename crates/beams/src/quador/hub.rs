@@ -1,129 +1,131 @@
-//! A hub: a ball and the stubs of the beams that meet in it, joined by quadrics.
+//! One hub: a ball and the half-beams that meet in it, joined by quadric fillets.
 //!
-//! With S = |x|² − r² and G affine and growing along its stub, a stub is S ≤ G². All of them at once are S ≤ N(G), where
-//! N(g) = max over y ≥ 0 of 2 y·g − yᵀRy and R is 1 on its diagonal and τ off it. N is convex, once differentiable and a
-//! quadratic form on each of finitely many cones, so every piece of the hub is a quadric, every separator a plane, every
-//! seam a conic and every join tangent. τ = 1 is the sharp union, where N is the square of the greatest G. Two stubs give
-//! the fillet S − (a² − 2τab + b²)/(1 − τ²) of Cirak and Sabin (2019) with τ = (β − α)/(β + α).
+//! With S = x·x − r² and G affine, increasing along its half-beam, a half-beam is S ≤ G². The hub is S ≤ N(G), where
+//! N(g) = max over y ≥ 0 of 2 y·g − yᵀRy and R is 1 on its diagonal and τ off it. N is convex, once differentiable and
+//! a quadratic form on each of finitely many cones, so every piece of the hub is a quadric, every boundary between
+//! pieces lies in a plane, every seam is a conic and every joint is tangent. τ = 1 is the sharp union, where N is the
+//! square of the largest G. Two half-beams give the fillet S − (a² − 2τab + b²)/(1 − τ²) of the note with τ = (β −
+//! α)/(β + α).
 //!
-//! τ of a pair is the product of a number t of each stub. Then R is always positive definite, and the stubs that shape a
-//! point are those with g > tσ, where σ = Σ t (g − tσ)/(1 − t²) over them: one equation for one number.
+//! τ of a pair is the product of the blend parameters t of its half-beams. Then R is always positive definite, and the
+//! active half-beams at a point are those with g > tσ, where σ = Σ t (g − tσ)/(1 − t²) over them: one equation for one
+//! number.
 
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
-/// An affine function of the place in a hub's frame: a·x + b.
+/// An affine function of the position x in a hub's frame: a·x + b.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Affine {
-    /// Its gradient.
+pub(crate) struct AffineFunction {
+    /// Gradient a.
     pub a: Vec3,
-    /// Its value at the hub's centre.
+    /// Value b at the hub's centre.
     pub b: f64,
 }
 
-impl Affine {
+impl AffineFunction {
     /// The value at x.
     #[inline]
-    pub fn at(&self, x: Vec3) -> f64 {
+    pub(crate) fn at(&self, x: Vec3) -> f64 {
         dot(self.a, x) + self.b
     }
 
     /// self + s · o.
     #[inline]
-    pub fn plus(&self, s: f64, o: &Affine) -> Affine {
-        Affine { a: add(self.a, scale(o.a, s)), b: self.b + s * o.b }
+    pub(crate) fn plus(&self, s: f64, o: &AffineFunction) -> AffineFunction {
+        AffineFunction { a: add(self.a, scale(o.a, s)), b: self.b + s * o.b }
     }
 }
 
-/// The half of a beam that belongs to a hub.
+/// The half of a beam that belongs to one hub.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stub {
-    /// The beam, and which of its ends is here.
+pub struct HalfBeam {
+    /// Index of the beam.
     pub beam: u32,
-    /// 0 or 1.
+    /// Which of its ends is at this hub: 0 or 1.
     pub end: usize,
-    /// From the hub's centre to the other's.
+    /// Unit vector from the hub's centre to the other hub's centre.
     pub axis: Vec3,
     /// G = √λ (axis · x − contact).
-    pub g: Affine,
-    /// Where the contact circle lies along the axis, mm.
+    pub(crate) g: AffineFunction,
+    /// Position of the contact plane along the axis, mm.
     pub contact: f64,
-    /// [A, B, C] of ρ² = A z² + B z + C.
-    pub section: [f64; 3],
-    /// Where the beam is parted between its hubs, along the axis, mm.
+    /// Coefficients [A, B, C] of the meridian ρ² = A z² + B z + C.
+    pub meridian: [f64; 3],
+    /// Position of the split plane along the axis, mm.
     pub split: f64,
-    /// How far the hub's own formula is followed beyond, inside the beam, mm.
+    /// Position of the cut plane along the axis, mm; at least `split`.
     pub cut: f64,
-    /// t.
-    pub share: f64,
+    /// Blend parameter t, in [0, 1].
+    pub blend: f64,
     /// 1/(1 − t²).
     pub weight: f64,
 }
 
-impl Stub {
-    /// ρ² at z.
+impl HalfBeam {
+    /// ρ² at z along the axis, mm².
     #[inline]
-    pub fn squared(&self, z: f64) -> f64 {
-        let [a, b, c] = self.section;
+    pub fn radius_squared(&self, z: f64) -> f64 {
+        let [a, b, c] = self.meridian;
         (a * z + b) * z + c
     }
 
-    /// Sets t.
-    pub fn set_share(&mut self, t: f64) {
-        (self.share, self.weight) = (t, 1.0 / ((1.0 - t) * (1.0 + t)));
+    /// Sets the blend parameter t.
+    pub fn set_blend(&mut self, t: f64) {
+        (self.blend, self.weight) = (t, 1.0 / ((1.0 - t) * (1.0 + t)));
     }
 
-    /// The greatest radius between the centre and the cut, mm.
-    pub fn thickest(&self) -> f64 {
-        let [a, b, _] = self.section;
-        let ends = self.squared(0.0).max(self.squared(self.cut));
+    /// Maximum radius between the centre and the cut plane, mm.
+    pub fn max_radius(&self) -> f64 {
+        let [a, b, _] = self.meridian;
+        let ends = self.radius_squared(0.0).max(self.radius_squared(self.cut));
         let top = -b / (2.0 * a);
-        if a < 0.0 && top > 0.0 && top < self.cut { ends.max(self.squared(top)) } else { ends }.max(0.0).sqrt()
+        if a < 0.0 && top > 0.0 && top < self.cut { ends.max(self.radius_squared(top)) } else { ends }.max(0.0).sqrt()
     }
 }
 
-/// A hub with its stubs. Places are relative to its centre.
+/// A hub with its half-beams. Positions are relative to its centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Hub<'a> {
     /// Radius of the ball, mm.
     pub radius: f64,
-    /// The stubs.
-    pub stubs: &'a [Stub],
-    /// Whether stubs meet in creases (τ = 1).
+    /// Its half-beams.
+    pub half_beams: &'a [HalfBeam],
+    /// Whether half-beams meet in creases (τ = 1).
     pub sharp: bool,
 }
 
-/// Everything that shapes a hub at one place: N, its gradient, and which stubs it is made of.
+/// The smooth union N at one position, its gradient, and the active half-beams.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Grown {
+pub(crate) struct SmoothUnion {
     /// N, mm².
     pub value: f64,
     /// Its gradient, mm.
     pub gradient: Vec3,
-    /// A bit for each of the first 64 stubs that N is made of.
+    /// Label: a bit for each of the first 64 half-beams that are active.
     pub active: u64,
 }
 
 impl Hub<'_> {
-    /// N at x.
+    /// N at x, with gradient and label.
     #[inline]
-    pub fn grown(&self, x: Vec3) -> Grown {
+    pub(crate) fn smooth_union(&self, x: Vec3) -> SmoothUnion {
         if self.sharp {
-            let mut best = Grown::default();
+            let mut best = SmoothUnion::default();
             let mut most = 0.0;
-            for (i, s) in self.stubs.iter().enumerate() {
+            for (i, s) in self.half_beams.iter().enumerate() {
                 let g = s.g.at(x);
                 if g > most {
                     most = g;
-                    best = Grown { value: g * g, gradient: scale(s.g.a, 2.0 * g), active: 1 << (i & 63) };
+                    best = SmoothUnion { value: g * g, gradient: scale(s.g.a, 2.0 * g), active: 1 << (i & 63) };
                 }
             }
             return best;
         }
         let sigma = self.sigma(x);
-        let mut out = Grown::default();
-        for (i, s) in self.stubs.iter().enumerate() {
+        let mut out = SmoothUnion::default();
+        for (i, s) in self.half_beams.iter().enumerate() {
             let g = s.g.at(x);
-            let f = g - s.share * sigma;
+            let f = g - s.blend * sigma;
             if f > 0.0 {
                 let y = f * s.weight;
                 out.value += y * g;
@@ -134,35 +136,35 @@ impl Hub<'_> {
         out
     }
 
-    /// N at x alone.
+    /// N at x, mm².
     #[inline]
-    pub fn grown_value(&self, x: Vec3) -> f64 {
+    pub fn smooth_union_value(&self, x: Vec3) -> f64 {
         if self.sharp {
-            let g = self.stubs.iter().fold(0.0, |m: f64, s| m.max(s.g.at(x)));
+            let g = self.half_beams.iter().fold(0.0, |m: f64, s| m.max(s.g.at(x)));
             return g * g;
         }
         let sigma = self.sigma(x);
         let mut n = 0.0;
-        for s in self.stubs {
+        for s in self.half_beams {
             let g = s.g.at(x);
-            n += (g - s.share * sigma).max(0.0) * s.weight * g;
+            n += (g - s.blend * sigma).max(0.0) * s.weight * g;
         }
         n
     }
 
-    /// σ at x: the root of a convex, falling, piecewise linear function, by Newton's steps from zero, which only rise and
-    /// stop when the stubs above t σ no longer change.
+    /// σ at x: the root of a convex, decreasing, piecewise linear function, by Newton's method from zero. The iterates
+    /// increase, and end when the set of half-beams above t σ no longer changes.
     #[inline]
     fn sigma(&self, x: Vec3) -> f64 {
         let (mut sigma, mut count) = (0.0, usize::MAX);
         loop {
             let (mut top, mut bottom, mut n) = (0.0, 1.0, 0);
-            for s in self.stubs {
+            for s in self.half_beams {
                 let g = s.g.at(x);
-                if g > s.share * sigma {
-                    let w = s.share * s.weight;
+                if g > s.blend * sigma {
+                    let w = s.blend * s.weight;
                     top += w * g;
-                    bottom += w * s.share;
+                    bottom += w * s.blend;
                     n += 1;
                 }
             }
@@ -171,7 +173,7 @@ impl Hub<'_> {
             }
             (sigma, count) = (top / bottom, n);
             if n == 1 {
-                // A single stub keeps itself: g > t σ always, as t² < 1.
+                // A single half-beam stays active: g > t σ, since t² < 1.
                 return sigma;
             }
         }
@@ -180,22 +182,22 @@ impl Hub<'_> {
     /// S − N at x, mm²: negative inside.
     #[inline]
     pub fn value(&self, x: Vec3) -> f64 {
-        dot(x, x) - self.radius * self.radius - self.grown_value(x)
+        dot(x, x) - self.radius * self.radius - self.smooth_union_value(x)
     }
 
     /// S − N at x and its gradient.
     #[inline]
     pub fn gradient(&self, x: Vec3) -> (f64, Vec3) {
-        let n = self.grown(x);
+        let n = self.smooth_union(x);
         (dot(x, x) - self.radius * self.radius - n.value, sub(scale(x, 2.0), n.gradient))
     }
 
-    /// How far x lies beyond where the hub's formula holds (positive beyond), mm: along the stub that it is nearest to in the
-    /// sense of G, or by how much that stub leads.
+    /// How far x lies outside the range of the hub's formula (mm; positive outside), and the gradient: the distance
+    /// past the cut plane of the half-beam with the largest G, limited by the difference of G to the second largest.
     #[inline]
-    pub fn beyond(&self, x: Vec3) -> (f64, Vec3) {
+    pub fn past_cut(&self, x: Vec3) -> (f64, Vec3) {
         let (mut first, mut second) = (0.0, 0.0);
-        for s in self.stubs {
+        for s in self.half_beams {
             let g = s.g.at(x);
             if g > first {
                 (second, first) = (first, g);
@@ -204,7 +206,7 @@ impl Hub<'_> {
             }
         }
         let mut most = (f64::NEG_INFINITY, [0.0; 3]);
-        for s in self.stubs {
+        for s in self.half_beams {
             let (g, along) = (s.g.at(x), dot(s.axis, x) - s.cut);
             let lead = g - if g == first { second } else { first };
             if along.min(lead) > most.0 {
@@ -214,16 +216,16 @@ impl Hub<'_> {
         most
     }
 
-    /// Whether x, relative to the centre, is in the hub's part of the lattice: inside, and before the split of the stub that
-    /// leads.
-    pub fn holds(&self, x: Vec3) -> bool {
-        self.value(x) < 0.0 && self.before_split(x)
+    /// Whether x is in the hub's part of the solid: inside, and before the split plane of the half-beam with the
+    /// largest G.
+    pub fn contains(&self, x: Vec3) -> bool {
+        self.value(x) < 0.0 && self.is_before_split(x)
     }
 
-    /// Whether x lies before the split of the stub that leads there.
-    pub fn before_split(&self, x: Vec3) -> bool {
+    /// Whether x lies before the split plane of the half-beam with the largest G.
+    pub fn is_before_split(&self, x: Vec3) -> bool {
         let mut first = (0.0, None);
-        for s in self.stubs {
+        for s in self.half_beams {
             let g = s.g.at(x);
             if g > first.0 {
                 first = (g, Some(s));
@@ -232,12 +234,13 @@ impl Hub<'_> {
         first.1.is_none_or(|s| dot(s.axis, x) <= s.split)
     }
 
-    /// A box that holds the hub's part with the stubs up to their cuts: fillets lie in the hull of ball and stubs.
+    /// Bounds of the hub's part with half-beams up to their cut planes: fillets lie in the convex hull of the ball and
+    /// these.
     pub fn bounds(&self) -> Aabb {
         let r = self.radius;
         let mut b = Aabb { min: [-r; 3], max: [r; 3] };
-        for s in self.stubs {
-            let thick = s.thickest();
+        for s in self.half_beams {
+            let thick = s.max_radius();
             for a in 0..3 {
                 let side = thick * (1.0 - s.axis[a] * s.axis[a]).max(0.0).sqrt();
                 let end = s.axis[a] * s.cut;
@@ -248,10 +251,10 @@ impl Hub<'_> {
         b
     }
 
-    /// A bound of the curvature of N: half its second derivative along any unit vector is at most this.
-    pub fn bend(&self) -> f64 {
+    /// Upper bound of half the second derivative of N along any unit vector.
+    pub fn curvature_bound(&self) -> f64 {
         if self.sharp {
-            return self.stubs.iter().map(|s| dot(s.g.a, s.g.a)).fold(0.0, f64::max);
+            return self.half_beams.iter().map(|s| dot(s.g.a, s.g.a)).fold(0.0, f64::max);
         }
         let mut m = [[0.0; 3]; 3];
         let (mut sum, mut t) = ([0.0; 3], 1.0);
@@ -262,19 +265,19 @@ impl Hub<'_> {
                 }
             }
         };
-        for s in self.stubs {
+        for s in self.half_beams {
             tensor(s.g.a, s.weight);
-            sum = add(sum, scale(s.g.a, s.share * s.weight));
-            t += s.share * s.share * s.weight;
+            sum = add(sum, scale(s.g.a, s.blend * s.weight));
+            t += s.blend * s.blend * s.weight;
         }
         tensor(sum, -1.0 / t);
         geometry::math::spectral_norm(&m)
     }
 
-    /// The middle of the crotch of two stubs, where they would have met in a crease, and the fillet's radius of curvature there
-    /// (infinite where it is not hollow); `None` if they do not meet.
+    /// The middle of the crotch of two half-beams, where the crease between them would be, and the fillet's radius of
+    /// curvature there (mm; infinite if not concave); `None` if they do not meet.
     pub fn crotch(&self, i: usize, j: usize, tau: f64) -> Option<(Vec3, f64)> {
-        let (p, q) = (&self.stubs[i], &self.stubs[j]);
+        let (p, q) = (&self.half_beams[i], &self.half_beams[j]);
         let (kp, kq) = (norm(p.g.a), norm(q.g.a));
         let cos = dot(p.axis, q.axis);
         let across = sub(q.axis, scale(p.axis, cos));
@@ -283,7 +286,7 @@ impl Hub<'_> {
             return None;
         }
         let across = scale(across, 1.0 / sin);
-        // Where G is g for both: (u, v) = o + g e along the first axis and across it.
+        // Points where both G equal g: (u, v) = o + g e, along the first axis and perpendicular to it.
         let (o, e) = ([p.contact, (q.contact - cos * p.contact) / sin], [1.0 / kp, (1.0 / kq - cos / kp) / sin]);
         let two = e[0] * e[0] + e[1] * e[1] - 2.0 / (1.0 + tau);
         let (one, none) = (o[0] * e[0] + o[1] * e[1], o[0] * o[0] + o[1] * o[1] - self.radius * self.radius);
@@ -294,7 +297,7 @@ impl Hub<'_> {
         if root < 0.0 {
             return None;
         }
-        // The first place outwards where the sign turns: −none / (one + √root) is positive as none < 0.
+        // The first sign change outwards: −none / (one + √root) is positive since none < 0.
         let g = -none / (one + root.sqrt());
         if !(g > 0.0 && g.is_finite()) {
             return None;
@@ -311,17 +314,17 @@ impl Hub<'_> {
         Some((add(scale(p.axis, x[0]), scale(across, x[1])), radius))
     }
 
-    /// Pairs of stubs that meet in a crease or the fillet that fills it.
-    pub fn neighbours(&self) -> Vec<(usize, usize)> {
+    /// Pairs of half-beams that meet in a crease or in the fillet that replaces it.
+    pub fn adjacent_pairs(&self) -> Vec<(usize, usize)> {
         let mut out = Vec::new();
-        for i in 0..self.stubs.len() {
+        for i in 0..self.half_beams.len() {
             for j in 0..i {
                 let Some((x, _)) = self.crotch(i, j, 1.0 - 1e-12) else {
                     continue;
                 };
-                let g = self.stubs[i].g.at(x);
-                let led = |(k, s): (usize, &Stub)| k != i && k != j && s.g.at(x) > g * (1.0 + 1e-9);
-                if !self.stubs.iter().enumerate().any(led) {
+                let g = self.half_beams[i].g.at(x);
+                let led = |(k, s): (usize, &HalfBeam)| k != i && k != j && s.g.at(x) > g * (1.0 + 1e-9);
+                if !self.half_beams.iter().enumerate().any(led) {
                     out.push((j, i));
                 }
             }
@@ -329,20 +332,20 @@ impl Hub<'_> {
         out
     }
 
-    /// The least τ for which the fillet of stub i with stub j ends before `z` along stub i and stays away up to its split: the
-    /// greatest G_j/G_i there along the side that faces j.
-    pub fn least_tau(&self, i: usize, j: usize, z: f64) -> f64 {
-        let (p, q) = (&self.stubs[i], &self.stubs[j]);
+    /// The minimum τ at which the fillet of half-beams i and j ends before `z` along i and up to its split plane: the
+    /// maximum of G_j/G_i there on the meridian that faces j.
+    pub fn min_tau(&self, i: usize, j: usize, z: f64) -> f64 {
+        let (p, q) = (&self.half_beams[i], &self.half_beams[j]);
         let cos = dot(p.axis, q.axis);
         let sin = norm(sub(q.axis, scale(p.axis, cos)));
         let ratio = |z: f64| {
-            let rho = p.squared(z).max(0.0).sqrt();
+            let rho = p.radius_squared(z).max(0.0).sqrt();
             let g = norm(q.g.a) * (z * cos + rho * sin - q.contact);
             g / (norm(p.g.a) * (z - p.contact))
         };
         let mut most = ratio(z).max(ratio(p.split));
-        // Where the ratio is stationary: sin (m z + n) = (d_i cos − d_j) ρ, as (ρ²)'/2 (z − d) − ρ² is linear in z.
-        let ([a, b, c], d) = (p.section, p.contact);
+        // Stationary points of the ratio: sin (m z + n) = (d_i cos − d_j) ρ, since (ρ²)'/2 (z − d) − ρ² is linear in z.
+        let ([a, b, c], d) = (p.meridian, p.contact);
         let (m, n) = (sin * (-a * d - b / 2.0), sin * (-b * d / 2.0 - c));
         let w = d * cos - q.contact;
         let (two, one, none) = (m * m - w * w * a, 2.0 * m * n - w * w * b, n * n - w * w * c);

@@ -5,7 +5,7 @@ use super::*;
 use crate::graph::{self, Beam, Profile};
 use geometry::math::{add, dot, norm, scale, unit};
 
-/// Numbers between 0 and 1 that are the same every time.
+/// A fixed pseudo-random sequence in [0, 1).
 pub(super) struct Random(pub u64);
 
 impl Random {
@@ -34,7 +34,7 @@ pub(super) fn star(radius: f64, ends: &[(Vec3, f64, f64)], profile: impl Fn(usiz
     Graph { hubs, beams }
 }
 
-/// A hub of `n` beams, no two closer than about 40 degrees for few beams, less for many.
+/// A hub of `n` beams, at least about 40 degrees apart for few beams, less for many.
 pub(super) fn random_star(random: &mut Random, n: usize) -> Graph {
     let least = (0.9f64).min((2.4 / n as f64).sqrt());
     let mut axes: Vec<Vec3> = Vec::new();
@@ -49,7 +49,7 @@ pub(super) fn random_star(random: &mut Random, n: usize) -> Graph {
     star(0.4 + 0.2 * random.next(), &ends, |i| Profile::Mid(mid[i]))
 }
 
-/// The axes, both ways.
+/// The unit vectors ±x, ±y, ±z.
 pub(super) fn six() -> Vec<Vec3> {
     (0..6)
         .map(|i| {
@@ -60,12 +60,12 @@ pub(super) fn six() -> Vec<Vec3> {
         .collect()
 }
 
-/// N by trying every set of stubs.
+/// N by enumeration of all sets of half-beams.
 fn brute(hub: &Hub, x: Vec3) -> f64 {
-    let n = hub.stubs.len();
-    let g: Vec<f64> = hub.stubs.iter().map(|s| s.g.at(x)).collect();
+    let n = hub.half_beams.len();
+    let g: Vec<f64> = hub.half_beams.iter().map(|s| s.g.at(x)).collect();
     let tau = |i: usize, j: usize| {
-        if i == j { 1.0 } else { hub.stubs[i].share * hub.stubs[j].share }
+        if i == j { 1.0 } else { hub.half_beams[i].blend * hub.half_beams[j].blend }
     };
     let mut best: f64 = 0.0;
     for set in 1u32..1 << n {
@@ -103,13 +103,13 @@ fn the_fillet_is_the_greatest_over_all_sets_of_stubs() {
             for _ in 0..200 {
                 let x = scale(random.direction(), 3.0 * random.next());
                 let want = if hub.sharp {
-                    hub.stubs.iter().map(|s| s.g.at(x).max(0.0).powi(2)).fold(0.0, f64::max)
+                    hub.half_beams.iter().map(|s| s.g.at(x).max(0.0).powi(2)).fold(0.0, f64::max)
                 } else {
                     brute(&hub, x)
                 };
-                let got = hub.grown(x);
+                let got = hub.smooth_union(x);
                 assert!((got.value - want).abs() < 1e-12 * (1.0 + want), "{n} {fillet:?}: {got:?} {want}");
-                assert!((hub.grown_value(x) - want).abs() < 1e-12 * (1.0 + want));
+                assert!((hub.smooth_union_value(x) - want).abs() < 1e-12 * (1.0 + want));
             }
         }
     }
@@ -135,7 +135,7 @@ fn two_stubs_give_the_quadric_of_the_note() {
     assert!((x[0] - 1.154_700_538_379_251_7).abs() < 1e-14 && (radius - 0.408_248_290_463_863_1).abs() < 1e-14);
     // Asking for that radius gives that fillet.
     let again = Quadors::new(&graph, Fillet::Radius(radius)).expect("a star");
-    assert!((again.hub(0).stubs[0].share.powi(2) - 0.6).abs() < 1e-12 && again.shortfalls().is_empty());
+    assert!((again.hub(0).half_beams[0].blend.powi(2) - 0.6).abs() < 1e-12 && again.shortfalls().is_empty());
     // The third cylinder closes the corner at 0.7817 on the diagonal.
     let ends: Vec<_> = six()[..3].iter().map(|&u| (u, 20.0, 1.0)).collect();
     let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.6)).expect("a star");
@@ -149,15 +149,15 @@ fn the_hub_is_once_differentiable() {
         let q = Quadors::new(&random_star(&mut random, n), Fillet::Auto).expect("a star");
         let hub = q.hub(0);
         for _ in 0..50 {
-            // Along a segment, where the set of stubs changes the gradient does not jump.
+            // Along a segment the gradient does not jump where the label changes.
             let (mut a, mut b) =
                 (scale(random.direction(), 2.0 * random.next()), scale(random.direction(), 2.0 * random.next()));
-            if hub.grown(a).active == hub.grown(b).active {
+            if hub.smooth_union(a).active == hub.smooth_union(b).active {
                 continue;
             }
             for _ in 0..50 {
                 let m = scale(add(a, b), 0.5);
-                if hub.grown(m).active == hub.grown(a).active { a = m } else { b = m }
+                if hub.smooth_union(m).active == hub.smooth_union(a).active { a = m } else { b = m }
             }
             let (u, v) = (hub.gradient(a).1, hub.gradient(b).1);
             assert!(norm(sub(u, v)) < 1e-10 * (1.0 + norm(u)), "valence {n}: {u:?} {v:?}");
@@ -175,15 +175,15 @@ fn fillets_end_before_the_beams_are_parted() {
                 continue;
             }
             let hub = q.hub(0);
-            for (i, s) in hub.stubs.iter().enumerate() {
+            for (i, s) in hub.half_beams.iter().enumerate() {
                 let side = unit(geometry::math::cross(s.axis, [0.3, 0.5, 0.81]));
                 let other = geometry::math::cross(s.axis, side);
                 for k in 0..64 {
                     let z = s.split * (1.0 + 1e-9);
                     let (sin, cos) = (f64::from(k) / 64.0 * core::f64::consts::TAU).sin_cos();
-                    let rho = s.squared(z).sqrt();
+                    let rho = s.radius_squared(z).sqrt();
                     let x = add(scale(s.axis, z), add(scale(side, rho * cos), scale(other, rho * sin)));
-                    assert_eq!(hub.grown(x).active, 1 << i, "{n} {fillet:?}");
+                    assert_eq!(hub.smooth_union(x).active, 1 << i, "{n} {fillet:?}");
                     assert!(hub.value(x).abs() < 1e-12 * z * z);
                 }
             }
@@ -191,7 +191,7 @@ fn fillets_end_before_the_beams_are_parted() {
     }
 }
 
-/// A small lattice: `n`³ cubic cells of edge 10 with hubs of slightly random place and radius.
+/// A small lattice: `n`³ cubic cells of edge 10 with hubs at slightly random positions with slightly random radii.
 pub(super) fn cubic(n: usize, jitter: f64) -> Graph {
     let mut random = Random(11);
     let m = n + 1;
@@ -234,7 +234,7 @@ fn the_field_is_negative_in_the_solid_alone_and_continuous() {
             let ahead = q.value(add(p, scale(g[0], 1e-7)));
             let rise = (ahead - v) / 1e-7;
             assert!(
-                (rise - dot(g[0], g[0])).abs() < 2e-5 || v > 0.9 * q.cap || g[0] == [0.0; 3] || kink(&q, p),
+                (rise - dot(g[0], g[0])).abs() < 2e-5 || v > 0.9 * q.cap || g[0] == [0.0; 3] || near_kink(&q, p),
                 "{fillet:?} {p:?}: {rise} {g:?}"
             );
         }
@@ -242,8 +242,8 @@ fn the_field_is_negative_in_the_solid_alone_and_continuous() {
     }
 }
 
-/// Whether hubs or pieces change near p.
-fn kink(q: &Quadors, p: Vec3) -> bool {
+/// Whether the hub or the label changes near p.
+fn near_kink(q: &Quadors, p: Vec3) -> bool {
     let slope = |p| {
         let (mut a, mut g) = ([0.0], [[0.0; 3]]);
         q.gradients(&[p], &mut a, &mut g);
@@ -258,21 +258,21 @@ fn bounds_of_boxes_hold_every_value() {
     for fillet in [Fillet::None, Fillet::Auto] {
         let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
         let mut random = Random(4);
-        let mut told = 0;
+        let mut decided = 0;
         for _ in 0..3000 {
             let size = 0.05 * 100f64.powf(random.next());
             let min = [0; 3].map(|_| 26.0 * random.next() - 3.0);
             let b = Aabb { min, max: min.map(|v| v + size * (0.2 + random.next())) };
             let bound = q.bound(&b);
-            told += usize::from(bound.lo > 0.0 || bound.hi < 0.0);
+            decided += usize::from(bound.lo > 0.0 || bound.hi < 0.0);
             for _ in 0..40 {
                 let p = [0, 1, 2].map(|a| b.min[a] + random.next() * (b.max[a] - b.min[a]));
                 let v = q.value(p);
                 assert!(v >= bound.lo && v <= bound.hi, "{fillet:?} {b:?}: {v} {bound:?}");
             }
         }
-        // Most small boxes are told to be empty or full.
-        assert!(told > 1200, "{told}");
+        // Most small boxes are proven empty or full.
+        assert!(decided > 1200, "{decided}");
     }
 }
 
@@ -284,26 +284,26 @@ fn faults_say_what_is_wrong() {
         assert!(f.at == at && f.message.contains(words), "{f}");
     };
     says(Quadors::new(&two(Profile::Lambda(9.0)), Fillet::Auto), "beams[0].profile", "between");
-    says(Quadors::new(&two(Profile::Cylinder), Fillet::Auto), "beams[0].profile", "one radius");
+    says(Quadors::new(&two(Profile::Cylinder), Fillet::Auto), "beams[0].profile", "equal radius");
     says(Quadors::new(&two(Profile::Cone), Fillet::Tau(1.0)), "fillet", "tau");
     says(Quadors::new(&two(Profile::Cone), Fillet::Radius(f64::NAN)), "fillet", "radius");
     let mut lost = two(Profile::Cone);
     lost.beams[0].ends[1] = 7;
-    says(Quadors::new(&lost, Fillet::None), "beams[0]", "names hub 7");
+    says(Quadors::new(&lost, Fillet::None), "beams[0]", "unknown hub 7");
     let mut same = two(Profile::Cone);
     same.hubs[1].center = [0.0; 3];
-    says(Quadors::new(&same, Fillet::None), "beams[0]", "no direction");
+    says(Quadors::new(&same, Fillet::None), "beams[0]", "zero length");
     let mut odd = two(Profile::Cone);
     odd.hubs[0].center[1] = f64::NAN;
-    says(Quadors::new(&odd, Fillet::None), "hubs[0]", "not a position");
-    // Nearly parallel beams are built, but exact answers are refused.
+    says(Quadors::new(&odd, Fillet::None), "hubs[0]", "three finite numbers");
+    // Nearly parallel beams can be built, but exact results are refused.
     let close = star(1.0, &[([1.0, 0.0, 0.0], 5.0, 1.0), (unit([1.0, 0.1, 0.0]), 5.0, 1.0)], |_| Profile::Cone);
     let q = Quadors::new(&close, Fillet::Auto).expect("built");
-    assert!(q.exact().is_err() && !q.overlaps().is_empty());
+    assert!(q.require_closed_forms().is_err() && !q.overlaps().is_empty());
 }
 
-/// Faces by how many stubs shape them.
-fn census(c: &complex::Complex) -> Vec<usize> {
+/// Number of faces by number of active half-beams.
+fn faces_by_label_size(c: &complex::Complex) -> Vec<usize> {
     let mut n = vec![0; 8];
     c.faces.iter().for_each(|f| n[f.label.count_ones() as usize] += 1);
     while n.last() == Some(&0) {
@@ -317,7 +317,7 @@ fn equal(axes: &[Vec3], length: f64, fillet: Fillet) -> Quadors {
     Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), fillet).expect("a star")
 }
 
-/// All places whose coordinates are those given, with signs and orders as they may be.
+/// All vectors with the given coordinates, in any order and with any signs.
 pub(super) fn orbit(v: Vec3) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
     for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
@@ -335,15 +335,15 @@ pub(super) fn orbit(v: Vec3) -> Vec<Vec3> {
 fn hubs_of_the_usual_cells_have_their_faces() {
     let sc = equal(&six(), 10.0, Fillet::Tau(0.7));
     let c = complex::Complex::new(&sc.hub(0)).expect("a hub");
-    assert_eq!((c.vertices.len(), c.arcs.len(), census(&c)), (24, 48, vec![0, 6, 12, 8]));
+    assert_eq!((c.vertices.len(), c.arcs.len(), faces_by_label_size(&c)), (24, 48, vec![0, 6, 12, 8]));
     let octet = equal(&orbit([1.0, 1.0, 0.0]), 10.0, Fillet::Tau(0.8));
-    assert_eq!(census(&complex::Complex::new(&octet.hub(0)).expect("a hub")), [0, 12, 24, 32, 6]);
+    assert_eq!(faces_by_label_size(&complex::Complex::new(&octet.hub(0)).expect("a hub")), [0, 12, 24, 32, 6]);
     let sharp = equal(&orbit([1.0, 1.0, 0.0]), 10.0, Fillet::None);
     let c = complex::Complex::new(&sharp.hub(0)).expect("a hub");
-    // The edges of a rhombic dodecahedron, six of its corners of four.
-    assert_eq!((c.vertices.len(), c.arcs.len(), census(&c)), (14, 24, vec![0, 12]));
+    // The edges of a rhombic dodecahedron, six of its vertices of valence four.
+    assert_eq!((c.vertices.len(), c.arcs.len(), faces_by_label_size(&c)), (14, 24, vec![0, 12]));
     let bcc = equal(&orbit([1.0, 1.0, 1.0]), 10.0, Fillet::Tau(0.8));
-    println!("bcc {:?}", census(&complex::Complex::new(&bcc.hub(0)).expect("a hub")));
+    println!("bcc {:?}", faces_by_label_size(&complex::Complex::new(&bcc.hub(0)).expect("a hub")));
 }
 
 #[test]
@@ -363,7 +363,7 @@ fn seams_are_tangent_and_close_over_random_hubs() {
                 assert_eq!(c.euler(), 2);
                 hubs += 1;
                 for a in &c.arcs {
-                    let [l, r] = a.sides.map(|s| quadric::piece(&hub, s).0);
+                    let [l, r] = a.labels.map(|s| hub_quadric::piece_quadric(&hub, s).0);
                     for k in 0..=6 {
                         let x = a.conic.at(a.conic.end * f64::from(k) / 6.0);
                         let size = 1.0 + dot(x, x);
@@ -373,7 +373,7 @@ fn seams_are_tangent_and_close_over_random_hubs() {
                         );
                         assert!(hub.value(x).abs() < 1e-9 * size, "{n} {fillet:?} {k}: {}", hub.value(x));
                         if !hub.sharp {
-                            let bend = norm(sub(unit(l.half_slope(x)), unit(r.half_slope(x))));
+                            let bend = norm(sub(unit(l.half_gradient(x)), unit(r.half_gradient(x))));
                             worst = worst.max(bend);
                         }
                     }
@@ -397,16 +397,16 @@ fn rays_hit_the_surface_first_where_it_is() {
             if q.contains(o) {
                 continue;
             }
-            let way = random.direction();
-            let hit = q.ray(o, way);
+            let direction = random.direction();
+            let hit = q.ray(o, direction);
             let reach = hit.map_or(40.0, |h| h.distance);
-            // Nothing solid before it.
+            // Nothing solid before the hit.
             for k in 0..200 {
                 let t = (f64::from(k) + 0.5) / 200.0 * reach;
-                let x = add(o, scale(way, t));
+                let x = add(o, scale(direction, t));
                 assert!(
                     q.value(x) > -1e-6 || reach - t < 1e-6,
-                    "{fillet:?} {o:?} {way:?} at {t} of {reach}: {}",
+                    "{fillet:?} {o:?} {direction:?} at {t} of {reach}: {}",
                     q.value(x)
                 );
             }
@@ -415,7 +415,9 @@ fn rays_hit_the_surface_first_where_it_is() {
             assert!(q.value(h.at).abs() < 1e-9);
             let (mut v, mut g) = ([0.0], [[0.0; 3]]);
             q.gradients(&[add(h.at, scale(h.normal, 1e-9))], &mut v, &mut g);
-            assert!(dot(h.normal, way) < 0.0 && (norm(sub(unit(g[0]), h.normal)) < 1e-5 || fillet == Fillet::None));
+            assert!(
+                dot(h.normal, direction) < 0.0 && (norm(sub(unit(g[0]), h.normal)) < 1e-5 || fillet == Fillet::None)
+            );
         }
         assert!(hits > 800, "{hits}");
     }

@@ -16,7 +16,7 @@ use super::{map, sample};
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::truss::{Beams, Truss, fill};
-use ::beams::graph::{self, Radii, Trim, Wire, sized};
+use ::beams::graph::{self, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
@@ -57,7 +57,7 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", place)?;
     }
-    let graph = sized(&wire, &own, &radii, Grade::values).map_err(fault)?;
+    let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
     let inside = |p: Vec3| space.value(p) <= slack;
@@ -74,7 +74,7 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
     let truss = Truss {
         whole: whole(&quadors, space),
         collisions,
-        facts: wire.facts(&inside),
+        report: wire.report(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
         graph,
@@ -93,7 +93,7 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
 fn whole(quadors: &Quadors, region: &dyn Field) -> bool {
     // A hub and its stubs lie within a box, and that within a ball.
     (0..quadors.len()).into_par_iter().all(|i| {
-        let b = quadors.hold(i);
+        let b = quadors.hub_bounds(i);
         region.bound(&b).hi <= 0.0 || region.value(b.center()) + 0.5 * norm(b.size()) <= 0.0
     })
 }
@@ -118,7 +118,7 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
     let (quadors, apart, whole) = match beams {
         Beams::Truss(t) => (t.quadors.clone(), t.collisions.is_empty(), t.whole),
         Beams::Pattern(laid) => {
-            let written = laid.written()?;
+            let written = laid.expand()?;
             let whole = whole(&written, &*built.solid.region);
             let apart = written.collisions().is_empty();
             (Arc::new(written), apart, whole)
@@ -137,7 +137,7 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
 
 /// A frame before it is cleaned and trimmed.
 struct Frame {
-    wire: Wire,
+    wire: Wireframe,
     /// Radii that nodes have of their own, NaN where they have none; empty if none has.
     own: Vec<f64>,
     wavelength: f64,
@@ -169,7 +169,7 @@ fn frame(
         let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
         DesignError::unknown(&below("cell"), "cell of beams", name, &names)
     })?;
-    let net = unit.net().map_err(|f| DesignError::fault(&place.path, f))?;
+    let net = unit.graph().map_err(|f| DesignError::fault(&place.path, f))?;
     let at = Place { path: below("map"), ..*place };
     let made = map::map(map, &at)?;
     map::warn(&made, map, &place.path, warnings);

@@ -9,7 +9,7 @@ use super::grade::Allowed;
 use super::place::{Place, finite};
 use super::{Built, Warning};
 use ::beams::graph::{Hub, Profile};
-use ::beams::pattern::{Laid, Pattern, Similarity, Strut};
+use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
 use geometry::fault::{counted, number};
 
 /// Most repeats of a step: every one is kept as a turn, a scale and a shift.
@@ -21,7 +21,7 @@ pub(super) fn laid(
     of: &PatternSpec,
     place: &Place,
     warnings: &mut Vec<Warning>,
-) -> Result<Laid, DesignError> {
+) -> Result<PatternField, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let single = |given: &Option<GradeSpec>, key: &'static str| match given {
         None => Ok(None),
@@ -35,7 +35,7 @@ pub(super) fn laid(
     let at = below("pattern");
     let nodes = given(&of.nodes, &format!("{at}.nodes"))?;
     let mut hubs = Vec::new();
-    for (i, center) in nodes.places.iter().enumerate() {
+    for (i, center) in nodes.positions.iter().enumerate() {
         let own = nodes.radii.get(i).copied().filter(|r| !r.is_nan());
         let Some(radius) = own.or(hub).or(radius) else {
             let message = "it has no radius of its own, and no radius of beams is given; give one";
@@ -50,8 +50,8 @@ pub(super) fn laid(
         (None, Some(r)) => Profile::Mid(r),
         (Some(ProfileSpec::Cone), _) | (None, None) => Profile::Cone,
     };
-    let strut = |s: &[i32; 5]| Strut { ends: [s[0] as u32, s[1] as u32], by: [s[2], s[3], s[4]], profile };
-    let mut steps = [(Similarity::STILL, 1); 3];
+    let strut = |s: &[i32; 5]| Strut { ends: [s[0] as u32, s[1] as u32], offset: [s[2], s[3], s[4]], profile };
+    let mut steps = [(Similarity::IDENTITY, 1); 3];
     for (i, (step, repeat)) in steps.iter_mut().zip(&of.repeat).enumerate() {
         let at = |key: &str| format!("{at}.repeat[{i}].{key}");
         for (key, three) in [("rotate", repeat.rotate), ("about", repeat.about), ("by", repeat.by)] {
@@ -81,7 +81,7 @@ pub(super) fn laid(
     }
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;
-    let laid = Laid::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
+    let laid = PatternField::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
     let region = place.region.bounds();
     if laid.bounds().intersection(region).is_empty() {
         let (b, r) = (laid.bounds(), region);
@@ -104,7 +104,7 @@ pub(super) fn laid(
             "{} of beams run into each other without a common node, as many about one hub of each kind, the first at {}: they are \
              joined there, but not filleted, and no exact volume is told; make them thinner, or put nodes there",
             counted(c.count, "pair"),
-            beams::graph::place(p)
+            beams::graph::position_text(p)
         );
         warnings.push(Warning { path: at, message });
     }
@@ -112,7 +112,7 @@ pub(super) fn laid(
 }
 
 /// The figures of a pattern.
-pub(super) fn report(laid: &Laid, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
+pub(super) fn report(laid: &PatternField, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
     let pattern = laid.pattern();
     let (hubs, beams) = pattern.counts();
     let radii = pattern.nodes.iter().map(|h| h.radius);
@@ -130,13 +130,13 @@ pub(super) fn report(laid: &Laid, built: &Built, sampled: &dyn core::ops::Deref<
         "repeats": pattern.steps.map(|s| s.1),
         "hubs": hubs,
         "beams": beams,
-        "kinds": laid.kinds().1.len(),
+        "kinds": laid.representatives().1.len(),
         "volume": volume,
         "collisions": found.map(|c| c.count),
         "fraction": fraction,
         "fraction_exact": exact,
         "porosity": 1.0 - fraction,
-        "thickness": 2.0 * laid.thinnest(),
+        "thickness": 2.0 * laid.min_radius(),
         "hub_radius": [range[0] * scales[0], range[1] * scales[1]],
     })
 }

@@ -4,10 +4,10 @@ use super::*;
 use crate::graph::Profile;
 use core::f64::consts::PI;
 
-/// ∫ area over heights from a to b along a direction, by Lobatto's rule of 4 places and Kronrod's extension to 7, halved until they
-/// agree: areas are analytic between the heights at which the plane touches something, and both ends are looked at, so that
-/// what begins within a part is not missed.
-fn heaped(q: &Quadors, normal: Vec3, [a, b]: [f64; 2], slack: f64, depth: u32) -> f64 {
+/// ∫ area over heights from a to b along a direction, by Lobatto's rule of 4 points and Kronrod's extension to 7,
+/// bisected until they agree: areas are analytic between the heights at which the plane touches the solid, and both
+/// ends are evaluated, so that a part that starts within an interval is not missed.
+fn integrated(q: &Quadors, normal: Vec3, [a, b]: [f64; 2], slack: f64, depth: u32) -> f64 {
     let (m, h) = ((a + b) / 2.0, (b - a) / 2.0);
     let at = |s: f64| {
         let plane = Plane::new(scale(normal, m + s * h), normal).expect("a plane");
@@ -22,7 +22,7 @@ fn heaped(q: &Quadors, normal: Vec3, [a, b]: [f64; 2], slack: f64, depth: u32) -
     if (rough - fine).abs() < slack || depth == 0 {
         return fine;
     }
-    heaped(q, normal, [a, m], slack, depth - 1) + heaped(q, normal, [m, b], slack, depth - 1)
+    integrated(q, normal, [a, m], slack, depth - 1) + integrated(q, normal, [m, b], slack, depth - 1)
 }
 
 fn volume(q: &Quadors, normal: Vec3, slack: f64) -> f64 {
@@ -30,9 +30,9 @@ fn volume(q: &Quadors, normal: Vec3, slack: f64) -> f64 {
     let half = scale(b.size(), 0.5);
     let reach = (0..3).map(|a| half[a] * normal[a].abs()).sum::<f64>();
     let middle = dot(b.center(), normal);
-    // Rules that agree by chance do not in sixteen parts at once.
+    // Rules may agree by chance, but not in sixteen intervals at once.
     let part = |k: i32| middle + reach * f64::from(k - 8) / 8.0;
-    (0..16).map(|k| heaped(q, normal, [part(k), part(k + 1)], slack, 24)).sum()
+    (0..16).map(|k| integrated(q, normal, [part(k), part(k + 1)], slack, 24)).sum()
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn areas_add_up_to_the_volume() {
     for n in [1, 2, 3, 4, 6, 9, 12] {
         for fillet in [Fillet::None, Fillet::Auto] {
             let q = Quadors::new(&random_star(&mut random, n), fillet).expect("a star");
-            // About a hundred parts, each for 1e-10 or better, of a volume of three or more.
+            // About a hundred intervals, each to 1e-10 or better, of a volume of three or more.
             let [got, other] = [0; 2].map(|_| volume(&q, random.direction(), 1e-10));
             assert!((got - other).abs() < 4e-9 * got, "{n} {fillet:?}: {got} {other}");
             let Ok(want) = q.volume() else { continue };
@@ -51,11 +51,11 @@ fn areas_add_up_to_the_volume() {
         }
     }
     assert!(compared >= 8, "{compared}");
-    // The corners of six beams have a known volume: 5π a beam, less 8√2, and what fillets of τ = 0.7 add.
+    // The corners of six beams have a known volume: 5π a beam, minus 8√2, plus the fillets of τ = 0.7.
     let ends: Vec<_> = six().into_iter().map(|u| (u, 10.0, 1.0)).collect();
     for (fillet, added) in [(Fillet::None, 0.0), (Fillet::Tau(0.7), 0.405_808_119_0)] {
         let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), fillet).expect("a star");
-        // Half of each beam and the balls at the ends: half a ball and half a beam for each of them.
+        // Half of each beam and half a ball at each end.
         let want = 60.0 * PI - 8.0 * 2f64.sqrt() + 6.0 * 2.0 / 3.0 * PI + added;
         let got = volume(&q, [0.36, 0.48, 0.8], 1e-8);
         assert!((got - want).abs() < 1e-6, "{fillet:?}: {got} {want}");
@@ -81,7 +81,7 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
                 for a in arcs {
                     for c in &a.curves {
                         let at = c.at(0.37);
-                        let x = plane.place(at);
+                        let x = plane.point_at(at);
                         let local = sub(x, q.center(a.hub as usize));
                         assert!(q.hub(a.hub as usize).value(local).abs() < 1e-9, "{x:?}");
                         let [u, v] = [at[0] - a.about[0], at[1] - a.about[1]];
@@ -89,14 +89,14 @@ fn loops_close_on_the_surface_with_the_solid_to_their_left() {
                         let q2 = m[0] * u * u + 2.0 * m[1] * u * v + m[2] * v * v;
                         assert!((q2 + 2.0 * (m[3] * u + m[4] * v) + m[5]).abs() < 1e-9);
                         let ahead = c.at(0.371);
-                        let way = [ahead[0] - at[0], ahead[1] - at[1]];
-                        let far = 1e-5 / way[0].hypot(way[1]);
+                        let direction = [ahead[0] - at[0], ahead[1] - at[1]];
+                        let far = 1e-5 / direction[0].hypot(direction[1]);
                         if c.points[0] == c.points[2] || far > 1e4 {
                             continue;
                         }
-                        let left = plane.place([at[0] - way[1] * far, at[1] + way[0] * far]);
-                        let right = plane.place([at[0] + way[1] * far, at[1] - way[0] * far]);
-                        // Where the plane nearly lies in the surface, both sides are near to it.
+                        let left = plane.point_at([at[0] - direction[1] * far, at[1] + direction[0] * far]);
+                        let right = plane.point_at([at[0] + direction[1] * far, at[1] - direction[0] * far]);
+                        // Where the plane is nearly tangent to the surface, both sides are close to it.
                         assert!(q.value_at(left) < q.value_at(right), "{fillet:?} {x:?}");
                     }
                 }
@@ -113,8 +113,8 @@ impl Quadors {
 
 #[test]
 fn areas_are_what_points_say() {
-    // Points at random in each of n² squares: a square on the outline errs by at most half its area at random, and about
-    // 2 × length/side of them are there.
+    // Stratified Monte Carlo, one point in each of n² squares: a square on the boundary contributes an error of at most
+    // half its area, and about 2 × length/side of them are on the boundary.
     let mut random = Random(47);
     for fillet in [Fillet::None, Fillet::Auto] {
         let q = Quadors::new(&cubic(2, 1.5), fillet).expect("a lattice");
@@ -140,7 +140,7 @@ fn areas_are_what_points_say() {
                 for j in 0..n {
                     let u = low[0] + side[0] * (f64::from(i) + random.next());
                     let v = low[1] + side[1] * (f64::from(j) + random.next());
-                    inside += u32::from(q.contains(s.plane.place([u, v])));
+                    inside += u32::from(q.contains(s.plane.point_at([u, v])));
                 }
             }
             let square = side[0] * side[1];
@@ -162,20 +162,20 @@ fn planes_of_symmetry_are_sliced() {
     };
     for normal in [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]] {
         let turn = normal.iter().sum::<f64>();
-        // Halfway along, where beams are parted.
+        // At mid length, where beams are split.
         let s = at(normal, 5.0 * turn);
         assert!((s.area - 9.0 * PI).abs() < 1e-10, "{}", s.area);
         assert_eq!(s.loops.len(), 9);
-        // Through the axes: strips, whose crossings are counted once, and a quarter of a disc beyond each corner.
+        // Through the axes: strips, whose crossings count once, and a quarter disc beyond each corner.
         let s = at(normal, 0.0);
         assert!((s.area - 224.0 - PI).abs() < 1e-10, "{}", s.area);
         assert_eq!(s.loops.len(), 5);
-        // Along the tops: what is a line there counts for nothing, up to the width √(2 r δ) of a strip at a depth of δ = 1e-8.
+        // Along the tops: a line of contact has no area, up to the width √(2 r δ) of a strip at depth δ = 1e-8.
         let s = at(normal, turn);
         assert!((s.area - 9.0 * PI).abs() < 240.0 * 3e-4, "{} {}", s.area, s.moved);
         assert_eq!(at(normal, -5.0 * turn).loops.len(), 0);
     }
-    // Octet and filleted hubs in their planes of symmetry, through the centre and in the planes of seams.
+    // Octet and filleted hubs in their symmetry planes, through the centre and in the planes of seams.
     for (axes, fillet) in [
         (six(), Fillet::Tau(0.7)),
         (super::super::tests::orbit([1.0, 1.0, 0.0]), Fillet::Tau(0.8)),
@@ -190,7 +190,8 @@ fn planes_of_symmetry_are_sliced() {
                     let plane = Plane::new(scale(normal, h), normal).expect("a plane");
                     q.slice(&plane).expect("a slice").area
                 };
-                // Areas are continuous in height (to a root, where the plane touches a cylinder's length).
+                // Areas are continuous in height (up to a square root, where the plane touches a cylinder along its
+                // length).
                 let (a, b, c) = (area(h - 1e-7), area(h), area(h + 1e-7));
                 assert!(b > a.min(c) - 2e-2 && b < a.max(c) + 2e-2, "{fillet:?} {normal:?} {h}: {a} {b} {c}");
             }
@@ -210,7 +211,7 @@ fn a_slice_far_from_the_origin_keeps_its_digits() {
     for (p, n) in [([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), ([5.0, 5.0, 0.3], [0.6, 0.0, 0.8])] {
         let a = near.slice(&Plane::new(p, n).expect("a plane")).expect("a slice");
         let b = far.slice(&Plane::new(add(p, by), n).expect("a plane")).expect("a slice");
-        // Places are known to 1e-12 there.
+        // Positions are accurate to 1e-12 there.
         assert!((a.area - b.area).abs() < 1e-9 * a.area, "{} {}", a.area, b.area);
     }
 }

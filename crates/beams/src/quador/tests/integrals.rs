@@ -2,11 +2,13 @@
 
 use super::*;
 
-/// The volume of a hub's part less its beams, for cylinders of radius 1 and length 10.
+/// The volume of a hub's part, for cylinders of radius 1 and length 10.
 fn hub_volume(axes: &[Vec3], fillet: Fillet) -> f64 {
     let q = equal(axes, 10.0, fillet);
     assert!(q.shortfalls().is_empty() && q.overlaps().is_empty());
-    integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL).expect("whole").volume
+    integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::DEFAULT_ORDER)
+        .expect("whole")
+        .volume
 }
 
 #[test]
@@ -51,7 +53,7 @@ fn golden_volumes_of_filleted_hubs() {
         (Fillet::Tau(0.5), 0.105_062_5, 1e-7),
     ] {
         let q = Quadors::new(&graph, fillet).expect("a star");
-        let got = integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::USUAL)
+        let got = integral::hub_mass::<false>(&q.hub(0), &q.complex(0).expect("a hub"), integral::DEFAULT_ORDER)
             .expect("whole")
             .volume;
         assert!((got - want).abs() < digits, "{fillet:?}: {got} {want}");
@@ -66,7 +68,7 @@ fn golden_volumes_of_filleted_hubs() {
     }
 }
 
-/// Two beams that are thicker in the middle than their hub, one of them along x.
+/// Two beams, thicker in the middle than their hub, one of them along x.
 fn bulging(other: Vec3) -> Graph {
     let ends = [([1.0, 0.0, 0.0], 4.0, 0.5), (other, 4.0, 0.5)];
     star(0.5, &ends, |_| Profile::Mid(0.8))
@@ -78,11 +80,11 @@ fn a_neck_between_opposite_beams_is_a_body_of_revolution() {
     for tau in [0.2, 0.5, 0.9] {
         let q = Quadors::new(&bulging([-1.0, 0.0, 0.0]), Fillet::Tau(tau)).expect("a star");
         let (hub, c) = (q.hub(0), q.complex(0).expect("a hub"));
-        // One ring, which both seams bound.
+        // One annular face, bounded by both seams.
         assert!(c.faces.iter().any(|f| f.label == 3 && f.loops.len() == 2));
-        let split = hub.stubs[0].split;
-        let square = |z: f64| hub.radius * hub.radius - z * z + hub.grown_value([z, 0.0, 0.0]);
-        // N has a kink in its second derivative at two places: steps of h are off by h³.
+        let split = hub.half_beams[0].split;
+        let square = |z: f64| hub.radius * hub.radius - z * z + hub.smooth_union_value([z, 0.0, 0.0]);
+        // N has a kink in its second derivative at two points: the error of steps h is O(h³).
         let n = 100_000;
         let h = 2.0 * split / f64::from(n);
         let middles = (0..n).map(|k| square(-split + h * (f64::from(k) + 0.5)));
@@ -100,7 +102,7 @@ fn a_neck_between_opposite_beams_is_a_body_of_revolution() {
 #[test]
 fn integrals_are_converged_for_every_hub() {
     let mut random = Random(31);
-    let fine = integral::Order { nodes: &[16, 24], differ: 1e-11 };
+    let fine = integral::QuadratureOrder { nodes: &[16, 24], tolerance: 1e-11 };
     let (mut worst, mut done): ([f64; 3], usize) = ([0.0; 3], 0);
     for n in 1..=14 {
         for fillet in [Fillet::Auto, Fillet::Tau(0.7), Fillet::None] {
@@ -111,7 +113,7 @@ fn integrals_are_converged_for_every_hub() {
                 }
                 let (hub, c) = (q.hub(0), q.complex(0).expect("a hub"));
                 let of = |order| integral::hub_mass::<true>(&hub, &c, order).expect("integrals");
-                let (usual, want) = (of(integral::USUAL), of(fine));
+                let (usual, want) = (of(integral::DEFAULT_ORDER), of(fine));
                 let volume = q.hub_volume(0).expect("a volume");
                 let trace: f64 = (0..3).map(|a| want.second[a][a]).sum();
                 done += 1;
@@ -131,22 +133,22 @@ fn integrals_are_converged_for_every_hub() {
     assert!(done > 120, "{done}");
 }
 
-/// Points thrown at random into a box: of n of them a share p falls into the solid, within four standard deviations.
+/// Monte Carlo: of n points in a box a fraction p falls into the solid, within four standard deviations.
 #[test]
 fn integrals_are_those_of_points_thrown_at_random() {
     let mut random = Random(41);
-    let mut stars = Vec::new();
+    let mut incidence = Vec::new();
     for (n, fillet) in
         [(2, Fillet::Auto), (3, Fillet::Auto), (5, Fillet::Tau(0.5)), (8, Fillet::Auto), (13, Fillet::Auto)]
     {
-        stars.push((n, random_star(&mut random, n), fillet));
+        incidence.push((n, random_star(&mut random, n), fillet));
     }
-    // Fillets that go round the neck between two beams, all the way and almost.
+    // Fillets that surround the neck between two beams, completely and almost.
     for bent in [-0.99f64, -0.8, -0.6] {
         let axis = [bent, (1.0 - bent * bent).sqrt(), 0.0];
-        stars.push((2, bulging(axis), Fillet::Tau(0.2)));
+        incidence.push((2, bulging(axis), Fillet::Tau(0.2)));
     }
-    for (n, graph, fillet) in stars {
+    for (n, graph, fillet) in incidence {
         let q = Quadors::new(&graph, fillet).expect("a star");
         let mass = q.mass().expect("exact");
         let (b, thrown) = (q.bounds(), 400_000);
@@ -162,20 +164,20 @@ fn integrals_are_those_of_points_thrown_at_random() {
             }
         }
         let boxed: f64 = b.size().iter().product();
-        let share = mass.volume / boxed;
-        let deviation = (share * (1.0 - share) / f64::from(thrown)).sqrt();
+        let fraction = mass.volume / boxed;
+        let deviation = (fraction * (1.0 - fraction) / f64::from(thrown)).sqrt();
         let found = inside as f64 / f64::from(thrown);
-        assert!((found - share).abs() < 4.0 * deviation, "{n} {fillet:?}: {found} {share}");
+        assert!((found - fraction).abs() < 4.0 * deviation, "{n} {fillet:?}: {found} {fraction}");
         for a in 0..3 {
             let (mean, square) = (sum[a] / inside as f64, squares[a] / inside as f64);
             let spread = (square - mean * mean).sqrt();
             let off = (mean - mass.centroid()[a]).abs();
             assert!(off < 4.0 * spread / (inside as f64).sqrt(), "{n} {fillet:?} {a}: {off}");
-            // The inertia's diagonal is the spread of the two other axes.
+            // The second moments follow from the inertia tensor's diagonal.
             let inertia = mass.inertia();
             let others = (0..3).map(|k| inertia[k][k]).sum::<f64>() / 2.0 - inertia[a][a];
             let want = (others / mass.volume).sqrt();
-            // A sample's spread is within its own share of 1/√n, times what heavy ends add.
+            // The standard error of a sample's spread is of order 1/√n, more with heavy tails.
             assert!((spread / want - 1.0).abs() < 8.0 / (inside as f64).sqrt(), "{n} {a}: {spread} {want}");
         }
     }

@@ -1,4 +1,4 @@
-//! Surfaces in triangles.
+//! Tessellations.
 
 use super::*;
 
@@ -6,7 +6,7 @@ use super::*;
 fn equal_hubs_are_found_wherever_they_are() {
     let one = Quadors::new(&cubic(3, 0.0), Fillet::Auto).expect("a lattice");
     let classes = one.classes();
-    // Corners, edges, faces and the inside of a cube, by what is missing.
+    // Corners, edges, faces and interior of a cube, by missing neighbours.
     assert_eq!((classes.sample.len(), one.len()), (27, 64));
     let each: f64 = (0..one.len()).map(|i| one.hub_volume(i).expect("exact")).sum();
     assert!((one.volume().expect("exact") / each - 1.0).abs() < 1e-12);
@@ -44,7 +44,7 @@ fn meshes_are_closed_and_converge_at_second_order() {
             let m = geometry::measure::size(&mesh);
             let name = format!("{} beams {fillet:?} at {chord}", graph.beams.len());
             assert!(m.closed && m.pieces == 1 && m.cavities == 0, "{name}: {m:?}");
-            // As read back from single precision, too.
+            // Also after rounding to single precision.
             let mut low = mesh.clone();
             let round = |c: &mut f64| *c = f64::from(*c as f32);
             low.vertices.iter_mut().flatten().for_each(round);
@@ -54,18 +54,19 @@ fn meshes_are_closed_and_converge_at_second_order() {
                 assert!(!flat, "{name}");
             }
             assert!(error <= *chord, "{name}: {error}");
-            // What lies between two surfaces that are no further apart than that; distances are told to first order.
+            // The volume between two surfaces at most that far apart; distances are first-order estimates.
             let off = exact.volume - mesh.volume();
             assert!(off.abs() < 1.1 * error * exact.area, "{name}: {off}");
             *sum += (off / exact.volume).powi(2);
         }
     }
-    // Halving edges is a quarter of the chord error, and second order a quarter of what is lost.
+    // Halving edges divides the chord error by four, and the volume error likewise.
     let [a, b] = errors.map(f64::sqrt);
     assert!(b < a / 3.0, "{a} {b}");
 }
 
-/// Symmetric hubs, whole and in part as at the border of a block: corners of four, seams in planes through the centre.
+/// Symmetric hubs, complete and partial as at the boundary of a block: vertices of valence four, seams in planes
+/// through the centre.
 #[test]
 fn symmetric_hubs_are_meshed() {
     let octet = orbit([1.0, 1.0, 0.0]);
@@ -81,7 +82,8 @@ fn symmetric_hubs_are_meshed() {
         part(&[2]),
         part(&[0, 2]),
         part(&[0, 1, 2]),
-        // Straight on along one axis or two, and more beams to one side: fillets between equal cylinders have no width there.
+        // Collinear beams along one or two axes, and others on one side: fillets between equal cylinders have zero
+        // width there.
         of(&[0, 3]),
         of(&[0, 3, 2]),
         of(&[0, 3, 2, 1]),
@@ -102,43 +104,43 @@ fn symmetric_hubs_are_meshed() {
     }
 }
 
-/// Hub by hub as it is streamed: the same triangles, and the figures of the whole from those of the classes.
+/// Hub by hub, as streamed: the same triangles, and the measures of the whole from those of the classes.
 #[test]
 fn what_is_drawn_hub_by_hub_is_the_mesh() {
     for fillet in [Fillet::Auto, Fillet::None] {
         let q = Quadors::new(&cubic(2, 1.0), fillet).expect("a lattice");
-        let drawn = q.drawn(0.02).expect("drawn");
-        let mesh = drawn.mesh().expect("joined");
-        let streamed: Vec<[Vec3; 3]> = (0..q.len()).flat_map(|i| drawn.hub(i)).collect();
+        let tessellation = q.tessellation(0.02).expect("drawn");
+        let mesh = tessellation.mesh().expect("joined");
+        let streamed: Vec<[Vec3; 3]> = (0..q.len()).flat_map(|i| tessellation.hub(i)).collect();
         let placed = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
         assert!(streamed.iter().eq(&mesh.triangles.iter().map(placed).collect::<Vec<_>>()));
-        let (want, got) = (geometry::measure::size(&mesh), drawn.figures());
+        let (want, got) = (geometry::measure::size(&mesh), tessellation.measures());
         assert_eq!(got.triangles, mesh.triangles.len());
-        assert_eq!((got.euler, got.pieces), (want.euler, want.pieces));
-        // Sums of thousands of terms in another order.
+        assert_eq!((got.euler, got.components), (want.euler, want.pieces));
+        // Sums of thousands of terms in different order.
         assert!((got.volume / want.volume - 1.0).abs() < 1e-11);
         assert!((got.area / want.area - 1.0).abs() < 1e-11);
     }
 }
 
-/// A cylinder's triangles run along it: what is between its seam and its rim takes about as many as both have points, and no more.
+/// A cylinder's triangles run along it: their number is about that of the vertices of its seam and end circle.
 #[test]
 fn cylinders_take_few_triangles() {
     let q = equal(&six(), 14.0, Fillet::None);
     for chord in [0.03, 0.003, 0.0003] {
-        let drawn = q.drawn(chord).expect("drawn");
-        let n: usize = (0..q.beams()).map(|b| q.ring(b, chord)).sum();
-        let got = drawn.part(0).triangles.len();
+        let tessellation = q.tessellation(chord).expect("drawn");
+        let n: usize = (0..q.beams()).map(|b| q.circle_size(b, chord)).sum();
+        let got = tessellation.hub_mesh(0).triangles.len();
         assert!(got < 3 * n, "{chord}: {got} for {n} points of rims");
     }
 }
 
-/// As many as the chord error says: four times finer is four times as many, and triangles use what they are allowed.
+/// Second order: a fourth of the chord error needs four times the triangles, and the allowed error is used.
 #[test]
 fn fillets_take_triangles_as_the_chord_error_says() {
     for axes in [six(), orbit([1.0, 1.0, 0.0]), orbit([1.0, 1.0, 1.0])] {
         let q = equal(&axes, 14.0, Fillet::Auto);
-        let [some, more] = [0.02, 0.005].map(|c| q.drawn(c).expect("drawn").triangles() as f64);
+        let [some, more] = [0.02, 0.005].map(|c| q.tessellation(c).expect("drawn").triangles() as f64);
         assert!(more < 4.4 * some, "{}: {some} {more}", axes.len());
         let (mesh, _) = q.mesh(0.005).expect("meshed");
         let middles: Vec<Vec3> = (mesh.triangles.iter())
@@ -147,10 +149,10 @@ fn fillets_take_triangles_as_the_chord_error_says() {
                 scale(add(a, add(b, c)), 1.0 / 3.0)
             })
             .collect();
-        let near = q.nearest();
+        let near = q.closest_points();
         let off = |p: &Vec3| near.closest(*p).expect("a place").distance.abs();
         let mean = middles.iter().map(off).sum::<f64>() / middles.len() as f64;
-        // Halving leaves from a quarter to all of it, along the sides; in the middle less where a surface is a saddle.
+        // Bisection leaves edges at a quarter to all of the chord error; centroids less where the surface is a saddle.
         assert!(mean > 0.2 * 0.005, "{}: {mean}", axes.len());
     }
 }

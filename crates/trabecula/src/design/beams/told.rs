@@ -8,7 +8,7 @@ use crate::design::place::Place;
 use crate::design::{Built, Warning, pattern};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
-use ::beams::pattern::Laid;
+use ::beams::pattern::PatternField;
 use geometry::fault::{counted, number};
 use geometry::math::Vec3;
 
@@ -83,9 +83,9 @@ pub(super) fn warn(
             at(c.at)
         ));
     }
-    if let Some((n, p)) = truss.graph.swallowed() {
+    if let Some((n, p)) = truss.graph.contained_beams() {
         say(format!("{} lie within another one of the same hub, the first about {}", counted(n, "beam"), at(p)));
-    } else if let Some((angle, p)) = truss.facts.angle.filter(|a| a.0 < NARROW) {
+    } else if let Some((angle, p)) = truss.report.min_angle.filter(|a| a.0 < NARROW) {
         say(format!(
             "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
             at(p)
@@ -110,9 +110,9 @@ pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
 }
 
 /// The same of a pattern.
-pub(in crate::design) fn inside(laid: &Laid, built: &Built) -> bool {
+pub(in crate::design) fn inside(laid: &PatternField, built: &Built) -> bool {
     let region = &*built.solid.region;
-    let each = || laid.written().is_ok_and(|written| whole(&written, region));
+    let each = || laid.expand().is_ok_and(|expanded| whole(&expanded, region));
     region.bound(&laid.bounds()).hi <= 0.0 || laid.pattern().counts().1 <= FEW && each()
 }
 
@@ -135,11 +135,11 @@ pub(in crate::design) fn report(beams: &Beams, built: &Built, sampled: &dyn core
         Beams::Truss(truss) => truss,
         Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
     };
-    let (facts, graph, quadors) = (&truss.facts, &truss.graph, &truss.quadors);
+    let (frame, graph, quadors) = (&truss.report, &truss.graph, &truss.quadors);
     let [least, most] =
         (graph.hubs.iter().map(|h| h.radius)).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)]);
     let valence: serde_json::Map<String, Json> =
-        (facts.valence.iter()).map(|(v, n)| (v.to_string(), json!(n))).collect();
+        (frame.valence.iter()).map(|(v, n)| (v.to_string(), json!(n))).collect();
     let thin = (0..graph.beams.len()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
     // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
@@ -148,24 +148,24 @@ pub(in crate::design) fn report(beams: &Beams, built: &Built, sampled: &dyn core
     json!({
         "cell": truss.cell,
         "wavelength": truss.wavelength,
-        "hubs": facts.valence.values().sum::<usize>(),
-        "beams": facts.struts,
+        "hubs": frame.valence.values().sum::<usize>(),
+        "beams": frame.struts,
         "fraction": fraction,
         "fraction_exact": exact,
         "porosity": 1.0 - fraction,
         "thickness": 2.0 * thin,
         "hub_radius": [least, most],
-        "length": facts.length,
-        "total_length": facts.total,
+        "length": frame.length,
+        "total_length": frame.total_length,
         "volume": mass.map(|m| m.volume),
         "area": mass.map(|m| m.area),
         "centroid": mass.map(|m| m.centroid()),
         "inertia": mass.map(|m| m.inertia()),
         "valence": valence,
         "fillet_radius": truss.fillet,
-        "smallest_angle": facts.angle.map(|a| a.0),
-        "smallest_angle_at": facts.angle.map(|a| a.1),
-        "pieces": facts.pieces,
+        "smallest_angle": frame.min_angle.map(|a| a.0),
+        "smallest_angle_at": frame.min_angle.map(|a| a.1),
+        "pieces": frame.components,
         "dangling": truss.dangling,
         "collisions": truss.collisions.len(),
         "cleaned": {

@@ -9,8 +9,8 @@ use crate::design::level::check_varied;
 use crate::design::place::{Place, finite};
 use crate::design::samples;
 use crate::grade::Grade;
-use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wire};
-use ::beams::quador::pencil::Pencil;
+use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wireframe};
+use ::beams::quador::Pencil;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
 
@@ -29,7 +29,7 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
     let Some((first, fault)) = wrong.first() else {
         return Ok(());
     };
-    let [from, to] = graph.beams[*first].ends.map(|n| graph::place(graph.hubs[n as usize].center));
+    let [from, to] = graph.beams[*first].ends.map(|n| graph::position_text(graph.hubs[n as usize].center));
     let more = match wrong.len() {
         1 => String::new(),
         n => format!(" ({} in all)", counted(n, "such beam")),
@@ -87,7 +87,7 @@ pub(super) fn thickest(radii: &Radii<Grade>, bounds: &Aabb, place: &Place) -> f6
     of.map(most).fold(0.0, f64::max).min(norm(bounds.size()))
 }
 
-pub(super) fn mean_length(wire: &Wire) -> f64 {
+pub(super) fn mean_length(wire: &Wireframe) -> f64 {
     let total: f64 = wire.struts.iter().map(|s| wire.length(*s)).sum();
     total / wire.struts.len().max(1) as f64
 }
@@ -104,7 +104,7 @@ pub(super) fn merging(spec: &BeamsSpec, mean: f64, place: &Place) -> Result<f64,
 }
 
 /// Refuses a frame of which nothing is left.
-pub(super) fn check_left(wire: &Wire, key: &str, place: &Place) -> Result<(), DesignError> {
+pub(super) fn check_left(wire: &Wireframe, key: &str, place: &Place) -> Result<(), DesignError> {
     if !wire.struts.is_empty() {
         return Ok(());
     }
@@ -123,7 +123,7 @@ pub(super) fn check_left(wire: &Wire, key: &str, place: &Place) -> Result<(), De
 }
 
 /// Nodes and struts of the user's own.
-pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>), DesignError> {
+pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<f64>), DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let read = |path: &str, key: &str| samples::bytes(path, &below(key), place);
     let wrong =
@@ -144,18 +144,18 @@ pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wire, Vec<f64>)
         }
         Some(StrutsSpec::Rows(rows)) => {
             for (i, n) in rows.iter().enumerate().flat_map(|(i, r)| r.iter().map(move |n| (i, n))) {
-                if *n as usize >= nodes.places.len() {
+                if *n as usize >= nodes.positions.len() {
                     let message = format!(
                         "there is no node {n}; there are {}, counted from 0",
-                        counted(nodes.places.len(), "node")
+                        counted(nodes.positions.len(), "node")
                     );
                     let at = format!("{}[{i}]", below("struts"));
                     return Err(DesignError::new(at, message).found(n.to_string()));
                 }
             }
-            Wire { nodes: nodes.places.clone(), struts: rows.clone() }
+            Wireframe { nodes: nodes.positions.clone(), struts: rows.clone() }
         }
-        None => Wire::default(),
+        None => Wireframe::default(),
     };
     if spec.radius.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
         let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
@@ -179,7 +179,7 @@ pub(in crate::design) fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, De
         if let Some(r) = radius {
             Allowed::Positive("radius").check(&path, r, "")?;
         }
-        nodes.places.push(at);
+        nodes.positions.push(at);
         nodes.radii.push(radius.unwrap_or(f64::NAN));
         nodes.names.insert(i.to_string(), i as u32);
     }

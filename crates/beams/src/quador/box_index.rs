@@ -1,34 +1,34 @@
-//! Boxes in a uniform grid: which of them hold a point.
+//! Uniform-grid index of boxes, queried by points, boxes, planes and rays.
 
 use geometry::math::{Aabb, Vec3};
 
-/// Boxes by the cells of a grid that they touch.
+/// Boxes listed by the grid cells that they touch.
 #[derive(Clone, Debug, Default)]
-pub struct Index {
+pub(super) struct BoxIndex {
     origin: Vec3,
-    /// Cells for a mm, along each axis.
+    /// Cells per mm, along each axis.
     per: Vec3,
     cells: [usize; 3],
     starts: Vec<u32>,
     items: Vec<u32>,
 }
 
-impl Index {
-    /// An index of boxes, about four cells for each.
-    pub fn new(boxes: impl Iterator<Item = Aabb> + Clone) -> Index {
+impl BoxIndex {
+    /// Index of boxes, with about four cells for each.
+    pub(super) fn new(boxes: impl Iterator<Item = Aabb> + Clone) -> BoxIndex {
         let (mut all, mut count) = (Aabb::EMPTY, 0usize);
         for b in boxes.clone() {
             all = all.union(b);
             count += 1;
         }
         if count == 0 {
-            return Index::default();
+            return BoxIndex::default();
         }
         let size = all.size().map(|s| s.max(1e-9));
         let edge = (size[0] * size[1] * size[2] / (4.0 * count as f64)).cbrt();
         let cells = size.map(|s| ((s / edge).ceil() as usize).clamp(1, 1024));
         let per = [0, 1, 2].map(|a| cells[a] as f64 / size[a]);
-        let mut out = Index {
+        let mut out = BoxIndex {
             origin: all.min,
             per,
             cells,
@@ -78,7 +78,7 @@ impl Index {
 
     #[inline]
     fn step(&self, a: usize, v: f64) -> usize {
-        // A cast takes what is below the grid, or no number, to its first cell.
+        // The cast maps values below the grid, and NaN, to the first cell.
         (((v - self.origin[a]) * self.per[a]) as usize).min(self.cells[a] - 1)
     }
 
@@ -86,9 +86,10 @@ impl Index {
         ([0, 1, 2].map(|a| self.step(a, b.min[a])), [0, 1, 2].map(|a| self.step(a, b.max[a])))
     }
 
-    /// The boxes in the cell of a point: all that may hold it. Nothing is missed outside the grid either, where there are none.
+    /// The boxes listed in the cell of a point: all boxes that may contain it. Outside the grid no box contains a
+    /// point.
     #[inline]
-    pub fn near(&self, p: Vec3) -> &[u32] {
+    pub(super) fn near(&self, p: Vec3) -> &[u32] {
         if self.items.is_empty() {
             return &[];
         }
@@ -96,8 +97,9 @@ impl Index {
         &self.items[self.starts[c] as usize..self.starts[c + 1] as usize]
     }
 
-    /// The boxes that may touch a box, in order and once each, unless its cells list more than `most`.
-    pub fn touching(&self, b: &Aabb, most: usize) -> Option<Vec<u32>> {
+    /// The boxes that may touch a box, sorted, each once; `None` if there are more than `most` (or cells list many
+    /// more).
+    pub(super) fn touching(&self, b: &Aabb, most: usize) -> Option<Vec<u32>> {
         let mut out = Vec::new();
         if self.items.is_empty() {
             return Some(out);
@@ -118,8 +120,9 @@ impl Index {
         (out.len() <= most).then_some(out)
     }
 
-    /// Calls `f` with the boxes in the cells that a box touches, row by row of cells, some more than once.
-    pub fn about(&self, b: &Aabb, f: &mut impl FnMut(&[u32])) {
+    /// Calls `f` with the boxes listed in the cells that a box touches, by rows of cells; a box may occur more than
+    /// once.
+    pub(super) fn about(&self, b: &Aabb, f: &mut impl FnMut(&[u32])) {
         if self.items.is_empty() {
             return;
         }
@@ -133,13 +136,13 @@ impl Index {
         }
     }
 
-    /// The boxes in the cells that a plane n·x = level goes through, in order and once each.
-    pub fn across(&self, normal: Vec3, level: f64) -> Vec<u32> {
+    /// The boxes listed in the cells that the plane n·x = level crosses, sorted, each once.
+    pub(super) fn across(&self, normal: Vec3, level: f64) -> Vec<u32> {
         let mut out = Vec::new();
         if self.items.is_empty() {
             return out;
         }
-        // Columns along the axis that the plane is steepest to, and where it passes through each.
+        // Columns along the axis closest to the normal, and the interval of the plane in each.
         let a = (0..3).max_by(|&i, &j| normal[i].abs().total_cmp(&normal[j].abs())).unwrap_or(2);
         let (b, c) = ((a + 1) % 3, (a + 2) % 3);
         let edge = |axis: usize| 1.0 / self.per[axis];
@@ -167,26 +170,27 @@ impl Index {
         out
     }
 
-    /// Calls `f` with the boxes of each cell along a ray and where the ray leaves the cell, until it answers no.
-    pub fn along(&self, origin: Vec3, way: Vec3, f: &mut impl FnMut(&[u32], f64) -> bool) {
-        if self.items.is_empty() || !way.iter().chain(&origin).all(|v| v.is_finite()) {
+    /// Calls `f` with the boxes listed in each cell along a ray and the parameter at which the ray leaves the cell,
+    /// until it returns false.
+    pub(super) fn along(&self, origin: Vec3, direction: Vec3, f: &mut impl FnMut(&[u32], f64) -> bool) {
+        if self.items.is_empty() || !direction.iter().chain(&origin).all(|v| v.is_finite()) {
             return;
         }
         let size = [0, 1, 2].map(|a| self.cells[a] as f64 / self.per[a]);
         let all = Aabb { min: self.origin, max: [0, 1, 2].map(|a| self.origin[a] + size[a]) };
-        let Some((from, _)) = super::query::crossed(&all, origin, way) else {
+        let Some((from, _)) = super::rays::clip_line(&all, origin, direction) else {
             return;
         };
-        let start = [0, 1, 2].map(|a| origin[a] + way[a] * from.max(0.0));
+        let start = [0, 1, 2].map(|a| origin[a] + direction[a] * from.max(0.0));
         let mut at = [0, 1, 2].map(|a| self.step(a, start[a]));
         loop {
-            // Where the ray leaves the cell along each axis.
+            // The parameter at which the ray leaves the cell, by axis.
             let leave = [0, 1, 2].map(|a| {
-                let wall = at[a] + usize::from(way[a] > 0.0);
-                if way[a] == 0.0 {
+                let wall = at[a] + usize::from(direction[a] > 0.0);
+                if direction[a] == 0.0 {
                     f64::INFINITY
                 } else {
-                    (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / way[a]
+                    (self.origin[a] + wall as f64 / self.per[a] - origin[a]) / direction[a]
                 }
             });
             let a = (0..3).min_by(|&a, &b| leave[a].total_cmp(&leave[b])).unwrap_or(0);
@@ -195,7 +199,7 @@ impl Index {
             {
                 return;
             }
-            match way[a] > 0.0 {
+            match direction[a] > 0.0 {
                 true if at[a] + 1 < self.cells[a] => at[a] += 1,
                 false if at[a] > 0 => at[a] -= 1,
                 _ => return,

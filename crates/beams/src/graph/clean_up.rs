@@ -1,61 +1,62 @@
-//! Clean-up of a wire frame: what is twice, or of no length, is taken out, and told.
+//! Clean-up of a wireframe: coincident nodes are merged; zero-length, duplicate and isolated parts are removed and
+//! counted.
 
 use std::collections::{HashMap, HashSet};
 
-use super::wire::{Stars, Wire};
+use super::wireframe::{Incidence, Wireframe};
 use geometry::math::{Vec3, norm, sub};
 use geometry::union_find::{find, unite};
 
-/// What a clean-up did.
+/// Counts of a clean-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cleaned {
-    /// Nodes that were merged into another at the same place.
+    /// Nodes merged into another node at the same position.
     pub merged: usize,
-    /// Struts left out because both ends are one node.
+    /// Struts removed because both ends are the same node.
     pub short: usize,
-    /// Struts left out because another joins the same nodes.
+    /// Struts removed because another strut joins the same nodes.
     pub duplicates: usize,
-    /// Nodes left out because no strut ends there.
+    /// Nodes removed because no strut ends there.
     pub isolated: usize,
-    /// Struts with a free end left out, one after the other.
+    /// Struts with a free end removed one after the other.
     pub dangling: usize,
 }
 
-impl Wire {
-    /// Merges nodes at most `within` (mm) apart, each into the one of least number near it, and leaves out struts of no
-    /// length, struts between the same two nodes, and nodes without struts. `radii`, if not empty, is kept in step.
+impl Wireframe {
+    /// Merges nodes at most `within` (mm) apart, each into the lowest-numbered node near it, and removes zero-length
+    /// struts, duplicate struts and isolated nodes. `radii`, unless empty, is reduced with the nodes.
     pub fn clean(&mut self, within: f64, radii: &mut Vec<f64>) -> Cleaned {
-        let mut done = Cleaned::default();
+        let mut counts = Cleaned::default();
         let root = self.merged(within);
-        done.merged = (root.iter().enumerate()).filter(|(n, r)| *n != **r as usize).count();
-        let mut seen = HashSet::with_capacity(self.struts.len());
+        counts.merged = (root.iter().enumerate()).filter(|(n, r)| *n != **r as usize).count();
+        let mut joined = HashSet::with_capacity(self.struts.len());
         self.struts.retain_mut(|strut| {
             *strut = strut.map(|n| root[n as usize]);
             let [a, b] = *strut;
             if a == b {
-                done.short += 1;
+                counts.short += 1;
                 return false;
             }
-            let new = seen.insert([a.min(b), a.max(b)]);
-            done.duplicates += usize::from(!new);
+            let new = joined.insert([a.min(b), a.max(b)]);
+            counts.duplicates += usize::from(!new);
             new
         });
         let before = self.nodes.len();
-        self.keep(radii);
-        done.isolated = before - done.merged - self.nodes.len();
-        done
+        self.drop_isolated(radii);
+        counts.isolated = before - counts.merged - self.nodes.len();
+        counts
     }
 
-    /// Leaves out struts with an end that no other shares, until there are none; ends that are `held` are not free.
-    /// Returns how many.
+    /// Removes struts that have an end of valence 1, repeatedly, until none is left; nodes for which `held` holds are
+    /// not free ends. Returns the number removed.
     pub fn drop_dangling(&mut self, held: &impl Fn(Vec3) -> bool, radii: &mut Vec<f64>) -> usize {
-        let stars = Stars::of(self);
-        let mut valence: Vec<usize> = (0..self.nodes.len()).map(|n| stars.at(n).len()).collect();
+        let incidence = Incidence::of(self);
+        let mut valence: Vec<usize> = (0..self.nodes.len()).map(|n| incidence.at(n).len()).collect();
         let mut gone = vec![false; self.struts.len()];
         let free = |n: usize, valence: &[usize]| valence[n] == 1 && !held(self.nodes[n]);
         let mut open: Vec<usize> = (0..self.nodes.len()).filter(|n| free(*n, &valence)).collect();
         while let Some(n) = open.pop() {
-            let Some(s) = stars.at(n).iter().find(|s| !gone[**s as usize]) else {
+            let Some(s) = incidence.at(n).iter().find(|s| !gone[**s as usize]) else {
                 continue;
             };
             gone[*s as usize] = true;
@@ -68,21 +69,21 @@ impl Wire {
         }
         let mut left = gone.iter();
         self.struts.retain(|_| left.next() == Some(&false));
-        self.keep(radii);
+        self.drop_isolated(radii);
         gone.iter().filter(|g| **g).count()
     }
 
-    /// How many nodes have a single strut, ends that are `held` not counted.
+    /// Number of nodes of valence 1, `held` nodes excepted.
     pub fn dangling(&self, held: &impl Fn(Vec3) -> bool) -> usize {
-        let stars = Stars::of(self);
+        let incidence = Incidence::of(self);
         let nodes = self.nodes.iter().enumerate();
-        nodes.filter(|(n, p)| stars.at(*n).len() == 1 && !held(**p)).count()
+        nodes.filter(|(n, p)| incidence.at(*n).len() == 1 && !held(**p)).count()
     }
 
-    /// For each node the one of least number that it is merged into.
+    /// For each node the lowest-numbered node that it is merged into.
     fn merged(&self, within: f64) -> Vec<u32> {
         let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        // Nodes that are near each other lie in neighbouring cubes, nearly always in the same.
+        // Nodes within the distance lie in the same or adjacent cubes.
         let edge = (4.0 * within).max(f64::MIN_POSITIVE);
         let cube = |p: Vec3| p.map(|v| (v / edge).floor());
         let mut cubes: HashMap<[u64; 3], Vec<u32>> = HashMap::with_capacity(self.nodes.len());
@@ -116,20 +117,20 @@ mod tests {
 
     #[test]
     fn what_is_twice_goes_and_is_told() {
-        let mut wire = Wire {
+        let mut wireframe = Wireframe {
             nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-7, 0.0], [0.0, 1.0, 0.0], [5.0; 3], [-1e-9, 0.0, 0.0]],
             struts: vec![[0, 1], [2, 5], [1, 2], [1, 3], [3, 0]],
         };
         let mut radii = vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-        let done = wire.clean(1e-6, &mut radii);
-        assert_eq!(done, Cleaned { merged: 2, short: 1, duplicates: 1, isolated: 1, dangling: 0 });
-        assert_eq!(wire.struts, [[0, 1], [1, 2], [2, 0]]);
+        let counts = wireframe.clean(1e-6, &mut radii);
+        assert_eq!(counts, Cleaned { merged: 2, short: 1, duplicates: 1, isolated: 1, dangling: 0 });
+        assert_eq!(wireframe.struts, [[0, 1], [1, 2], [2, 0]]);
         assert_eq!(radii, [0.1, 0.2, 0.4]);
     }
 
     #[test]
     fn a_tail_goes_strut_by_strut_unless_it_is_held() {
-        let line = |n: u32| Wire {
+        let line = |n: u32| Wireframe {
             nodes: (0..=n).map(|i| [f64::from(i), 0.0, 0.0]).collect(),
             struts: (0..n).map(|i| [i, i + 1]).collect(),
         };

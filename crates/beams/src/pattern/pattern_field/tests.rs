@@ -1,12 +1,12 @@
 use super::*;
 use crate::graph::{Hub, Profile};
 
-fn places() -> impl Iterator<Item = Vec3> {
+fn samples_in_unit_cube() -> impl Iterator<Item = Vec3> {
     (1..4000).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract()))
 }
 
 fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
-    let strut = |by| Strut { ends: [0, 0], by, profile: Profile::Mid(0.2) };
+    let strut = |offset| Strut { ends: [0, 0], offset, profile: Profile::Mid(0.2) };
     Pattern {
         nodes: vec![Hub { center, radius: 0.25 }],
         struts: vec![strut([1, 0, 0]), strut([0, 1, 0]), strut([0, 0, 1]), strut([1, -1, 0])],
@@ -14,7 +14,7 @@ fn pattern(steps: [(Similarity, u32); 3], center: Vec3) -> Pattern {
     }
 }
 
-/// Translations, a swirl about an axis with rings along it, a shrinking spiral, and one in which no two commute.
+/// Translations; rotation with rings along the axis; a shrinking spiral; and steps none of which commute.
 fn samples() -> [Pattern; 4] {
     let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
     let turn = |z| Similarity::new(1.0, [0.0, 0.0, z], [0.0; 3], [0.0; 3]);
@@ -42,15 +42,15 @@ fn a_pattern_is_what_it_is_written_out() {
             let (hubs, beams) = pattern.counts();
             assert_eq!((graph.hubs.len() as f64, graph.beams.len() as f64), (hubs, beams));
             let whole = Quadors::new(&graph, fillet).expect("quadors");
-            let laid = Laid::new(pattern.clone(), fillet).expect("laid");
+            let field = PatternField::new(pattern.clone(), fillet).expect("a pattern");
             let b = whole.bounds();
             let (mut inside, mut out) = (0, 0);
-            for t in places() {
+            for t in samples_in_unit_cube() {
                 let p = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
                 let is = whole.contains(p);
-                assert_eq!(laid.contains(p), is, "{n} {p:?}");
-                let (v, own) = (laid.value(p), whole.value(p));
-                // Both fields have the sign of the solid, but for what rounding leaves on its surface.
+                assert_eq!(field.contains(p), is, "{n} {p:?}");
+                let (v, own) = (field.value(p), whole.value(p));
+                // Both fields have the sign of the solid, except for rounding on the surface.
                 if own.abs() > 1e-9 {
                     assert_eq!(v < 0.0, own < 0.0, "{n} {p:?} {v} {own}");
                 }
@@ -65,15 +65,15 @@ fn a_pattern_is_what_it_is_written_out() {
 #[test]
 fn bounds_hold_the_values() {
     for pattern in samples() {
-        let laid = Laid::new(pattern, Fillet::Tau(0.8)).expect("laid");
-        let all = laid.bounds();
-        for (i, t) in places().take(300).enumerate() {
+        let field = PatternField::new(pattern, Fillet::Tau(0.8)).expect("a pattern");
+        let all = field.bounds();
+        for (i, t) in samples_in_unit_cube().take(300).enumerate() {
             let p: Vec3 = core::array::from_fn(|a| all.min[a] + t[a] * all.size()[a]);
             let b = Aabb { min: p, max: p }.grown(0.05 * (1 + i % 7) as f64);
-            let range = laid.bound(&b);
-            for t in places().take(30) {
+            let range = field.bound(&b);
+            for t in samples_in_unit_cube().take(30) {
                 let q: Vec3 = core::array::from_fn(|a| b.min[a] + t[a] * b.size()[a]);
-                let v = laid.value(q);
+                let v = field.value(q);
                 assert!(range.lo - 1e-12 <= v && v <= range.hi + 1e-12, "{v} {range:?}");
             }
         }
@@ -84,20 +84,20 @@ fn bounds_hold_the_values() {
 fn different_hubs_are_few_where_steps_commute() {
     let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
     let steps = [(by([1.5, 0.0, 0.0]), 1000), (by([0.0, 1.5, 0.0]), 1000), (by([0.0, 0.0, 1.5]), 1000)];
-    let laid = Laid::new(pattern(steps, [0.0; 3]), Fillet::None).expect("laid");
-    let (_, kinds) = laid.kinds();
-    assert_eq!(kinds.len(), 27);
-    assert_eq!(kinds.iter().map(|k| k.1).sum::<f64>(), 1e9);
-    assert!(laid.contains([750.0, 751.5, 750.7]) && !laid.contains([750.7, 750.7, 750.7]));
-    assert_eq!(laid.pattern().counts().0, 1e9);
+    let field = PatternField::new(pattern(steps, [0.0; 3]), Fillet::None).expect("a pattern");
+    let (_, representatives) = field.representatives();
+    assert_eq!(representatives.len(), 27);
+    assert_eq!(representatives.iter().map(|k| k.1).sum::<f64>(), 1e9);
+    assert!(field.contains([750.0, 751.5, 750.7]) && !field.contains([750.7, 750.7, 750.7]));
+    assert_eq!(field.pattern().counts().0, 1e9);
 }
 
-/// A strut that misses its neighbours by little or runs into them: as the whole written out has it.
+/// A strut that narrowly misses its neighbours or intersects them: the same answer as for the expanded pattern.
 #[test]
 fn beams_that_run_into_each_other_are_found() {
     let by = |v| Similarity::new(1.0, [0.0; 3], [0.0; 3], v);
     let crossing = |apart: f64, r: f64| {
-        let strut = |ends, by| Strut { ends, by, profile: Profile::Mid(r) };
+        let strut = |ends, offset| Strut { ends, offset, profile: Profile::Mid(r) };
         let node = |z| Hub { center: [0.0, 0.0, z], radius: r };
         // Both diagonals of a square, one above the other.
         Pattern {
@@ -106,10 +106,10 @@ fn beams_that_run_into_each_other_are_found() {
             steps: [(by([3.0, 0.0, 0.0]), 40), (by([0.0, 3.0, 0.0]), 30), (by([0.0, 0.0, 4.0]), 1)],
         }
     };
-    let laid = |p: Pattern| Laid::new(p, Fillet::None).expect("a pattern");
+    let field = |p: Pattern| PatternField::new(p, Fillet::None).expect("a pattern");
     for (r, some) in [(0.24, false), (0.26, true)] {
-        let found = laid(crossing(0.5, r)).collisions().expect("beams");
-        let found = found.expect("few kinds");
+        let found = field(crossing(0.5, r)).collisions().expect("beams");
+        let found = found.expect("few classes");
         assert_eq!(found.count > 0, some, "{r}: {found:?}");
         if let Some(p) = found.at {
             // In the middle of a square, halfway up.
@@ -119,9 +119,9 @@ fn beams_that_run_into_each_other_are_found() {
         }
     }
     for (n, pattern) in samples().into_iter().enumerate() {
-        let laid = laid(pattern);
-        let found = laid.collisions().expect("beams").expect("few kinds");
-        let all = laid.written().expect("small").collisions();
+        let field = field(pattern);
+        let found = field.collisions().expect("beams").expect("few classes");
+        let all = field.expand().expect("small").collisions();
         assert_eq!(found.count > 0, !all.is_empty(), "sample {n}: {found:?}");
     }
 }

@@ -1,81 +1,81 @@
-//! Faces in exact rational form: biquadratic patches, trimmed by conics in space and in their own parameters.
+//! Faces in exact rational form: biquadratic Bézier patches, trimmed by conics in space and in the parameter plane.
 //!
-//! A quadric is seen from one of its own points, the pole A: the line from A through a point B of the plane across from it meets
-//! the quadric once more, in X = Q(B, B) A − 2 Q(A, B) B with Q the quadric's bilinear form on homogeneous places. With B linear in
-//! (s, t) that is of degree two, so a biquadratic Bézier patch holds it exactly; for a sphere it is stereographic projection.
-//! The way back is a central projection, which takes a conic on the quadric to a conic: a rational quadratic curve in
-//! space stays one in (s, t). The pole lies off the face. The faces of stubs, which go all round, are cut in three or more by
-//! meridians, which are conics too, and end at the rim.
+//! A quadric is parametrised by projection from one of its own points, the pole A: the line from A through a point B of
+//! a plane meets the quadric again in X = Q(B, B) A − 2 Q(A, B) B, with Q the bilinear form in homogeneous coordinates.
+//! With B linear in (s, t) this has degree two, so a biquadratic Bézier patch represents it exactly; for a sphere it is
+//! stereographic projection. The inverse is a central projection, which maps conics to conics: a rational quadratic
+//! curve in space stays one in (s, t). The pole lies off the face. The annular faces of half-beams are cut in three or
+//! more by meridian planes, in conics, and end at the end circle.
 
 use core::f64::consts::TAU;
 
 use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
-use super::bezier::{Bezier, Path, curves, onward};
+use super::bezier::{Bezier, Path, curves, section_tangent};
 use super::complex::{Complex, Face};
-use super::hub::{Hub, Stub};
-use super::quadric::Quadric;
+use super::hub::{HalfBeam, Hub};
+use super::hub_quadric::Quadric;
 
-/// A side of a patch.
+/// A trimming curve of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trim {
-    /// In space, about the hub's centre.
+pub struct TrimCurve {
+    /// In space, relative to the hub's centre, mm.
     pub space: Bezier<3>,
-    /// In (s, t): the same curve, though not at the same speed.
+    /// In (s, t): the same curve, with another parametrisation.
     pub flat: Bezier<2>,
-    /// The arc of the hub that it is part of; none on a rim and where a stub's face is cut.
+    /// The arc of the hub that it is part of; `None` on end circles and meridian cuts.
     pub arc: Option<u32>,
 }
 
 /// A piece of a face in rational form.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// The face.
+    /// Index of the face.
     pub face: u32,
-    /// Its quadric, about the hub's centre.
+    /// Its quadric, in the hub's frame.
     pub quadric: Quadric,
-    /// The pole.
+    /// The pole A.
     pub pole: Vec3,
-    /// Where s = t = 0 is, on the quadric.
+    /// The point of the quadric with s = t = 0.
     pub origin: Vec3,
-    /// s and t, of length one, parallel to the tangents at the pole.
+    /// Unit vectors along s and t, parallel to the tangent plane at the pole.
     pub axes: [Vec3; 2],
-    /// Loops of sides, the face to the left of each, seen from outside.
-    pub trims: Vec<Vec<Trim>>,
+    /// Loops of trimming curves, the face on their left seen from outside.
+    pub trims: Vec<Vec<TrimCurve>>,
 }
 
-/// A side before its patch has a pole.
-type Side = (Bezier<3>, Option<u32>);
+/// A boundary curve in space, and its arc.
+type BoundaryCurve = (Bezier<3>, Option<u32>);
 
 impl Patch {
-    /// The place of (s, t).
+    /// The point at (s, t).
     pub fn at(&self, [s, t]: [f64; 2]) -> Vec3 {
         let b = add(self.origin, add(scale(self.axes[0], s), scale(self.axes[1], t)));
         let (bb, ab) = (self.quadric.at(b), 2.0 * self.polar());
         scale(sub(scale(self.pole, bb), scale(b, ab)), 1.0 / (bb - ab))
     }
 
-    /// Q(A, B), the same for all B of the plane.
+    /// Q(A, B), constant on the plane.
     fn polar(&self) -> f64 {
         let (q, a) = (&self.quadric, self.pole);
-        dot(self.origin, q.half_slope(a)) + dot(q.b, a) + q.c
+        dot(self.origin, q.half_gradient(a)) + dot(q.b, a) + q.c
     }
 
-    /// (s, t) of a place, and the weight that the projection gives it.
-    fn seen(&self, x: Vec3) -> ([f64; 2], f64) {
-        let n = self.quadric.half_slope(self.pole);
-        let (way, far) = (sub(x, self.pole), dot(sub(self.origin, self.pole), n));
-        let weight = dot(way, n) / far;
-        let b = sub(add(self.pole, scale(way, 1.0 / weight)), self.origin);
+    /// (s, t) of a point, and its weight in the projection.
+    fn project(&self, x: Vec3) -> ([f64; 2], f64) {
+        let n = self.quadric.half_gradient(self.pole);
+        let (direction, far) = (sub(x, self.pole), dot(sub(self.origin, self.pole), n));
+        let weight = dot(direction, n) / far;
+        let b = sub(add(self.pole, scale(direction, 1.0 / weight)), self.origin);
         ([dot(b, self.axes[0]), dot(b, self.axes[1])], weight)
     }
 
-    /// (s, t) of a place of the quadric.
+    /// (s, t) of a point of the quadric.
     pub fn parameters(&self, x: Vec3) -> [f64; 2] {
-        self.seen(x).0
+        self.project(x).0
     }
 
-    /// The least and greatest s, and t, of its sides' control points.
+    /// Ranges [min, max] of s and of t, over the control points of the trimming curves.
     pub fn range(&self) -> [[f64; 2]; 2] {
         let all = || self.trims.iter().flatten().flat_map(|t| t.flat.points);
         [0, 1].map(|a| {
@@ -85,14 +85,14 @@ impl Patch {
         })
     }
 
-    /// The control points and weights of the biquadratic Bézier patch over its range, s first. Weights are those of the formula: a
-    /// corner of the range that the face does not reach may have one below zero.
-    pub fn net(&self) -> ([[Vec3; 3]; 3], [[f64; 3]; 3]) {
+    /// Control points and weights of the biquadratic Bézier patch over its range, s first. Weights are those of the
+    /// formula: at a corner of the range outside the face a weight may be negative.
+    pub fn control_net(&self) -> ([[Vec3; 3]; 3], [[f64; 3]; 3]) {
         let (q, [u, v]) = (&self.quadric, self.axes);
-        let h = q.half_slope(self.origin);
+        let h = q.half_gradient(self.origin);
         let ab = 2.0 * self.polar();
         let [s, t] = self.range();
-        // Polar forms of 1, s, s² at the pairs of ends that the control points stand for.
+        // Polar forms of 1, s, s² at the parameter pairs of the control points.
         let blossom = |[a, b]: [f64; 2]| [[1.0, a, a * a], [1.0, (a + b) / 2.0, a * b], [1.0, b, b * b]];
         let (ss, tt) = (blossom(s), blossom(t));
         let mut net = ([[[0.0; 3]; 3]; 3], [[0.0; 3]; 3]);
@@ -112,17 +112,24 @@ impl Patch {
         net
     }
 
-    /// A patch seen from a pole; `None` if a side runs through the pole's tangent plane, where (s, t) are infinite.
-    fn seen_from(face: u32, quadric: Quadric, pole: Vec3, origin: Vec3, sides: &[Vec<Side>]) -> Option<Patch> {
-        let n = quadric.half_slope(pole);
+    /// The patch with a given pole; `None` if a boundary curve meets the pole's tangent plane, where (s, t) are
+    /// infinite.
+    fn with_pole(
+        face: u32,
+        quadric: Quadric,
+        pole: Vec3,
+        origin: Vec3,
+        boundary: &[Vec<BoundaryCurve>],
+    ) -> Option<Patch> {
+        let n = quadric.half_gradient(pole);
         let u = unit(cross(n, if n[0].abs() < 0.6 * norm(n) { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
         let mut patch = Patch { face, quadric, pole, origin, axes: [u, cross(unit(n), u)], trims: Vec::new() };
-        for walked in sides {
+        for boundary_loop in boundary {
             let mut loops = Vec::new();
-            let mut todo: Vec<(Side, u32)> = walked.iter().rev().map(|s| (*s, 6)).collect();
+            let mut todo: Vec<(BoundaryCurve, u32)> = boundary_loop.iter().rev().map(|s| (*s, 6)).collect();
             while let Some(((space, arc), depth)) = todo.pop() {
-                let seen = space.points.map(|p| patch.seen(p));
-                let [k, l, m] = [seen[0].1, space.weight * seen[1].1, seen[2].1];
+                let project = space.points.map(|p| patch.project(p));
+                let [k, l, m] = [project[0].1, space.weight * project[1].1, project[2].1];
                 if k.is_nan() || k < 1e-3 || m < 1e-3 {
                     return None;
                 }
@@ -133,20 +140,20 @@ impl Patch {
                     todo.push(((first, arc), depth.checked_sub(1)?));
                     continue;
                 }
-                let flat = Bezier { points: seen.map(|s| s.0), weight };
-                loops.push(Trim { space, flat, arc });
+                let flat = Bezier { points: project.map(|s| s.0), weight };
+                loops.push(TrimCurve { space, flat, arc });
             }
             patch.trims.push(loops);
         }
         Some(patch)
     }
 
-    /// The patch of a simply connected piece of a face, seen from across the hub or, failing that, from somewhere near there.
-    fn across(face: u32, quadric: Quadric, origin: Vec3, sides: &[Vec<Side>]) -> Option<Patch> {
-        let normal = unit(quadric.half_slope(origin));
+    /// The patch of a simply connected piece of a face, with a pole across the hub or near there.
+    fn with_opposite_pole(face: u32, quadric: Quadric, origin: Vec3, boundary: &[Vec<BoundaryCurve>]) -> Option<Patch> {
+        let normal = unit(quadric.half_gradient(origin));
         let u = unit(cross(normal, if normal[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
         let v = cross(normal, u);
-        // Through the quadric's own middle, the hub's, and along the normal.
+        // Through the centre of the quadric, through the hub's centre, and along the normal.
         let middle = scale(apply(&inverse(&quadric.m), quadric.b), -1.0);
         let normal = scale(normal, -1.0);
         let inward = [sub(middle, origin), unit(scale(origin, -1.0)), normal];
@@ -154,22 +161,22 @@ impl Patch {
             let (sin, cos) = (TAU * f64::from(k) / 8.0).sin_cos();
             [0.3, 0.8, 2.0].map(|by| add(normal, scale(add(scale(u, cos), scale(v, sin)), by)))
         });
-        inward.into_iter().chain(tilts).find_map(|way| {
-            // The origin is on the quadric: the other root.
-            let t = -2.0 * dot(quadric.half_slope(origin), way) / quadric.form(way, way);
-            let pole = add(origin, scale(way, t));
+        inward.into_iter().chain(tilts).find_map(|direction| {
+            // The origin is one root; this is the other.
+            let t = -2.0 * dot(quadric.half_gradient(origin), direction) / quadric.form(direction, direction);
+            let pole = add(origin, scale(direction, t));
             let far = t.is_finite() && norm(pole) < 1e6 * norm(origin);
-            far.then(|| Patch::seen_from(face, quadric, pole, origin, sides))?
+            far.then(|| Patch::with_pole(face, quadric, pole, origin, boundary))?
         })
     }
 }
 
 impl Complex {
-    /// The exact rational patches of a hub's faces; faces of which no pole sees the whole are left out, and counted.
+    /// The exact rational patches of a hub's faces, and the number of faces for which no pole was found.
     pub fn patches(&self, hub: &Hub) -> (Vec<Patch>, usize) {
         let (mut out, mut left) = (Vec::new(), 0);
         for (i, face) in self.faces.iter().enumerate() {
-            match self.of_face(hub, i as u32, face) {
+            match self.face_patches(hub, i as u32, face) {
                 Some(made) => out.extend(made),
                 None => left += 1,
             }
@@ -177,48 +184,48 @@ impl Complex {
         (out, left)
     }
 
-    fn of_face(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<Patch>> {
+    fn face_patches(&self, hub: &Hub, number: u32, face: &Face) -> Option<Vec<Patch>> {
         let q = face.quadric;
-        if let Some(stub) = face.rim {
-            let stub = &hub.stubs[stub as usize];
-            // Where a seam turns back at one azimuth it does not at another.
-            let ways = [3, 4, 6].into_iter().flat_map(|n| (0..5).map(move |k| (n, k)));
-            return ways.map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k))).find_map(|(n, first)| {
-                sectors(self, face, stub, n, first)?
+        if let Some(half_beam) = face.end_circle {
+            let half_beam = &hub.half_beams[half_beam as usize];
+            // A seam that turns back at one azimuth may not at another.
+            let attempts = [3, 4, 6].into_iter().flat_map(|n| (0..5).map(move |k| (n, k)));
+            return attempts.map(|(n, k)| (n, 0.737 + TAU / n as f64 * 0.2 * f64::from(k))).find_map(|(n, first)| {
+                sectors(self, face, half_beam, n, first)?
                     .into_iter()
-                    .map(|(origin, sides)| Patch::across(number, q, origin, &[sides]))
+                    .map(|(origin, boundary)| Patch::with_opposite_pole(number, q, origin, &[boundary]))
                     .collect()
             });
         }
-        let sides: Vec<Vec<Side>> =
-            face.loops.iter().map(|l| l.iter().flat_map(|w| self.sides(*w, None)).collect()).collect();
+        let boundary: Vec<Vec<BoundaryCurve>> =
+            face.loops.iter().map(|l| l.iter().flat_map(|w| self.boundary_curves(*w, None)).collect()).collect();
         if face.label == 0 {
-            // A ball is seen from the middle of a stub; a lone one by halves.
-            let Some(s) = hub.stubs.first() else {
+            // The pole of the ball is on the axis of a half-beam; a hub without beams is cut in halves.
+            let Some(s) = hub.half_beams.first() else {
                 let r = hub.radius;
                 let half = |z: f64| {
                     let (n, from) = ([0.0, 0.0, z], [r, 0.0, 0.0]);
-                    let rim = Path::new(&q, n, from, onward(&q, n, from))?.until(None)?;
-                    let sides = rim.curves().into_iter().map(|c| (c, None)).collect();
-                    Patch::seen_from(number, q, [0.0, 0.0, -z * r], [0.0, 0.0, z * r], &[sides])
+                    let end_circle = Path::new(&q, n, from, section_tangent(&q, n, from))?.ended_at(None)?;
+                    let boundary = end_circle.curves().into_iter().map(|c| (c, None)).collect();
+                    Patch::with_pole(number, q, [0.0, 0.0, -z * r], [0.0, 0.0, z * r], &[boundary])
                 };
                 return [1.0, -1.0].into_iter().map(half).collect();
             };
             let pole = scale(s.axis, hub.radius);
-            let patch = Patch::seen_from(number, q, pole, scale(pole, -1.0), &sides)?;
+            let patch = Patch::with_pole(number, q, pole, scale(pole, -1.0), &boundary)?;
             return Some(vec![patch]);
         }
-        let middle = sides.iter().flatten().fold([0.0; 3], |sum, (b, _)| {
+        let middle = boundary.iter().flatten().fold([0.0; 3], |sum, (b, _)| {
             let [p, _, r] = b.points;
             add(sum, scale(unit(b.at(0.5)), norm(sub(p, r))))
         });
         let middle = unit(middle);
-        let origin = scale(middle, q.exit(middle));
-        Some(vec![Patch::across(number, q, origin, &sides)?])
+        let origin = scale(middle, q.ray_exit(middle));
+        Some(vec![Patch::with_opposite_pole(number, q, origin, &boundary)?])
     }
 
-    /// An arc as it is walked, or the part of it between two of its angles.
-    fn sides(&self, (arc, forward): (u32, bool), part: Option<[f64; 2]>) -> Vec<Side> {
+    /// An arc in its direction of traversal, or the part between two of its angles.
+    fn boundary_curves(&self, (arc, forward): (u32, bool), part: Option<[f64; 2]>) -> Vec<BoundaryCurve> {
         let conic = &self.arcs[arc as usize].conic;
         let [from, to] = part.unwrap_or([0.0, conic.end]);
         let mut made = curves(conic, from, to);
@@ -230,23 +237,29 @@ impl Complex {
     }
 }
 
-/// A stub's face, cut by half-planes about its axis: a place in the middle of each sector, and its sides. `None` if the seam
-/// turns back across one of them.
-fn sectors(complex: &Complex, face: &Face, stub: &Stub, count: usize, first: f64) -> Option<Vec<(Vec3, Vec<Side>)>> {
-    let (q, axis) = (&face.quadric, stub.axis);
+/// The face of a half-beam cut by meridian planes: a point in the middle of each sector, and its boundary. `None` if
+/// the seam crosses a meridian plane backwards.
+fn sectors(
+    complex: &Complex,
+    face: &Face,
+    half_beam: &HalfBeam,
+    count: usize,
+    first: f64,
+) -> Option<Vec<(Vec3, Vec<BoundaryCurve>)>> {
+    let (q, axis) = (&face.quadric, half_beam.axis);
     let pole = if axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     let side = unit(cross(axis, pole));
     let other = cross(axis, side);
     let azimuth = |k: usize| first + TAU * k as f64 / count as f64;
     let along = |a: f64| add(scale(side, a.cos()), scale(other, a.sin()));
-    let across = |a: f64| cross(axis, along(a));
-    // The seam in pieces between the cuts, and the cut that each begins at.
-    let mut pieces: Vec<(Option<usize>, Vec<Side>)> = Vec::new();
+    let perpendicular = |a: f64| cross(axis, along(a));
+    // The pieces of the seam between cuts, each with the cut at its start.
+    let mut pieces: Vec<(Option<usize>, Vec<BoundaryCurve>)> = Vec::new();
     for &(arc, forward) in face.loops.iter().flatten() {
         let conic = &complex.arcs[arc as usize].conic;
         let mut stops: Vec<(f64, usize)> = Vec::new();
         for k in 0..count {
-            let m = across(azimuth(k));
+            let m = perpendicular(azimuth(k));
             for t in conic.roots([dot(m, conic.v), dot(m, conic.e[0]), dot(m, conic.e[1])], false) {
                 if t < conic.end && dot(conic.at(t), along(azimuth(k))) > 0.0 {
                     stops.push((t, k));
@@ -262,7 +275,7 @@ fn sectors(complex: &Complex, face: &Face, stub: &Stub, count: usize, first: f64
             .map(|w| {
                 let start = if forward { w[0].1 } else { w[1].1 };
                 let part = Some([w[0].0, w[1].0]);
-                (start, complex.sides((arc, forward), part))
+                (start, complex.boundary_curves((arc, forward), part))
             })
             .collect();
         if !forward {
@@ -272,51 +285,51 @@ fn sectors(complex: &Complex, face: &Face, stub: &Stub, count: usize, first: f64
     }
     let first = pieces.iter().position(|p| p.0 == Some(0))?;
     pieces.rotate_left(first);
-    let mut out: Vec<(Vec3, Vec<Side>)> = Vec::new();
-    for (start, sides) in pieces {
+    let mut out: Vec<(Vec3, Vec<BoundaryCurve>)> = Vec::new();
+    for (start, boundary) in pieces {
         if let Some(k) = start {
-            // Seen from outside, with the stub to its left, the seam goes round with growing azimuth.
+            // Seen from outside with the half-beam on its left, the seam has increasing azimuth.
             if k != out.len() {
                 return None;
             }
             out.push(([0.0; 3], Vec::new()));
         }
-        out.last_mut()?.1.extend(sides);
+        out.last_mut()?.1.extend(boundary);
     }
     if out.len() != count {
         return None;
     }
     let corners: Vec<Vec3> = out.iter().map(|o| o.1[0].0.points[0]).collect();
     let meridian = |k: usize| {
-        let (from, m) = (corners[k % count], across(azimuth(k)));
-        let way = onward(q, m, from);
-        let up = if dot(way, axis) > 0.0 { way } else { scale(way, -1.0) };
+        let (from, m) = (corners[k % count], perpendicular(azimuth(k)));
+        let direction = section_tangent(q, m, from);
+        let up = if dot(direction, axis) > 0.0 { direction } else { scale(direction, -1.0) };
         let path = Path::new(q, m, from, up)?;
-        let end = path.first(dot(axis, from) - stub.split, axis, false)?;
-        path.until(Some(end))
+        let end = path.first_root(dot(axis, from) - half_beam.split, axis, false)?;
+        path.ended_at(Some(end))
     };
     for k in 0..count {
         let (up, down) = (meridian(k + 1)?, meridian(k)?);
         let (from, n) = (up.at(1.0), scale(axis, -1.0));
-        let back = Path::new(q, n, from, onward(q, n, from))?;
-        let m = across(azimuth(k));
-        let end = back.first(dot(m, from), m, false)?;
-        let rim = back.until(Some(end))?;
+        let back = Path::new(q, n, from, section_tangent(q, n, from))?;
+        let m = perpendicular(azimuth(k));
+        let end = back.first_root(dot(m, from), m, false)?;
+        let end_circle = back.ended_at(Some(end))?;
         let mut down = down.curves();
         down.reverse();
         down.iter_mut().for_each(|b| b.points.reverse());
-        let cuts = up.curves().into_iter().chain(rim.curves()).chain(down);
+        let cuts = up.curves().into_iter().chain(end_circle.curves()).chain(down);
         out[k].1.extend(cuts.map(|c| (c, None)));
-        let way = along((azimuth(k) + azimuth(k + 1)) / 2.0);
-        let height = (dot(corners[k], axis) + dot(corners[(k + 1) % count], axis)) / 4.0 + stub.split / 2.0;
-        let rho = stub.squared(height).max(0.0).sqrt();
-        out[k].0 = add(scale(axis, height), scale(way, rho));
+        let direction = along((azimuth(k) + azimuth(k + 1)) / 2.0);
+        let height = (dot(corners[k], axis) + dot(corners[(k + 1) % count], axis)) / 4.0 + half_beam.split / 2.0;
+        let rho = half_beam.radius_squared(height).max(0.0).sqrt();
+        out[k].0 = add(scale(axis, height), scale(direction, rho));
     }
     Some(out)
 }
 
-/// The symmetric 4 × 4 matrix of a quadric about another origin: xᵀMx for homogeneous x.
-pub fn matrix(q: &Quadric, center: Vec3) -> [[f64; 4]; 4] {
+/// The symmetric 4 × 4 matrix of a quadric about another origin, for homogeneous coordinates.
+pub fn homogeneous_matrix(q: &Quadric, center: Vec3) -> [[f64; 4]; 4] {
     let mut out = [[0.0; 4]; 4];
     let mc = apply(&q.m, center);
     for i in 0..3 {
@@ -335,29 +348,29 @@ mod tests {
     use super::*;
     use crate::graph::Profile;
 
-    /// What must hold of every patch of a hub; how many were left out.
+    /// Checks every patch of a hub; returns the numbers of patches and of faces left out.
     fn check(hub: &Hub, complex: &Complex) -> (usize, usize) {
         let (patches, left) = complex.patches(hub);
-        let mut walked = vec![0; complex.arcs.len()];
+        let mut boundary_loop = vec![0; complex.arcs.len()];
         for p in &patches {
             let face = &complex.faces[p.face as usize];
-            let (net, weights) = p.net();
+            let (net, weights) = p.control_net();
             let range = p.range();
             for walked_loop in &p.trims {
                 for (k, t) in walked_loop.iter().enumerate() {
                     let next = &walked_loop[(k + 1) % walked_loop.len()];
                     let size = hub.radius + norm(t.space.points[0]);
                     assert!(norm(sub(t.space.points[2], next.space.points[0])) < 1e-8 * size);
-                    for share in [0.0, 0.21, 0.5, 0.84, 1.0] {
-                        // The side lies on the face, in space and by its parameters.
-                        let x = t.space.at(share);
+                    for fraction in [0.0, 0.21, 0.5, 0.84, 1.0] {
+                        // The trimming curve lies on the face, in space and by its parameters.
+                        let x = t.space.at(fraction);
                         assert!(p.quadric.at(x).abs() < 1e-9 * size * size, "{}", p.quadric.at(x));
-                        let y = p.at(t.flat.at(share));
+                        let y = p.at(t.flat.at(fraction));
                         assert!(p.quadric.at(y).abs() < 1e-9 * size * size);
                         assert!(hub.value(y).abs() < 1e-8 * size * size, "{}", hub.value(y));
                         let there = p.parameters(x);
                         assert!(norm(sub(p.at(there), x)) < 1e-8 * size, "{x:?} {:?}", p.at(there));
-                        // The net gives the same place.
+                        // The control net gives the same point.
                         let at = p.parameters(y);
                         let bernstein = |a: usize| {
                             let [lo, hi] = range[a];
@@ -377,11 +390,11 @@ mod tests {
                         assert!(norm(sub(z, y)) < 1e-7 * size, "{z:?} {y:?}");
                     }
                     if let Some(a) = t.arc {
-                        walked[a as usize] += 1;
+                        boundary_loop[a as usize] += 1;
                     }
                 }
             }
-            // Inside the sides of a face the label is its own.
+            // Inside the boundary the point is on the quadric.
             let inner = p
                 .trims
                 .iter()
@@ -394,7 +407,7 @@ mod tests {
             }
         }
         if left == 0 {
-            assert!(walked.iter().all(|w| *w >= 2), "each arc is walked from both sides: {walked:?}");
+            assert!(boundary_loop.iter().all(|w| *w >= 2), "each arc is traversed from both sides: {boundary_loop:?}");
         }
         (patches.len(), left)
     }
@@ -421,7 +434,7 @@ mod tests {
         let ends: Vec<_> = six().into_iter().map(|u| (u, 10.0, 1.0)).collect();
         let q = Quadors::new(&star(1.0, &ends, |_| Profile::Cylinder), Fillet::Tau(0.7)).expect("a star");
         let complex = q.complex(0).expect("a hub");
-        // Six stubs in thirds, twelve fillets, eight corners.
+        // Six half-beam faces in thirds, twelve fillets, eight corners.
         assert_eq!(check(&q.hub(0), &complex), (38, 0));
         assert!(made > 1000 && left == 0, "{made} patches, {left} faces left out");
     }
@@ -429,9 +442,9 @@ mod tests {
     #[test]
     fn the_matrix_is_the_quadric_elsewhere() {
         let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.1, -0.2, 0.3], c: -1.0 };
-        q.square(-0.7, &super::super::hub::Affine { a: [1.0, 2.0, -0.5], b: 0.3 });
+        q.add_square(-0.7, &super::super::hub::AffineFunction { a: [1.0, 2.0, -0.5], b: 0.3 });
         let (center, x) = ([3.0, -1.0, 2.0], [0.3, 0.8, -0.4]);
-        let m = matrix(&q, center);
+        let m = homogeneous_matrix(&q, center);
         let y = add(center, x);
         let h = [y[0], y[1], y[2], 1.0];
         let value: f64 = (0..4).map(|i| (0..4).map(|j| h[i] * m[i][j] * h[j]).sum::<f64>()).sum();

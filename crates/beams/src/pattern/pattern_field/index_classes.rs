@@ -1,15 +1,16 @@
-//! Which hubs of a repeat differ.
+//! Classes of equal hubs along one repeat step.
 
-/// Which hubs along a step differ: the first and the last few, and one for all between; or every one.
+/// Classes along a step: the first few and the last few indices one each, all between in one class; or every index its
+/// own class.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Classes {
+pub(super) struct IndexClasses {
     pub count: usize,
-    /// How many at either end have less neighbours; none if every one differs.
+    /// Number of indices at either end with fewer neighbours; `None` if every index is its own class.
     pub ends: Option<usize>,
 }
 
-impl Classes {
-    pub fn len(&self) -> usize {
+impl IndexClasses {
+    pub(super) fn len(&self) -> usize {
         match self.ends {
             Some(m) if self.count > 2 * m + 1 => 2 * m + 1,
             _ => self.count,
@@ -17,7 +18,7 @@ impl Classes {
     }
 
     /// The class of an index.
-    pub fn of(&self, i: usize) -> usize {
+    pub(super) fn of(&self, i: usize) -> usize {
         match self.ends {
             Some(m) if self.count > 2 * m + 1 => {
                 if i < m {
@@ -32,8 +33,8 @@ impl Classes {
         }
     }
 
-    /// The first index of a class, and how many there are of it.
-    pub fn members(&self, class: usize) -> (usize, usize) {
+    /// The first index of a class, and the number of its members.
+    pub(super) fn members(&self, class: usize) -> (usize, usize) {
         match self.ends {
             Some(m) if self.count > 2 * m + 1 => {
                 if class < m {

@@ -1,23 +1,24 @@
-//! All feet, of quadrics and of arcs of conics, by polynomials.
+//! All feet of perpendiculars, on quadrics and on conic arcs, as roots of polynomials.
 //!
-//! Q(x(μ)) = 0 is a polynomial of degree six in μ. On an arc X = v + W/D with W and D quadratic forms of the angle's sine and cosine, it is
-//! one of degree four. All real roots are found, between those of the derivative.
+//! Q(x(μ)) = 0 is a polynomial of degree six in μ. On an arc X = v + W/D, with W and D quadratic forms of sine and
+//! cosine of the angle, the condition has degree four. All real roots are isolated by the roots of the derivative.
 
 use geometry::math::{Vec3, add, apply, dot, norm, root, scale, sub, transpose};
 
-use super::super::quadric::Conic;
-use super::Axes;
+use super::super::conic::Conic;
+use super::PrincipalAxes;
 
-/// Azimuths that are tried where a whole circle is equally near.
-const ROUND: usize = 32;
+/// Number of azimuths tried where a whole circle is equally close.
+const AZIMUTHS: usize = 32;
 
-impl Axes {
-    /// The feet of p on the whole quadric; where p is about as near to all of a circle or sphere, some places of it.
+impl PrincipalAxes {
+    /// The feet of p on the whole quadric; where p is about equally close to a circle or sphere of points, some of
+    /// them.
     pub(in crate::quador) fn feet(&self, p: Vec3, out: &mut Vec<Vec3>) {
-        let p = apply(&self.turn, p);
-        let back = transpose(&self.turn);
+        let p = apply(&self.axes, p);
+        let back = transpose(&self.axes);
         let mut put = |x: Vec3, mu: f64| {
-            if let Some(x) = self.polished(p, x, mu) {
+            if let Some(x) = self.newton(p, x, mu) {
                 out.push(apply(&back, x));
             }
         };
@@ -27,7 +28,7 @@ impl Axes {
                 put(x, mu);
             }
         }
-        // Where 1 + μm vanishes along some axes and p − μb does too, x is free along them but for Q.
+        // Where 1 + μm and p − μb both vanish along some axes, x is free along them except for Q = 0.
         let largest = self.m.iter().fold(0.0f64, |a, m| a.max(m.abs()));
         let size = norm(p) + self.c.abs().sqrt();
         for i in 0..3 {
@@ -52,7 +53,7 @@ impl Axes {
                 continue;
             }
             let r = square.sqrt();
-            // What little p is off decides, if it is.
+            // A small remaining offset of p decides.
             let mut off = [0.0; 3];
             free.iter().for_each(|&j| off[j] = p[j] - mu * self.b[j]);
             if norm(off) > 0.0 {
@@ -60,7 +61,7 @@ impl Axes {
                 put(add(middle, off), mu);
                 put(sub(middle, off), mu);
             }
-            let steps = if free.len() == 1 { 2 } else { ROUND };
+            let steps = if free.len() == 1 { 2 } else { AZIMUTHS };
             for k in 0..steps {
                 let turn = (0.5 + k as f64) / steps as f64;
                 let (sin, cos) = (turn * core::f64::consts::TAU).sin_cos();
@@ -84,7 +85,7 @@ impl Axes {
         }
     }
 
-    /// Q(x(μ)) Π (1 + μmᵢ)², from the constant on.
+    /// The coefficients of Q(x(μ)) Π (1 + μmᵢ)², constant term first.
     fn polynomial(&self, p: Vec3) -> [f64; 7] {
         let squares = [0, 1, 2].map(|i| {
             let m = self.m[i];
@@ -113,8 +114,8 @@ impl Axes {
     }
 }
 
-/// The places of an arc from which its distance to p is stationary, and its ends.
-pub(in crate::quador) fn feet_on_arc(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
+/// The points of an arc at which the distance to p is stationary, and its ends.
+pub(in crate::quador) fn feet_on_conic(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
     let a = sub(c.v, p);
     // With t = tan θ: D = d₀ + d₁t + d₂t², X − p = (a D − q (t e₁ + t² e₂))/D.
     let d = [c.m[0], 2.0 * c.m[1], c.m[2]];
@@ -126,7 +127,7 @@ pub(in crate::quador) fn feet_on_arc(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
         2.0 * dot(w[1], w[2]),
         dot(w[2], w[2]),
     ];
-    // N'D − 2ND'; the fifth powers cancel.
+    // N'D − 2ND'; the terms of degree five cancel.
     let mut f = [0.0; 6];
     for i in 0..5 {
         for j in 0..3 {
@@ -149,7 +150,7 @@ pub(in crate::quador) fn feet_on_arc(c: &Conic, p: Vec3, out: &mut Vec<Vec3>) {
     }
 }
 
-/// The real roots of c₀ + c₁x + …, ascending, and of its derivatives what is nearly a double root.
+/// The real roots of c₀ + c₁x + …, ascending; and those of its derivative that are nearly double roots.
 fn roots(c: &[f64]) -> Vec<f64> {
     let largest = c.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let mut n = c.len();
@@ -193,7 +194,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quador::quadric::Quadric;
+    use crate::quador::hub_quadric::Quadric;
     use crate::quador::tests::Random;
     use geometry::math::unit;
 
@@ -218,7 +219,7 @@ mod tests {
             }
             let got = roots(&c);
             for r in &want {
-                // Six roots within six units, no two nearer than 0.05: a root moves by 1e-16 · 4⁶/0.05⁵ at worst.
+                // Six roots within six units, pairwise 0.05 apart: a root moves by at most 1e-16 · 4⁶/0.05⁵.
                 assert!(got.iter().any(|g| (g - r).abs() < 1e-6), "{want:?} {got:?}");
             }
         }
@@ -230,26 +231,26 @@ mod tests {
         for _ in 0..300 {
             let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -1.0 };
             for _ in 0..2 {
-                let g = crate::quador::hub::Affine {
+                let g = crate::quador::hub::AffineFunction {
                     a: scale(random.direction(), 1.2 * random.next()),
                     b: random.next() - 0.7,
                 };
-                q.square(-random.next(), &g);
+                q.add_square(-random.next(), &g);
             }
             let p = scale(random.direction(), 3.0 * random.next());
             let mut feet = Vec::new();
-            Axes::new(&q).feet(p, &mut feet);
+            PrincipalAxes::new(&q).feet(p, &mut feet);
             let mut least = f64::INFINITY;
             for x in &feet {
                 assert!(q.at(*x).abs() < 1e-9 * (1.0 + dot(*x, *x)));
-                let g = unit(q.half_slope(*x));
+                let g = unit(q.half_gradient(*x));
                 let across = sub(sub(p, *x), scale(g, dot(sub(p, *x), g)));
                 assert!(norm(across) < 1e-6 * (1.0 + norm(*x)), "{across:?}");
                 least = least.min(norm(sub(p, *x)));
             }
             for _ in 0..2000 {
                 let x = scale(random.direction(), 1.0);
-                let t = q.exit(x);
+                let t = q.ray_exit(x);
                 if t > 0.0 && t < 1e3 {
                     assert!(norm(sub(scale(x, t), p)) > least - 1e-9, "{q:?} {p:?}");
                 }

@@ -1,74 +1,78 @@
-//! Beams of a pattern that run into each other without a hub between them: looked for about one hub of each kind.
+//! Beams of a pattern that intersect without a common hub, found around one hub of each class.
 
 use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::Laid;
+use super::PatternField;
 use crate::graph::{Beam, Graph, Hub};
 use crate::pattern::Pattern;
 use crate::quador::{Fillet, Quadors};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Vec3, sub};
 
-/// Most kinds of hubs that are looked at.
-const LOOKED: usize = 4096;
+/// Maximum number of classes examined.
+const MAX_CLASSES: usize = 4096;
 
-/// What runs into each other.
+/// Intersecting beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collisions {
-    /// Pairs of beams, those about one hub of each kind.
+    /// Number of pairs around one hub of each class.
     pub count: usize,
-    /// Where a first one is, mm.
+    /// Position of the first pair, mm.
     pub at: Option<Vec3>,
 }
 
-impl Laid {
-    /// Beams that meet without a common hub: those of a hub of each kind, halfway through its repeats, and all beams near it. What
-    /// only a few hubs at an end of the repeats have near them is not seen. `None` if more kinds differ than are looked at.
+impl PatternField {
+    /// Pairs of beams that intersect without a common hub: those of one hub of each class, in the middle of its
+    /// repeats, with all beams near it. Intersections that only other hubs at the ends of a class have are missed.
+    /// `None` if there are too many classes.
     ///
     /// # Errors
-    /// Beams that cannot be, which `new` has refused.
+    /// Beams that cannot be built, which `new` has refused already.
     pub fn collisions(&self) -> Result<Option<Collisions>, Fault> {
-        if self.kinds.len() > LOOKED {
+        if self.representatives.len() > MAX_CLASSES {
             return Ok(None);
         }
-        let each = (0..self.kinds.len()).into_par_iter().map(|m| self.about(m)).collect::<Result<Vec<_>, Fault>>()?;
+        let each = (0..self.representatives.len())
+            .into_par_iter()
+            .map(|m| self.around(m))
+            .collect::<Result<Vec<_>, Fault>>()?;
         Ok(Some(Collisions { count: each.iter().map(|e| e.count).sum(), at: each.iter().find_map(|e| e.at) }))
     }
 
-    /// Those of a hub of one kind.
-    fn about(&self, kind: usize) -> Result<Collisions, Fault> {
+    /// Pairs around the representative of one class.
+    fn around(&self, class: usize) -> Result<Collisions, Fault> {
         let nodes = self.pattern.nodes.len();
-        let [lu, lv, _] = self.classes.map(|c| c.len());
-        let (class, node) = (kind / nodes, (kind % nodes) as u32);
-        let of = [class % lu, class / lu % lv, class / (lu * lv)];
+        let [classes_u, classes_v, _] = self.classes.map(|c| c.len());
+        let (class, node) = (class / nodes, (class % nodes) as u32);
+        let of = [class % classes_u, class / classes_u % classes_v, class / (classes_u * classes_v)];
         let index = [0, 1, 2].map(|a| {
             let (first, n) = self.classes[a].members(of[a]);
             (first + n / 2) as u32
         });
-        let (there, aside) = (self.pattern.at(index), self.kinds[kind].aside);
-        let held = self.quadors.hold(self.kinds[kind].hub);
-        let held = Aabb { min: sub(held.min, aside), max: sub(held.max, aside) };
+        let (there, offset) = (self.pattern.at(index), self.representatives[class].offset);
+        let bounds = self.quadors.hub_bounds(self.representatives[class].hub);
+        let bounds = Aabb { min: sub(bounds.min, offset), max: sub(bounds.max, offset) };
         let mut near = vec![(node, index)];
-        self.places(&super::carried(&there, &held), &mut |at, _, _, _| {
+        self.indices_near(&super::image_bounds(&there, &bounds), &mut |at, _, _, _| {
             let at = at.map(|v| v as u32);
             let others = (0..nodes as u32).map(|n| (n, at));
             near.extend(others.filter(|o| *o != (node, index)));
             true
         });
-        // As seen from the first place, which is where digits are best.
-        let home = there.inverse();
+        // In the frame of the representative, where rounding is least.
+        let inverse = there.inverse();
         let mut cluster = Cluster::new(&self.pattern);
         for (n, at) in near {
             cluster.add(n, at, |n, at| {
-                let (seen, h) = (home.after(&self.pattern.at(at)), self.pattern.nodes[n as usize]);
-                Hub { center: seen.apply(h.center), radius: seen.scale * h.radius }
+                let (local, h) = (inverse.after(&self.pattern.at(at)), self.pattern.nodes[n as usize]);
+                Hub { center: local.apply(h.center), radius: local.scale * h.radius }
             });
         }
         let graph = cluster.graph;
         let found = Quadors::new(&graph, Fillet::None)?.collisions();
-        // The hub itself came first.
+        // The hub itself is the first.
         let own = |b: u32| graph.beams[b as usize].ends.contains(&0);
         let mut own = found.iter().filter(|c| c.beams.iter().any(|b| own(*b)));
         let first = own.next();
@@ -80,18 +84,18 @@ impl Laid {
 struct Cluster<'a> {
     pattern: &'a Pattern,
     graph: Graph,
-    names: HashMap<(u32, [u32; 3]), u32>,
-    /// Beams by their strut and where it starts.
+    indices: HashMap<(u32, [u32; 3]), u32>,
+    /// Beams by strut and start index.
     beams: HashSet<(usize, [u32; 3])>,
 }
 
 impl<'a> Cluster<'a> {
     fn new(pattern: &'a Pattern) -> Self {
-        Cluster { pattern, graph: Graph::default(), names: HashMap::new(), beams: HashSet::new() }
+        Cluster { pattern, graph: Graph::default(), indices: HashMap::new(), beams: HashSet::new() }
     }
 
-    fn name(&mut self, n: u32, at: [u32; 3], ball: &impl Fn(u32, [u32; 3]) -> Hub) -> u32 {
-        *self.names.entry((n, at)).or_insert_with(|| {
+    fn index_of(&mut self, n: u32, at: [u32; 3], ball: &impl Fn(u32, [u32; 3]) -> Hub) -> u32 {
+        *self.indices.entry((n, at)).or_insert_with(|| {
             self.graph.hubs.push(ball(n, at));
             self.graph.hubs.len() as u32 - 1
         })
@@ -99,14 +103,14 @@ impl<'a> Cluster<'a> {
 
     /// Adds a hub with its beams.
     fn add(&mut self, n: u32, at: [u32; 3], ball: impl Fn(u32, [u32; 3]) -> Hub) {
-        let own = self.name(n, at, &ball);
+        let own = self.index_of(n, at, &ball);
         for (number, s) in self.pattern.struts.iter().enumerate() {
             for end in [0, 1] {
                 if s.ends[end] != n {
                     continue;
                 }
                 let sign = if end == 0 { 1 } else { -1 };
-                let other: [i64; 3] = core::array::from_fn(|a| i64::from(at[a]) + i64::from(sign * s.by[a]));
+                let other: [i64; 3] = core::array::from_fn(|a| i64::from(at[a]) + i64::from(sign * s.offset[a]));
                 if (0..3).any(|a| !(0..i64::from(self.pattern.steps[a].1)).contains(&other[a])) {
                     continue;
                 }
@@ -115,12 +119,12 @@ impl<'a> Cluster<'a> {
                 if !self.beams.insert((number, from)) {
                     continue;
                 }
-                let far = self.name(s.ends[1 - end], other, &ball);
+                let far = self.index_of(s.ends[1 - end], other, &ball);
                 let ends = if end == 0 { [own, far] } else { [far, own] };
-                // A beam is as large as its first end is.
+                // A beam has the scale of its first end.
                 let node = self.pattern.nodes[s.ends[0] as usize].radius;
-                let grown = self.graph.hubs[ends[0] as usize].radius / node;
-                self.graph.beams.push(Beam { ends, profile: Pattern::grown(s.profile, grown) });
+                let scale = self.graph.hubs[ends[0] as usize].radius / node;
+                self.graph.beams.push(Beam { ends, profile: Pattern::scaled_profile(s.profile, scale) });
             }
         }
     }

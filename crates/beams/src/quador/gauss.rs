@@ -1,9 +1,9 @@
-//! Gauss's rules.
+//! Gauss–Legendre quadrature.
 
 use core::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Nodes and weights of Gauss's rule on [0, 1].
+/// Nodes and weights of the n-point Gauss rule on [0, 1], n ≤ 64.
 pub(super) fn gauss(n: usize) -> &'static [(f64, f64)] {
     static RULES: OnceLock<Vec<Vec<(f64, f64)>>> = OnceLock::new();
     let rules = RULES.get_or_init(|| (0..=64).map(rule).collect());

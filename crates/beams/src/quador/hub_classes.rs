@@ -1,25 +1,25 @@
-//! Hubs that are equal but for their place: what is found of one holds for all.
+//! Classes of hubs that are equal up to translation: one representative is computed for all.
 
 use std::collections::HashMap;
 
 use super::Quadors;
 
-/// Hubs by what they are, wherever they are.
-pub(super) struct Classes {
+/// A partition of the hubs into classes of equal hubs.
+pub(super) struct HubClasses {
     /// The class of each hub.
     pub of: Vec<u32>,
-    /// A hub of each class.
+    /// A representative of each class.
     pub sample: Vec<usize>,
-    /// How many hubs each class has.
+    /// Number of hubs of each class.
     pub count: Vec<usize>,
 }
 
-/// What numbers are rounded to before they are compared: of directions, and of lengths in the lattice's typical radius.
+/// Rounding before comparison: of directions, and of lengths in units of the typical radius.
 const DIGITS: f64 = 1e9;
 
 impl Quadors {
-    /// The classes of all hubs: equal to a billionth, beams in the same order.
-    pub(super) fn classes(&self) -> Classes {
+    /// The classes of all hubs: equal to 1e-9, beams in the same order.
+    pub(super) fn classes(&self) -> HubClasses {
         let mut known: HashMap<Vec<i64>, u32> = HashMap::new();
         let (mut sample, mut count) = (Vec::new(), Vec::new());
         let per = DIGITS / self.scale;
@@ -28,12 +28,12 @@ impl Quadors {
         let of = (0..self.len())
             .map(|i| {
                 let hub = self.hub(i);
-                let mut key = Vec::with_capacity(1 + 9 * hub.stubs.len());
+                let mut key = Vec::with_capacity(1 + 9 * hub.half_beams.len());
                 key.push(length(hub.radius));
-                for s in hub.stubs {
+                for s in hub.half_beams {
                     key.extend(s.axis.map(number));
                     key.extend([s.contact, s.split].map(length));
-                    key.extend([s.section[0], s.share].map(number));
+                    key.extend([s.meridian[0], s.blend].map(number));
                     key.push(s.end as i64);
                 }
                 *known.entry(key).or_insert_with(|| {
@@ -44,6 +44,6 @@ impl Quadors {
             })
             .collect::<Vec<u32>>();
         of.iter().for_each(|&c| count[c as usize] += 1);
-        Classes { of, sample, count }
+        HubClasses { of, sample, count }
     }
 }

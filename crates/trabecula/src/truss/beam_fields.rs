@@ -1,6 +1,6 @@
-//! Beams as fields of the extractor: their own values, gradients and bounds.
+//! Beams as implicit functions for surface extraction.
 
-use beams::pattern::Laid;
+use beams::pattern::PatternField;
 use beams::quador::Quadors;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -35,4 +35,4 @@ macro_rules! field_of {
     )*};
 }
 
-field_of!(Quadors, Laid);
+field_of!(Quadors, PatternField);

@@ -1,43 +1,43 @@
-//! Beams that run into each other without a hub between them: integrals over hubs count what they share twice.
+//! Beams that intersect without a common hub: integrals over hubs would count their common part twice.
 
 use rayon::prelude::*;
 
-use crate::graph::place;
+use crate::graph::position_text;
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 
 use super::Quadors;
-use super::index::Index;
+use super::box_index::BoxIndex;
 
-/// Two beams that have no hub in common and yet meet.
+/// Two beams without a common hub that intersect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// The beams.
+    /// Indices of the beams.
     pub beams: [u32; 2],
-    /// Between both axes, where they are nearest, mm.
+    /// Midpoint of the shortest segment between both axes, mm.
     pub at: Vec3,
 }
 
 impl Quadors {
-    /// Pairs of beams without a common hub whose axes come nearer than both are thick there, hubs included, by the first beam.
-    /// Each pair is looked at where the axes are nearest.
+    /// Pairs of beams without a common hub whose axes come closer than the sum of their radii there, hubs included;
+    /// sorted by the first beam. Each pair is tested where the axes are closest.
     pub fn collisions(&self) -> Vec<Collision> {
         let axis = |b: usize| self.ends[b].map(|h| self.center(h as usize));
-        let held: Vec<Aabb> = (0..self.beams())
+        let bounds: Vec<Aabb> = (0..self.beams())
             .into_par_iter()
             .map(|b| {
                 let [p, q] = axis(b);
-                Aabb::EMPTY.with(p).with(q).grown(self.thickest(b))
+                Aabb::EMPTY.with(p).with(q).grown(self.max_radius(b))
             })
             .collect();
-        let index = Index::new(held.iter().copied());
+        let index = BoxIndex::new(bounds.iter().copied());
         let first = |a: usize| {
             let mut near: Vec<usize> = Vec::new();
             let meets = |b: &usize| {
-                let (p, q) = (&held[a], &held[*b]);
+                let (p, q) = (&bounds[a], &bounds[*b]);
                 *b > a && (0..3).all(|k| p.min[k] <= q.max[k] && q.min[k] <= p.max[k])
             };
-            index.about(&held[a], &mut |items| {
+            index.about(&bounds[a], &mut |items| {
                 near.extend(items.iter().map(|b| *b as usize).filter(meets));
             });
             near.sort_unstable();
@@ -45,11 +45,11 @@ impl Quadors {
             near.into_iter()
                 .filter(|&b| self.ends[a].iter().all(|h| !self.ends[b].contains(h)))
                 .filter_map(|b| {
-                    let [s, t] = nearest(axis(a), axis(b));
-                    let place = |[p, q]: [Vec3; 2], s: f64| add(p, scale(sub(q, p), s));
-                    let (x, y) = (place(axis(a), s), place(axis(b), t));
-                    let thick = self.thick(a, s) + self.thick(b, t);
-                    (norm(sub(x, y)) < thick * (1.0 - 1e-9))
+                    let [s, t] = closest_parameters(axis(a), axis(b));
+                    let position_text = |[p, q]: [Vec3; 2], s: f64| add(p, scale(sub(q, p), s));
+                    let (x, y) = (position_text(axis(a), s), position_text(axis(b), t));
+                    let radius_at = self.radius_at(a, s) + self.radius_at(b, t);
+                    (norm(sub(x, y)) < radius_at * (1.0 - 1e-9))
                         .then_some(Collision { beams: [a as u32, b as u32], at: scale(add(x, y), 0.5) })
                 })
                 .collect::<Vec<_>>()
@@ -58,11 +58,11 @@ impl Quadors {
         each.into_iter().flatten().collect()
     }
 
-    /// The volume of the whole, mm³, if beams meet in hubs alone.
+    /// The volume of the whole (mm³), if beams meet in hubs alone.
     ///
     /// # Errors
-    /// As for `volume`, and beams that run into each other elsewhere.
-    pub fn sole_volume(&self) -> Result<f64, Fault> {
+    /// As for `volume`, and beams that intersect without a common hub.
+    pub fn checked_volume(&self) -> Result<f64, Fault> {
         let found = self.collisions();
         let Some(c) = found.first() else {
             return self.volume();
@@ -70,39 +70,39 @@ impl Quadors {
         Err(Fault::new(
             format!("beams[{}]", c.beams[0]),
             format!(
-                "it runs into beam {} at {} without a common node ({} in all), and what they share has no closed form: make them \
-                 thinner, or put nodes there",
+                "intersects beam {} at {} without a common node ({} in all): the common part has no closed form; make the beams \
+                 thinner, or add nodes there",
                 c.beams[1],
-                place(c.at),
+                position_text(c.at),
                 counted(found.len(), "such pair")
             ),
         ))
     }
 
-    /// The radius of a beam, with the balls at its ends, at a share s of its length.
-    fn thick(&self, beam: usize, s: f64) -> f64 {
+    /// The radius of a beam, with the balls at its ends, at the fraction s of its length, mm.
+    fn radius_at(&self, beam: usize, s: f64) -> f64 {
         let p = &self.pencils[beam];
         let z = s * p.length;
         let [a, b] = self.ends[beam].map(|h| self.balls[h as usize].radius);
         let balls = (a * a - z * z).max(b * b - (p.length - z).powi(2));
-        p.squared(z).max(balls).max(0.0).sqrt()
+        p.radius_squared(z).max(balls).max(0.0).sqrt()
     }
 
-    /// No less than the radius of a beam anywhere.
-    fn thickest(&self, beam: usize) -> f64 {
-        let stub = |h: u32| {
-            let stubs = self.hub(h as usize).stubs;
-            stubs.iter().find(|s| s.beam as usize == beam)
+    /// Upper bound of the radius of a beam, mm.
+    fn max_radius(&self, beam: usize) -> f64 {
+        let half_beam = |h: u32| {
+            let half_beams = self.hub(h as usize).half_beams;
+            half_beams.iter().find(|s| s.beam as usize == beam)
         };
         let ends = self.ends[beam];
         let balls = ends.map(|h| self.balls[h as usize].radius);
-        let sides = ends.map(|h| stub(h).map_or(0.0, |s| s.thickest()));
+        let sides = ends.map(|h| half_beam(h).map_or(0.0, |s| s.max_radius()));
         balls[0].max(balls[1]).max(sides[0]).max(sides[1])
     }
 }
 
-/// Where two segments are nearest, as shares of their lengths.
-fn nearest([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> [f64; 2] {
+/// The closest points of two segments, as fractions of their lengths.
+fn closest_parameters([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> [f64; 2] {
     let (u, v, w) = (sub(b, a), sub(d, c), sub(a, c));
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
     let (uw, vw) = (dot(u, w), dot(v, w));
@@ -135,7 +135,7 @@ mod tests {
         let at = [0.0, 0.0, 0.45];
         let want = Collision { beams: [0, 1], at };
         assert_eq!(found, [want]);
-        // Beside each other, and end to end.
+        // Parallel, and end to end.
         let beside = |y: f64| [[-5.0, y, 0.0], [5.0, y, 0.0]];
         assert_eq!(lone(&[x, beside(0.99)]).collisions().len(), 1);
         assert_eq!(lone(&[x, beside(1.01)]).collisions(), []);
@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(lone(&[x, on(6.01)]).collisions(), []);
     }
 
-    /// Cylinders with round ends: nearer than a diameter somewhere, by looking everywhere along them.
+    /// Cylinders with round ends: compared with the minimum distance by dense sampling.
     #[test]
     fn all_pairs_of_a_heap_are_found_and_no_other() {
         let mut random = Random(8);
@@ -161,13 +161,13 @@ mod tests {
                 .map(|n| norm(sub(along(ends[a], n % 65), along(ends[b], n / 65))))
                 .fold(f64::INFINITY, f64::min)
         };
-        // Samples are off by half a step of both, an eighth of a mm at most.
+        // Sampling is off by at most half a step of both, an eighth of a mm.
         for a in 0..ends.len() {
             for b in a + 1..ends.len() {
-                let told = found.iter().any(|c| c.beams == [a as u32, b as u32]);
+                let listed = found.iter().any(|c| c.beams == [a as u32, b as u32]);
                 let d = apart(a, b);
-                assert!(told || d >= 1.0 - 1e-9, "{a} {b}: {d}");
-                assert!(!told || d < 1.0 + 0.125, "{a} {b}: {d}");
+                assert!(listed || d >= 1.0 - 1e-9, "{a} {b}: {d}");
+                assert!(!listed || d < 1.0 + 0.125, "{a} {b}: {d}");
             }
         }
         assert!(found.len() > 5, "{}", found.len());

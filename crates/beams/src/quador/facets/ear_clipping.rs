@@ -1,46 +1,47 @@
-//! Faces covered by triangles between the points of their outlines.
+//! Triangulation of faces between the vertices of their boundary polygons.
 
 use core::f64::consts::TAU;
 
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 use super::super::complex::Face;
-use super::finer::lies;
-use super::{Facets, turn, walk};
+use super::refinement::alignment;
+use super::{Facets, loop_vertices, orientation};
 
-/// Turns of directions below this are none: planes of seams may pass through the centre, and vertices are good to a ten-millionth.
-const STRAIGHT: f64 = 1e-9;
+/// Orientations below this count as collinear: planes of seams may pass through the centre, and vertices are accurate
+/// to 1e-7.
+const COLLINEAR: f64 = 1e-9;
 
 impl Facets<'_> {
-    /// Triangles over a face that seams alone bound.
-    pub(super) fn outlined(&mut self, chains: &[Vec<u32>], face: &Face) -> Option<Vec<[u32; 3]>> {
+    /// Triangulates a face bounded by seams alone.
+    pub(super) fn bounded(&mut self, polylines: &[Vec<u32>], face: &Face) -> Option<Vec<[u32; 3]>> {
         if face.loops.is_empty() {
             return Some(self.ball());
         }
-        let mut loops: Vec<Vec<u32>> = face.loops.iter().map(|l| walk(chains, l)).collect();
+        let mut loops: Vec<Vec<u32>> = face.loops.iter().map(|l| loop_vertices(polylines, l)).collect();
         loops.retain(|l| l.len() > 2);
         if let [alone] = &loops[..]
             && face.label == 0
         {
-            // A cap, or all but a cap: around the middle.
+            // A cap, or the complement of one: a fan about its centre.
             let middle = self.complex.pole(face);
             let place = |i: u32| self.points[i as usize];
             let number = self.points.len() as u32;
             let fan: Vec<[u32; 3]> =
                 (0..alone.len()).map(|k| [number, alone[k], alone[(k + 1) % alone.len()]]).collect();
-            if fan.iter().all(|t| turn(middle, place(t[1]), place(t[2])) > 0.0) {
+            if fan.iter().all(|t| orientation(middle, place(t[1]), place(t[2])) > 0.0) {
                 self.points.push(middle);
                 return Some(fan);
             }
         }
-        self.joined(loops, face)
+        self.connected(loops, face)
     }
 
-    /// Triangles between loops.
-    pub(super) fn joined(&self, mut loops: Vec<Vec<u32>>, face: &Face) -> Option<Vec<[u32; 3]>> {
+    /// Triangulates a face between several loops.
+    pub(super) fn connected(&self, mut loops: Vec<Vec<u32>>, face: &Face) -> Option<Vec<[u32; 3]>> {
         let mut outline = loops.pop().unwrap_or_default();
         while !loops.is_empty() {
-            // Rings are opened along the shortest bridge.
+            // Loops are connected along the shortest bridge.
             let gap = |a: u32, b: u32| norm(sub(unit(self.points[a as usize]), unit(self.points[b as usize])));
             let mut best = (f64::INFINITY, 0, 0, 0);
             for (l, inner) in loops.iter().enumerate() {
@@ -60,7 +61,7 @@ impl Facets<'_> {
         self.ears(outline, face)
     }
 
-    /// An octahedron in a lone ball.
+    /// An octahedron in a hub without beams.
     fn ball(&mut self) -> Vec<[u32; 3]> {
         let (r, n) = (self.hub.radius, self.points.len() as u32);
         for a in 0..6 {
@@ -76,20 +77,20 @@ impl Facets<'_> {
         (0..8).map(corner).collect()
     }
 
-    /// Cuts an outline into triangles, the best ear first.
+    /// Triangulates a polygon by ear clipping, the best ear first.
     fn ears(&self, mut outline: Vec<u32>, face: &Face) -> Option<Vec<[u32; 3]>> {
         let place = |i: u32| self.points[i as usize];
         let worth = |[a, b, c]: [u32; 3]| {
             let [p, q, r] = self.corners([a, b, c]);
-            if a == b || b == c || c == a || turn(unit(p), unit(q), unit(r)) <= STRAIGHT {
+            if a == b || b == c || c == a || orientation(unit(p), unit(q), unit(r)) <= COLLINEAR {
                 return f64::NEG_INFINITY;
             }
             let edge = |p: Vec3, q: Vec3| dot(sub(p, q), sub(p, q));
             let shape = norm(cross(sub(q, p), sub(r, p))) / (edge(p, q) + edge(q, r) + edge(r, p));
-            // A chord that leaves the surface is the last resort, or a triangle that stands on it, as one along a seam does.
-            let off = self.off(scale(add(p, r), 0.5)) / edge(p, r).sqrt();
-            let lies = (lies(face, [p, q, r]) - 0.2).max(1e-4);
-            shape * lies / (1.0 + 8.0 * off).powi(2)
+            // Diagonals that leave the surface, and triangles at a large angle to it, are a last resort.
+            let off = self.distance(scale(add(p, r), 0.5)) / edge(p, r).sqrt();
+            let alignment = (alignment(face, [p, q, r]) - 0.2).max(1e-4);
+            shape * alignment / (1.0 + 8.0 * off).powi(2)
         };
         let ear = |o: &[u32], i: usize| [o[(i + o.len() - 1) % o.len()], o[i], o[(i + 1) % o.len()]];
         let mut out = Vec::with_capacity(outline.len());
@@ -101,16 +102,16 @@ impl Facets<'_> {
             let i = order.into_iter().find(|&i| {
                 let [a, b, c] = ear(&outline, i);
                 let [p, q, r] = self.corners([a, b, c]);
-                // What lies on a side is in the way too: seams may run straight, seen from the centre.
+                // Vertices on an edge obstruct too: seams may be straight seen from the centre.
                 let [p, q, r] = [p, q, r].map(unit);
                 outline.iter().all(|&o| {
                     let x = unit(place(o));
                     o == a
                         || o == b
                         || o == c
-                        || turn(p, q, x) < -STRAIGHT
-                        || turn(q, r, x) < -STRAIGHT
-                        || turn(r, p, x) < -STRAIGHT
+                        || orientation(p, q, x) < -COLLINEAR
+                        || orientation(q, r, x) < -COLLINEAR
+                        || orientation(r, p, x) < -COLLINEAR
                 })
             })?;
             out.push(ear(&outline, i));
@@ -128,9 +129,9 @@ impl Facets<'_> {
     }
 }
 
-/// Triangles between a loop around an axis and the rim beyond it, by azimuth.
+/// Triangulates the strip between a loop around an axis and the end circle, by azimuth.
 pub(super) fn strip(axis: Vec3, points: &[Vec3], inner: &[u32], ring: &[u32]) -> Vec<[u32; 3]> {
-    let side = super::super::drawn::across(axis);
+    let side = super::super::tessellation::perpendicular(axis);
     let other = cross(axis, side);
     let azimuth = |i: u32| dot(points[i as usize], other).atan2(dot(points[i as usize], side));
     let sorted = |of: &[u32]| {

@@ -1,46 +1,50 @@
-//! The walk along the seams of a hub.
+//! Tracing of the seams of a hub.
 //!
-//! From a vertex on, the next event along a conic is the least root of a few quadratics, and the whole is found by walking.
-//! Symmetric hubs have more than two events in one place; each stub's G is shifted, for the planes alone, by its own 1e-12 of
-//! the radius, which keeps events apart, and what comes out shorter than that is made one place afterwards. Pieces touch along a
-//! seam, so a seam that is off by δ is off the surface by δ².
+//! From a vertex the next event along a conic is the smallest root of a few quadratics, so the whole complex is found
+//! by following seams. Symmetric hubs have several events at one point. The G of each half-beam is therefore perturbed,
+//! for the planes alone, by its own multiple of 1e-12 of the radius, which separates events; arcs shorter than that are
+//! collapsed afterwards. Pieces are tangent along a seam, so a seam displaced by δ is off the surface by O(δ²).
 
 use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
-use super::super::hub::{Affine, Hub, Stub};
-use super::super::quadric::{Conic, Quadric, piece};
-use super::{Arc, Complex, Face, Key, MERGE, NONE, Vertex};
+use super::super::conic::Conic;
+use super::super::hub::{AffineFunction, HalfBeam, Hub};
+use super::super::hub_quadric::{Quadric, piece_quadric};
+use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
 
-/// How far planes are shifted, in radii of the hub.
-const SHIFT: f64 = 2e-12;
+/// Size of the perturbation, in hub radii.
+const PERTURBATION: f64 = 2e-12;
 
-/// A number of the order of one (greater by the seed) for a stub, well mixed: in a symmetric hub no few of them may add up to
-/// nothing.
-pub(in crate::quador) fn shift(stub: usize, seed: u64) -> f64 {
-    let hash = (stub as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+/// A pseudo-random factor of a half-beam, of order one and increasing with the seed, such that no small sum of them
+/// vanishes in a symmetric hub.
+pub(in crate::quador) fn perturbation(half_beam: usize, seed: u64) -> f64 {
+    let hash = (half_beam as u64 + 1 + 97 * seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let hash = (hash ^ hash >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let hash = (hash ^ hash >> 32).wrapping_mul(0x94D0_49BB_1331_11EB);
     let unit = (hash >> 11) as f64 / (1u64 << 53) as f64;
     8f64.powi(seed as i32) * (0.5 + unit)
 }
 
-pub(super) struct Walk<'a> {
+pub(super) struct SeamTracer<'a> {
     hub: &'a Hub<'a>,
-    /// G of the stubs, shifted.
-    g: Vec<Affine>,
+    /// Perturbed G of the half-beams.
+    g: Vec<AffineFunction>,
     vertices: Vec<Vertex>,
     arcs: Vec<Arc>,
-    /// Arcs at each vertex.
+    /// Arcs incident to each vertex.
     at: Vec<[u32; 4]>,
-    pieces: Vec<(u64, Quadric, Affine)>,
+    pieces: Vec<(u64, Quadric, AffineFunction)>,
 }
 
-impl<'a> Walk<'a> {
-    pub(super) fn new(hub: &'a Hub<'a>, seed: u64) -> Walk<'a> {
-        let shifted = |(i, s): (usize, &Stub)| Affine { a: s.g.a, b: s.g.b + SHIFT * shift(i, seed) * hub.radius };
-        Walk {
+impl<'a> SeamTracer<'a> {
+    pub(super) fn new(hub: &'a Hub<'a>, seed: u64) -> SeamTracer<'a> {
+        let shifted = |(i, s): (usize, &HalfBeam)| AffineFunction {
+            a: s.g.a,
+            b: s.g.b + PERTURBATION * perturbation(i, seed) * hub.radius,
+        };
+        SeamTracer {
             hub,
-            g: hub.stubs.iter().enumerate().map(shifted).collect(),
+            g: hub.half_beams.iter().enumerate().map(shifted).collect(),
             vertices: Vec::new(),
             arcs: Vec::new(),
             at: Vec::new(),
@@ -48,46 +52,47 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The quadric of a label, and σ of the shifted G.
-    fn piece(&mut self, label: u64) -> (Quadric, Affine) {
+    /// The quadric of a label, and σ of the perturbed G.
+    fn piece_quadric(&mut self, label: u64) -> (Quadric, AffineFunction) {
         if let Some(&(_, q, s)) = self.pieces.iter().find(|p| p.0 == label) {
             return (q, s);
         }
-        let (q, mut sigma) = piece(self.hub, label);
+        let (q, mut sigma) = piece_quadric(self.hub, label);
         if !self.hub.sharp {
-            // σ is linear in G, and so is its shift.
-            let (mut shift, mut t) = (0.0, 1.0);
-            for (i, s) in self.hub.stubs.iter().enumerate().filter(|(i, _)| label >> i & 1 == 1) {
-                shift += s.share * s.weight * (self.g[i].b - s.g.b);
-                t += s.share * s.share * s.weight;
+            // σ is linear in G, and so is its perturbation.
+            let (mut perturbation, mut t) = (0.0, 1.0);
+            for (i, s) in self.hub.half_beams.iter().enumerate().filter(|(i, _)| label >> i & 1 == 1) {
+                perturbation += s.blend * s.weight * (self.g[i].b - s.g.b);
+                t += s.blend * s.blend * s.weight;
             }
-            sigma.b += shift / t;
+            sigma.b += perturbation / t;
         }
         self.pieces.push((label, q, sigma));
         (q, sigma)
     }
 
-    /// What vanishes where stub m joins a label; in a sharp hub, G itself (of label 0, nothing).
-    fn toggle(&self, m: usize, sigma: &Affine) -> Affine {
-        self.g[m].plus(-self.hub.stubs[m].share, sigma)
+    /// The function that vanishes where half-beam m becomes active for a label.
+    fn toggle(&self, m: usize, sigma: &AffineFunction) -> AffineFunction {
+        self.g[m].plus(-self.hub.half_beams[m].blend, sigma)
     }
 
-    fn sharp_g(&self, label: u64) -> Affine {
-        if label == 0 { Affine::default() } else { self.g[label.trailing_zeros() as usize] }
+    fn sharp_g(&self, label: u64) -> AffineFunction {
+        if label == 0 { AffineFunction::default() } else { self.g[label.trailing_zeros() as usize] }
     }
 
-    /// The plane between two labels, positive towards the greater.
-    fn plane(&mut self, [a, b]: [u64; 2]) -> Affine {
+    /// The plane between two labels, positive on the side of the larger.
+    fn plane(&mut self, [a, b]: [u64; 2]) -> AffineFunction {
         if self.hub.sharp {
             return self.sharp_g(b).plus(-1.0, &self.sharp_g(a));
         }
-        let sigma = self.piece(a).1;
+        let sigma = self.piece_quadric(a).1;
         self.toggle((a ^ b).trailing_zeros() as usize, &sigma)
     }
 
-    /// Calls `f` with every event that can end the seam between labels a < b, and the function that is negative before it.
-    fn guards(&mut self, [a, b]: [u64; 2], f: &mut impl FnMut(u64, Affine)) {
-        let n = self.hub.stubs.len();
+    /// Calls `f` with every event that can end the seam between labels a < b, and the function that is negative before
+    /// it.
+    fn guards(&mut self, [a, b]: [u64; 2], f: &mut impl FnMut(u64, AffineFunction)) {
+        let n = self.hub.half_beams.len();
         if self.hub.sharp {
             let own = self.sharp_g(b);
             for m in (0..n).map(|i| 1 << i).chain([0]) {
@@ -97,20 +102,20 @@ impl<'a> Walk<'a> {
             }
             return;
         }
-        let sigma = self.piece(a).1;
+        let sigma = self.piece_quadric(a).1;
         for m in 0..n {
             let bit = 1u64 << m;
             let toggle = self.toggle(m, &sigma);
             if a & bit != 0 {
-                f(bit, Affine::default().plus(-1.0, &toggle));
+                f(bit, AffineFunction::default().plus(-1.0, &toggle));
             } else if b & bit == 0 {
                 f(bit, toggle);
             }
         }
     }
 
-    /// The labels around the end of the seam [a, b] at event m.
-    fn around(&self, [a, b]: [u64; 2], m: u64) -> [u64; 4] {
+    /// The labels around the end of seam [a, b] at event m.
+    fn labels_around(&self, [a, b]: [u64; 2], m: u64) -> [u64; 4] {
         if self.hub.sharp {
             let mut l = [a, b, m];
             l.sort_unstable();
@@ -121,16 +126,16 @@ impl<'a> Walk<'a> {
         [low, low | j, low | j | m, low | m]
     }
 
-    /// The seams that leave a vertex, as pairs of labels a < b, and the event that ends them there.
-    fn seams(&self, around: [u64; 4]) -> impl Iterator<Item = ([u64; 2], u64)> + use<> {
-        let [p, q, r, s] = around;
+    /// The seams that leave a vertex, as pairs of labels a < b, each with the event at this vertex.
+    fn seams(&self, labels_around: [u64; 4]) -> impl Iterator<Item = ([u64; 2], u64)> + use<> {
+        let [p, q, r, s] = labels_around;
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
         let all = if self.hub.sharp {
             [(order(p, q), r), (order(q, r), p), (order(p, r), q), ([0, 0], 0)]
         } else {
             [(order(p, q), p ^ s), (order(q, r), p ^ q), (order(s, r), p ^ q), (order(p, s), p ^ q)]
         };
-        // Of a filleted vertex, seams that differ by j end by m and the other way round.
+        // At a vertex with fillets, seams across which j changes end by m and conversely.
         let (j, m) = (p ^ q, p ^ s);
         let sharp = self.hub.sharp;
         all.into_iter()
@@ -138,7 +143,8 @@ impl<'a> Walk<'a> {
             .map(move |(l, e)| if sharp { (l, e) } else { (l, if l[0] ^ l[1] == j { m } else { j }) })
     }
 
-    /// Follows the seam between labels from a place on it along a direction: the conic up to its end, and the event there.
+    /// Follows the seam between two labels from a point along a direction: the conic up to its end, and the event
+    /// there.
     fn trace(
         &mut self,
         labels: [u64; 2],
@@ -146,19 +152,19 @@ impl<'a> Walk<'a> {
         tangent: Vec3,
         born: Option<u64>,
     ) -> Option<(Conic, Option<u64>)> {
-        let quadric = self.piece(labels[0]).0;
+        let quadric = self.piece_quadric(labels[0]).0;
         let plane = self.plane(labels);
         let mut conic = Conic::new(&quadric, unit(plane.a), from, tangent)?;
         let mut event = None;
         let (probe, mut end) = (conic, f64::NEG_INFINITY);
         self.guards(labels, &mut |m, f| {
             let along = [f.at(from), dot(f.a, probe.e[0]), dot(f.a, probe.e[1])];
-            let cot = probe.first(along, born == Some(m));
+            let cot = probe.first_root_cotangent(along, born == Some(m));
             if cot > end {
                 (end, event) = (cot, Some(m));
             }
         });
-        let open = conic.opening();
+        let open = conic.asymptote_cotangent();
         if open >= end && open.is_finite() {
             return None;
         }
@@ -168,23 +174,24 @@ impl<'a> Walk<'a> {
         Some((conic, event))
     }
 
-    /// The vertex with these labels nearest to a place, made if it is new.
-    fn vertex(&mut self, around: [u64; 4], near: Vec3) -> Option<u32> {
-        let (j, m) = if self.hub.sharp { (around[1], around[2]) } else { (around[1], around[3]) };
-        let base = around[0];
-        let quadric = self.piece(base).0;
+    /// The vertex with these labels nearest to a position; created if new.
+    fn vertex(&mut self, labels_around: [u64; 4], near: Vec3) -> Option<u32> {
+        let (j, m) =
+            if self.hub.sharp { (labels_around[1], labels_around[2]) } else { (labels_around[1], labels_around[3]) };
+        let base = labels_around[0];
+        let quadric = self.piece_quadric(base).0;
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
         let planes = [self.plane(order(base, j)), self.plane(order(base, m))];
         let mut at = near;
         for _ in 0..3 {
-            let slope = scale(quadric.half_slope(at), 2.0);
+            let slope = scale(quadric.half_gradient(at), 2.0);
             let rows = [planes[0].a, planes[1].a, slope];
             let step = apply(&inverse(&rows), [planes[0].at(at), planes[1].at(at), quadric.at(at)]);
             if !step.iter().all(|v| v.is_finite()) {
                 return None;
             }
             at = sub(at, step);
-            // Newton's steps square: what is left is below the last digit.
+            // Newton's method converges quadratically: the rest is below rounding.
             if dot(step, step) < 1e-20 * dot(at, at) {
                 break;
             }
@@ -192,8 +199,8 @@ impl<'a> Walk<'a> {
         if norm(sub(at, near)) > 1e-5 * (norm(near) + self.hub.radius) {
             return None;
         }
-        let far = dot(quadric.half_slope(at), cross(planes[0].a, planes[1].a)) > 0.0;
-        let key = Key { around, far };
+        let far = dot(quadric.half_gradient(at), cross(planes[0].a, planes[1].a)) > 0.0;
+        let key = Key { labels_around, far };
         if let Some(i) = self.vertices.iter().position(|v| v.key == key) {
             return Some(i as u32);
         }
@@ -204,11 +211,11 @@ impl<'a> Walk<'a> {
 
     fn push(&mut self, ends: [u32; 2], labels: [u64; 2], conic: Conic) {
         let plane = self.plane(labels);
-        let outward = self.piece(labels[0]).0.half_slope(conic.v);
+        let outward = self.piece_quadric(labels[0]).0.half_gradient(conic.v);
         let left = dot(plane.a, cross(outward, conic.e[0]));
-        let sides = if left > 0.0 { [labels[1], labels[0]] } else { labels };
+        let labels = if left > 0.0 { [labels[1], labels[0]] } else { labels };
         let id = self.arcs.len() as u32;
-        self.arcs.push(Arc { ends, sides, conic, plane });
+        self.arcs.push(Arc { ends, labels, conic, plane });
         let distinct = if ends[0] == ends[1] { &ends[..1] } else { &ends };
         for &v in distinct {
             if let Some(slot) = self.at.get_mut(v as usize).and_then(|s| s.iter_mut().find(|s| **s == NONE)) {
@@ -217,20 +224,20 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// A place on the seam that bounds the pure part of a stub, and the labels there: along a generator, the last event before
-    /// the split.
-    fn seed(&mut self, i: usize) -> Option<([u64; 2], Vec3)> {
-        let s = self.hub.stubs[i];
+    /// A point on the seam that bounds the face of one half-beam alone, and the labels there: the last event before the
+    /// split plane along a meridian.
+    fn seed_point(&mut self, i: usize) -> Option<([u64; 2], Vec3)> {
+        let s = self.hub.half_beams[i];
         let own = 1u64 << i;
-        let (_, sigma) = self.piece(own);
+        let (_, sigma) = self.piece_quadric(own);
         let side = unit(cross(s.axis, if s.axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
-        // An odd azimuth, away from what symmetric hubs have in common.
+        // An arbitrary azimuth that avoids the symmetry planes of symmetric hubs.
         let (sin, cos) = 0.737_f64.sin_cos();
         let side = add(scale(side, cos), scale(cross(s.axis, side), sin));
-        let place = |z: f64| add(scale(s.axis, z), scale(side, s.squared(z).max(0.0).sqrt()));
+        let place = |z: f64| add(scale(s.axis, z), scale(side, s.radius_squared(z).max(0.0).sqrt()));
         let mut best = (s.contact, [0, own]);
-        let (a, b, c) = (s.section[0], s.section[1], s.section[2]);
-        for m in 0..self.hub.stubs.len() {
+        let (a, b, c) = (s.meridian[0], s.meridian[1], s.meridian[2]);
+        for m in 0..self.hub.half_beams.len() {
             if m == i {
                 continue;
             }
@@ -249,43 +256,43 @@ impl<'a> Walk<'a> {
             }
         }
         let (z, labels) = best;
-        // On the shifted plane and the quadric at once.
-        let (quadric, plane) = (self.piece(labels[0]).0, self.plane(labels));
+        // Onto the perturbed plane and the quadric.
+        let (quadric, plane) = (self.piece_quadric(labels[0]).0, self.plane(labels));
         let mut x = place(z);
         for _ in 0..3 {
-            let slope = scale(quadric.half_slope(x), 2.0);
+            let slope = scale(quadric.half_gradient(x), 2.0);
             let rows = [plane.a, slope, cross(plane.a, slope)];
             x = sub(x, apply(&inverse(&rows), [plane.at(x), quadric.at(x), 0.0]));
         }
         x.iter().all(|v| v.is_finite()).then_some((labels, x))
     }
 
-    /// Walks all seams; `None` if an event has no place.
-    pub(super) fn run(&mut self) -> Option<()> {
-        for i in 0..self.hub.stubs.len() {
+    /// Traces all seams; `None` if an event cannot be located.
+    pub(super) fn trace_all(&mut self) -> Option<()> {
+        for i in 0..self.hub.half_beams.len() {
             let own = 1u64 << i;
-            if self.arcs.iter().any(|a| a.sides.contains(&own)) {
+            if self.arcs.iter().any(|a| a.labels.contains(&own)) {
                 continue;
             }
-            let (labels, from) = self.seed(i)?;
-            let quadric = self.piece(labels[0]).0;
-            let tangent = unit(cross(self.plane(labels).a, quadric.half_slope(from)));
+            let (labels, from) = self.seed_point(i)?;
+            let quadric = self.piece_quadric(labels[0]).0;
+            let tangent = unit(cross(self.plane(labels).a, quadric.half_gradient(from)));
             let (conic, event) = self.trace(labels, from, tangent, None)?;
             match event {
                 None => {
                     let v = self.vertices.len() as u32;
                     self.vertices.push(Vertex {
                         at: from,
-                        key: Key { around: [labels[0], labels[1], u64::MAX, i as u64], far: false },
+                        key: Key { labels_around: [labels[0], labels[1], u64::MAX, i as u64], far: false },
                     });
                     self.at.push([NONE; 4]);
                     self.push([v, v], labels, conic);
                 }
                 Some(m) => {
-                    let first = self.vertex(self.around(labels, m), conic.at(conic.end))?;
+                    let first = self.vertex(self.labels_around(labels, m), conic.at(conic.end))?;
                     let mut todo = first as usize;
                     while todo < self.vertices.len() {
-                        self.leave(todo as u32)?;
+                        self.trace_from(todo as u32)?;
                         todo += 1;
                     }
                 }
@@ -294,21 +301,21 @@ impl<'a> Walk<'a> {
         Some(())
     }
 
-    /// Follows every seam that leaves a vertex and was not yet arrived by.
-    fn leave(&mut self, v: u32) -> Option<()> {
+    /// Follows every seam at a vertex that has not been traced from its other end.
+    fn trace_from(&mut self, v: u32) -> Option<()> {
         let Vertex { at, key } = self.vertices[v as usize];
-        for (labels, event) in self.seams(key.around) {
+        for (labels, event) in self.seams(key.labels_around) {
             let is = |a: &u32| {
                 *a != NONE && {
-                    let s = self.arcs[*a as usize].sides;
+                    let s = self.arcs[*a as usize].labels;
                     s == labels || s == [labels[1], labels[0]]
                 }
             };
             if self.at[v as usize].iter().any(is) {
                 continue;
             }
-            let quadric = self.piece(labels[0]).0;
-            let mut tangent = unit(cross(self.plane(labels).a, quadric.half_slope(at)));
+            let quadric = self.piece_quadric(labels[0]).0;
+            let mut tangent = unit(cross(self.plane(labels).a, quadric.half_gradient(at)));
             let mut rise = 0.0;
             self.guards(labels, &mut |m, f| {
                 if m == event {
@@ -319,7 +326,7 @@ impl<'a> Walk<'a> {
                 tangent = scale(tangent, -1.0);
             }
             let (conic, end) = self.trace(labels, at, tangent, Some(event))?;
-            let to = self.vertex(self.around(labels, end?), conic.at(conic.end))?;
+            let to = self.vertex(self.labels_around(labels, end?), conic.at(conic.end))?;
             if self.vertices.len() > 4096 {
                 return None;
             }
@@ -328,9 +335,9 @@ impl<'a> Walk<'a> {
         Some(())
     }
 
-    /// Faces of the arcs, short arcs made one place; `None` if it is no sphere.
-    pub(super) fn finish(mut self) -> Option<Complex> {
-        // The next arc of a face at a vertex is the other one there that borders it.
+    /// Assembles the faces from the arcs and collapses short arcs; `None` if the result is not a topological sphere.
+    pub(super) fn assemble(mut self) -> Option<Complex> {
+        // The next arc of a face at a vertex is the other incident arc that bounds the face.
         let mut used = vec![[false; 2]; self.arcs.len()];
         let mut faces: Vec<Face> = Vec::new();
         for first in 0..self.arcs.len() {
@@ -338,7 +345,7 @@ impl<'a> Walk<'a> {
                 if used[first][side] {
                     continue;
                 }
-                let label = self.arcs[first].sides[side];
+                let label = self.arcs[first].labels[side];
                 let (mut loops, mut arc, mut left) = (Vec::new(), first, side);
                 loop {
                     if used[arc][left] {
@@ -353,11 +360,11 @@ impl<'a> Walk<'a> {
                     }
                     let next = self.at[to as usize]
                         .iter()
-                        .find(|&&n| n != NONE && n as usize != arc && self.arcs[n as usize].sides.contains(&label))?;
+                        .find(|&&n| n != NONE && n as usize != arc && self.arcs[n as usize].labels.contains(&label))?;
                     arc = *next as usize;
                     let b = &self.arcs[arc];
                     left = usize::from(b.ends[0] != to);
-                    if b.sides[left] != label {
+                    if b.labels[left] != label {
                         return None;
                     }
                     if (arc, left) == (first, side) {
@@ -365,23 +372,23 @@ impl<'a> Walk<'a> {
                     }
                 }
                 let closed = loops.len() == 1 && self.arcs[first].ends[0] == self.arcs[first].ends[1];
-                // Loops without a vertex bound one ring together.
+                // Closed arcs with the same label bound one annular face.
                 let ring = |f: &&mut Face| f.label == label && (closed || f.loops.iter().any(|l| l.len() == 1));
                 if let Some(f) = faces.iter_mut().find(ring) {
                     f.loops.push(loops);
                     continue;
                 }
-                let rim = (label.count_ones() == 1).then(|| label.trailing_zeros());
-                let quadric = self.piece(label).0;
-                faces.push(Face { label, quadric, loops: vec![loops], rim });
+                let end_circle = (label.count_ones() == 1).then(|| label.trailing_zeros());
+                let quadric = self.piece_quadric(label).0;
+                faces.push(Face { label, quadric, loops: vec![loops], end_circle });
             }
         }
-        if self.hub.stubs.is_empty() {
-            let quadric = self.piece(0).0;
-            faces.push(Face { label: 0, quadric, loops: Vec::new(), rim: None });
+        if self.hub.half_beams.is_empty() {
+            let quadric = self.piece_quadric(0).0;
+            faces.push(Face { label: 0, quadric, loops: Vec::new(), end_circle: None });
         }
-        // Each stub shows, once.
-        for i in 0..self.hub.stubs.len() {
+        // Each half-beam has exactly one face of its own.
+        for i in 0..self.hub.half_beams.len() {
             if faces.iter().filter(|f| f.label == 1 << i).count() != 1 {
                 return None;
             }
@@ -390,7 +397,7 @@ impl<'a> Walk<'a> {
         if complex.euler() != 2 {
             return None;
         }
-        let complex = complex.merged(MERGE * self.hub.radius);
+        let complex = complex.collapsed(COLLAPSE_LENGTH * self.hub.radius);
         (complex.euler() == 2).then_some(complex)
     }
 }

@@ -1,0 +1,191 @@
+//! Wireframes: nodes and struts without radii, and their statistics.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use geometry::math::{Vec3, dot, norm, sub, unit};
+use geometry::union_find::unite;
+
+/// A wireframe: nodes, and struts between them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wireframe {
+    /// Node positions, mm.
+    pub nodes: Vec<Vec3>,
+    /// Indices of the two nodes of each strut.
+    pub struts: Vec<[u32; 2]>,
+}
+
+/// Statistics of a wireframe.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WireframeReport {
+    /// Number of nodes by valence, of nodes inside.
+    pub valence: BTreeMap<usize, usize>,
+    /// Number of struts with an end inside.
+    pub struts: usize,
+    /// Minimum and maximum length of these struts, mm.
+    pub length: [f64; 2],
+    /// Total length of these struts, mm.
+    pub total_length: f64,
+    /// Minimum angle between two struts at a node (degrees), and the node's position, mm.
+    pub min_angle: Option<(f64, Vec3)>,
+    /// Number of connected components.
+    pub components: usize,
+}
+
+/// Struts incident to each node (compressed rows).
+pub(super) struct Incidence {
+    from: Vec<u32>,
+    struts: Vec<u32>,
+}
+
+impl Incidence {
+    /// The incidence of a wireframe.
+    pub(super) fn of(wireframe: &Wireframe) -> Incidence {
+        let mut from = vec![0u32; wireframe.nodes.len() + 1];
+        for end in wireframe.struts.iter().flatten() {
+            from[*end as usize + 1] += 1;
+        }
+        for n in 0..wireframe.nodes.len() {
+            from[n + 1] += from[n];
+        }
+        let mut next = from.clone();
+        let mut struts = vec![0u32; 2 * wireframe.struts.len()];
+        for (s, ends) in wireframe.struts.iter().enumerate() {
+            for end in ends {
+                let slot = &mut next[*end as usize];
+                struts[*slot as usize] = s as u32;
+                *slot += 1;
+            }
+        }
+        Incidence { from, struts }
+    }
+
+    /// The struts incident to a node.
+    pub(super) fn at(&self, node: usize) -> &[u32] {
+        &self.struts[self.from[node] as usize..self.from[node + 1] as usize]
+    }
+}
+
+impl Wireframe {
+    /// Length of a strut, mm.
+    pub fn length(&self, strut: [u32; 2]) -> f64 {
+        let [a, b] = strut.map(|n| self.nodes[n as usize]);
+        norm(sub(b, a))
+    }
+
+    /// Removes nodes without struts, keeping the order; returns the new index of each node that remains.
+    fn compact(&mut self) -> Vec<Option<u32>> {
+        let mut used = vec![false; self.nodes.len()];
+        for end in self.struts.iter().flatten() {
+            used[*end as usize] = true;
+        }
+        let mut count = 0;
+        let number = |used: &bool| {
+            used.then(|| {
+                count += 1;
+                count - 1
+            })
+        };
+        let numbers: Vec<Option<u32>> = used.iter().map(number).collect();
+        let mut drop_isolated = used.iter();
+        self.nodes.retain(|_| drop_isolated.next() == Some(&true));
+        for end in self.struts.iter_mut().flatten() {
+            *end = numbers[*end as usize].unwrap_or(0);
+        }
+        numbers
+    }
+
+    /// Removes nodes without struts, and their radii.
+    pub(super) fn drop_isolated(&mut self, radii: &mut Vec<f64>) {
+        let numbers = self.compact();
+        if !radii.is_empty() {
+            let mut kept = numbers.iter();
+            radii.retain(|_| kept.next().is_some_and(Option::is_some));
+        }
+    }
+
+    /// Statistics of the nodes for which `inside` holds and of the struts incident to them.
+    pub fn report(&self, inside: &(impl Fn(Vec3) -> bool + Sync)) -> WireframeReport {
+        let within: Vec<bool> = self.nodes.par_iter().map(|p| inside(*p)).collect();
+        let has = |s: &&[u32; 2]| s.iter().any(|n| within[*n as usize]);
+        let part = Wireframe { nodes: self.nodes.clone(), struts: self.struts.iter().filter(has).copied().collect() };
+        let incidence = Incidence::of(&part);
+        let mut report = WireframeReport {
+            struts: part.struts.len(),
+            length: [f64::INFINITY, 0.0],
+            components: part.components(),
+            ..WireframeReport::default()
+        };
+        for strut in &part.struts {
+            let l = self.length(*strut);
+            report.length = [report.length[0].min(l), report.length[1].max(l)];
+            report.total_length += l;
+        }
+        let mut max_cosine = -1.0;
+        let mut rays: Vec<Vec3> = Vec::new();
+        for (n, slot) in self.nodes.iter().enumerate() {
+            if !within[n] {
+                continue;
+            }
+            let incident = incidence.at(n);
+            *report.valence.entry(incident.len()).or_default() += 1;
+            rays.clear();
+            rays.extend(incident.iter().map(|s| {
+                let [a, b] = part.struts[*s as usize];
+                let other = if a as usize == n { b } else { a };
+                unit(sub(self.nodes[other as usize], *slot))
+            }));
+            for (i, a) in rays.iter().enumerate() {
+                for b in &rays[..i] {
+                    let cosine = dot(*a, *b);
+                    // Equal angles differ by rounding: the first position is reported.
+                    if cosine > max_cosine + 1e-12 {
+                        max_cosine = cosine;
+                        // By the chord, since the cosine is flat at small angles.
+                        let half = 0.5 * norm(sub(*a, *b)).min(2.0);
+                        report.min_angle = Some((2.0 * half.asin().to_degrees(), *slot));
+                    }
+                }
+            }
+        }
+        report
+    }
+
+    /// Number of connected components; nodes without struts do not count.
+    fn components(&self) -> usize {
+        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
+        let ends: BTreeSet<u32> = self.struts.iter().flatten().copied().collect();
+        let mut components = ends.len();
+        for [a, b] in &self.struts {
+            components -= usize::from(unite(&mut root, *a, *b));
+        }
+        components
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn facts_of_a_square_with_a_tail() {
+        let wireframe = Wireframe {
+            nodes: vec![
+                [0.0, 0.0, 0.0],
+                [2.0, 0.0, 0.0],
+                [2.0, 2.0, 0.0],
+                [0.0, 2.0, 0.0],
+                [0.0, 5.0, 0.0],
+                [9.0, 9.0, 9.0],
+                [9.0, 9.0, 8.0],
+            ],
+            struts: vec![[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [5, 6]],
+        };
+        let report = wireframe.report(&|_| true);
+        assert_eq!(report.valence, BTreeMap::from([(1, 3), (2, 3), (3, 1)]));
+        assert_eq!((report.length, report.components), ([1.0, 3.0], 2));
+        assert!((report.total_length - 12.0).abs() < 1e-12);
+        assert!(report.min_angle.is_some_and(|a| (a.0 - 90.0).abs() < 1e-9));
+    }
+}
