@@ -1,10 +1,10 @@
-//! The background mesher: a body-centred cubic lattice fitted to a region by moving nodes onto its surface and cutting.
+//! Background tetrahedral mesher: isosurface stuffing of a body-centred cubic lattice in a region.
 //!
-//! Needs nothing of the region but its signed distance, and its angles are bounded: cutting a lattice that is not bisected
-//! leaves none below 10.7° or above 164.8°, whatever the region, and what comes after makes none worse than that.
+//! The only input from the region is its signed distance. Dihedral angles are bounded: stuffing a uniform lattice
+//! leaves angles between 10.7° and 164.8° for any region, and later steps keep these bounds.
 //!
-//! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007. The grading (by bisection), the
-//! edges and corners, and the improvement of shapes are not from there.
+//! Source: F. Labelle, J. R. Shewchuk, Isosurface stuffing, ACM Transactions on Graphics 26(3), 2007. Grading (by
+//! bisection), feature edges and corners, and shape improvement are additions.
 
 use serde::Serialize;
 
@@ -14,61 +14,61 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::tetmesh::{TetMesh, conformity};
 
-mod cover;
+mod boundary_repair;
 mod creases;
 mod features;
 mod grid;
-mod mend;
-mod shape;
+mod isosurface_stuffing;
+mod region_fit;
 mod smooth;
-mod stuff;
+mod tet_shape;
 mod work;
 
-pub use cover::fit;
-pub use shape::ANGLES;
+pub use region_fit::fit;
+pub use tet_shape::ANGLES;
 use work::{Around, Work};
 
-/// More tetrahedra than this are refused.
+/// Maximum number of tetrahedra.
 const MOST: usize = 20_000_000;
-/// Shapes that fitting may leave (1 where the worst angle is one of `ANGLES`).
+/// Minimum shape after fitting (1 if the worst angle is one of `ANGLES`).
 const LEAST: f64 = 1.0;
-/// How often edges and corners are looked for: better shapes make room for more of them.
+/// Number of rounds of feature fitting: better shapes allow more features to be fitted.
 const ROUNDS: usize = 3;
-/// How often a round is done again where the boundary met itself.
+/// Number of repetitions of a round whose boundary is non-manifold.
 const TRIES: usize = 4;
-/// The lattice is stretched by at most this share to fit the bounds.
+/// Maximum relative stretch of the lattice to fit the bounds.
 const FIT: f64 = 0.08;
 
-/// How a mesh fits its region.
+/// Quality of the fit of a mesh to its region.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fit {
-    /// Mean distance between the boundary's triangles, at their middles and the middles of their edges, and the region's
-    /// surface (mm); at edges and corners of the region, no more than that.
+    /// Mean distance from the centroids and edge midpoints of boundary triangles to the region's surface (mm); at edges
+    /// and corners of the region an upper bound.
     pub deviation_mean: f64,
-    /// 5 % of these distances are greater (mm).
+    /// 95th percentile of these distances (mm).
     pub deviation_p95: f64,
-    /// The greatest (mm).
+    /// Maximum of these distances (mm).
     pub deviation: f64,
-    /// Where it is (mm).
+    /// Position of the maximum (mm).
     pub deviation_at: Vec3,
-    /// Share of the region that no tetrahedron covers, by looks at points in it: cut edges and thin walls.
+    /// Fraction of the region that no tetrahedron covers, by sampling: cut edges and thin walls.
     pub lost: f64,
-    /// How deep below the region's surface the deepest such point is (mm).
+    /// Depth below the region's surface of the deepest uncovered point (mm).
     pub lost_depth: f64,
-    /// Where it is (mm).
+    /// Position of that point (mm).
     pub lost_at: Vec3,
-    /// Volume taken away where the boundary would have met itself, and of crumbs beside the main pieces (mm³).
+    /// Volume removed where the boundary was non-manifold, and of small detached fragments (mm³).
     pub mended: f64,
 }
 
-/// The tetrahedral mesh of a region, by its signed distance (1-Lipschitz, negative inside) and its bounds: tetrahedra of
-/// the volume of a regular one of edge `size` (mm), boundary nodes on the surface. `inside` are points in the region,
-/// spread evenly, by which the size is looked at and what is lost is found.
+/// The tetrahedral mesh of a region, given by its signed distance (1-Lipschitz, negative inside) and bounds: tetrahedra
+/// of the volume of a regular one of edge `size` (mm), boundary nodes on the surface. `inside` are uniformly spread
+/// points in the region, used to sample the size and uncovered parts.
 ///
-/// The same for any number of threads.
+/// The result does not depend on the number of threads.
 ///
-/// **Errors**: a size that is not positive, so great that nothing is left of the region, or so small that there are more than
-/// twenty million tetrahedra.
+/// **Errors**: a size that is not positive, a size so large that no tetrahedron fits, or so small that there are more
+/// than twenty million tetrahedra.
 pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec3]) -> Result<(TetMesh, Fit), Fault> {
     let mut sizes = vec![0.0; inside.len()];
     size.values(inside, &mut sizes);
@@ -79,14 +79,14 @@ pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec
     }
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let extent = bounds.size().into_iter().fold(0.0, f64::max);
-    // A cube holds twelve tetrahedra: ∛√2 of the edge of the regular one of a twelfth of it.
+    // A cube holds twelve tetrahedra: ∛√2 times the edge of the regular tetrahedron of a twelfth of its volume.
     let cube = fitted(bounds, 2f64.powf(1.0 / 6.0) * largest.min(extent));
     let mut grid = grid::Grid::new(region, bounds, cube, MOST)?;
     if size.constant().is_none() {
         grid.refine(region, size, MOST)?;
     }
-    let (mut mesh, on) = stuff::stuff(&grid, region);
-    let mended = mend::mend(&mut mesh);
+    let (mut mesh, on) = isosurface_stuffing::stuff(&grid, region);
+    let mended = boundary_repair::repair(&mut mesh);
     if mesh.tets.is_empty() {
         let message = format!(
             "no tetrahedron of size {} mm fits into the region; use a smaller one, at most half its thickness",
@@ -99,8 +99,8 @@ pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec
     Ok((mesh, fit))
 }
 
-/// Puts nodes onto edges and corners of the region and betters the shapes, in rounds: better shapes make room for more of
-/// them. Where the boundary would then meet itself, as at thin walls, things are left as they were.
+/// Moves nodes onto edges and corners of the region and improves shapes, in rounds: better shapes allow more features
+/// to be fitted. Where the boundary would become non-manifold, as at thin walls, nodes stay where they are.
 fn shaped(mut work: Work) -> TetMesh {
     for round in 1..=ROUNDS {
         let before = (work.mesh.clone(), work.on.clone(), work.held.clone());
@@ -125,7 +125,7 @@ fn shaped(mut work: Work) -> TetMesh {
     work.mesh
 }
 
-/// The edge of the lattice's cubes, near the one asked for, for which most bounds are planes of the lattice.
+/// The cube edge of the lattice, near the requested one, for which most bounds are planes of the lattice.
 fn fitted(bounds: &Aabb, cube: f64) -> f64 {
     const STEPS: i32 = 160;
     let misfit = |cube: f64| {
@@ -136,7 +136,7 @@ fn fitted(bounds: &Aabb, cube: f64) -> f64 {
         off.into_iter().sum::<f64>()
     };
     let cost = |c: f64| misfit(c) + 0.5 * (c / cube - 1.0).abs() / FIT;
-    // What fits one side exactly, and what is between.
+    // Candidates that fit one extent exactly, and uniform candidates between.
     let exact = bounds.size().into_iter().flat_map(|l| {
         let n = (2.0 * l / cube).round();
         (-3..=3).map(move |d| 2.0 * l / (n + f64::from(d)).max(1.0))

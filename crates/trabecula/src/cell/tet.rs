@@ -1,9 +1,9 @@
-//! Tetrahedral cells: what a regular tetrahedron about a point of full tetrahedral symmetry cuts out of a cell.
+//! Tetrahedral cells: a cubic cell restricted to a regular tetrahedron about a site of full tetrahedral symmetry.
 //!
 //! Source: Chen, Kabaria, Nelaturi, Lew, Piecewise hierarchical implicit surface structures constructed using
-//! tetrahedron-based unit cells. In barycentric coordinates f is symmetric in all four: T_d permutes the corners in every
-//! way. So its four traces are one function with the face's full symmetry, and f fits across the faces of any conforming
-//! mesh, whatever the order of its corners, the edge of the tetrahedron and the shape of the mesh's.
+//! tetrahedron-based unit cells. In barycentric coordinates f is symmetric under all permutations, since T_d permutes
+//! the vertices. So its traces on the four faces are one function with the full symmetry of the face, and f is
+//! continuous across the faces of any conforming mesh, for any vertex order, tetrahedron edge and element shape.
 
 mod connect;
 mod fraction;
@@ -26,21 +26,21 @@ pub type Bary = [f64; 4];
 /// Largest edge of the tetrahedron, in edges of the cubic cell: beyond it a cell has hundreds of periods.
 const LARGEST: f64 = 8.0;
 
-/// A tetrahedral cell: f in barycentric coordinates, Σ λ_i p_i being the phase.
+/// A tetrahedral cell: f in barycentric coordinates, with phase Σ λ_i p_i.
 pub struct Stencil {
     series: Series,
-    /// p_1 … p_4, turns.
+    /// Phases p_1 … p_4 of the vertices, turns.
     corners: [Vec3; 4],
     volume: OnceLock<fraction::Table>,
     connect: [OnceLock<connect::Pieces>; 3],
 }
 
-/// In how many pieces the solid of a tetrahedral cell is.
+/// Numbers of connected components of a tetrahedral cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Count {
-    /// Pieces of the solid.
+    /// Connected components of the solid.
     pub pieces: usize,
-    /// Pieces of its trace on one face, which are its ports.
+    /// Connected components of its trace on one face (ports).
     pub ports: usize,
 }
 
@@ -70,7 +70,7 @@ impl Stencil {
             connect: Default::default(),
         };
         let defect = stencil.asymmetry();
-        // Phases of some turns are good to 1e-15 of them, and f is as steep as Σ amplitude · 2π|h|.
+        // Phases of some turns are accurate to 1e-15 of their size, and f has the Lipschitz bound Σ amplitude · 2π|h|.
         if defect > 1e-9 * stencil.series.amplitude() {
             let [x, y, z] = site.map(number);
             let message = format!(
@@ -82,7 +82,7 @@ impl Stencil {
         Ok(stencil)
     }
 
-    /// The same cell less a constant: its surface f = 0 is this one's f = `level`.
+    /// The same cell shifted by a constant: its surface f = 0 is the surface f = `level` of this one.
     ///
     /// # Errors
     /// As [`Series::about`].
@@ -95,7 +95,7 @@ impl Stencil {
         })
     }
 
-    /// The greatest difference of f between points that differ in the order of their coordinates.
+    /// Maximum difference of f between points whose coordinates are permutations of each other.
     fn asymmetry(&self) -> f64 {
         let swaps = [[1, 0, 2, 3], [0, 2, 1, 3], [0, 1, 3, 2]];
         let mut worst = 0.0f64;
@@ -152,22 +152,22 @@ impl Stencil {
         self.volume.get_or_init(|| fraction::Table::new(self))
     }
 
-    /// Least and greatest value of f in the tetrahedron, to the fourth power of 1/96 of its edge.
+    /// Range of f in the tetrahedron, to fourth order in 1/96 of its edge.
     pub fn range(&self) -> Interval {
         self.table().range()
     }
 
-    /// The solid share of the tetrahedron's volume at level `iso`, within 1e-4. An affine map keeps it.
+    /// Solid fraction of the tetrahedron at level `iso`, within 1e-4; invariant under affine maps.
     pub fn fraction(&self, part: Part, iso: f64) -> f64 {
         self.table().fraction(part, iso)
     }
 
-    /// The level at which the part fills this share of the tetrahedron (0 < fraction < 1).
+    /// The level at which the part has this solid fraction (0 < fraction < 1).
     pub fn iso(&self, part: Part, fraction: f64) -> f64 {
         self.table().iso(part, fraction)
     }
 
-    /// The solid share of a face's area at level `iso`, within 1e-4.
+    /// Solid fraction of a face at level `iso`, within 1e-4.
     pub fn face_fraction(&self, part: Part, iso: f64) -> f64 {
         fraction::of_face(self, part, iso)
     }
@@ -176,8 +176,8 @@ impl Stencil {
         self.connect[part as usize].get_or_init(|| connect::Pieces::new(self, part))
     }
 
-    /// The intervals of the level in which the solid is one piece that reaches all four faces: there the lattice on a mesh
-    /// whose tetrahedra hang together by faces is one piece. Found on a subdivision of 48 steps to the edge.
+    /// The intervals of the level in which the solid is connected and reaches all four faces: there the lattice is
+    /// connected on any mesh whose tetrahedra are connected by faces. Found on a subdivision of 48 steps per edge.
     pub fn connected(&self, part: Part) -> &[[f64; 2]] {
         self.pieces(part).whole()
     }
@@ -190,7 +190,7 @@ impl Stencil {
         ends.map(|i| sorted(i.map(share))).collect()
     }
 
-    /// Pieces of the solid and of its trace on a face at level `iso`.
+    /// Connected components of the solid and of its trace on a face at level `iso`.
     pub fn count(&self, part: Part, iso: f64) -> Count {
         self.pieces(part).count(iso)
     }

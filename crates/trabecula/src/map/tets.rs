@@ -1,5 +1,5 @@
-//! Maps over a tetrahedral mesh: a place is a tetrahedron and barycentric coordinates in it, which are affine there and
-//! continuous everywhere (equations 12 and 13 of Chen et al.).
+//! Point location in a tetrahedral mesh: a position is represented by a tetrahedron and barycentric coordinates, which
+//! are affine in each tetrahedron and continuous across faces (equations 12 and 13 of Chen et al.).
 
 use std::collections::{HashMap, VecDeque};
 
@@ -10,13 +10,13 @@ use geometry::tetmesh::TetMesh;
 /// No tetrahedron.
 pub const NONE: u32 = u32::MAX;
 
-/// The most boxes of the index.
+/// Maximum number of boxes of the index.
 const MOST: f64 = 4e6;
 
 /// The corners of the face opposite each corner of a positive tetrahedron, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// A tetrahedral mesh that places are found in.
+/// A tetrahedral mesh with point location.
 pub struct Tets {
     nodes: Vec<Vec3>,
     /// Nodes ascending, so that tetrahedra with a common face have its corners in the same order.
@@ -30,16 +30,16 @@ pub struct Tets {
     slopes: Vec<Mat3>,
     bounds: Aabb,
     boxes: Boxes,
-    /// By how much of its barycentric coordinates a tetrahedron reaches beyond itself.
+    /// Overlap: the barycentric distance by which a tetrahedron extends beyond its faces.
     overlap: f64,
 }
 
-/// Which tetrahedra a box of a regular grid meets.
+/// A uniform grid of boxes, with the tetrahedra that each may intersect.
 struct Boxes {
     min: Vec3,
     edge: f64,
     shape: [usize; 3],
-    /// The box whose list holds for each: its own, or the nearest with one.
+    /// For each box the box whose list applies: its own, or the nearest non-empty one.
     owner: Vec<u32>,
     first: Vec<u32>,
     list: Vec<u32>,
@@ -64,8 +64,8 @@ impl Boxes {
 }
 
 impl Tets {
-    /// A mesh whose tetrahedra are positive and meet face to face. With an `overlap` (below 1/4) tetrahedra are also found
-    /// a little outside, where all coordinates are above −overlap.
+    /// A conforming mesh of positively oriented tetrahedra. With an `overlap` (below 1/4) tetrahedra are also found
+    /// slightly outside, where all coordinates are above −overlap.
     ///
     /// # Errors
     /// No tetrahedron, an inverted or flat one, a face of more than two tetrahedra.
@@ -80,7 +80,7 @@ impl Tets {
         for (n, (t, flip)) in tets.iter_mut().zip(&mut flipped).enumerate() {
             let at = |t: &[u32; 4]| t.map(|v| mesh.nodes[v as usize]);
             let positive = volume(at(t)) > 0.0;
-            // Sorting four by adjacent swaps, each of which turns the orientation.
+            // Sorting four by adjacent swaps, each of which reverses the orientation.
             let mut swaps = 0;
             for _ in 0..3 {
                 for i in 0..3 {
@@ -127,7 +127,7 @@ impl Tets {
         Ok(out)
     }
 
-    /// Sorts tetrahedra into boxes; empty boxes take the list of a nearest one.
+    /// Sorts tetrahedra into boxes; empty boxes refer to a nearest non-empty one.
     fn index(&mut self) {
         let size = self.bounds.size();
         let wanted = (4.0 * self.tets.len() as f64).min(MOST);
@@ -149,7 +149,7 @@ impl Tets {
                     for i in lo[0]..=hi[0] {
                         let at = [i, j, k];
                         let middle: Vec3 = core::array::from_fn(|a| self.boxes.min[a] + (at[a] as f64 + 0.5) * edge);
-                        // The box lies outside a face if its nearest corner does; a little rounding is allowed for.
+                        // The box is outside a face if its nearest vertex is; with a margin for rounding.
                         let out = planes.iter().any(|(n, d)| {
                             let reach = 0.500001 * edge * n.iter().map(|v| v.abs()).sum::<f64>();
                             dot(*n, middle) - d > reach
@@ -199,7 +199,7 @@ impl Tets {
         self.boxes.list = pairs.into_iter().map(|p| p.1).collect();
     }
 
-    /// The corners of a tetrahedron grown by the overlap.
+    /// The vertices of a tetrahedron enlarged by the overlap.
     fn grown(&self, t: usize) -> [Vec3; 4] {
         let corners = self.corners(t);
         let middle = scale(corners.iter().fold([0.0; 3], |s, p| add(s, *p)), 0.25);
@@ -212,7 +212,7 @@ impl Tets {
         self.tets.len()
     }
 
-    /// Whether there is none; never.
+    /// Whether there are none; never.
     pub fn is_empty(&self) -> bool {
         self.tets.is_empty()
     }
@@ -237,7 +237,7 @@ impl Tets {
         self.zones.get(t).copied().unwrap_or(0)
     }
 
-    /// For each node, the share of the volume about it that is of some zones.
+    /// For each node, the fraction of the volume of its tetrahedra that belongs to some zones.
     pub fn shares(&self, wanted: impl Fn(u32) -> bool) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.nodes.len()];
         for t in 0..self.len() {
@@ -257,7 +257,7 @@ impl Tets {
         self.across[t]
     }
 
-    /// The corners (mm) of a tetrahedron.
+    /// The vertices (mm) of a tetrahedron.
     pub fn corners(&self, t: usize) -> [Vec3; 4] {
         self.tets[t].map(|v| self.nodes[v as usize])
     }
@@ -277,7 +277,7 @@ impl Tets {
         self.bounds
     }
 
-    /// By how much tetrahedra reach beyond themselves.
+    /// The overlap, in barycentric coordinates.
     pub fn overlap(&self) -> f64 {
         self.overlap
     }
@@ -326,8 +326,8 @@ impl Tets {
         [l[0], l[1], l[2], 1.0 - l[0] - l[1] - l[2]]
     }
 
-    /// The tetrahedron that a point lies in, and its coordinates there; outside the mesh, one of those nearby, in whose
-    /// coordinates some are then negative.
+    /// The tetrahedron that contains a point, and the barycentric coordinates; outside the mesh, a nearby tetrahedron,
+    /// with some coordinates negative.
     pub fn locate(&self, p: Vec3) -> (usize, [f64; 4]) {
         let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
         for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
@@ -343,7 +343,7 @@ impl Tets {
         (best.1, best.2)
     }
 
-    /// Calls `f` with every tetrahedron in whose overlap a point lies; with the one of `locate`, if there is none.
+    /// Calls `f` with every tetrahedron in whose overlap a point lies; with that of `locate` if there is none.
     pub fn each_near(&self, p: Vec3, mut f: impl FnMut(usize, [f64; 4])) {
         let mut none = true;
         for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
@@ -359,8 +359,8 @@ impl Tets {
         }
     }
 
-    /// Calls `f` with all tetrahedra, some of them several times, that points of a box may be found in; `false` if they are
-    /// too many to be worth it.
+    /// Calls `f` with all tetrahedra, possibly repeated, in which points of a box may be located; `false` if there are
+    /// more than `most`.
     pub fn each_in(&self, b: &Aabb, most: usize, mut f: impl FnMut(usize)) -> bool {
         let (lo, hi) = (self.boxes.place(b.min), self.boxes.place(b.max));
         let boxes: usize = (0..3).map(|a| hi[a] - lo[a] + 1).product();
@@ -389,7 +389,7 @@ fn volume([a, b, c, d]: [Vec3; 4]) -> f64 {
     dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0
 }
 
-/// The edges from the fourth corner as columns: what takes the first three coordinates to a place.
+/// The edges from the fourth vertex as columns: the matrix from the first three coordinates to the position.
 fn columns(c: &[Vec3; 4]) -> Mat3 {
     transpose(&[sub(c[0], c[3]), sub(c[1], c[3]), sub(c[2], c[3])])
 }
@@ -399,7 +399,7 @@ fn planes(c: &[Vec3; 4]) -> [(Vec3, f64); 4] {
     core::array::from_fn(|i| {
         let [p, q, r] = FACES[i].map(|k| c[k]);
         let n = cross(sub(q, p), sub(r, p));
-        // The corner opposite lies inside, whatever the order.
+        // The opposite vertex lies inside, for either orientation.
         let n = if dot(n, sub(c[i], p)) > 0.0 { scale(n, -1.0) } else { n };
         (n, dot(n, p))
     })

@@ -1,29 +1,29 @@
-//! Edges of the region that edges of the boundary cut across: a node is put where they pass.
+//! Feature edges of the region that edges of the boundary cut across: a node is placed on them.
 
 use rayon::prelude::*;
 
 use super::features::{meeting, touching};
-use super::shape::shape;
+use super::isosurface_stuffing::values;
 use super::smooth::improve;
-use super::stuff::values;
+use super::tet_shape::shape;
 use super::work::Work;
 use crate::field::Field;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
-/// An edge of the boundary is looked at if its middle is farther from the surface than this share of its length.
+/// Boundary edges are examined if their midpoint is farther from the surface than this fraction of their length.
 const OFF: f64 = 0.02;
-/// One that cuts no edge of the region is halved if it is farther off than this share of its length: over an arc of its own
-/// length for radius it would be 0.13.
+/// An edge that crosses no feature edge is bisected if its midpoint is farther off than this fraction of its length;
+/// for an arc whose radius is the length it would be 0.13.
 const SHORT: f64 = 0.1;
-/// How often the nodes around are looked at to make room.
+/// Number of passes over the surrounding nodes to improve their tetrahedra.
 const PASSES: usize = 3;
-/// Where planes that touch the region are looked for along it: near its ends too, as the nearer an edge of the region
-/// passes to one, the less of the boundary's edge is on its side.
+/// Positions along an edge at which tangent planes of the region are sampled; also near its ends, since a feature edge
+/// may pass close to one.
 const LOOKS: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// Moves an end of, or halves, edges of the boundary that cut across an edge or corner of the region, so that there is a node
-/// on it; and halves those that cut a curve short. As far as no tetrahedron gets worse than `least` or than the worst beside
-/// it was; with `room` once the nodes around have made room.
+/// Moves an end of, or bisects, boundary edges that cut across a feature edge or corner of the region, so that a node
+/// lies on it; and bisects those that cut a curve short. No tetrahedron gets worse than `least` or than the worst at
+/// its nodes was; with `room`, after surrounding nodes were moved.
 pub(super) fn creases(work: &mut Work, least: f64, room: bool) {
     let mut moved = vec![false; work.mesh.nodes.len()];
     for found in crossed(work) {

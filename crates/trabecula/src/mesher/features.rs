@@ -1,7 +1,7 @@
-//! Edges and corners of the region: nodes near them are moved onto them.
+//! Feature edges and corners of the region: nodes near them are moved onto them.
 //!
-//! The planes that touch the region near a node, if they differ, meet in a point or a line, and the node goes to the
-//! nearest place that is on all of them: the least squares of dual contouring (Ju et al. 2002).
+//! If the tangent planes of the region near a node differ, they meet in a point or a line, and the node moves to the
+//! nearest point on all of them: the least squares of dual contouring (Ju et al. 2002).
 
 use rayon::prelude::*;
 
@@ -9,18 +9,18 @@ use super::work::Work;
 use crate::field::Field;
 use geometry::math::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 
-/// Normals that differ by less than this (degrees) are of one smooth face.
+/// Normals that differ by less than this (degrees) belong to one smooth face.
 const SMOOTH: f64 = 25.0;
-/// A node is moved at most by this share of its shortest edge on the boundary.
+/// Maximum displacement of a node, as a fraction of its shortest boundary edge.
 const REACH: f64 = 0.9;
-/// The second look is so many times closer: what is a bend and not an edge is flat there.
+/// Scale of the second sampling relative to the first: there a smooth bend is flat and an edge is not.
 const CLOSER: f64 = 0.1;
 
-/// A plane that touches the region: a point of it and its normal.
+/// A tangent plane of the region: a point and its normal.
 pub(super) type Plane = (Vec3, Vec3);
 
-/// Moves nodes of the boundary onto edges and corners of the region, as far as no tetrahedron gets worse than `least` or
-/// than the worst beside it was.
+/// Moves boundary nodes onto feature edges and corners of the region, if no tetrahedron gets worse than `least` or than
+/// the worst at its node was.
 pub(super) fn features(work: &mut Work, least: f64) {
     let (region, mesh) = (work.region, &work.mesh);
     let faces = mesh.boundary_faces();
@@ -61,8 +61,8 @@ pub(super) fn features(work: &mut Work, least: f64) {
     }
 }
 
-/// The place nearest to `p` where planes that touch the region near it meet, and in how many directions they hold it; `None` if
-/// they are of one smooth face.
+/// The point nearest to `p` where tangent planes of the region near it meet, and the number of constrained directions;
+/// `None` if they belong to one smooth face.
 pub(super) fn meeting(region: &dyn Field, p: Vec3, near: &[Plane]) -> Option<(Vec3, usize)> {
     let near = distinct(near)?;
     let (first, _) = nearest(p, &near);
@@ -70,7 +70,7 @@ pub(super) fn meeting(region: &dyn Field, p: Vec3, near: &[Plane]) -> Option<(Ve
     Some(nearest(first, &distinct(&touching(region, &closer))?))
 }
 
-/// The planes that touch the region nearest to points.
+/// The tangent planes of the region nearest to points.
 pub(super) fn touching(region: &dyn Field, points: &[Vec3]) -> Vec<Plane> {
     const BATCH: usize = 256;
     let (mut v, mut g) = (vec![0.0; points.len()], vec![[0.0; 3]; points.len()]);
@@ -82,7 +82,7 @@ pub(super) fn touching(region: &dyn Field, points: &[Vec3]) -> Vec<Plane> {
     foot.map(|((p, v), g)| (sub(*p, scale(*g, *v)), *g)).collect()
 }
 
-/// One plane of each direction; `None` if all are of one smooth face.
+/// One plane per normal direction; `None` if all belong to one smooth face.
 fn distinct(planes: &[Plane]) -> Option<Vec<Plane>> {
     let alike = (SMOOTH / 2.0).to_radians().cos();
     let mut kept: Vec<Plane> = Vec::new();
@@ -96,9 +96,9 @@ fn distinct(planes: &[Plane]) -> Option<Vec<Plane>> {
     edge.then_some(kept)
 }
 
-/// The place nearest to `p` that is on all planes, and in how many directions they hold it.
+/// The point nearest to `p` on all planes, and the number of constrained directions.
 fn nearest(p: Vec3, planes: &[Plane]) -> (Vec3, usize) {
-    // Two planes: their line; more: the least squares, by the plane system of the three that differ most.
+    // Two planes: their line. More: least squares, by the system of the three that differ most.
     let n = |i: usize| planes[i].1;
     let mut best = (0.0, [0, 1, 1]);
     for i in 0..planes.len() {
@@ -112,7 +112,7 @@ fn nearest(p: Vec3, planes: &[Plane]) -> (Vec3, usize) {
         }
     }
     let away = |i: usize| dot(n(i), sub(planes[i].0, p));
-    // Three planes less than this apart are of a crease that bends.
+    // Three planes closer than this belong to a curved edge.
     if best.0 > 0.2 {
         let [i, j, k] = best.1;
         let m: Mat3 = [n(i), n(j), n(k)];

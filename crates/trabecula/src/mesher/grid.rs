@@ -1,11 +1,11 @@
-//! The background: a body-centred cubic lattice of tetrahedra about a region, bisected where it is to be finer.
+//! The background lattice: body-centred cubic tetrahedra around a region, bisected where a smaller size is required.
 //!
-//! Two cubic lattices, each with its nodes in the middle of the other's cubes. A tetrahedron has an edge of each as
-//! opposite edges (long, the cube's edge) and four between them (short, √3/2 of it); its dihedral angles are 60° and 90°.
+//! Two cubic lattices, the nodes of each at the cube centres of the other. A tetrahedron has one edge of each as
+//! opposite edges (long, the cube edge) and four between them (short, √3/2 of it); its dihedral angles are 60° and 90°.
 //! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007.
 //!
-//! Bisected at its longest edge a tetrahedron goes through three more shapes and comes back to the first of them at half
-//! the size (Maubach's bisection of the orthoscheme), so that angles do not decay: none is below 45° or above 120°.
+//! Bisection at the longest edge passes through three more shapes and returns to the first at half the size (Maubach's
+//! bisection of the orthoscheme), so angles do not degrade: all are between 45° and 120°.
 
 use std::collections::HashMap;
 
@@ -15,41 +15,42 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
 use geometry::tetmesh::tet_quality::size_of;
 
-/// Units of a node's whole coordinates in the edge of a cube: it can be halved so often.
+/// Integer coordinate units per cube edge; the number of possible bisections is its logarithm.
 const UNIT: i32 = 1 << 12;
-/// Cubes along the edge of a block that is looked at, or left out, as a whole.
+/// Cubes per edge of a block that is kept or skipped as a whole.
 const BLOCK: i32 = 4;
 
-/// Tetrahedra on nodes of whole coordinates.
+/// Tetrahedra with nodes of integer coordinates.
 pub(super) struct Grid {
-    /// Nodes in units.
+    /// Node coordinates, in units.
     pub keys: Vec<[i32; 3]>,
-    /// Tetrahedra, positive; in those that are not bisected nodes 0, 1 are of one lattice and 2, 3 of the other.
+    /// Tetrahedra, positively oriented; in those that are not bisected nodes 0, 1 belong to one lattice and 2, 3 to the
+    /// other.
     pub tets: Vec<[u32; 4]>,
-    /// Whether any was bisected.
+    /// Whether any tetrahedron was bisected.
     pub bisected: bool,
     origin: Vec3,
     unit: f64,
 }
 
-/// The direction of an edge: how many of its coordinates differ.
+/// The direction of an edge, by the number of coordinates that differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Along {
     /// Along an axis.
     Axis,
-    /// Along the diagonal of a square.
+    /// Along a face diagonal.
     Face,
-    /// Along the diagonal of a cube.
+    /// Along a body diagonal.
     Body,
 }
 
 impl Grid {
-    /// The tetrahedra of the lattice with cubes of edge `cube` (mm) that may have a part in the region.
+    /// The tetrahedra of the lattice with cubes of edge `cube` (mm) that may intersect the region.
     ///
     /// **Errors**: more than `most` tetrahedra.
     pub fn new(region: &dyn Field, bounds: &Aabb, cube: f64, most: usize) -> Result<Grid, Fault> {
         let size = bounds.size();
-        // The lattice is laid evenly about the region, planes on both sides of its bounds where it fits.
+        // The lattice is centred on the region, with planes on both sides of its bounds where they fit.
         let steps = size.map(|l| (2.0 * l / cube).round());
         let origin = core::array::from_fn(|a| bounds.min[a] + (size[a] - steps[a] * cube / 2.0) / 2.0);
         let mut grid =
@@ -87,7 +88,7 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Whether blocks that lie in the region hold more than `most` tetrahedra: told without making them.
+    /// Whether the blocks inside the region hold more than `most` tetrahedra, counted without making them.
     fn surely_more(&self, region: &dyn Field, end: [i32; 3], most: usize) -> bool {
         let mut count = 0.0;
         let mut todo = vec![([-1; 3], end)];
@@ -112,7 +113,7 @@ impl Grid {
         Aabb { min: reach(low), max: reach(high) }
     }
 
-    /// The tetrahedra about the three faces on a cube's upper sides.
+    /// The tetrahedra around the three upper faces of a cube.
     fn cube(&mut self, c: [i32; 3], names: &mut HashMap<[i32; 3], u32>) {
         let mut name = |key: [i32; 3]| {
             *names.entry(key).or_insert_with(|| {
@@ -140,12 +141,12 @@ impl Grid {
         }
     }
 
-    /// The place of a node (mm).
+    /// The position of a node (mm).
     pub fn place(&self, key: [i32; 3]) -> Vec3 {
         core::array::from_fn(|a| self.origin[a] + self.unit * f64::from(key[a]))
     }
 
-    /// The places of all nodes (mm).
+    /// The positions of all nodes (mm).
     pub fn places(&self) -> Vec<Vec3> {
         self.keys.iter().map(|k| self.place(*k)).collect()
     }
@@ -166,8 +167,8 @@ impl Grid {
         }
     }
 
-    /// Bisects tetrahedra that may have a part in the region until each is of the size asked for at its middle, within
-    /// the sixth root of two, and neighbours share whole faces.
+    /// Bisects tetrahedra that may intersect the region until each has the requested size at its centroid, within a
+    /// factor of the sixth root of two, and the mesh is conforming.
     ///
     /// **Errors**: a size that is not positive; more than `most` tetrahedra.
     pub fn refine(&mut self, region: &dyn Field, size: &Grade, most: usize) -> Result<(), Fault> {
@@ -221,7 +222,7 @@ impl Grid {
         }
     }
 
-    /// The places of the ends of the longest edge; of two the one of the first lattice.
+    /// The end points of the longest edge; of two, that of the first lattice.
     fn longest(&self, t: [u32; 4]) -> [usize; 2] {
         let rank = |[a, b]: [usize; 2]| {
             let first = self.keys[t[a] as usize].iter().all(|k| k % UNIT == 0);
@@ -230,7 +231,7 @@ impl Grid {
         geometry::tetmesh::EDGES.into_iter().fold([0, 1], |m, e| if rank(e) > rank(m) { e } else { m })
     }
 
-    /// Whether a tetrahedron that may have a part in the region is larger than it is to be.
+    /// Whether a tetrahedron that may intersect the region is larger than requested.
     fn coarse(&self, t: [u32; 4], region: &dyn Field, size: &Grade) -> Result<bool, Fault> {
         let p = t.map(|n| self.place(self.keys[n as usize]));
         let middle: Vec3 = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
@@ -257,7 +258,7 @@ impl Grid {
     }
 }
 
-/// A block's halves along its longest side, the upper one first.
+/// The halves of a block along its longest extent, the upper one first.
 fn halves(low: [i32; 3], high: [i32; 3]) -> [([i32; 3], [i32; 3]); 2] {
     let extent = |a: usize| high[a] - low[a];
     let axis = (0..3).fold(0, |m, a| if extent(a) > extent(m) { a } else { m });

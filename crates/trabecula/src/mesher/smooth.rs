@@ -1,20 +1,20 @@
-//! Nodes of badly shaped tetrahedra are moved to where the worst of theirs is better.
+//! Shape improvement: nodes of badly shaped tetrahedra are moved to improve the worst of them.
 
-use super::shape::shape;
+use super::tet_shape::shape;
 use super::work::Work;
 use crate::field::Field;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use geometry::tetmesh::FACES;
 
-/// Shapes better than this are left alone: dihedral angles of about 26 to 142 degrees.
+/// Shapes better than this are not changed: dihedral angles of about 26 to 142 degrees.
 const GOOD: f64 = 6.0;
-/// How often all nodes are looked at.
+/// Number of passes over all nodes.
 const ROUNDS: usize = 4;
-/// Steps that are tried, in parts of the mean edge at the node.
+/// Step lengths tried, as fractions of the mean edge length at the node.
 const STEPS: [f64; 4] = [0.3, 0.15, 0.07, 0.03];
 
-/// Moves nodes, those on the surface along it, those that edges of the region hold not at all. No tetrahedron gets worse than
-/// the worst of its node's was.
+/// Moves nodes, those on the surface along it, those on feature edges not at all. No tetrahedron gets worse than the
+/// worst at its node was.
 pub(super) fn smooth(work: &mut Work) {
     for _ in 0..ROUNDS {
         let mut moved = false;
@@ -29,7 +29,7 @@ pub(super) fn smooth(work: &mut Work) {
     }
 }
 
-/// Moves one node, if that makes the worst of its tetrahedra better.
+/// Moves one node if that improves the worst of its tetrahedra.
 pub(super) fn improve(work: &mut Work, n: usize) -> bool {
     let (mut best, tet) = work.worst(n);
     if best >= GOOD || work.bars(work.mesh.nodes[n]) {
@@ -45,7 +45,7 @@ pub(super) fn improve(work: &mut Work, n: usize) -> bool {
         }
     }
     let edge = length / count;
-    // Towards the middle of the neighbours; away from, and towards, the face opposite in the worst tetrahedron, and along it.
+    // Towards the centroid of the neighbours; away from, towards and along the opposite face of the worst tetrahedron.
     let middle = unit(sum);
     let t = mesh.tets[tet as usize];
     let here = t.iter().position(|m| *m as usize == n).unwrap_or(0);
@@ -90,8 +90,7 @@ pub(super) fn improve(work: &mut Work, n: usize) -> bool {
     place != start
 }
 
-/// The place on the surface near `p`, if a few steps along the gradient lead there without leaving the side of the region
-/// that has this normal.
+/// The surface point near `p`, if a few gradient steps lead there on the same sheet of the surface (by this normal).
 fn onto(region: &dyn Field, mut p: Vec3, normal: Vec3, edge: f64) -> Option<Vec3> {
     let (mut v, mut g) = ([0.0], [[0.0; 3]]);
     for _ in 0..6 {

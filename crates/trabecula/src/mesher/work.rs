@@ -1,6 +1,6 @@
 //! A mesh at work: the tetrahedra at each node, what is known of the nodes, and places that are left alone.
 
-use super::shape::shape;
+use super::tet_shape::shape;
 use crate::field::Field;
 use geometry::math::{Vec3, norm, sub};
 use geometry::tetmesh::TetMesh;

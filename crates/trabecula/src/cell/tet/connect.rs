@@ -1,8 +1,8 @@
-//! In how many pieces a tetrahedral cell and its traces are, level by level.
+//! Connected components of a tetrahedral cell and its traces, as functions of the level.
 //!
-//! On a small simplex f is linear and the solid convex: it hangs together. So pieces are those of a graph of small
-//! tetrahedra, joined where they have solid on a common small triangle, and a simplex joins in at the least "depth" that f
-//! has in it. All levels are swept through at once, deepest first.
+//! On a small simplex f is interpolated linearly and the solid is convex, hence connected. So components are those of a
+//! graph of small tetrahedra, adjacent where they have solid on a common small triangle; a simplex enters the graph at
+//! the minimum "depth" of f on it. All levels are swept at once by union-find, deepest first.
 
 use super::nodes::{Grid, Nodes};
 use super::{Count, Part, Stencil};
@@ -11,16 +11,17 @@ use geometry::union_find::unite;
 /// Steps along the edge of the tetrahedron.
 const STEPS: usize = 48;
 
-/// How the number of pieces changes with the depth: lower f, upper −f, sheet |f|; solid is what lies below it.
+/// Number of connected components as a function of the depth: lower f, upper −f, sheet |f|; solid is what lies below
+/// it.
 pub(super) struct Pieces {
     upper: bool,
-    /// From this depth on there are so many pieces, ascending.
+    /// Pairs of a depth and the number of components from there on, ascending.
     solid: Vec<(f64, usize)>,
     trace: Vec<(f64, usize)>,
     whole: Vec<[f64; 2]>,
 }
 
-/// The least depth on a simplex.
+/// The minimum depth on a simplex.
 fn least(part: Part, values: &[f64]) -> f64 {
     let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     match part {
@@ -38,7 +39,7 @@ struct Sweep {
 }
 
 impl Sweep {
-    /// From which depth on there are how many pieces.
+    /// Pairs of a depth and the number of components from there on.
     fn counts(mut self, slack: f64) -> Vec<(f64, usize)> {
         let mut births = self.nodes.clone();
         births.sort_unstable_by(f64::total_cmp);
@@ -52,7 +53,7 @@ impl Sweep {
             if next == f64::INFINITY {
                 return out;
             }
-            // Equal depths at equivalent places differ in the last digits.
+            // Equal depths at equivalent positions differ by rounding.
             while births.get(born).is_some_and(|d| *d <= next + slack) {
                 born += 1;
             }

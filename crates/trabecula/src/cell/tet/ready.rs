@@ -1,7 +1,8 @@
-//! The ready tetrahedral cells: networks and sheets over all eight groups that have a site of tetrahedral symmetry.
+//! The predefined tetrahedral cells: networks and sheets over all eight space groups that have a site of tetrahedral
+//! symmetry.
 //!
-//! Found by a sweep over groups, waves, sites, edges and duals; kept are those that are one piece over a wide range of
-//! fractions and meet the faces in clean ports. All figures are computed from the series.
+//! Selected from a sweep over groups, waves, sites, edges and duals: connected over a wide range of fractions, with
+//! well-defined ports on the faces. All figures are computed from the series.
 
 use std::f64::consts::TAU;
 
@@ -15,12 +16,12 @@ use geometry::symmetry::{Group, Side};
 
 use Side::{Im, Re};
 
-/// A ready tetrahedral cell.
+/// A predefined tetrahedral cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Ready {
     /// Name in designs.
     pub name: &'static str,
-    /// What it looks like.
+    /// Description of its appearance.
     pub title: &'static str,
     /// Space group, with the origin choice.
     pub group: &'static str,
@@ -32,9 +33,9 @@ pub struct Ready {
     pub edge_over_root: f64,
     /// Equation 11 instead of 10.
     pub dual: bool,
-    /// The part that it is made for.
+    /// The part for which it is intended.
     pub part: Part,
-    /// A solid fraction at which that part is one piece.
+    /// A solid fraction at which that part is connected.
     pub fraction: f64,
 }
 
@@ -261,12 +262,12 @@ static READY: [Ready; 20] = [
     },
 ];
 
-/// All ready cells.
+/// All predefined cells.
 pub fn ready_cells() -> &'static [Ready] {
     &READY
 }
 
-/// The ready cell of this name.
+/// The predefined cell of this name.
 pub fn ready(name: &str) -> Option<&'static Ready> {
     READY.iter().find(|r| r.name == name)
 }
@@ -289,7 +290,7 @@ pub(crate) fn series(group: &Group, terms: &[([i32; 3], Side, f64)]) -> Result<S
 }
 
 impl Ready {
-    /// What it is and what is known of it, computed from the series.
+    /// Its definition and figures, computed from the series.
     ///
     /// # Errors
     /// None for those that are listed.

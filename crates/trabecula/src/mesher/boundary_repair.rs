@@ -1,30 +1,30 @@
-//! Where the boundary meets itself in a node or an edge: taken away, as a surface is wanted that is one sheet everywhere.
+//! Repair of a non-manifold boundary: tetrahedra are removed where the boundary meets itself in a node or an edge.
 
 use std::collections::HashSet;
 
 use super::work::Around;
 use geometry::tetmesh::{FACES, TetMesh, volume};
 
-/// A piece is a crumb if it has less than this share of the largest one's volume,
-const CRUMB: f64 = 0.01;
-/// and at most so many tetrahedra: too few to show a body of its own.
-const FEW: usize = 100;
+/// A connected component is a fragment if its volume is less than this fraction of the largest one's,
+const FRAGMENT_FRACTION: f64 = 0.01;
+/// and it has at most this number of tetrahedra: too few to be a body of its own.
+const FRAGMENT_TETS: usize = 100;
 
-/// Takes tetrahedra away until no two sheets of the boundary share a node, and crumbs that this or thin places leave; gives
-/// their volume (mm³).
-pub(super) fn mend(mesh: &mut TetMesh) -> f64 {
+/// Removes tetrahedra until no two boundary sheets share a node, and fragments that this or thin walls leave; returns
+/// the removed volume (mm³).
+pub(super) fn repair(mesh: &mut TetMesh) -> f64 {
     let mut lost = 0.0;
     loop {
-        let mut away = pinches(mesh);
-        if away.is_empty() {
-            away = crumbs(mesh);
+        let mut removed = non_manifold(mesh);
+        if removed.is_empty() {
+            removed = fragments(mesh);
         }
-        if away.is_empty() {
+        if removed.is_empty() {
             return lost;
         }
         let mut kept = Vec::with_capacity(mesh.tets.len());
         for (i, t) in (0..).zip(&mesh.tets) {
-            if away.contains(&i) {
+            if removed.contains(&i) {
                 lost += volume(t.map(|n| mesh.nodes[n as usize]));
             } else {
                 kept.push(*t);
@@ -34,8 +34,8 @@ pub(super) fn mend(mesh: &mut TetMesh) -> f64 {
     }
 }
 
-/// The tetrahedra of pieces that are crumbs.
-fn crumbs(mesh: &TetMesh) -> HashSet<u32> {
+/// The tetrahedra of fragments.
+fn fragments(mesh: &TetMesh) -> HashSet<u32> {
     let (count, piece) = mesh.pieces();
     let (mut size, mut tets) = (vec![0.0; count], vec![0; count]);
     for (i, p) in piece.iter().enumerate() {
@@ -43,13 +43,13 @@ fn crumbs(mesh: &TetMesh) -> HashSet<u32> {
         tets[*p as usize] += 1;
     }
     let most = size.iter().copied().fold(0.0, f64::max);
-    let crumb = |p: u32| size[p as usize] < CRUMB * most && tets[p as usize] <= FEW;
-    let of = piece.iter().enumerate().filter(|(_, p)| crumb(**p));
+    let fragment = |p: u32| size[p as usize] < FRAGMENT_FRACTION * most && tets[p as usize] <= FRAGMENT_TETS;
+    let of = piece.iter().enumerate().filter(|(_, p)| fragment(**p));
     of.map(|(i, _)| i as u32).collect()
 }
 
-/// The tetrahedra to be taken away at nodes with more than one sheet.
-fn pinches(mesh: &TetMesh) -> HashSet<u32> {
+/// The tetrahedra to be removed at nodes with more than one boundary sheet.
+fn non_manifold(mesh: &TetMesh) -> HashSet<u32> {
     let around = Around::new(mesh);
     let mut sheets: Vec<Vec<[u32; 2]>> = vec![Vec::new(); mesh.nodes.len()];
     for [a, b, c] in mesh.boundary_faces() {
@@ -57,7 +57,7 @@ fn pinches(mesh: &TetMesh) -> HashSet<u32> {
             sheets[n as usize].push(edge);
         }
     }
-    let mut away = HashSet::new();
+    let mut removed = HashSet::new();
     for (n, link) in sheets.iter().enumerate() {
         if link.is_empty() || cycles(link) == 1 {
             continue;
@@ -65,18 +65,18 @@ fn pinches(mesh: &TetMesh) -> HashSet<u32> {
         let groups = groups(mesh, n as u32, around.of(n));
         let size = |of: &Vec<u32>| of.iter().map(|i| volume(mesh.corners(*i as usize))).sum::<f64>();
         if let [_] = groups.as_slice() {
-            // A hole through the tetrahedra at the node: nothing short of all of them mends it for sure.
-            away.extend(groups.iter().flatten());
+            // The tetrahedra at the node enclose a hole: only removing all of them is certain to repair it.
+            removed.extend(groups.iter().flatten());
             continue;
         }
         let most = (0..groups.len()).fold(0, |m, i| if size(&groups[i]) > size(&groups[m]) { i } else { m });
         let rest = groups.iter().enumerate().filter(|(i, _)| *i != most);
-        away.extend(rest.flat_map(|(_, of)| of));
+        removed.extend(rest.flat_map(|(_, of)| of));
     }
-    away
+    removed
 }
 
-/// Cycles of the edges opposite to a node in its boundary faces; more than one if a node of them is met twice.
+/// Number of cycles of the edges opposite to a node in its boundary faces; more than one if a node occurs twice.
 fn cycles(link: &[[u32; 2]]) -> usize {
     let mut left = link.to_vec();
     let mut count = 0;
@@ -94,7 +94,7 @@ fn cycles(link: &[[u32; 2]]) -> usize {
     if starts.windows(2).any(|w| w[0] == w[1]) { usize::MAX } else { count }
 }
 
-/// The tetrahedra at a node in groups that hang together by faces at the node.
+/// The tetrahedra at a node in groups connected by faces at the node.
 fn groups(mesh: &TetMesh, n: u32, tets: &[u32]) -> Vec<Vec<u32>> {
     let faces: Vec<Vec<[u32; 3]>> = tets
         .iter()

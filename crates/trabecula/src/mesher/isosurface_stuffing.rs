@@ -1,7 +1,7 @@
-//! Moving nodes onto the surface and cutting what still crosses it.
+//! Isosurface stuffing: nodes are moved onto the surface and tetrahedra that still cross it are cut.
 //!
-//! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007; the diagonals by an order
-//! of the edges instead of their parity rule, which does the same and serves bisected tetrahedra too.
+//! Source: Labelle & Shewchuk, Isosurface Stuffing, ACM Transactions on Graphics 26(3), 2007. Diagonals follow from an
+//! order of the edges instead of the parity rule; the result is the same, and it also serves bisected tetrahedra.
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
@@ -13,12 +13,13 @@ use crate::field::Field;
 use geometry::math::Vec3;
 use geometry::tetmesh::{EDGES, TetMesh};
 
-/// A node is moved onto a place where an edge crosses the surface if it is closer than this share of the edge: of an edge
-/// along an axis, along the diagonal of a square, of a cube. The first and the last are the paper's, for its angles.
+/// A node is moved to the crossing of an edge with the surface if it is closer than this fraction of the edge: along an
+/// axis, a face diagonal, a body diagonal. The first and the last are those of the paper, for its angle bounds.
 const SHARES: [f64; 3] = [0.24999, 0.33, 0.41189];
-/// The same, at nodes of bisected tetrahedra, as a share of the node's shortest edge: tetrahedra would turn over otherwise.
+/// The same at nodes of bisected tetrahedra, as a fraction of the node's shortest edge: tetrahedra could be inverted
+/// otherwise.
 const LEAST: f64 = 0.35;
-/// Edges that one task looks at.
+/// Edges per parallel task.
 const BATCH: usize = 256;
 
 /// A node's side of the surface.

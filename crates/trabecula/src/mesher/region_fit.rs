@@ -1,14 +1,14 @@
-//! How a mesh fits its region: how far its boundary is from the surface, and what of the region it leaves out.
+//! Fit of a mesh to its region: distance of the boundary from the surface, and the uncovered part of the region.
 
 use std::collections::HashMap;
 
 use super::Fit;
-use super::stuff::values;
+use super::isosurface_stuffing::values;
 use crate::field::Field;
 use geometry::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
 use geometry::tetmesh::TetMesh;
 
-/// The fit of a mesh to a region, by the region's signed distance (mm) and points inside it.
+/// The fit of a mesh to a region, given its signed distance (mm) and points inside it.
 pub fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3]) -> Fit {
     let boundary = mesh.boundary();
     let mut looks = Vec::with_capacity(4 * boundary.triangles.len());
@@ -37,10 +37,10 @@ pub fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3]) -> Fit {
     }
 }
 
-/// The points in no tetrahedron.
+/// The points that are in no tetrahedron.
 fn uncovered(mesh: &TetMesh, points: &[Vec3]) -> Vec<Vec3> {
     let bounds = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-    // About a point in a cell.
+    // About one point per cell.
     let [x, y, z] = bounds.size();
     let cell = (x * y * z / points.len().max(1) as f64).cbrt().max(1e-9 * norm(bounds.size()));
     let index = |p: Vec3| p.map(|v| (v / cell).floor() as i64);
@@ -70,7 +70,7 @@ fn uncovered(mesh: &TetMesh, points: &[Vec3]) -> Vec<Vec3> {
     left.map(|(p, _)| *p).collect()
 }
 
-/// Whether a point is in a tetrahedron or, to rounding, on it.
+/// Whether a point is in a tetrahedron, within rounding.
 fn holds(t: [Vec3; 4], p: Vec3) -> bool {
     geometry::tetmesh::FACES.iter().all(|&[a, b, c]| {
         let n = cross(sub(t[b], t[a]), sub(t[c], t[a]));

@@ -1,11 +1,11 @@
-//! How good a tetrahedron is, while nodes are moved.
+//! Shape measure of a tetrahedron while nodes are moved.
 
 use geometry::math::Vec3;
 use geometry::tetmesh::{tet_quality::dihedral_cosines, volume};
 
-/// The least and the greatest dihedral angle (degrees) that cutting leaves in a lattice that is not bisected.
+/// The minimum and maximum dihedral angle (degrees) after stuffing a uniform lattice.
 ///
-/// Source: Labelle & Shewchuk 2007, whose proof goes through all ways of cutting.
+/// Source: Labelle & Shewchuk 2007, proven by enumeration of all cuts.
 pub const ANGLES: [f64; 2] = [10.7, 164.8];
 
 /// 1 where the worst dihedral angle is one of `ANGLES`, more where all are better (16 in a regular tetrahedron); a small
