@@ -120,6 +120,8 @@ docs: $(VENV)/.installed
 	$(BIN)/python scripts/blend_tables.py
 	$(BIN)/python scripts/beam_tables.py
 	$(BIN)/python scripts/gallery.py
+	$(BIN)/python scripts/builders.py
+	$(BIN)/python scripts/design_page.py
 	$(BIN)/python scripts/design_reference.py
 
 clean:

@@ -154,7 +154,7 @@ CASES = [
     ("size = [8, 8, 8]", "size = [8, 8, 0]", "region.box.size", ["0"]),
     ("size = [8, 8, 8]", "size = [8, 8, -8]", "region.box.size", ["-8"]),
     ("size = [8, 8, 8]", "size = [8, nan, 8]", "region.box.size", ["NaN"]),
-    ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["both"]),
+    ("size = [8, 8, 8]", "size = [8, 8, 8]\nmin = [0, 0, 0]", "region.box.min", ["size and min at once"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.sphere]\nradius = -2", "region.sphere.radius", ["-2"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'none.stl'", "region.mesh.path", ["does not exist"]),
     ("[region.box]\nsize = [8, 8, 8]", "[region.mesh]\npath = 'a.step'", "region.mesh.path", ["stl"]),
@@ -305,9 +305,9 @@ def test_counts_and_numbers_are_words(tmp_path):
     """Plurals, and numbers with few digits."""
     for line, instead, part in [
         ("size = [8, 8, 8]", "size = [8]", "found 1 value"),
-        ("size = [8, 8, 8]", "size = [8, 8, -1e300]", "size is -1e300;"),
+        ("size = [8, 8, 8]", "size = [8, 8, -1e300]", "size is -1e300 mm;"),
         ("fraction = 0.3", "porosity = -0.00000012345678901234567", "porosity is -1.23457e-7;"),
-        ("[region.box]\nsize = [8, 8, 8]", "[region]\nunion = []", "at least 1 region, found 0"),
+        ("[region.box]\nsize = [8, 8, 8]", "[region]\nunion = []", "at least 1 item, found 0"),
         ("wavelength = 4.0", "wavelength = 12.000000000000002", "wavelength, 12 mm, is more than"),
     ]:
         file = tmp_path / "bad.toml"

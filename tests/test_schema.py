@@ -1,6 +1,8 @@
 """The generated schema is current, is a schema, and agrees with the reader."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,15 @@ def test_current():
     """schema/design.json is what the core makes; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema."""
     committed = json.loads((ROOT / "schema" / "design.json").read_text())
     assert committed == json.loads(_core.schema())
+
+
+@pytest.mark.parametrize("script", ["builders", "design_page"])
+def test_what_is_made_from_the_schema_is_current(script):
+    """The Python builders and the reference page; renew them by running the script."""
+    made = subprocess.run(
+        [sys.executable, ROOT / "scripts" / f"{script}.py", "--check"], check=False, capture_output=True, text=True
+    )
+    assert made.returncode == 0, made.stderr
 
 
 @pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.toml")), ids=lambda p: p.name)

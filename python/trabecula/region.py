@@ -1,3 +1,4 @@
+# Made by scripts/builders.py from schema/design.json; do not edit.
 """Regions: where the part may be. Lengths in mm."""
 
 from __future__ import annotations
@@ -10,55 +11,77 @@ from .given import settings
 
 __all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "tetrahedron", "union"]
 
-Point = Sequence[float]
-
 
 def box(
-    size: Point | None = None,
-    center: Point | None = None,
+    size: Sequence[float] | None = None,
+    center: Sequence[float] | None = None,
     *,
-    min: Point | None = None,
-    max: Point | None = None,
+    min: Sequence[float] | None = None,
+    max: Sequence[float] | None = None,
 ) -> dict:
-    """An axis-aligned box, by ``size`` and ``center`` (the origin unless given) or by the corners ``min`` and ``max``."""
+    """An axis-aligned box, by its size and centre, or by two corners.
+
+    size: Edge lengths [x, y, z]. [mm, above 0, optional]
+    center: Its middle. [mm, default [0.0, 0.0, 0.0]]
+    min: Lower corner. [mm, optional]
+    max: Upper corner. [mm, optional]
+    """
     return {"box": settings(size=size, center=center, min=min, max=max)}
 
 
-def cylinder(base: Point, radius: float, height: float, axis: Point | None = None) -> dict:
-    """A straight round cylinder from the middle of its lower face, ``base``, along ``axis`` (+z unless given)."""
-    return {"cylinder": settings(base=base, axis=axis, radius=radius, height=height)}
+def cylinder(base: Sequence[float], radius: float, height: float, axis: Sequence[float] | None = None) -> dict:
+    """A straight round cylinder.
+
+    base: Middle of the lower face. [mm]
+    radius: Radius. [mm, above 0]
+    height: Height along the axis. [mm, above 0]
+    axis: Direction from the lower to the upper face; its length does not matter. [default [0.0, 0.0, 1.0]]
+    """
+    return {"cylinder": settings(base=base, radius=radius, height=height, axis=axis)}
 
 
-def sphere(radius: float, center: Point | None = None) -> dict:
-    """A ball about ``center`` (the origin unless given)."""
-    return {"sphere": settings(center=center, radius=radius)}
+def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
+    """A ball.
+
+    radius: Radius. [mm, above 0]
+    center: Centre. [mm, default [0.0, 0.0, 0.0]]
+    """
+    return {"sphere": settings(radius=radius, center=center)}
 
 
-def tetrahedron(corners: Sequence[Point], sharpness: float | None = None) -> dict:
-    """The tetrahedron of four ``corners`` (mm), in any order.
+def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = None) -> dict:
+    """A tetrahedron.
 
-    With a ``sharpness`` (per mm) its faces are joined by a smooth maximum (LogSumExp): edges draw back by ln 2 / sharpness,
-    corners by ln 3 / sharpness. Neighbours then leave gaps between them, so it is for a single one only.
+    corners: Its four corners, in any order. [mm]
+    sharpness: With it faces are joined by a smooth maximum (LogSumExp) of this sharpness, which draws edges back by ln
+        2 over it and corners by ln 3: smooth, but with gaps between neighbours, so for a single tetrahedron only. [per
+        mm, above 0, optional]
     """
     return {"tetrahedron": settings(corners=corners, sharpness=sharpness)}
 
 
-def halfspace(point: Point, normal: Point) -> dict:
-    """One side of the plane through ``point``; ``normal`` points out of the solid."""
+def halfspace(point: Sequence[float], normal: Sequence[float]) -> dict:
+    """One side of a plane; it bounds nothing alone, so combine it.
+
+    point: A point on the plane. [mm]
+    normal: Normal of the plane; it points out of the solid. Its length does not matter.
+    """
     return {"halfspace": settings(point=point, normal=normal)}
 
 
 def mesh(
     path: str | os.PathLike[str],
-    unit: str | None = None,
+    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
 ) -> dict:
     """A triangle mesh from a file (stl, obj, ply, off, 3mf).
 
-    ``unit`` is that of the file (mm unless given; a 3MF names its own), ``scale`` a factor on top. A relative path
-    starts at the design file, or at the working directory for a design made in Python. A mesh that does not bound a
-    solid is repaired, with a warning that says how, or with ``repair="refuse"`` it is an error with counts.
+    path: Path of the file, relative to the design file.
+    unit: Unit of the file's coordinates (mm unless given); a 3MF file names its own. [optional]
+    scale: Factor on all coordinates, after the unit. [above 0, default 1.0]
+    repair: Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
+        [default "auto"]
     """
     return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair)}
 
@@ -79,5 +102,9 @@ def difference(first: dict, *others: dict) -> dict:
 
 
 def offset(of: dict, by: float) -> dict:
-    """A region grown by a distance (mm), or shrunk by a negative one."""
-    return {"offset": {"of": of, "by": by}}
+    """A region grown or shrunk by a distance.
+
+    of: The region.
+    by: Distance; positive grows. [mm]
+    """
+    return {"offset": settings(of=of, by=by)}

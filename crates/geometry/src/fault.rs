@@ -7,12 +7,20 @@ pub struct Fault {
     pub at: String,
     /// The sentence.
     pub message: String,
+    /// The value that was found, where it is one.
+    pub found: Option<String>,
 }
 
 impl Fault {
     /// A fault at `at`.
     pub fn new(at: impl Into<String>, message: impl Into<String>) -> Self {
-        Fault { at: at.into(), message: message.into() }
+        Fault { at: at.into(), message: message.into(), found: None }
+    }
+
+    /// The same fault, with the value that was found.
+    pub fn found(mut self, found: impl Into<String>) -> Self {
+        self.found = Some(found.into());
+        self
     }
 
     /// The same fault, its place moved under `key`.
@@ -20,6 +28,7 @@ impl Fault {
         self.at = match (key.is_empty(), self.at.is_empty()) {
             (true, _) => self.at,
             (false, true) => key.to_string(),
+            (false, false) if self.at.starts_with('[') => format!("{key}{}", self.at),
             (false, false) => format!("{key}.{}", self.at),
         };
         self

@@ -98,7 +98,7 @@ mod _core {
     /// The JSON Schema of a design, as JSON text.
     #[pyfunction]
     fn schema() -> String {
-        trabecula::design::schema().to_string()
+        trabecula::design::schema()
     }
 
     /// A space group: its number, its name, and its operations as rotations and translations (in parts of 24).

@@ -73,17 +73,8 @@ impl TetMesh {
     #[staticmethod]
     #[pyo3(signature = (path, folder, unit=None, split=false))]
     fn read(py: Python<'_>, path: String, folder: PathBuf, unit: Option<&str>, split: bool) -> PyResult<TetMesh> {
-        let unit = match unit {
-            None => None,
-            Some(word) => match Unit::ALL.iter().find(|u| u.0 == word) {
-                Some(known) => Some(known.1),
-                None => {
-                    let known = Unit::ALL.map(|u| u.0).join(", ");
-                    let message = format!("unit is \"{word}\"; it must be one of {known}");
-                    return Err(pyo3::exceptions::PyValueError::new_err(message));
-                }
-            },
-        };
+        let unit = unit.map(str::parse::<Unit>).transpose();
+        let unit = unit.map_err(|e| pyo3::exceptions::PyValueError::new_err(format!("unit: {}", e.message)))?;
         let spec = TetFileSpec { path, unit, split, joined: Joined::default() };
         let made = run(py, None, None, |_| Tets::in_file(&spec, &Folder(folder)))?;
         of(py, made)

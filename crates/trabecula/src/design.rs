@@ -5,17 +5,15 @@
 
 mod beams;
 mod blend;
+mod bridge;
 mod build;
 mod cell;
 mod control;
 mod data;
-mod error;
 mod grade;
 mod joins;
-mod json;
 mod level;
 mod map;
-mod node;
 mod pattern;
 mod place;
 mod read;
@@ -54,11 +52,10 @@ use geometry::repair::Repaired;
 use geometry::tetmesh::TetMesh;
 use read::RegionIn;
 
+pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use blend::Blended;
 pub use data::*;
-pub use error::DesignError;
 pub use joins::Joins;
-pub use node::{Lines, Node, Value};
 pub use schema::schema;
 pub use tets::{TetReport, Tets};
 
@@ -74,7 +71,7 @@ pub struct Design {
     #[serde(default)]
     pub units: Units,
     /// Where the part may be.
-    pub region: RegionSpec,
+    pub region: RegionKind,
     /// What fills the region: lattices under names of your own. Several need a blend.
     #[serde(default, skip_serializing_if = "Lattices::is_empty")]
     #[schemars(extend("minProperties" = 1))]
@@ -140,15 +137,6 @@ impl Loader for NoFiles {
     }
 }
 
-/// Something in a design that is allowed but may not be meant.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Warning {
-    /// Path of the key in the design.
-    pub path: String,
-    /// What may not be meant, with the numbers.
-    pub message: String,
-}
-
 /// A lattice over a tetrahedral mesh.
 pub struct Tiled {
     /// Its name.
@@ -187,7 +175,7 @@ pub struct Built {
 
 impl Design {
     /// A design of one lattice in a region.
-    pub fn new(region: RegionSpec, name: &str, lattice: LatticeSpec) -> Design {
+    pub fn new(region: RegionKind, name: &str, lattice: LatticeSpec) -> Design {
         let lattice = Lattices::from([(name.to_string(), lattice)]);
         Design {
             schema: 1,
@@ -247,7 +235,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
     let found = match read::region_in(node)? {
         RegionIn::Design(design) => build::space(&design, loader),
-        RegionIn::Alone(spec) => region::region(&spec, "region", loader, &mut region::Notes::default()),
+        RegionIn::Alone(spec) => region::region(&spec, "region", loader, &mut crate::region::Notes::default()),
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));

@@ -45,6 +45,7 @@ pub mod extract;
 pub mod field;
 pub mod grade;
 pub mod implicit;
+mod kind;
 pub mod lattice;
 pub mod map;
 pub mod mesher;

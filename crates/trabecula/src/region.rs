@@ -5,16 +5,115 @@ use std::sync::Arc;
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
+use crate::kind::{Kind, Warning};
+use geometry::fault::Fault;
 use geometry::math::Aabb;
+use geometry::repair::Repaired;
 
+mod bodies;
 mod csg;
+mod cuboid;
+mod cylinder;
+mod file;
+mod halfspace;
 mod mesh;
 mod meshes;
+mod offset;
 mod primitive;
+mod sphere;
+mod tetrahedron;
 
-pub use csg::{Difference, Intersection, Offset, Union};
+pub use csg::{Difference, Intersection, Union};
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use file::MeshFile;
+pub use halfspace::{HalfSpace, HalfSpaceKind};
 pub use mesh::MeshRegion;
-pub use primitive::{Cuboid, Cylinder, HalfSpace, Sphere, Tetrahedron};
+pub use offset::Offset;
+pub use sphere::Sphere;
+pub use tetrahedron::Tetrahedron;
+
+/// Where the part may be. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Region", noun = "region", family = Build)]
+#[allow(missing_docs)] // The comment of each type says what it is.
+pub enum RegionKind {
+    Box(cuboid::BoxKind),
+    Cylinder(cylinder::CylinderKind),
+    Sphere(Sphere),
+    Tetrahedron(tetrahedron::TetrahedronKind),
+    HalfSpace(HalfSpaceKind),
+    Mesh(MeshFile),
+    Union(csg::UnionKind),
+    Intersection(csg::IntersectionKind),
+    Difference(csg::DifferenceKind),
+    Offset(offset::OffsetKind),
+}
+
+/// A kind of region, as it is declared.
+pub(crate) trait Build {
+    /// The region. Errors name the key; ranges are checked here.
+    fn build(&self, context: &mut Context) -> Result<Region, Fault>;
+}
+
+impl RegionKind {
+    /// The region. Errors name the key below this kind's place.
+    pub(crate) fn build(&self, context: &mut Context) -> Result<Region, Fault> {
+        context.below(self.key(), |context| self.family().build(context))
+    }
+}
+
+/// What is to be said of regions beside them.
+#[derive(Debug, Default)]
+pub(crate) struct Notes {
+    /// Possible mistakes.
+    pub warnings: Vec<Warning>,
+    /// What was repaired in each mesh, by the path of its table.
+    pub repairs: Vec<(String, Repaired)>,
+}
+
+/// Where a region is built: its place in the design, and where files come from.
+pub(crate) struct Context<'a> {
+    path: String,
+    load: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
+    notes: &'a mut Notes,
+}
+
+impl<'a> Context<'a> {
+    pub fn new(path: &str, load: &'a dyn Fn(&str) -> Result<Vec<u8>, String>, notes: &'a mut Notes) -> Self {
+        Context { path: path.into(), load, notes }
+    }
+
+    /// Builds what stands under `key`, or at an index such as "[0]"; a fault has the key before its place.
+    fn below<T>(&mut self, key: &str, build: impl FnOnce(&mut Self) -> Result<T, Fault>) -> Result<T, Fault> {
+        let outer = self.path.len();
+        self.path.push_str(if key.starts_with('[') { "" } else { "." });
+        self.path.push_str(key);
+        let built = build(self);
+        self.path.truncate(outer);
+        built.map_err(|f| f.under(key))
+    }
+
+    /// Whether the kind that is being built is the whole region of the design.
+    fn is_part(&self) -> bool {
+        self.path.strip_prefix("region.").is_some_and(|kind| !kind.contains(['.', '[']))
+    }
+
+    /// The bytes of a file, or a sentence that says why there are none.
+    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        (self.load)(path)
+    }
+
+    /// Warns of the kind that is being built.
+    fn warn(&mut self, message: String) {
+        self.notes.warnings.push(Warning { path: self.path.clone(), message });
+    }
+
+    /// Keeps what was repaired in a mesh.
+    fn repaired(&mut self, done: Repaired) {
+        self.notes.repairs.push((self.path.clone(), done));
+    }
+}
 
 /// A signed distance function (1-Lipschitz; exact for primitives and meshes, a lower bound of the
 /// absolute distance for combinations), with what a mesher and a report need beside it.

@@ -8,13 +8,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::data::*;
-use super::error::DesignError;
 use super::pattern;
 use super::place::{LOOKS, Place};
 use super::{Built, Warning};
 use super::{map, sample};
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use crate::truss::{Beams, Truss, fill};
 use ::beams::graph::{self, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};

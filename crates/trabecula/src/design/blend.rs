@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::Warning;
 use super::control;
 use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::Place;
 use super::sample;
 use crate::blend::{Blend, By, Constituent, Weights};
+use crate::kind::DesignError;
 use geometry::fault::number;
 use geometry::math::{Vec3, add, norm, scale, sub};
 

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::cell::cell;
 use super::data::*;
-use super::error::DesignError;
 use super::place::{LOOKS, Place};
 use super::{
     Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, skin, tets, tiling, warn,
@@ -12,6 +11,7 @@ use super::{
 use crate::blend::Constituent;
 use crate::cell::Part;
 use crate::implicit::Implicit;
+use crate::kind::DesignError;
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::solid::Solid;
@@ -33,7 +33,7 @@ impl From<PartSpec> for Part {
 
 /// The region that a design's solid is in.
 pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
-    let mut notes = region::Notes::default();
+    let mut notes = crate::region::Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     Ok(domain.map_or(space, |d| d.region))
@@ -43,7 +43,7 @@ pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignErr
 fn given(
     d: &Design,
     loader: &dyn Loader,
-    notes: &mut region::Notes,
+    notes: &mut crate::region::Notes,
 ) -> Result<(Region, Option<tets::Tets>), DesignError> {
     match region::region(&d.region, "region", loader, notes) {
         Ok(space) => Ok((space, None)),
@@ -55,7 +55,7 @@ fn given(
 }
 
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
-    let mut notes = region::Notes::default();
+    let mut notes = crate::region::Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     let bounds = space.bounds();
     if bounds.is_empty() {
@@ -91,7 +91,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         notes.warnings.push(Warning { path: "region".into(), message });
     }
     let (filled, thinnest) = skin::filled(d, &space, &points, loader, &mut notes)?;
-    let region::Notes { mut warnings, repairs } = notes;
+    let crate::region::Notes { mut warnings, repairs } = notes;
     let (mut lattices, mut tilings) = (Vec::new(), Vec::new());
     if let Some(domain) = domain {
         let place = Place {

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::data::*;
-use super::error::DesignError;
 use super::place::finite;
 use super::{Loader, samples};
 use crate::cell::{Cell, Series, Term, named};
+use crate::kind::DesignError;
 use geometry::fault::Fault;
 use geometry::math::sin_cos_turns;
 use geometry::symmetry::{Group, Side};

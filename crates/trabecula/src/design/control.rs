@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use super::data::*;
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
 use super::place::{Place, finite};
-use super::region::{self, Notes};
+use super::region;
 use super::samples;
 use crate::field::Field;
 use crate::grade::{Grade, Polyline, Rbf, Sigmoid};
+use crate::kind::DesignError;
+use crate::region::Notes;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, norm, scale};
 

@@ -6,6 +6,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::schema;
+pub use crate::kind::{OneOrThree, OneOrTwo, Unit};
+pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 
 mod beams;
 mod blend;
@@ -16,211 +18,6 @@ pub use beams::*;
 pub use blend::*;
 pub use grade::*;
 pub use map::*;
-
-/// A number, or three of them along x, y, z.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum OneOrThree {
-    /// The same along all three axes.
-    One(f64),
-    /// Along x, y, z.
-    Three([f64; 3]),
-}
-
-impl OneOrThree {
-    /// The three numbers.
-    pub fn three(self) -> [f64; 3] {
-        match self {
-            OneOrThree::One(v) => [v; 3],
-            OneOrThree::Three(v) => v,
-        }
-    }
-}
-
-/// Where the part may be. Lengths in mm.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum RegionSpec {
-    /// An axis-aligned box.
-    Box(BoxSpec),
-    /// A straight round cylinder.
-    Cylinder(CylinderSpec),
-    /// A ball.
-    Sphere(SphereSpec),
-    /// A tetrahedron.
-    Tetrahedron(TetrahedronSpec),
-    /// One side of a plane; it bounds nothing alone, so combine it.
-    HalfSpace(HalfSpaceSpec),
-    /// A triangle mesh from a file (stl, obj, ply, off, 3mf).
-    Mesh(MeshSpec),
-    /// Points in any of the regions.
-    Union(Vec<RegionSpec>),
-    /// Points in all of the regions.
-    Intersection(Vec<RegionSpec>),
-    /// Points in the first region and in none of the others.
-    Difference(Vec<RegionSpec>),
-    /// A region grown or shrunk by a distance.
-    Offset(OffsetSpec),
-}
-
-/// A box by its size and centre, or by two corners.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum BoxSpec {
-    /// By size and centre.
-    Size(BoxSize),
-    /// By two corners.
-    Corners(BoxCorners),
-}
-
-/// A box by its size and centre.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BoxSize {
-    /// Edge lengths (mm).
-    pub size: [f64; 3],
-    /// Its middle (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub center: [f64; 3],
-}
-
-/// A box by two corners.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BoxCorners {
-    /// Lower corner (mm).
-    pub min: [f64; 3],
-    /// Upper corner (mm).
-    pub max: [f64; 3],
-}
-
-/// A straight round cylinder.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CylinderSpec {
-    /// Middle of the lower face (mm).
-    pub base: [f64; 3],
-    /// Direction from the lower to the upper face; its length does not matter.
-    #[serde(default = "build_axis", skip_serializing_if = "is_build_axis")]
-    pub axis: [f64; 3],
-    /// Radius (mm).
-    pub radius: f64,
-    /// Height along the axis (mm).
-    pub height: f64,
-}
-
-/// A ball.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SphereSpec {
-    /// Centre (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub center: [f64; 3],
-    /// Radius (mm).
-    pub radius: f64,
-}
-
-/// A tetrahedron.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TetrahedronSpec {
-    /// Its four corners (mm), in any order.
-    pub corners: [[f64; 3]; 4],
-    /// With it faces are joined by a smooth maximum (LogSumExp) of this sharpness (per mm), which draws edges back by ln 2
-    /// over it and corners by ln 3: smooth, but with gaps between neighbours, so for a single tetrahedron only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sharpness: Option<f64>,
-}
-
-/// One side of a plane.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HalfSpaceSpec {
-    /// A point on the plane (mm).
-    pub point: [f64; 3],
-    /// Normal of the plane; it points out of the solid.
-    pub normal: [f64; 3],
-}
-
-/// A triangle mesh from a file.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MeshSpec {
-    /// Path of the file, relative to the design file.
-    pub path: String,
-    /// Unit of the file's coordinates (mm unless given); a 3MF file names its own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<Unit>,
-    /// Factor on all coordinates, after the unit.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub scale: f64,
-    /// Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub repair: RepairSpec,
-}
-
-/// What to do with a mesh that does not bound a solid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum RepairSpec {
-    /// Repair it, and warn of what was done.
-    #[default]
-    Auto,
-    /// Refuse it, with what is wrong in numbers.
-    Refuse,
-}
-
-/// A unit of length in a mesh file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Unit {
-    /// 0.001 mm.
-    Micron,
-    /// Millimetre.
-    Mm,
-    /// 10 mm.
-    Cm,
-    /// 1000 mm.
-    M,
-    /// 25.4 mm.
-    Inch,
-    /// 304.8 mm.
-    Foot,
-}
-
-impl Unit {
-    /// The words and what they mean.
-    pub const ALL: [(&'static str, Unit); 6] = [
-        ("mm", Unit::Mm),
-        ("micron", Unit::Micron),
-        ("cm", Unit::Cm),
-        ("m", Unit::M),
-        ("inch", Unit::Inch),
-        ("foot", Unit::Foot),
-    ];
-
-    /// Its length in mm.
-    pub fn in_mm(self) -> f64 {
-        match self {
-            Unit::Micron => 0.001,
-            Unit::Mm => 1.0,
-            Unit::Cm => 10.0,
-            Unit::M => 1000.0,
-            Unit::Inch => 25.4,
-            Unit::Foot => 304.8,
-        }
-    }
-}
-
-/// A region grown or shrunk.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OffsetSpec {
-    /// The region.
-    pub of: Box<RegionSpec>,
-    /// Distance (mm); positive grows.
-    pub by: f64,
-}
 
 /// A lattice: a cell seen through a map, cut by a part at a level.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -421,7 +218,7 @@ pub enum Fit {
 pub type Lattices = BTreeMap<String, LatticeSpec>;
 
 /// Named regions that are kept fully solid.
-pub type Keeps = BTreeMap<String, RegionSpec>;
+pub type Keeps = BTreeMap<String, RegionKind>;
 
 /// A skin: the part of the region that is at most so far below its surface.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -441,7 +238,7 @@ pub enum OpenSpec {
     /// The one on a side of the region's bounds.
     Side(SideSpec),
     /// The one on the plane of a half-space, facing as its normal does.
-    Plane(HalfSpaceSpec),
+    Plane(HalfSpaceKind),
 }
 
 /// A side of the region's bounds.

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::data::{GradeKind, GradeSpec};
-use super::error::DesignError;
 use super::place::{Place, finite};
 use super::{control, samples};
 use crate::grade::{Formula, Grade};
+use crate::kind::DesignError;
 use geometry::fault::number;
 use geometry::math::{norm, unit};
 

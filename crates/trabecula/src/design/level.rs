@@ -1,13 +1,13 @@
 //! How much is solid: data to [`Level`].
 
 use super::data::{AmountSpec, Fit, LevelSpec, Of, PartSpec};
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::{Place, finite};
 use super::sample;
 use crate::cell::{Cell, Part};
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
 use geometry::fault::number;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::Warning;
 use super::data::*;
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::{Place, finite};
 use super::{control, samples};
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use crate::map::{Affine, Map, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
 use geometry::fault::number;
 use geometry::math::{dot, norm, scale, sub, unit};

@@ -4,10 +4,10 @@ use serde_json::{Value as Json, json};
 
 use super::beams::{check_open, fillet, given, inside, share};
 use super::data::*;
-use super::error::DesignError;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use super::{Built, Warning};
+use crate::kind::DesignError;
 use ::beams::graph::{Hub, Profile};
 use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
 use geometry::fault::{counted, number};

@@ -1,8 +1,8 @@
 //! Where a part of a design stands: what every reader of data needs to know of the rest.
 
 use super::Loader;
-use super::error::DesignError;
 use crate::csg_tree::CsgSolid;
+use crate::kind::DesignError;
 use crate::region::Region;
 use geometry::fault::number;
 

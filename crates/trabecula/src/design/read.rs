@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use super::Design;
 use super::data::*;
-use super::error::DesignError;
-use super::node::{At, Node};
 use crate::cell::tet::ready_cells;
 use crate::cell::{catalogue, named};
-use geometry::fault::{self, counted};
+use crate::kind::DesignError;
+use crate::kind::{At, Kind, Node, Table};
+use geometry::fault;
 use geometry::symmetry::Group;
 
 mod beams;
@@ -23,8 +23,6 @@ type Read<T> = Result<T, DesignError>;
 
 const THREE: &str = "three numbers [x, y, z]";
 const AMOUNTS: &str = "exactly one of iso, fraction, porosity, thickness";
-const REGIONS: [&str; 10] =
-    ["box", "cylinder", "sphere", "tetrahedron", "halfspace", "mesh", "union", "intersection", "difference", "offset"];
 
 /// The design in a tree.
 pub(super) fn design(node: &Node) -> Read<Design> {
@@ -88,7 +86,7 @@ pub(super) fn design(node: &Node) -> Read<Design> {
 }
 
 /// The region in a design whose other keys are left alone.
-pub(super) fn region_of(node: &Node) -> Read<RegionSpec> {
+pub(super) fn region_of(node: &Node) -> Read<RegionKind> {
     let missing = "say where the part may be, such as [region.box] with size = [20, 20, 20]";
     match entry(&At::root(node), "region")? {
         Some(at) => region(&at),
@@ -110,7 +108,7 @@ pub(super) fn region_in(node: &Node) -> Read<RegionIn> {
 /// What a file that is read for its region holds.
 pub(super) enum RegionIn {
     Design(Box<Design>),
-    Alone(RegionSpec),
+    Alone(RegionKind),
 }
 
 /// The entry of a table with other keys, which are left alone.
@@ -146,67 +144,8 @@ fn three(at: &At) -> Read<[f64; 3]> {
     at.numbers(THREE)
 }
 
-fn region(at: &At) -> Read<RegionSpec> {
-    let (kind, at) = at.kind("region", &REGIONS)?;
-    let at = &at;
-    Ok(match kind {
-        "box" => RegionSpec::Box(cuboid(at)?),
-        "cylinder" => {
-            let f = at.fields("a cylinder", &["base", "axis", "radius", "height"])?;
-            RegionSpec::Cylinder(CylinderSpec {
-                base: three(f.need("base", "the middle of the lower face, [x, y, z] in mm")?)?,
-                axis: f.read("axis", [0.0, 0.0, 1.0], three)?,
-                radius: f.need("radius", "mm")?.number()?,
-                height: f.need("height", "mm, along the axis")?.number()?,
-            })
-        }
-        "sphere" => {
-            let f = at.fields("a sphere", &["center", "radius"])?;
-            RegionSpec::Sphere(SphereSpec {
-                center: f.read("center", [0.0; 3], three)?,
-                radius: f.need("radius", "mm")?.number()?,
-            })
-        }
-        "tetrahedron" => {
-            let f = at.fields("a tetrahedron", &["corners", "sharpness"])?;
-            let corners = f.need("corners", "four corners, [[x, y, z], …] in mm")?;
-            let found = corners.list("four corners")?;
-            let [a, b, c, d] = &found[..] else {
-                let message = format!("a tetrahedron has four corners, found {}", found.len());
-                return Err(corners.error(message));
-            };
-            RegionSpec::Tetrahedron(TetrahedronSpec {
-                corners: [three(a)?, three(b)?, three(c)?, three(d)?],
-                sharpness: f.read("sharpness", None, |at| at.number().map(Some))?,
-            })
-        }
-        "halfspace" => RegionSpec::HalfSpace(halfspace(at)?),
-        "mesh" => mesh(at)?,
-        "offset" => {
-            let f = at.fields("an offset", &["of", "by"])?;
-            RegionSpec::Offset(OffsetSpec {
-                of: Box::new(region(f.need("of", "the region to grow or shrink")?)?),
-                by: f.need("by", "mm; positive grows")?.number()?,
-            })
-        }
-        _ => {
-            let items = at.list("a list of regions")?;
-            let least = if kind == "difference" { 2 } else { 1 };
-            if items.len() < least {
-                return Err(at.error(format!(
-                    "{kind} needs at least {}, found {}",
-                    counted(least, "region"),
-                    items.len()
-                )));
-            }
-            let items = items.iter().map(region).collect::<Read<Vec<_>>>()?;
-            match kind {
-                "union" => RegionSpec::Union(items),
-                "intersection" => RegionSpec::Intersection(items),
-                _ => RegionSpec::Difference(items),
-            }
-        }
-    })
+fn region(at: &At) -> Read<RegionKind> {
+    RegionKind::read(at)
 }
 
 /// What others call the sides.
@@ -243,56 +182,20 @@ fn opening(at: &At) -> Read<OpenSpec> {
     if at.is_text() {
         return Ok(OpenSpec::Side(at.word_or("side", &SideSpec::ALL, &SIDES)?));
     }
-    Ok(OpenSpec::Plane(halfspace(at)?))
+    Ok(OpenSpec::Plane(HalfSpaceKind::read(at)?))
 }
 
 fn keeps(at: &At) -> Read<Keeps> {
     let mut keeps = Keeps::new();
     for (name, at) in at.entries("regions by name, such as [keep.boss.cylinder]")? {
         // A kind where a name should be.
-        if REGIONS.contains(&name) && region(&at).is_err() {
+        if RegionKind::keys().iter().any(|k| k.name == name) && region(&at).is_err() {
             let message = format!("a name comes first, such as [keep.boss.{name}]: {name} is a kind of region");
             return Err(at.error(message));
         }
         keeps.insert(name.to_string(), region(&at)?);
     }
     Ok(keeps)
-}
-
-fn halfspace(at: &At) -> Read<HalfSpaceSpec> {
-    let f = at.fields("a half-space", &["point", "normal"])?;
-    Ok(HalfSpaceSpec {
-        point: three(f.need("point", "a point on the plane, mm")?)?,
-        normal: three(f.need("normal", "the direction out of the solid")?)?,
-    })
-}
-
-fn cuboid(at: &At) -> Read<BoxSpec> {
-    let f = at.fields("a box", &["size", "center", "min", "max"])?;
-    let corners = ["min", "max"].iter().find_map(|k| f.get(k));
-    let size = ["size", "center"].iter().find_map(|k| f.get(k));
-    match (size, corners) {
-        (Some(_), Some(c)) => Err(c.error("a box has either size and center, or min and max; found both")),
-        (None, Some(_)) => Ok(BoxSpec::Corners(BoxCorners {
-            min: three(f.need("min", "the lower corner, mm")?)?,
-            max: three(f.need("max", "the upper corner, mm")?)?,
-        })),
-        _ => Ok(BoxSpec::Size(BoxSize {
-            size: three(f.need("size", "edge lengths [x, y, z] in mm (or give min and max)")?)?,
-            center: f.read("center", [0.0; 3], three)?,
-        })),
-    }
-}
-
-fn mesh(at: &At) -> Read<RegionSpec> {
-    let f = at.fields("a mesh", &["path", "unit", "scale", "repair"])?;
-    let repairs = [("auto", RepairSpec::Auto), ("refuse", RepairSpec::Refuse)];
-    Ok(RegionSpec::Mesh(MeshSpec {
-        path: f.need("path", "the mesh file, relative to the design file")?.text("a path")?.to_string(),
-        unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
-        scale: f.read("scale", 1.0, At::number)?,
-        repair: f.read("repair", RepairSpec::Auto, |at| at.word("repair", &repairs))?,
-    }))
 }
 
 /// What others call the parts.

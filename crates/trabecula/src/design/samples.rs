@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use super::Loader;
 use super::data::*;
-use super::error::DesignError;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
 use crate::field::Field;
 use crate::grade::{Grade, Samples};
+use crate::kind::DesignError;
 use crate::region::{MeshRegion, Shape as _};
 pub(super) use field::{field, several};
 use geometry::fault::{Fault, counted, number};

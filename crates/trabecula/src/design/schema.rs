@@ -1,17 +1,17 @@
 //! The JSON Schema of a design, generated from the data.
 
 use schemars::{Schema, SchemaGenerator, json_schema};
-use serde_json::Value;
 
 use super::Design;
+use super::bridge;
 use crate::cell::catalogue;
 use crate::cell::tet::ready_cells;
 
-/// The JSON Schema of a design (draft 2020-12).
-pub fn schema() -> Value {
+/// The JSON Schema of a design (draft 2020-12), as text.
+pub fn schema() -> String {
     let mut v = schemars::schema_for!(Design).to_value();
     v["title"] = "A Trabecula design".into();
-    v
+    serde_json::to_string_pretty(&bridge::ordered(bridge::node(&v))).unwrap_or_default() + "\n"
 }
 
 /// A space group's number or symbol.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::data::{OpenSpec, SkinSpec};
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
 use super::place::{LOOKS, Place};
@@ -12,6 +11,7 @@ use super::{Design, Loader, region, sample};
 use crate::csg_tree::CsgSolid;
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use crate::region::{HalfSpace, Intersection, Region};
 use crate::skin::skin;
 use geometry::fault::number;
@@ -23,7 +23,7 @@ pub(super) fn filled(
     space: &Region,
     points: &[Vec3],
     loader: &dyn Loader,
-    notes: &mut region::Notes,
+    notes: &mut crate::region::Notes,
 ) -> Result<(Vec<CsgSolid>, Option<f64>), DesignError> {
     let mut filled = Vec::new();
     let mut thinnest = None;

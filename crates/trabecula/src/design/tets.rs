@@ -6,10 +6,10 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use super::data::*;
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::place::{LOOKS, Place};
 use super::{Loader, Node, Warning, read, region, sample};
+use crate::kind::DesignError;
 use crate::mesher::{self, Fit, background};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
@@ -53,7 +53,7 @@ impl Tets {
         let make = || {
             let (path, spec) = read::tets_in(node, lattice)?;
             let region_spec = read::region_of(node)?;
-            let mut notes = region::Notes::default();
+            let mut notes = crate::region::Notes::default();
             let space = match region::region(&region_spec, "region", loader, &mut notes) {
                 Ok(space) => space,
                 Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
@@ -94,7 +94,7 @@ impl Tets {
 }
 
 /// The tetrahedral mesh that `spec` asks for; `place.path` is that of its table.
-pub(super) fn tets(spec: &TetsSpec, space: &RegionSpec, place: &Place) -> Result<Tets, DesignError> {
+pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, place: &Place) -> Result<Tets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&place.path, f);
     // Points that lie on the surface tell nothing of what is lost.
     let inside: Vec<Vec3> = {
@@ -127,7 +127,7 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionSpec, place: &Place) -> Result
             (mesh, None, checked, file.path.clone())
         }
     };
-    let mut notes = region::Notes::default();
+    let mut notes = crate::region::Notes::default();
     if let TetsSpec::Made(made) = spec {
         mesh.zones = zones(&mesh, made, &place.path, place.loader, &mut notes)?;
     }
@@ -147,7 +147,7 @@ fn zones(
     made: &MadeTetsSpec,
     path: &str,
     loader: &dyn Loader,
-    notes: &mut region::Notes,
+    notes: &mut crate::region::Notes,
 ) -> Result<Vec<u32>, DesignError> {
     if made.zones.is_empty() {
         return Ok(Vec::new());
@@ -159,7 +159,7 @@ fn zones(
     let middles: Vec<Vec3> = mesh.tets.iter().map(middle).collect();
     let mut of: Vec<Option<u32>> = vec![None; middles.len()];
     let numbered = made.zones.iter();
-    let mut numbered: Vec<(u32, &RegionSpec)> = numbered.filter_map(|(n, r)| Some((n.parse().ok()?, r))).collect();
+    let mut numbered: Vec<(u32, &RegionKind)> = numbered.filter_map(|(n, r)| Some((n.parse().ok()?, r))).collect();
     numbered.sort_by_key(|z| z.0);
     for (zone, spec) in numbered {
         let path = format!("{path}.zones.{zone}");
@@ -201,12 +201,12 @@ fn told(
 /// region then.
 pub(super) fn of_soup(
     spec: &TetsSpec,
-    space: &RegionSpec,
+    space: &RegionKind,
     path: &str,
     loader: &dyn Loader,
     why: DesignError,
 ) -> Result<Tets, DesignError> {
-    let (TetsSpec::Made(made), RegionSpec::Mesh(file)) = (spec, space) else {
+    let (TetsSpec::Made(made), RegionKind::Mesh(file)) = (spec, space) else {
         return Err(why);
     };
     let Ok(surface) = triangles(file, loader) else {
@@ -224,7 +224,7 @@ pub(super) fn of_soup(
     };
     let size = Allowed::Positive("size").check(&format!("{path}.size"), size, "")?;
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
-    let mut notes = region::Notes::default();
+    let mut notes = crate::region::Notes::default();
     mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
     let mut told = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
     told.warnings.extend(notes.warnings);

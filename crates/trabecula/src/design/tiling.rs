@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::cell::orbit_terms;
 use super::data::*;
-use super::error::DesignError;
 use super::grade::{Allowed, grade};
 use super::joins::{Joins, joins};
 use super::place::{LOOKS, Place, finite};
@@ -16,6 +15,7 @@ use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{Stencil, ready};
 use crate::cell::{Part, Series, named};
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};

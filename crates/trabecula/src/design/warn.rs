@@ -1,12 +1,12 @@
 //! What a lattice in a region is refused for, and warned of.
 
 use super::data::*;
-use super::error::DesignError;
 use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Warning, map, sample};
 use crate::cell::Distance;
 use crate::field::Field;
+use crate::kind::DesignError;
 use crate::lattice::Lattice;
 use geometry::fault::number;
 

@@ -3,12 +3,52 @@
 use std::sync::Arc;
 
 use super::meshes::{List, Meshes};
-use super::{HalfSpace, MeshRegion, Region, Shape};
+use super::{Build, Context, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
+use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
+
+/// Points in any of the regions.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Union")]
+pub struct UnionKind(#[kind(least = 1)] Vec<RegionKind>);
+
+/// Points in all of the regions.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Intersection")]
+pub struct IntersectionKind(#[kind(least = 1)] Vec<RegionKind>);
+
+/// Points in the first region and in none of the others.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Difference")]
+pub struct DifferenceKind(#[kind(least = 2)] Vec<RegionKind>);
+
+fn each(of: &[RegionKind], context: &mut Context) -> Result<Vec<Region>, Fault> {
+    of.iter().enumerate().map(|(i, r)| context.below(&format!("[{i}]"), |context| r.build(context))).collect()
+}
+
+impl Build for UnionKind {
+    fn build(&self, context: &mut Context) -> Result<Region, Fault> {
+        let of = each(&self.0, context)?;
+        bodies::warn(&of, context);
+        Ok(Arc::new(Union::new(of)?))
+    }
+}
+
+impl Build for IntersectionKind {
+    fn build(&self, context: &mut Context) -> Result<Region, Fault> {
+        Ok(Arc::new(Intersection::new(each(&self.0, context)?)?))
+    }
+}
+
+impl Build for DifferenceKind {
+    fn build(&self, context: &mut Context) -> Result<Region, Fault> {
+        Ok(Arc::new(Difference::new(each(&self.0, context)?)?))
+    }
+}
 
 /// What lies in any of the regions: the least of their distances.
 pub struct Union(List);
@@ -18,14 +58,6 @@ pub struct Intersection(List);
 
 /// What lies in the first region and in none of the others: max(d₀, −d₁, −d₂ …).
 pub struct Difference(List);
-
-/// A region grown (positive) or shrunk (negative): d − by.
-pub struct Offset {
-    of: Region,
-    by: f64,
-    /// Values closer to zero than this are zero, so that a flat face moved to a rounded coordinate stays exact.
-    snap: f64,
-}
 
 fn some(verb: &str, of: Vec<Region>) -> Result<List, Fault> {
     if of.is_empty() {
@@ -52,24 +84,6 @@ impl Difference {
     /// The first region without the others. Errors if the list is empty.
     pub fn new(of: Vec<Region>) -> Result<Self, Fault> {
         some("a difference", of).map(Difference)
-    }
-}
-
-impl Offset {
-    /// The region moved outwards by `by` mm. Errors if `by` is not finite.
-    pub fn new(of: Region, by: f64) -> Result<Self, Fault> {
-        if !by.is_finite() {
-            return Err(Fault::new("by", format!("{by} mm is not a distance: give a finite number")));
-        }
-        let mut planes = Vec::new();
-        (0..3).for_each(|axis| of.planes(axis, &mut planes));
-        // The moved coordinate, the distance and the difference each round once.
-        let snap = planes.iter().fold(0.0f64, |s, c| s.max(4.0 * f64::EPSILON * (c.abs() + by.abs())));
-        Ok(Offset { of, by, snap })
-    }
-
-    fn snapped(&self, v: f64) -> f64 {
-        if v.abs() <= self.snap { 0.0 } else { v }
     }
 }
 
@@ -278,56 +292,11 @@ macro_rules! joined {
 }
 joined!(Union, Intersection, Difference);
 
-impl Field for Offset {
-    fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        self.of.values(points, out);
-        out.iter_mut().for_each(|v| *v = self.snapped(*v - self.by));
-    }
-
-    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        self.of.gradients(points, values, gradients);
-        values.iter_mut().for_each(|v| *v = self.snapped(*v - self.by));
-    }
-
-    fn bound(&self, b: &Aabb) -> Interval {
-        let r = self.of.bound(b);
-        Interval::new(self.snapped(r.lo - self.by), self.snapped(r.hi - self.by))
-    }
-
-    fn fill(&self, block: &Block, out: &mut [f32]) {
-        self.fill_level(block, 0.0, out);
-    }
-}
-
-impl Shape for Offset {
-    fn bounds(&self) -> Aabb {
-        self.of.bounds().grown(self.by)
-    }
-
-    fn level_planes(&self, axis: usize, level: f64, out: &mut Vec<f64>) {
-        self.of.level_planes(axis, self.by + level, out);
-    }
-
-    fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
-        self.of.fill_level(block, self.by + level, out);
-        let snap = self.snap as f32;
-        out.iter_mut().filter(|v| v.abs() <= snap).for_each(|v| *v = 0.0);
-    }
-
-    fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
-        self.of.clone().surfaces(self.by + by, out)
-    }
-
-    fn volume(&self) -> Option<f64> {
-        if self.by == 0.0 { self.of.volume() } else { None }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::region::tests::check_shape;
-    use crate::region::{Cuboid, Cylinder, Sphere};
+    use crate::region::{Cuboid, Cylinder, Offset, Sphere};
     use std::sync::Arc;
 
     fn parts() -> [Region; 3] {

@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 
 use crate::design::data::*;
-use crate::design::error::DesignError;
 use crate::design::grade::{Allowed, grade};
 use crate::design::level::check_varied;
 use crate::design::place::{Place, finite};
 use crate::design::samples;
 use crate::grade::Grade;
+use crate::kind::DesignError;
 use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wireframe};
 use ::beams::quador::Pencil;
 use geometry::fault::{Fault, counted, number};

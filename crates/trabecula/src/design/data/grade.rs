@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{OneOrThree, RegionSpec, is_default};
+use super::{OneOrThree, RegionKind, is_default};
 
 /// A number that may vary in space.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -61,7 +61,7 @@ pub struct SigmoidSpec {
 #[serde(deny_unknown_fields)]
 pub struct WithinSpec {
     /// The region.
-    pub of: Box<RegionSpec>,
+    pub of: Box<RegionKind>,
     /// Width of the step (mm), half of it on either side of the surface.
     pub width: f64,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ControlSpec, FieldSpec, GradeSpec, OneOrThree, RegionSpec, Unit, is_default};
+use super::{ControlSpec, FieldSpec, GradeSpec, OneOrThree, OneOrTwo, RegionKind, Unit, is_default};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -52,7 +52,7 @@ pub struct MadeTetsSpec {
     /// Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius = 5 } } }`;
     /// the first of several counts, and all others are of zone 0.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub zones: BTreeMap<String, RegionSpec>,
+    pub zones: BTreeMap<String, RegionKind>,
     /// How cells are joined.
     #[serde(flatten)]
     pub joined: Joined,
@@ -286,16 +286,6 @@ pub struct SweepSpec {
     /// Which way the first edge points at the start, but for what it has along the line; chosen if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
-}
-
-/// A number, or two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum OneOrTwo {
-    /// The same for both.
-    One(f64),
-    /// One for each.
-    Two([f64; 2]),
 }
 
 /// A number that may vary, or three of them.

@@ -2,7 +2,7 @@
 
 use super::{Read, grade, map, three};
 use crate::design::data::*;
-use crate::design::node::At;
+use crate::kind::At;
 use beams::graph::catalogue;
 use geometry::fault::{counted, number};
 

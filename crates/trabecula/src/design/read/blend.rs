@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::Read;
 use super::grade::grade;
 use crate::design::data::*;
-use crate::design::error::DesignError;
-use crate::design::node::At;
+use crate::kind::At;
+use crate::kind::DesignError;
 use geometry::fault::counted;
 
 /// The blend of lattices with these names.

@@ -2,7 +2,7 @@
 
 use super::{Read, region, three};
 use crate::design::data::*;
-use crate::design::node::{At, Fields, GRADES};
+use crate::kind::{At, Fields, GRADES};
 
 pub(super) fn grade(at: &At) -> Read<GradeSpec> {
     if at.is_number() {

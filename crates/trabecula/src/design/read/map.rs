@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::grade::control;
 use super::{Read, grade, region, three};
 use crate::design::data::*;
-use crate::design::node::{At, Fields};
+use crate::kind::{At, Fields, Kind};
 use geometry::fault::counted;
 
 /// Ways to say how cells are turned, of which one is given.
@@ -88,7 +88,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     if let Some(path) = f.get("path") {
         return Ok(TetsSpec::File(TetFileSpec {
             path: path.text("a path")?.to_string(),
-            unit: f.read("unit", None, |at| at.word("unit", &Unit::ALL).map(Some))?,
+            unit: f.read("unit", None, |at| Unit::read(at).map(Some))?,
             split: f.read("split", false, At::truth)?,
             joined,
         }));
@@ -108,7 +108,7 @@ pub(super) fn tets(at: &At) -> Read<TetsSpec> {
     }))
 }
 
-fn zones(at: &At) -> Read<BTreeMap<String, RegionSpec>> {
+fn zones(at: &At) -> Read<BTreeMap<String, RegionKind>> {
     let of = at.entries("regions by the zone's number, such as { 1 = { sphere = { radius = 5 } } }")?;
     of.into_iter()
         .map(|(zone, at)| match zone.parse::<u32>() {

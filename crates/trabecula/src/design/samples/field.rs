@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::{bytes, extension, percent, pick};
 use crate::design::data::*;
-use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::grade::{Grade, Samples};
+use crate::kind::DesignError;
 use geometry::fault::{Fault, counted, number};
 use geometry::formats::{self, Shape};
 use geometry::math::Aabb;

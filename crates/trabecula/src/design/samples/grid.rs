@@ -2,9 +2,9 @@
 
 use super::{bytes, extension, percent, pick};
 use crate::design::data::*;
-use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::grade::Samples;
+use crate::kind::DesignError;
 use geometry::fault::Fault;
 use geometry::formats::{self, Shape};
 

@@ -2,9 +2,9 @@
 
 use crate::design::Loader;
 use crate::design::data::*;
-use crate::design::error::DesignError;
 use crate::design::place::Place;
 use crate::extract;
+use crate::kind::DesignError;
 use crate::solid::Solid;
 use geometry::fault::{Fault, number};
 use geometry::formats::{self, Elements, Shape};
@@ -18,8 +18,8 @@ const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "Ma
 
 /// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
 /// the region's.
-pub(super) fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Mesh, DesignError> {
-    if let RegionSpec::Mesh(file) = space {
+pub(super) fn surface(space: &RegionKind, place: &Place, size: f64) -> Result<Mesh, DesignError> {
+    if let RegionKind::Mesh(file) = space {
         return triangles(file, place.loader);
     }
     let solid = Solid::new(place.region.clone(), None, size);
@@ -31,7 +31,7 @@ pub(super) fn surface(space: &RegionSpec, place: &Place, size: f64) -> Result<Me
 }
 
 /// The triangles of a file as they are, mm.
-pub(super) fn triangles(file: &MeshSpec, loader: &dyn Loader) -> Result<Mesh, DesignError> {
+pub(super) fn triangles(file: &MeshFile, loader: &dyn Loader) -> Result<Mesh, DesignError> {
     let path = "region.mesh.path";
     let bytes = loader.load(&file.path).map_err(|e| DesignError::new(path, e).found(&file.path))?;
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e);

@@ -3,15 +3,40 @@
 use core::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{
-    HalfSpace, Shape, along, apart, coordinate_axis, direction, fill_rows, finite, flat, joined, joined_gradient,
-    length, one_surface, rounded,
+use super::primitive::{
+    along, apart, coordinate_axis, direction, field, fill_rows, flat, joined, joined_gradient, rounded,
 };
+use super::{Build, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
-use crate::field::Block;
+use crate::field::{Block, Field};
 use crate::implicit::Surface;
+use crate::kind::Kind;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
+
+/// A straight round cylinder.
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Cylinder")]
+pub struct CylinderKind {
+    /// Middle of the lower face.
+    #[kind(unit = "mm")]
+    base: Vec3,
+    /// Radius.
+    #[kind(unit = "mm", above = 0.0)]
+    radius: f64,
+    /// Height along the axis.
+    #[kind(unit = "mm", above = 0.0)]
+    height: f64,
+    /// Direction from the lower to the upper face; its length does not matter.
+    #[kind(default = [0.0, 0.0, 1.0])]
+    axis: Vec3,
+}
+
+impl Build for CylinderKind {
+    fn build(&self, _: &mut Context) -> Result<Region, Fault> {
+        Ok(Arc::new(Cylinder::new(self.base, self.axis, self.radius, self.height)?))
+    }
+}
 
 /// A solid cylinder of circular section with flat caps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +53,8 @@ impl Cylinder {
     /// The cylinder from the middle of its base (mm) along `axis` (any length). Errors if a number is not
     /// finite, the axis is zero, or radius or height is not above zero.
     pub fn new(base: Vec3, axis: Vec3, radius: f64, height: f64) -> Result<Self, Fault> {
-        let (base, axis) = (finite("base", base)?, direction("axis", axis)?);
-        let (radius, height) = (length("radius", radius)?, length("height", height)?);
+        CylinderKind { base, radius, height, axis }.valid()?;
+        let axis = direction("axis", axis)?;
         let aligned = coordinate_axis(axis).map(|a| {
             let (from, to) = (base[a], base[a] + axis[a] * height);
             (a, [from.min(to), from.max(to)])
@@ -186,3 +211,4 @@ impl Barrel {
         fill_rows(block, out, |p| self.distance(p) - level);
     }
 }
+field!(Cylinder, Barrel);

@@ -1,6 +1,7 @@
 //! What can be wrong with a design: the place, what was found, what is allowed, the nearest right word.
 
 use geometry::fault::{Fault, nearest};
+use serde::Serialize;
 
 /// A refused design.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -17,6 +18,15 @@ pub struct DesignError {
     pub message: String,
     /// The nearest right word to a misspelt one.
     pub nearest: Option<String>,
+}
+
+/// Something in a design that is allowed but may be a mistake.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// Path of the key in the design.
+    pub path: String,
+    /// The possible mistake, with the numbers.
+    pub message: String,
 }
 
 impl DesignError {
@@ -38,23 +48,23 @@ impl DesignError {
     }
 
     /// A fault raised below `path`.
-    pub(super) fn fault(path: &str, fault: Fault) -> Self {
+    pub(crate) fn fault(path: &str, fault: Fault) -> Self {
         let at = if fault.at.starts_with('[') || fault.at.is_empty() || path.is_empty() {
             format!("{path}{}", fault.at)
         } else {
             format!("{path}.{}", fault.at)
         };
-        DesignError::new(at, fault.message)
+        DesignError { found: fault.found, ..DesignError::new(at, fault.message) }
     }
 
     /// `word` is none of `allowed`. `what` names the kind of word: key, cell, region …
-    pub(super) fn unknown(path: &str, what: &str, word: &str, allowed: &[&str]) -> Self {
+    pub(crate) fn unknown(path: &str, what: &str, word: &str, allowed: &[&str]) -> Self {
         let nearest = nearest(word, allowed.iter().copied());
         Self::unknown_but(path, what, word, allowed, nearest)
     }
 
     /// The same, the nearest right word known.
-    pub(super) fn unknown_but(path: &str, what: &str, word: &str, allowed: &[&str], nearest: Option<&str>) -> Self {
+    pub(crate) fn unknown_but(path: &str, what: &str, word: &str, allowed: &[&str], nearest: Option<&str>) -> Self {
         let hint = nearest.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
         let stop = if hint.is_empty() { "." } else { "" };
         let mut e =

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{HalfSpace, Shape, along, finite, one_surface, rounded};
+use super::primitive::{along, field, rounded};
+use super::{Build, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
+use crate::field::{Block, Field};
 use crate::implicit::Surface;
+use crate::kind::Kind;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 
@@ -12,6 +15,25 @@ use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub};
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 /// A height of less than this share of the longest edge is none.
 const FLAT: f64 = 1e-6;
+
+/// A tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Tetrahedron")]
+pub struct TetrahedronKind {
+    /// Its four corners, in any order.
+    #[kind(unit = "mm")]
+    corners: [Vec3; 4],
+    /// With it faces are joined by a smooth maximum (LogSumExp) of this sharpness, which draws edges back by ln 2 over it and
+    /// corners by ln 3: smooth, but with gaps between neighbours, so for a single tetrahedron only.
+    #[kind(unit = "per mm", above = 0.0)]
+    sharpness: Option<f64>,
+}
+
+impl Build for TetrahedronKind {
+    fn build(&self, _: &mut Context) -> Result<Region, Fault> {
+        Ok(Arc::new(Tetrahedron::new(self.corners, self.sharpness)?))
+    }
+}
 
 /// A tetrahedron.
 ///
@@ -35,9 +57,7 @@ impl Tetrahedron {
     /// # Errors
     /// A coordinate that is not finite; corners in one plane; a sharpness that is not above zero, or at which nothing is left.
     pub fn new(corners: [Vec3; 4], sharpness: Option<f64>) -> Result<Self, Fault> {
-        for c in corners {
-            finite("corners", c)?;
-        }
+        TetrahedronKind { corners, sharpness }.valid()?;
         let [a, b, c, d] = corners;
         let six = dot(cross(sub(b, a), sub(c, a)), sub(d, a));
         let corners = if six < 0.0 { [a, c, b, d] } else { corners };
@@ -56,7 +76,7 @@ impl Tetrahedron {
             // At the middle of the inscribed ball all distances are −r, and ln(4 exp(−k r)) must be negative.
             let inner = six.abs() / normals.iter().map(|n| norm(*n)).sum::<f64>();
             let least = 4f64.ln() / inner;
-            if !(k.is_finite() && k > least) {
+            if k <= least {
                 let message = format!(
                     "{} is no sharpness (per mm) for this tetrahedron: its inscribed ball has a radius of {} mm, so nothing is left \
                      of it at {} or less; give a finite number well above",
@@ -131,11 +151,12 @@ impl Shape for Tetrahedron {
     }
 }
 
+field!(Tetrahedron);
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::field::Field;
     use crate::region::tests::check_shape;
 
     const CORNERS: [Vec3; 4] = [[-1.0, -0.8, -1.0], [1.2, -0.9, -1.0], [0.1, 1.4, -1.0], [0.2, 0.1, 1.5]];

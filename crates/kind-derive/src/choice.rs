@@ -1,0 +1,227 @@
+//! Enums: one of several kinds.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+use syn::{DataEnum, Error, Fields, Ident, Type, Variant};
+
+use crate::attributes::{Inner, Outer};
+
+/// The one field of a variant.
+fn one(variant: &Variant) -> syn::Result<&Type> {
+    match &variant.fields {
+        Fields::Unnamed(f) if f.unnamed.len() == 1 => Ok(&f.unnamed[0].ty),
+        _ => Err(Error::new_spanned(variant, "a variant has one field here")),
+    }
+}
+
+fn boxed(ty: &Type) -> bool {
+    matches!(ty, Type::Path(p) if p.path.segments.last().is_some_and(|s| s.ident == "Box"))
+}
+
+/// A table named by its kind, or a word.
+pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+    let (mut choices, mut reads, mut writes, mut checks) = (vec![], vec![], vec![], vec![]);
+    let (mut schemas, mut keys, mut members, mut from) = (vec![], vec![], vec![], vec![]);
+    for variant in &data.variants {
+        let (v, inner) = (&variant.ident, Inner::of(&variant.attrs)?);
+        let name = inner.key.clone().unwrap_or_else(|| v.to_string().to_lowercase());
+        let key = inner.describe(&name, true);
+        if matches!(variant.fields, Fields::Unit) {
+            choices.push(quote! { Choice { key: #key, word: true } });
+            reads.push(quote! { #name => Ok(#ident::#v) });
+            writes.push(quote! { #ident::#v => Value::Text(#name.into()).into() });
+            checks.push(quote! { #ident::#v => Ok(()) });
+            schemas.push(quote! { choices.push(word_schema(&#key)); });
+            keys.push(quote! { #ident::#v => #name });
+            continue;
+        }
+        let ty = one(variant)?;
+        choices.push(quote! { Choice { key: #key, word: false } });
+        reads.push(quote! { #name => Kind::read(&at).map(#ident::#v) });
+        from.push(quote! { #name => Kind::read(&at).map(#ident::#v) });
+        writes.push(quote! { #ident::#v(of) => Value::Table(vec![(#name.into(), None, Kind::write(of))]).into() });
+        let limits = if outer.inherit {
+            quote! { key }
+        } else {
+            quote! { &#key }
+        };
+        checks.push(quote! { #ident::#v(of) => Kind::check(of, #limits).map_err(|f| f.under(#name)) });
+        schemas.push(quote! { choices.push(named_schema::<#ty>(#key, defs)); });
+        keys.push(quote! { #ident::#v(_) => #name });
+        members.push(if boxed(ty) {
+            quote! { #ident::#v(of) => &**of }
+        } else {
+            quote! { #ident::#v(of) => of }
+        });
+    }
+    let (name, doc) = (&outer.name, &outer.doc);
+    let noun = outer.noun.clone().unwrap_or_else(|| ident.to_string().to_lowercase());
+    let check = outer.check.iter();
+    let family = outer.family.iter().map(|family| {
+        quote! {
+            impl #ident {
+                /// The key of the kind.
+                pub fn key(&self) -> &'static str {
+                    match self { #(#keys),* }
+                }
+                /// The kind, as one of its family.
+                pub(crate) fn family(&self) -> &dyn #family {
+                    match self { #(#members),* }
+                }
+            }
+        }
+    });
+    let family = quote! { #(#family)* };
+    let table = if from.is_empty() {
+        quote! {}
+    } else {
+        quote! {
+            impl Table for #ident {
+                fn keys() -> Vec<Key> {
+                    CHOICES.iter().filter(|c| !c.word).map(|c| Key { required: false, ..c.key }).collect()
+                }
+                fn from_fields(fields: &Fields) -> Result<Self, DesignError> {
+                    let (key, at) = fields.one_of(#noun, &Self::keys())?;
+                    match key { #(#from,)* _ => Err(at.unknown_kind(#noun, CHOICES)) }
+                }
+                fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
+                    if let Value::Table(entries) = self.write().value {
+                        out.extend(entries);
+                    }
+                }
+                fn open(defs: &mut Defs, out: &mut Open) {
+                    let mut choices = Vec::new();
+                    #(#schemas)*
+                    out.choices(choices);
+                }
+            }
+        }
+    };
+    Ok(quote! {
+        const CHOICES: &[Choice] = &[#(#choices),*];
+        #family
+        #table
+        impl Kind for #ident {
+            const DOC: &'static str = #doc;
+            fn expected() -> String {
+                expected_choice(#noun, CHOICES)
+            }
+            fn fits(node: &Node) -> u8 {
+                fits_choice(node, CHOICES)
+            }
+            fn read(at: &At) -> Result<Self, DesignError> {
+                let (key, at) = at.choice(#noun, CHOICES)?;
+                match key { #(#reads,)* _ => Err(at.unknown_kind(#noun, CHOICES)) }
+            }
+            fn write(&self) -> Node {
+                match self { #(#writes),* }
+            }
+            fn check(&self, key: &Key) -> Result<(), Fault> {
+                match self { #(#checks),* }?;
+                #(#check(self, key)?;)*
+                Ok(())
+            }
+            fn schema(_: &Key, defs: &mut Defs) -> Node {
+                defs.named(#name, |defs| {
+                    let mut choices = Vec::new();
+                    #(#schemas)*
+                    choice_schema(#doc, choices)
+                })
+            }
+        }
+    })
+}
+
+/// The variant follows from the type of the value.
+pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+    let names: Vec<&Ident> = data.variants.iter().map(|v| &v.ident).collect();
+    let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
+    let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
+    let doc = &outer.doc;
+    let check = outer.check.iter();
+    Ok(quote! {
+        impl Kind for #ident {
+            const DOC: &'static str = #doc;
+            fn expected() -> String {
+                [#(<#types as Kind>::expected()),*].join(" or ")
+            }
+            fn fits(node: &Node) -> u8 {
+                0 #(.max(<#types as Kind>::fits(node)))*
+            }
+            fn read(at: &At) -> Result<Self, DesignError> {
+                let best = Self::fits(at.node);
+                #(if best > 0 && <#types as Kind>::fits(at.node) == best {
+                    return Kind::read(at).map(#ident::#names);
+                })*
+                Err(at.expected(&Self::expected()))
+            }
+            fn write(&self) -> Node {
+                match self { #(#ident::#names(of) => Kind::write(of)),* }
+            }
+            fn check(&self, key: &Key) -> Result<(), Fault> {
+                match self { #(#ident::#names(of) => Kind::check(of, key)),* }?;
+                #(#check(self, key)?;)*
+                Ok(())
+            }
+            fn schema(key: &Key, defs: &mut Defs) -> Node {
+                let choices = vec![#(<#types as Kind>::schema(key, defs).described(#docs)),*];
+                any_schema(#doc, choices)
+            }
+        }
+    })
+}
+
+/// The variant follows from the keys that are given.
+pub fn alternatives(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
+    let names: Vec<&Ident> = data.variants.iter().map(|v| &v.ident).collect();
+    let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
+    let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
+    let places = (0..names.len()).collect::<Vec<_>>();
+    let (name, doc, noun) = (&outer.name, &outer.doc, outer.phrase());
+    let check = outer.check.iter();
+    Ok(quote! {
+        impl Table for #ident {
+            fn keys() -> Vec<Key> {
+                union_of_keys(vec![#(<#types as Table>::keys()),*])
+            }
+            fn from_fields(fields: &Fields) -> Result<Self, DesignError> {
+                match fields.alternative(&[#(<#types as Table>::keys()),*])? {
+                    #(#places => Table::from_fields(fields).map(#ident::#names),)*
+                    _ => Err(fields.at.expected(&Self::expected())),
+                }
+            }
+            fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
+                match self { #(#ident::#names(of) => Table::put(of, out)),* }
+            }
+            fn open(defs: &mut Defs, out: &mut Open) {
+                let choices = vec![#(Open::of::<#types>(defs).part(#docs, <#types as Kind>::DOC)),*];
+                out.choices(choices);
+            }
+        }
+        impl Kind for #ident {
+            const DOC: &'static str = #doc;
+            fn expected() -> String {
+                expected_table(#noun, &Self::keys())
+            }
+            fn fits(node: &Node) -> u8 {
+                u8::from(matches!(node.value, Value::Table(_)))
+            }
+            fn read(at: &At) -> Result<Self, DesignError> {
+                Self::from_fields(&at.table(&Self::expected(), Self::keys())?)
+            }
+            fn write(&self) -> Node {
+                let mut out = Vec::new();
+                self.put(&mut out);
+                Value::Table(out).into()
+            }
+            fn check(&self, key: &Key) -> Result<(), Fault> {
+                match self { #(#ident::#names(of) => Kind::check(of, key)),* }?;
+                #(#check(self, key)?;)*
+                Ok(())
+            }
+            fn schema(_: &Key, defs: &mut Defs) -> Node {
+                defs.named(#name, |defs| Open::of::<Self>(defs).closed(#doc))
+            }
+        }
+    })
+}

@@ -1,0 +1,349 @@
+//! The cursor that reads a tree with the path and the line at hand.
+
+use super::Key;
+use super::error::DesignError;
+use super::node::{Node, Value, describe};
+use super::{Choice, Kind};
+use geometry::fault::{counted, nearest};
+
+/// A node and the path that leads to it.
+#[derive(Clone)]
+pub(crate) struct At<'a> {
+    pub node: &'a Node,
+    pub path: String,
+    line: Option<usize>,
+}
+
+impl<'a> At<'a> {
+    pub fn root(node: &'a Node) -> Self {
+        At { node, path: String::new(), line: None }
+    }
+
+    fn below(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_string() } else { format!("{}.{key}", self.path) }
+    }
+
+    /// An error here.
+    pub fn error(&self, message: impl Into<String>) -> DesignError {
+        DesignError {
+            line: self.line.or(self.node.line),
+            found: Some(describe(self.node)),
+            ..DesignError::new(&self.path, message)
+        }
+    }
+
+    /// "expected X, found Y".
+    pub fn expected(&self, what: &str) -> DesignError {
+        let found = describe(self.node);
+        self.error(format!("expected {what}, found {found}"))
+    }
+
+    fn unknown(&self, what: &str, word: &str, allowed: &[&str]) -> DesignError {
+        let line = self.line.or(self.node.line);
+        DesignError { line, ..DesignError::unknown(&self.path, what, word, allowed) }
+    }
+
+    /// The entries of a table with any keys.
+    pub fn entries(&self, what: &str) -> Result<Vec<(&'a str, At<'a>)>, DesignError> {
+        let Value::Table(entries) = &self.node.value else {
+            return Err(self.expected(what));
+        };
+        Ok(entries.iter().map(|(k, line, node)| (k.as_str(), At { node, path: self.below(k), line: *line })).collect())
+    }
+
+    /// The keys of a table, all among `keys`; `what` is what was expected.
+    pub fn table(&self, what: &str, keys: Vec<Key>) -> Result<Fields<'a>, DesignError> {
+        let entries = self.entries(what)?;
+        for (key, at) in &entries {
+            if !keys.iter().any(|k| k.name == *key) {
+                return Err(at.unknown_of("key", key, &keys));
+            }
+        }
+        Ok(Fields { at: self.clone(), entries })
+    }
+
+    /// `word` is none of `keys`; near to a word that others use, the right one is named.
+    fn unknown_of(&self, what: &str, word: &str, keys: &[Key]) -> DesignError {
+        let names: Vec<&str> = keys.iter().map(|k| k.name).collect();
+        let meant = || {
+            let near = nearest(word, keys.iter().flat_map(|k| k.hints.iter().copied()))?;
+            keys.iter().find(|k| k.hints.contains(&near)).map(|k| k.name)
+        };
+        let near = nearest(word, names.iter().copied()).or_else(meant);
+        let line = self.line.or(self.node.line);
+        DesignError { line, ..DesignError::unknown_but(&self.path, what, word, &names, near) }
+    }
+
+    /// The kind that stands here: its key and where its value is. A word is its own value.
+    pub fn choice(&self, noun: &str, choices: &[Choice]) -> Result<(&'static str, At<'a>), DesignError> {
+        let any = |word: bool| choices.iter().filter(move |c| c.word == word).map(|c| c.key).collect::<Vec<Key>>();
+        let known = |name: &str| choices.iter().find(|c| c.key.name == name);
+        let all: Vec<Key> = choices.iter().map(|c| c.key).collect();
+        match &self.node.value {
+            Value::Text(word) if !any(true).is_empty() => match known(word) {
+                Some(c) if c.word => Ok((c.key.name, self.clone())),
+                Some(c) => Err(self.error(format!("{word} needs a value: write {{ {} = … }}", c.key.name))),
+                None => Err(self.unknown_of(noun, word, &all)),
+            },
+            Value::Table(_) if !any(false).is_empty() => {
+                let entries = self.entries(noun)?;
+                for (key, at) in &entries {
+                    match known(key) {
+                        Some(c) if c.word => {
+                            return Err(at.error(format!("{key} is a word without a value: write \"{key}\"")));
+                        }
+                        Some(_) => {}
+                        None => return Err(at.unknown_of(noun, key, &all)),
+                    }
+                }
+                let mut entries = entries.into_iter();
+                match (entries.next(), entries.next()) {
+                    (Some((key, at)), None) => match known(key) {
+                        Some(c) => Ok((c.key.name, at)),
+                        None => Err(at.unknown_of(noun, key, &all)),
+                    },
+                    (Some(a), Some(b)) => {
+                        Err(b.1.error(format!("two kinds of {noun} at once, {} and {}; give exactly one", a.0, b.0)))
+                    }
+                    (None, _) => {
+                        let names = any(false).iter().map(|k| k.name).collect::<Vec<_>>().join(", ");
+                        Err(self.error(format!("a {noun} is missing here; give one of {names}")))
+                    }
+                }
+            }
+            _ => Err(self.expected(&super::expected_choice(noun, choices))),
+        }
+    }
+
+    /// A kind that is none of `choices`.
+    pub fn unknown_kind(&self, noun: &str, choices: &[Choice]) -> DesignError {
+        self.expected(&super::expected_choice(noun, choices))
+    }
+
+    /// Refuses fewer than `least` items.
+    pub fn at_least(&self, found: usize, least: usize) -> Result<(), DesignError> {
+        if found >= least {
+            return Ok(());
+        }
+        let name = self.path.rsplit('.').next().unwrap_or_default();
+        Err(self.error(format!("{name} needs at least {}, found {found}", counted(least, "item"))))
+    }
+
+    /// The entries of a table whose keys are all among `allowed`.
+    pub fn fields(&self, what: &str, allowed: &[&str]) -> Result<Fields<'a>, DesignError> {
+        let what = format!("{what} (a table with {})", allowed.join(", "));
+        let entries = self.entries(&what)?;
+        for (key, at) in &entries {
+            if !allowed.contains(key) {
+                return Err(at.unknown("key", key, allowed));
+            }
+        }
+        Ok(Fields { at: self.clone(), entries })
+    }
+
+    /// The one kind named by a table with one key.
+    pub fn kind(&self, what: &str, allowed: &[&str]) -> Result<(&'a str, At<'a>), DesignError> {
+        let entries = self.entries(&format!("a {what} as a table named by its kind: {}", allowed.join(", ")))?;
+        for (key, at) in &entries {
+            if !allowed.contains(key) {
+                return Err(at.unknown(what, key, allowed));
+            }
+        }
+        let mut entries = entries.into_iter();
+        match (entries.next(), entries.next()) {
+            (Some(one), None) => Ok(one),
+            (None, _) => Err(self.error(format!("a {what} is missing here; give one of {}", allowed.join(", ")))),
+            (Some(a), Some(b)) => {
+                Err(b.1.error(format!("two kinds of {what} at once, {} and {}; give exactly one", a.0, b.0)))
+            }
+        }
+    }
+
+    pub fn text(&self, what: &str) -> Result<&'a str, DesignError> {
+        match &self.node.value {
+            Value::Text(s) => Ok(s),
+            _ => Err(self.expected(what)),
+        }
+    }
+
+    /// One of the words.
+    pub fn word<T: Copy>(&self, what: &str, words: &[(&str, T)]) -> Result<T, DesignError> {
+        self.word_or(what, words, &[])
+    }
+
+    /// One of the words; `meant` are words that others use, each with the one to use here.
+    pub fn word_or<T: Copy>(
+        &self,
+        what: &str,
+        words: &[(&str, T)],
+        meant: &[(&str, &'static str)],
+    ) -> Result<T, DesignError> {
+        let names: Vec<&str> = words.iter().map(|w| w.0).collect();
+        let word = self.text(&format!("one of {}", names.join(", ")))?;
+        if let Some(hit) = words.iter().find(|w| w.0 == word) {
+            return Ok(hit.1);
+        }
+        let near = nearest(word, meant.iter().map(|m| m.0));
+        let near = near.and_then(|n| meant.iter().find(|m| m.0 == n));
+        Err(match (near, nearest(word, names.iter().copied())) {
+            (Some((_, right)), None) => DesignError {
+                line: self.line.or(self.node.line),
+                ..DesignError::unknown_but(&self.path, what, word, &names, Some(*right))
+            },
+            _ => self.unknown(what, word, &names),
+        })
+    }
+
+    pub fn number(&self) -> Result<f64, DesignError> {
+        match &self.node.value {
+            Value::Number(v) => Ok(*v),
+            Value::Whole(v) => Ok(*v as f64),
+            Value::Table(t) if t.first().is_some_and(|e| GRADES.contains(&e.0.as_str())) => {
+                let of_map = [".map.affine.", ".map.spartan."];
+                Err(self.error(match of_map.iter().any(|m| self.path.contains(m)) {
+                    true => {
+                        "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary"
+                    }
+                    false => "this number cannot vary in space; give one number",
+                }))
+            }
+            _ => Err(self.expected("a number")),
+        }
+    }
+
+    pub fn truth(&self) -> Result<bool, DesignError> {
+        match &self.node.value {
+            Value::Bool(b) => Ok(*b),
+            _ => Err(self.expected("true or false")),
+        }
+    }
+
+    pub fn list(&self, what: &str) -> Result<Vec<At<'a>>, DesignError> {
+        let Value::List(items) = &self.node.value else {
+            return Err(self.expected(what));
+        };
+        let item = |(i, node): (usize, &'a Node)| At { node, path: format!("{}[{i}]", self.path), line: node.line };
+        Ok(items.iter().enumerate().map(item).collect())
+    }
+
+    pub fn numbers<const N: usize>(&self, what: &str) -> Result<[f64; N], DesignError> {
+        let items = self.list(what)?;
+        if items.len() != N {
+            let found = counted(items.len(), "value");
+            return Err(self.error(format!("expected {what}, found {found}")));
+        }
+        let mut out = [0.0; N];
+        for (o, item) in out.iter_mut().zip(&items) {
+            *o = item.number()?;
+        }
+        Ok(out)
+    }
+
+    pub fn is_list(&self) -> bool {
+        matches!(self.node.value, Value::List(_))
+    }
+
+    pub fn is_number(&self) -> bool {
+        matches!(self.node.value, Value::Number(_))
+    }
+
+    pub fn is_text(&self) -> bool {
+        matches!(self.node.value, Value::Text(_))
+    }
+}
+
+/// The kinds of grade in this version.
+pub(crate) const GRADES: [&str; 11] =
+    ["linear", "depth", "radial", "formula", "grid", "points", "field", "sigmoid", "region", "distance", "rbf"];
+
+/// A table whose keys are known to be allowed.
+pub(crate) struct Fields<'a> {
+    pub at: At<'a>,
+    entries: Vec<(&'a str, At<'a>)>,
+}
+
+impl<'a> Fields<'a> {
+    pub fn get(&self, key: &str) -> Option<&At<'a>> {
+        self.entries.iter().find(|e| e.0 == key).map(|e| &e.1)
+    }
+
+    pub fn need(&self, key: &str, meaning: &str) -> Result<&At<'a>, DesignError> {
+        self.get(key)
+            .ok_or_else(|| DesignError { found: None, ..self.at.error(format!("\"{key}\" is missing: {meaning}")) })
+    }
+
+    pub fn read<T>(
+        &self,
+        key: &str,
+        default: T,
+        read: impl FnOnce(&At<'a>) -> Result<T, DesignError>,
+    ) -> Result<T, DesignError> {
+        self.get(key).map_or(Ok(default), read)
+    }
+}
+
+impl<'a> Fields<'a> {
+    /// The value of a key, if it is given.
+    pub fn maybe<T: Kind>(&self, key: &str) -> Result<Option<T>, DesignError> {
+        self.get(key).map(|at| T::read(at)).transpose()
+    }
+
+    /// The value of a key that must be given.
+    pub fn required<T: Kind>(&self, key: &Key) -> Result<T, DesignError> {
+        T::read(self.need(key.name, &key.meaning())?)
+    }
+
+    /// The one of `keys` that is given.
+    pub fn one_of(&self, noun: &str, keys: &[Key]) -> Result<(&'static str, At<'a>), DesignError> {
+        let names = || keys.iter().map(|k| k.name).collect::<Vec<_>>().join(", ");
+        let mut given = self.entries.iter().filter_map(|(name, at)| Some((keys.iter().find(|k| k.name == *name)?, at)));
+        match (given.next(), given.next()) {
+            (Some((key, at)), None) => Ok((key.name, at.clone())),
+            (Some((a, _)), Some((b, at))) => {
+                Err(at.error(format!("{} and {} at once; give exactly one of {}", a.name, b.name, names())))
+            }
+            (None, _) => {
+                let message = format!("the {noun} is missing; give exactly one of {}", names());
+                Err(DesignError { found: None, ..self.at.error(message) })
+            }
+        }
+    }
+
+    /// Which of several sets of keys is given: the first of which there is a key that not all have.
+    pub fn alternative(&self, sets: &[Vec<Key>]) -> Result<usize, DesignError> {
+        let has = |set: &[Key], name: &str| set.iter().any(|k| k.name == name);
+        let shared = |name: &str| sets.iter().all(|s| has(s, name));
+        let given = |set: &[Key]| self.entries.iter().find(|(name, _)| has(set, name) && !shared(name)).map(|e| e.0);
+        let own = |set: &[Key]| set.iter().map(|k| k.name).filter(|n| !shared(n)).collect::<Vec<_>>().join(", ");
+        let Some(first) = sets.iter().position(|s| given(s).is_some()) else {
+            // None is: the first required key is missing.
+            let mut needed = sets.iter().flatten().filter(|k| k.required && self.get(k.name).is_none());
+            return match needed.next() {
+                Some(key) => {
+                    let others = sets[1..].iter().map(|s| own(s)).collect::<Vec<_>>().join("; or ");
+                    self.need(key.name, &format!("{} (or give {others})", key.meaning())).map(|_| 0)
+                }
+                None => Ok(0),
+            };
+        };
+        let fits = |set: &[Key]| {
+            given(set).is_some() && self.entries.iter().all(|(name, _)| has(set, name) || !known(sets, name))
+        };
+        if let Some(right) = sets.iter().position(|s| fits(s)) {
+            return Ok(right);
+        }
+        let stray = self.entries.iter().find(|(name, _)| !has(&sets[first], name) && known(sets, name));
+        match (given(&sets[first]), stray) {
+            (Some(a), Some((b, at))) => {
+                let each = sets.iter().map(|s| own(s)).collect::<Vec<_>>().join("; or ");
+                Err(at.error(format!("{a} and {b} at once; give either {each}")))
+            }
+            _ => Ok(first),
+        }
+    }
+}
+
+/// Whether one of the sets has a key of this name.
+fn known(sets: &[Vec<Key>], name: &str) -> bool {
+    sets.iter().flatten().any(|k| k.name == name)
+}
