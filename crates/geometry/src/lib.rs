@@ -11,8 +11,10 @@
 //! - **Signed distance**: [`MeshDistance`] repairs a mesh and gives its exact signed distance, negative inside; the sign is
 //!   that of angle-weighted normals or of winding numbers. [`feature_edges`] finds where the surface turns sharply.
 //! - **Simplification**: [`simplify()`] removes triangles within a proven distance, without self-intersections.
-//! - **Search**: [`Bvh`] is a bounding-volume hierarchy over anything with a box ([`Aabb`]); [`union_find`] joins sets.
-//! - **Symmetry**: [`symmetry`] has the 230 space groups by Hall symbol; [`math`] has vectors, matrices and intervals.
+//! - **Search**: [`Bvh`] is a bounding-volume hierarchy over anything with a box ([`Aabb`]); [`weld`] finds points
+//!   near each other; [`union_find`] joins sets.
+//! - **Symmetry**: [`symmetry`] has the 230 space groups by Hall symbol; [`math`] has vectors, matrices and intervals,
+//!   [`cubic_spline`] tricubic interpolation on grids.
 //! - **Pictures**: [`render`] draws meshes and charts.
 //!
 //! A part with a hole, from its file to a lighter one:
@@ -46,6 +48,7 @@
 //! ```
 
 pub mod bvh;
+pub mod cubic_spline;
 pub mod distance;
 pub mod fault;
 pub mod feature_edges;
@@ -63,6 +66,7 @@ pub mod symmetry;
 pub mod tetmesh;
 pub mod union_find;
 pub mod voxels;
+pub mod weld;
 
 pub use bvh::Bvh;
 pub use distance::MeshDistance;

@@ -1,8 +1,7 @@
 //! Triangle meshes: indexed, in f64, counter-clockwise seen from outside.
 
-use std::collections::HashMap;
-
 use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
+use crate::weld::PointHash;
 
 mod edge_counts;
 pub mod exact;
@@ -97,30 +96,21 @@ impl Mesh {
         if !(tolerance > 0.0 && tolerance.is_finite()) {
             return self.clone();
         }
-        let cell = 4.0 * tolerance;
-        let index = |x: f64| (x / cell).floor() as i64;
-        let mut kept: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(self.vertices.len());
+        let mut kept = PointHash::new(tolerance);
         let mut vertices: Vec<Vec3> = Vec::with_capacity(self.vertices.len());
         let mut to = Vec::with_capacity(self.vertices.len());
         for &p in &self.vertices {
-            let lo = p.map(|x| index(x - tolerance));
-            let hi = p.map(|x| index(x + tolerance));
-            let cells = (lo[0]..=hi[0])
-                .flat_map(|x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])));
-            let near = cells
-                .filter_map(|c| kept.get(&c))
-                .flatten()
-                .filter(|&&v| norm(sub(vertices[v as usize], p)) <= tolerance)
-                .min();
-            to.push(match near {
-                Some(&v) => v,
-                None => {
-                    let v = vertices.len() as u32;
-                    kept.entry(p.map(index)).or_default().push(v);
-                    vertices.push(p);
-                    v
+            let mut first = vertices.len() as u32;
+            kept.near(p, |v| {
+                if v < first && norm(sub(vertices[v as usize], p)) <= tolerance {
+                    first = v;
                 }
             });
+            if first as usize == vertices.len() {
+                kept.insert(p, first);
+                vertices.push(p);
+            }
+            to.push(first);
         }
         let moved = self.triangles.iter().map(|t| t.map(|v| to[v as usize]));
         let triangles = moved.filter(|[a, b, c]| a != b && b != c && c != a).collect();

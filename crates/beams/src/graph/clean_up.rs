@@ -1,11 +1,12 @@
 //! Clean-up of a wireframe: coincident nodes are merged; zero-length, duplicate and isolated parts are removed and
 //! counted.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::wireframe::{Incidence, Wireframe};
 use geometry::math::{Vec3, norm, sub};
-use geometry::union_find::{find, unite};
+use geometry::union_find::{find, singles, unite};
+use geometry::weld::PointHash;
 
 /// Counts of a clean-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,30 +83,15 @@ impl Wireframe {
 
     /// For each node the lowest-numbered node that it is merged into.
     fn merged(&self, within: f64) -> Vec<u32> {
-        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        // Nodes within the distance lie in the same or adjacent cubes.
-        let edge = (4.0 * within).max(f64::MIN_POSITIVE);
-        let cube = |p: Vec3| p.map(|v| (v / edge).floor());
-        let mut cubes: HashMap<[u64; 3], Vec<u32>> = HashMap::with_capacity(self.nodes.len());
-        let key = |c: Vec3| c.map(|v| (v + 0.0).to_bits());
-        for (n, p) in self.nodes.iter().enumerate() {
-            let (low, high) = (cube(p.map(|v| v - within)), cube(p.map(|v| v + within)));
-            let axis = |a: usize| {
-                if low[a] == high[a] { vec![low[a]] } else { vec![low[a], high[a]] }
-            };
-            for x in axis(0) {
-                for y in axis(1) {
-                    for z in axis(2) {
-                        let near = cubes.get(&key([x, y, z])).into_iter().flatten();
-                        for other in near {
-                            if norm(sub(self.nodes[*other as usize], *p)) <= within {
-                                unite(&mut root, n as u32, *other);
-                            }
-                        }
-                    }
+        let mut root = singles(self.nodes.len());
+        let mut earlier = PointHash::new(within);
+        for (n, p) in (0..).zip(&self.nodes) {
+            earlier.near(*p, |other| {
+                if norm(sub(self.nodes[other as usize], *p)) <= within {
+                    unite(&mut root, n, other);
                 }
-            }
-            cubes.entry(key(cube(*p))).or_default().push(n as u32);
+            });
+            earlier.insert(*p, n);
         }
         (0..root.len() as u32).map(|n| find(&mut root, n)).collect()
     }

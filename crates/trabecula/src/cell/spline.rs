@@ -1,12 +1,12 @@
 //! Tricubic B-splines on the torus: a function given at the nodes of a grid, with two continuous derivatives and a
 //! value that costs 64 multiplications.
 //!
-//! The coefficients are those of cardinal spline interpolation, found by a recursive filter along each axis in turn
-//! (Unser, Aldroubi and Eden, B-spline signal processing, IEEE Trans. Signal Process. 41, 1993). They are kept in f32:
-//! the spline is what they say it is, in whatever precision it is evaluated.
+//! The coefficients of the interpolating spline are kept in f32: they define the function, in whatever precision it is
+//! evaluated.
 
 use multiversion::multiversion;
 
+use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
 use geometry::math::{Interval, Mat3, Vec3, apply, norm, transpose};
 
 /// Nodes that a knot interval sees beyond its own.
@@ -26,22 +26,9 @@ pub(super) struct Spline {
 
 impl Spline {
     /// The spline that has `values` (x fastest) at the nodes k / shape.
-    pub(super) fn through(mut values: Vec<f64>, shape: [usize; 3]) -> Spline {
-        let [nx, ny, nz] = shape;
-        for (axis, step) in [(0, 1), (1, nx), (2, nx * ny)] {
-            let mut line = vec![0.0; shape[axis]];
-            for first in 0..nx * ny * nz {
-                if first / step % shape[axis] == 0 {
-                    for (k, v) in line.iter_mut().enumerate() {
-                        *v = values[first + k * step];
-                    }
-                    prefilter(&mut line);
-                    for (k, v) in line.iter().enumerate() {
-                        values[first + k * step] = *v;
-                    }
-                }
-            }
-        }
+    pub(super) fn through(values: Vec<f64>, shape: [usize; 3]) -> Spline {
+        let [nx, ny, _] = shape;
+        let values = coefficients(values, shape, Boundary::Periodic);
         Spline::from_coefficients(|[i, j, k]| values[(k * ny + j) * nx + i], shape)
     }
 
@@ -224,39 +211,6 @@ fn bernstein(block: &mut [f64; 64]) {
 fn along(row: &[f32], w: &[f64; 4]) -> f64 {
     let c = |i: usize| f64::from(row[i]);
     (c(0) * w[0] + c(1) * w[1]) + (c(2) * w[2] + c(3) * w[3])
-}
-
-/// The four cubic B-splines at place t of an interval.
-#[inline]
-fn weights(t: f64) -> [f64; 4] {
-    let r = 1.0 - t;
-    [r * r * r / 6.0, (t * t * (3.0 * t - 6.0) + 4.0) / 6.0, (r * r * (3.0 * r - 6.0) + 4.0) / 6.0, t * t * t / 6.0]
-}
-
-/// Their derivatives.
-#[inline]
-fn slopes(t: f64) -> [f64; 4] {
-    let r = 1.0 - t;
-    [-0.5 * r * r, t * (1.5 * t - 2.0), -r * (1.5 * r - 2.0), 0.5 * t * t]
-}
-
-/// Values on a circle of nodes to the coefficients of the cubic spline through them: (c₋ + 4 c + c₊) / 6 = v.
-fn prefilter(line: &mut [f64]) {
-    let n = line.len();
-    let pole = 3f64.sqrt() - 2.0;
-    // The sums over the whole circle; 0.268⁴⁸ is below rounding.
-    let far = 48;
-    let start =
-        |line: &[f64], at: &dyn Fn(usize) -> usize| (0..far).rev().fold(0.0, |sum, m| sum * pole + line[at(m) % n]);
-    line[0] = start(line, &|m| n * far - m);
-    for k in 1..n {
-        line[k] += pole * line[k - 1];
-    }
-    line[n - 1] = -pole * start(line, &|m| n - 1 + m);
-    for k in (0..n - 1).rev() {
-        line[k] = pole * (line[k + 1] - line[k]);
-    }
-    line.iter_mut().for_each(|v| *v *= 6.0);
 }
 
 /// A row along x sees the same y and z throughout: the spline becomes one of x alone.

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::grid::Grid;
 use crate::field::Block;
+use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
 use geometry::math::{Aabb, Mat3, Vec3};
 
 /// Fewest nodes along an axis.
@@ -41,7 +42,8 @@ impl Spline {
         let shape = grid.shape.map(|n| n + 2);
         let coefficients = {
             let [a, b, c] = values;
-            let made: Vec<Vec<f64>> = [a, b, c].into_par_iter().map(|v| coefficients(v, grid.shape)).collect();
+            let made: Vec<Vec<f64>> =
+                [a, b, c].into_par_iter().map(|v| coefficients(v, grid.shape, Boundary::NotAKnot)).collect();
             let mut made = made.into_iter();
             core::array::from_fn(|_| made.next().unwrap_or_default())
         };
@@ -324,20 +326,6 @@ fn along(row: &[f64], w: &[f64; 4]) -> f64 {
     row[0] * w[0] + row[1] * w[1] + row[2] * w[2] + row[3] * w[3]
 }
 
-/// The weights of four coefficients in the value at the share t of an interval.
-#[inline]
-fn weights(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [s * s * s / 6.0, (4.0 + t * t * (3.0 * t - 6.0)) / 6.0, (4.0 + s * s * (3.0 * s - 6.0)) / 6.0, t * t * t / 6.0]
-}
-
-/// The derivatives of `weights`.
-#[inline]
-fn slopes(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, s * (4.0 - 3.0 * s) / 2.0, t * t / 2.0]
-}
-
 /// A bound of the spectral norm, at most a seventh above it: λ of the greatest of M Mᵀ, to the eighth, is at most the sum
 /// of all.
 fn longest(m: &Mat3) -> f64 {
@@ -348,57 +336,6 @@ fn longest(m: &Mat3) -> f64 {
     // tr (A⁴)² = Σ aᵢⱼ², A = M Mᵀ; the eighth root for A, half of it for M.
     let trace: f64 = a.as_flattened().iter().map(|v| v * v).sum();
     trace.powf(1.0 / 16.0)
-}
-
-/// The coefficients of the spline through `values` (x fastest).
-fn coefficients(values: Vec<f64>, shape: [usize; 3]) -> Vec<f64> {
-    let (mut from, mut shape) = (values, shape);
-    for axis in 0..3 {
-        let inner: usize = shape[..axis].iter().product();
-        let (n, outer) = (shape[axis], shape[axis + 1..].iter().product::<usize>());
-        let mut to = vec![0.0; inner * (n + 2) * outer];
-        for (from, to) in from.chunks(inner * n).zip(to.chunks_mut(inner * (n + 2))) {
-            prefilter(from, to, n, inner);
-        }
-        from = to;
-        shape[axis] += 2;
-    }
-    from
-}
-
-/// Finds n + 2 coefficients along an axis, for `inner` lines side by side: (c₋ + 4c + c₊)/6 is the value, and the third
-/// derivative has no jump at the nodes beside the ends.
-fn prefilter(from: &[f64], to: &mut [f64], n: usize, inner: usize) {
-    let f = |i: usize, x: usize| from[i * inner + x];
-    // Coefficient i stands at entry i + 1.
-    let at = |i: usize| (i + 1) * inner;
-    for x in 0..inner {
-        // Known outright: what no knot there amounts to.
-        to[at(1) + x] = (8.0 * f(1, x) - f(0, x) - f(2, x)) / 6.0;
-        let m = n - 2;
-        to[at(m) + x] = (8.0 * f(m, x) - f(m - 1, x) - f(m + 1, x)) / 6.0;
-    }
-    // Between them, elimination and the way back.
-    let mut factor = vec![0.0; n];
-    for i in 2..n - 2 {
-        factor[i] = 1.0 / (4.0 - factor[i - 1]);
-        for x in 0..inner {
-            to[at(i) + x] = (6.0 * f(i, x) - to[at(i - 1) + x]) * factor[i];
-        }
-    }
-    for i in (2..n - 2).rev() {
-        for x in 0..inner {
-            to[at(i) + x] -= factor[i] * to[at(i + 1) + x];
-        }
-    }
-    for x in 0..inner {
-        let c = |to: &[f64], i: usize| to[at(i) + x];
-        to[at(0) + x] = 6.0 * f(1, x) - 4.0 * c(to, 1) - c(to, 2);
-        to[x] = 6.0 * f(0, x) - 4.0 * c(to, 0) - c(to, 1);
-        let l = n - 1;
-        to[at(l) + x] = 6.0 * f(l - 1, x) - 4.0 * c(to, l - 1) - c(to, l - 2);
-        to[at(n) + x] = 6.0 * f(l, x) - 4.0 * c(to, l) - c(to, l - 1);
-    }
 }
 
 #[cfg(test)]
