@@ -9,7 +9,19 @@ from typing import Literal
 
 from .given import settings
 
-__all__ = ["box", "cylinder", "difference", "halfspace", "intersection", "mesh", "offset", "sphere", "tetrahedron", "union"]
+__all__ = [
+    "box",
+    "capsule",
+    "cylinder",
+    "difference",
+    "halfspace",
+    "intersection",
+    "mesh",
+    "offset",
+    "sphere",
+    "tetrahedron",
+    "union",
+]
 
 
 def box(
@@ -47,6 +59,16 @@ def sphere(radius: float, center: Sequence[float] | None = None) -> dict:
     center: Centre. [mm, default [0.0, 0.0, 0.0]]
     """
     return {"sphere": settings(radius=radius, center=center)}
+
+
+def capsule(start: Sequence[float], end: Sequence[float], radius: float) -> dict:
+    """A capsule: all points within a distance of a straight segment.
+
+    start: One end of the segment, the centre of a hemisphere. [mm]
+    end: The other end of the segment. [mm]
+    radius: Radius. [mm, above 0]
+    """
+    return {"capsule": settings(start=start, end=end, radius=radius)}
 
 
 def tetrahedron(corners: Sequence[Sequence[float]], sharpness: float | None = None) -> dict:

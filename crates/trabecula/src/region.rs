@@ -11,6 +11,7 @@ use geometry::math::Aabb;
 use geometry::repair::Repaired;
 
 mod bodies;
+mod capsule;
 mod csg;
 mod cuboid;
 mod cylinder;
@@ -41,6 +42,7 @@ pub enum RegionKind {
     Box(cuboid::BoxKind),
     Cylinder(cylinder::CylinderKind),
     Sphere(Sphere),
+    Capsule(capsule::Capsule),
     Tetrahedron(tetrahedron::TetrahedronKind),
     HalfSpace(HalfSpaceKind),
     Mesh(MeshFile),
