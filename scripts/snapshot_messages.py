@@ -26,7 +26,7 @@ def main(wanted):
             if not block.startswith('["'):
                 out.append(block)
                 continue
-            name, row = next(iter(tomllib.loads(block).items()))
+            (row,) = tomllib.loads(block).values()
             given = {k: v for k, v in row.items() if k not in SAID}
             with tempfile.TemporaryDirectory() as folder:
                 os.chdir(folder)

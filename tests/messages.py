@@ -1,11 +1,12 @@
 """Rows of corpus/errors: designs and commands that are wrong in one way, and what is said of each.
 
-A row is a table named by what is wrong. Its design is the good one below with other pieces (`region = ...`; an empty text leaves
-a piece out), or a whole text (`design`, `json`, `bytes` in hexadecimal). `run` is done with the solid that it builds, `python` instead of
-building it, `command` is a command line. `files` stand beside it as written, and of `MADE` those that the row names.
+A row is a table named by what is wrong. Its design is the good one below with other pieces (`region = ...`; an empty text
+leaves a piece out), or a whole text (`design`, `json`, `bytes` in hexadecimal). `run` is evaluated with the solid that it
+builds, `python` instead of building it, `command` is a command line. `files` are written into its folder, and of `MADE` those
+that the row names.
 
-What is said stands after that: `error` (line of the file, path of the key: sentence), `warnings`, and for a command its `status`
-and what it writes on stderr (`says`). `scripts/snapshot_messages.py` writes these four.
+The expected texts come last: `error` (line of the file, path of the key: sentence), `warnings`, and for a command its `status`
+and its stderr (`says`). `scripts/snapshot_messages.py` writes these four.
 """
 
 import contextlib
@@ -86,7 +87,7 @@ def two(first, second):
 def grid_mesh(n, missing=()):
     """A cube whose faces are n by n squares, with some triangles missing."""
     index, vertices, triangles = {}, [], []
-    for a, b, c, d in QUADS:
+    for a, b, _, d in QUADS:
         p, u, v = (np.array(CORNERS[i], float) for i in (a, b, d))
         at = lambda i, j: tuple(p + (u - p) * i / n + (v - p) * j / n)  # noqa: B023, E731
         for i in range(n):
@@ -274,10 +275,10 @@ def said(row):
         names = {"lt": lt, "np": np}
         try:
             if "python" in row:
-                eval(row["python"], names)  # noqa: S307  our own rows
+                eval(row["python"], names)
             else:
                 names["solid"] = lt.load(name).build()
-                eval(row.get("run", "None"), names)  # noqa: S307
+                eval(row.get("run", "None"), names)
         except (lt.DesignError, ValueError, TypeError, OSError) as error:
             kind = "" if isinstance(error, (lt.DesignError)) else type(error).__name__ + ": "
             found["error"] = kind + plain(str(error), name)

@@ -434,7 +434,7 @@ def test_a_stream_is_the_mesh(tmp_path, fillet):
     mesh, path = solid.mesh(chord=0.05), tmp_path / "beams.stl"
     told_of = solid.save_stl(path, chord=0.05)
     for key in ("triangles", "volume", "area", "euler", "pieces", "cavities"):
-        assert told_of[key] == pytest.approx(mesh._summary()[key], rel=1e-11), key
+        assert told_of[key] == pytest.approx(mesh.summary()[key], rel=1e-11), key
     assert told_of["chord_error"] == mesh.chord_error
     read = lt.Mesh.read(path)
     assert read.counts[1] == mesh.counts[1] and read.defects == [] and read.pieces == 1

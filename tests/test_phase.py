@@ -88,7 +88,7 @@ def test_the_distortion_is_seen_and_had_by_the_point():
     solid = design(lt.map.phase(wavelength=3, rotate_z=turn)).build()
     d = solid.report()["lattices"]["core"]["distortion"]
     mesh = solid.mesh(per_cell=16)
-    found = solid.misfits(mesh.vertices)
+    found = solid.map_error(mesh.vertices)
     # Points between nodes are not far beyond what the nodes have.
     assert found["angle"].max() < 1.2 * max(a["max"] for a in d["angle"])
     assert found["angle"].max() > 0.8 * max(a["max"] for a in d["angle"])
@@ -102,7 +102,7 @@ def test_the_distortion_is_seen_and_had_by_the_point():
         mesh.png(color=found["angle"], span=(2, 1))
     still = design(lt.map.affine(wavelength=3)).build()
     with pytest.raises(ValueError, match="solved for"):
-        still.misfits(mesh.vertices)
+        still.map_error(mesh.vertices)
 
 
 def test_cells_follow_a_line_and_folds_are_refused(tmp_path):

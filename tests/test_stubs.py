@@ -1,6 +1,8 @@
 """The type stubs say what the compiled module has."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import trabecula
@@ -42,3 +44,10 @@ def test_public_names():
     for name in trabecula.__all__:
         thing = getattr(trabecula, name)
         assert name == "__version__" or thing.__doc__, name
+
+
+def test_report_classes_are_those_of_the_core():
+    """python/trabecula/reports.py is what scripts/report_classes.py makes."""
+    script = Path(__file__).parent.parent / "scripts" / "report_classes.py"
+    done = subprocess.run([sys.executable, str(script), "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, f"run {script}\n{done.stderr}"

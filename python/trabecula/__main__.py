@@ -2,12 +2,12 @@
 
 import sys
 
-from . import interrupt
+from . import terminal
 
 
 def main() -> int:
     """Runs the command; gives its exit status."""
-    interrupt.at_once()
+    terminal.interrupts_leave()
     from .cli import main as run
 
     return run()

@@ -1,4 +1,4 @@
-"""The design: what a file says, as frozen data, and its road to a solid."""
+"""The design: what a file says, as frozen data, and how it becomes a solid."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from .errors import DesignError, DesignWarning
+from .files import extension, read_text, whole_file
 from .given import copied, settings, three
-from .input import read_text
-from .output import extension, whole_file
 
 if TYPE_CHECKING:
     from .solid import Solid
@@ -26,7 +25,7 @@ __all__ = ["Beams", "Design", "Lattice", "load", "skin", "spartan"]
 
 @dataclass(frozen=True)
 class Lattice:
-    """A cell seen through a map, cut by a part at a level.
+    """A lattice: cell, map from position to phase, part, and level.
 
     ``cell`` and ``map`` and ``level`` come from the builders of those names; ``part`` is "sheet" (|f| ≤ t), "lower"
     (f ≤ t) or "upper" (f ≥ t).
@@ -93,7 +92,7 @@ class Design:
     ``region`` comes from the builders of that name; ``lattice`` is {name: Lattice}, or one Lattice (named ``core``); several
     need a ``blend``, from the builders of that name, that says where each is. ``beams``, instead of a lattice, is
     {name: Beams}, or one Beams (named ``core``).
-    ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid as far as the region goes.
+    ``skin`` comes from the builder of that name; ``keep`` is {name: region}, kept fully solid within the region.
     Nothing is checked before ``build``, the last line that can raise.
     """
 
@@ -144,7 +143,7 @@ class Design:
     def build(self) -> Solid:
         """The solid.
 
-        Raises DesignError for anything wrong, and warns (DesignWarning) of what may not be meant, such as a fraction
+        Raises DesignError for anything wrong, and warns (DesignWarning) of possible mistakes, such as a fraction
         at which the network falls apart.
         """
         from .solid import Solid
@@ -154,6 +153,11 @@ class Design:
         for warning in made.warnings:
             warnings.warn(f"{warning['path']}: {warning['message']}", DesignWarning, stacklevel=2)
         return made
+
+    def files(self) -> list[str]:
+        """The files that the design reads, as absolute paths."""
+        folder = self.folder or os.getcwd()
+        return [os.path.join(folder, name) for name in _files(self.to_dict())]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the design as TOML, or as JSON if the name ends so. Relative paths of files are kept right.
@@ -229,16 +233,21 @@ def spartan(
     return Design(region=box, lattice={name: lattice})
 
 
+def _files(data: Any) -> list[str]:
+    """The files that plain data names: what stands under ``path``, or as a table of beams."""
+    if isinstance(data, dict):
+        own = [data[key] for key in PATHS if isinstance(data.get(key), str)]
+        return own + [name for item in data.values() for name in _files(item)]
+    return [name for item in data for name in _files(item)] if isinstance(data, list) else []
+
+
 def _moved(data: Any, turn: Callable[[str], str]) -> Any:
     """The data with every relative path of a file turned: what stands under ``path``, or as a table of beams."""
     if isinstance(data, list):
         return [_moved(item, turn) for item in data]
     if not isinstance(data, dict):
         return data
-    return {
-        key: turn(item) if key in PATHS and isinstance(item, str) and not os.path.isabs(item) else _moved(item, turn)
-        for key, item in data.items()
-    }
+    return {key: turn(item) if key in PATHS and isinstance(item, str) else _moved(item, turn) for key, item in data.items()}
 
 
 def _relative(path: str, folder: str) -> str:

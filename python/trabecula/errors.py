@@ -1,8 +1,8 @@
-"""What can go wrong with a design, and what may not be meant."""
+"""Errors and warnings."""
 
 from __future__ import annotations
 
-__all__ = ["DesignError", "DesignWarning", "Refused"]
+__all__ = ["DesignError", "DesignWarning", "IslandsWarning", "Refused"]
 
 
 class DesignError(ValueError):
@@ -34,7 +34,11 @@ class DesignError(ValueError):
 
 
 class DesignWarning(UserWarning):
-    """Something in a design that is allowed but may not be meant."""
+    """A possible mistake in the design: allowed, but perhaps not meant."""
+
+
+class IslandsWarning(DesignWarning):
+    """A result in several connected components."""
 
 
 class Refused(Exception):

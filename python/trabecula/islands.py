@@ -1,16 +1,18 @@
-"""Pieces beside the largest: what is to become of them, and what is said of them."""
+"""Connected components other than the largest: keep, drop or refuse them, and the warning."""
 
 from __future__ import annotations
 
 import warnings
 
-from .errors import DesignWarning
+from .errors import IslandsWarning
 
 __all__ = ["check_islands", "left_out", "warn_islands"]
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Literal
+
+    from .reports import IslandsReport
 
     Islands = Literal["keep", "drop", "error"]
 
@@ -21,12 +23,13 @@ def check_islands(islands: object) -> None:
         raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
 
 
-def left_out(islands: dict) -> float:
+def left_out(islands: IslandsReport) -> float:
     """Volume of what was dropped, mm³."""
-    return islands["volume"] if islands["dropped"] else 0.0
+    return islands.volume if islands.dropped else 0.0
 
 
-def warn_islands(islands: dict, words: str) -> None:
+def warn_islands(islands: IslandsReport, words: str) -> None:
     """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
-    if islands["found"] > islands["dropped"]:
-        warnings.warn(f'the result is not in one piece: {words}; islands = "drop" leaves them out', DesignWarning, stacklevel=3)
+    if islands.found > islands.dropped:
+        message = f'the result is not in one piece: {words}; islands = "drop" leaves them out'
+        warnings.warn(message, IslandsWarning, stacklevel=3)

@@ -6,7 +6,7 @@ import math
 import os
 
 from . import _core
-from .output import check_place, special
+from .files import check_place, special
 
 __all__ = ["file_size", "fits"]
 
@@ -59,7 +59,8 @@ def fits(
         request = f"{word} {edge:g} mm"
         advice = f"; try {word} {_up(better):g} mm"
         if _up(better) > coarsest:
-            advice = f"; no {word} that would be of use needs little enough, so ask for less of the part, or another place"
+            place = " or another disk" if path else ""
+            advice = f"; even the coarsest useful {word} needs more: take a smaller part{place}"
     raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
 
 

@@ -129,7 +129,7 @@ def tets(
     unit: str | None = None,
     split: bool | None = None,
     overlap: float | None = None,
-    road: str | None = None,
+    method: str | None = None,
 ) -> dict:
     """A cell in each tetrahedron of a mesh of the region, made or read.
 
@@ -139,10 +139,10 @@ def tets(
     ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …),
     ``unit`` of its coordinates, ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
 
-    ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``road`` is "explicit", in each
+    ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``method`` is "explicit", in each
     tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
     """
-    given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, road=road)
+    given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, method=method)
     if zones is not None:
         given["zones"] = {str(zone): region for zone, region in zones.items()}
     return {"tets": given}

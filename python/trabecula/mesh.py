@@ -7,9 +7,9 @@ import os
 from functools import cached_property
 
 from . import _core
+from .files import extension, read_text, whole_file
 from .given import number, positive, whole
 from .machine import file_size, fits
-from .output import extension, whole_file
 from .thickness import Thickness
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -20,25 +20,20 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .reports import (
+        IslandsReport,
+        MeshReport,
+        QualityReport,
+        SimplifyReport,
+        SpecificSurface,
+        SurfaceReport,
+        VoidReport,
+    )
+    from .solid import Solid
+
 __all__ = ["READS", "WRITES", "Mesh"]
 
 WRITES = ("stl", "3mf", "ply", "obj")
-FIGURES = (
-    "volume",
-    "area",
-    "area_lattice",
-    "area_cut",
-    "solid_fraction",
-    "porosity",
-    "euler",
-    "pieces",
-    "cavities",
-    "voids",
-    "closed",
-    "bounds",
-    "specific_surface",
-    "hydraulic_diameter",
-)
 #: Pairs of triangles after which self-intersections are counted no further.
 MANY = 1_000_000
 READS = ("stl", "3mf", "ply", "obj", "off")
@@ -78,7 +73,7 @@ class Mesh(Picture):
         core: _core.Mesh,
         region: _core.Region | None = None,
         edge: float | None = None,
-        islands: dict | None = None,
+        islands: IslandsReport | None = None,
         chord_error: float | None = None,
     ):
         if not isinstance(core, _core.Mesh):
@@ -88,7 +83,7 @@ class Mesh(Picture):
         self._edge = edge
         self._islands = islands
         self._chord_error = chord_error
-        self._simplification: dict | None = None
+        self._simplification: SimplifyReport | None = None
 
     @staticmethod
     def of(vertices: ArrayLike, triangles: ArrayLike) -> Mesh:
@@ -154,23 +149,32 @@ class Mesh(Picture):
         return self._core.cut
 
     @cached_property
-    def _figures(self) -> dict:
-        return self._core.measure()
-
-    def measure(self) -> dict:
-        """Every figure: volume, area, area_lattice, area_cut, solid_fraction, porosity, euler, pieces, cavities,
-        voids, closed, bounds, specific_surface, hydraulic_diameter. Those that need a region are None for a mesh without one.
-        """
-        figures = dict(self._figures)
-        share = self.solid_fraction
-        figures |= {"solid_fraction": share, "porosity": None if share is None else 1 - share}
-        figures |= {"specific_surface": self.specific_surface, "hydraulic_diameter": self.hydraulic_diameter}
-        figures["voids"] = self.voids
-        return {k: figures[k] for k in FIGURES}
+    def _size(self) -> MeshReport:
+        """The figures that need no region."""
+        return self._core.measure(None)
 
     @cached_property
+    def _measures(self) -> MeshReport:
+        return self._size if self._region_volume is None else self._core.measure(self._region_volume)
+
+    def measure(self) -> MeshReport:
+        """All figures: volume, areas, Euler number, connected components, cavities, closedness, bounds; with a region also
+        solid fraction, porosity and hydraulic diameter, else None.
+        """
+        return self._measures
+
+    def summary(self) -> SurfaceReport:
+        """The figures that a streamed surface has too (``Solid.save_stl``)."""
+        from .reports import SurfaceReport
+
+        keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")
+        figures = {"triangles": self.counts[1], **{k: self._size[k] for k in keys}}
+        figures["islands"] = None if self._islands is None else self._islands.to_dict()
+        return SurfaceReport(figures | ({} if self._chord_error is None else {"chord_error": self._chord_error}))
+
+    @property
     def solid_fraction(self) -> float | None:
-        """Volume of the solid over volume of its region; None for a mesh without a region."""
+        """Volume of the solid over volume of its region, 0 to 1; None for a mesh without a region."""
         return None if self._region_volume is None else self.volume / self._region_volume
 
     @cached_property
@@ -178,27 +182,16 @@ class Mesh(Picture):
         return None if self._region is None else self._region.volume(self._edge or self._spacing())
 
     @property
-    def specific_surface(self) -> dict[str, float | None]:
-        """Area over volume, 1/mm: ``area_of_solid`` is all area over the solid's volume, ``area_of_region`` all area and
-        ``lattice_of_region`` the lattice's area, without cuts, over the region's volume.
-        """
-        area, lattice = self.area, self._figures["area_lattice"]
-        whole = self._region_volume
-        return {
-            "area_of_solid": area / self.volume if self.volume else None,
-            "area_of_region": area / whole if whole else None,
-            "lattice_of_region": lattice / whole if whole and lattice is not None else None,
-        }
+    def specific_surface(self) -> SpecificSurface:
+        """Area over volume, 1/mm: of the solid, of the region, and the lattice's area alone of the region."""
+        return self._measures.specific_surface
 
     @property
     def hydraulic_diameter(self) -> float | None:
-        """4 · pore volume / wetted area, mm: the region's volume without the solid's, and the lattice's area without
-        cuts. None without a region or a lattice.
+        """4 · pore volume / wetted area, mm, where pore volume is the region's without the solid's, and wetted area the
+        lattice's; cut faces are not counted. None without a region or a lattice.
         """
-        lattice = self._figures["area_lattice"]
-        if self._region_volume is None or not lattice:
-            return None
-        return 4 * (self._region_volume - self.volume) / lattice
+        return self._measures.hydraulic_diameter
 
     @cached_property
     def self_intersections(self) -> int:
@@ -208,20 +201,9 @@ class Mesh(Picture):
         return self._core.self_intersections(MANY)
 
     @cached_property
-    def quality(self) -> dict[str, float] | None:
-        """How well shaped the triangles are: ``smallest_angle`` and its 5th percentile ``smallest_angle_p05``, degrees (60
-        at best), and ``largest_aspect``, the longest edge over 2√3 times the inscribed circle's radius (1 at best; None
-        for a triangle without area). None without triangles.
-        """
-        found = self._core.quality()
-        if found is None:
-            return None
-        least, p05, aspect = found
-        return {
-            "smallest_angle": least,
-            "smallest_angle_p05": p05,
-            "largest_aspect": aspect if math.isfinite(aspect) else None,
-        }
+    def quality(self) -> QualityReport | None:
+        """Smallest angle, its 5th percentile and largest aspect ratio of the triangles; None without triangles."""
+        return self._core.quality()
 
     @cached_property
     def defects(self) -> list[str]:
@@ -254,7 +236,7 @@ class Mesh(Picture):
         workers = None if threads is None else whole("threads", threads, 1, 4096)
         spacing, shape, need = self._core.thickness_needs(self._region, wanted)
         fits(need, f"{math.prod(shape):.3g} voxels", edge=spacing, power=3, word="step")
-        return Thickness(*self._core.thickness(self._region, spacing, workers, progress))
+        return Thickness(self._core.thickness(self._region, spacing, workers, progress))
 
     @property
     def porosity(self) -> float | None:
@@ -264,22 +246,22 @@ class Mesh(Picture):
     @property
     def volume(self) -> float:
         """Enclosed volume, mm³."""
-        return self._figures["volume"]
+        return self._size.volume
 
     @property
     def area(self) -> float:
         """Area, mm²."""
-        return self._figures["area"]
+        return self._size.area
 
     @property
     def euler(self) -> int:
         """Vertices − edges + triangles: of the surface, twice that of the solid."""
-        return self._figures["euler"]
+        return self._size.euler
 
     @property
     def pieces(self) -> int:
         """Number of separate solids; a cavity is not a piece."""
-        return self._figures["pieces"]
+        return self._size.pieces
 
     @property
     def chord_error(self) -> float | None:
@@ -289,44 +271,31 @@ class Mesh(Picture):
         return self._chord_error
 
     @property
-    def islands(self) -> dict | None:
-        """What there was beside the largest piece when a solid was meshed; None for a mesh from a file.
-
-        ``found`` and ``dropped`` count the pieces, ``border`` those with surface on the region's boundary, mostly crumbs
-        that it cuts off; the others lie inside. ``volume`` is theirs together, mm³, and ``share`` the largest piece's
-        share of all. ``largest`` has the ``volume``, ``place`` and ``bounds`` (mm) of the largest of them, or is None.
+    def islands(self) -> IslandsReport | None:
+        """The connected components other than the largest that were found when a solid was meshed: how many, how many were
+        left out, their volume (mm³), and the largest of them. None for a mesh from a file.
         """
         return self._islands
 
     @property
     def cavities(self) -> int:
         """Number of closed voids."""
-        return self._figures["cavities"]
+        return self._size.cavities
 
-    @cached_property
-    def voids(self) -> list[dict]:
-        """The closed voids, from which powder and resin cannot drain, the largest first.
-
-        Each has ``volume`` (mm³), ``point`` (mm, inside the void) and ``bounds`` (lower and upper corner, mm). There are
-        as many as ``cavities``.
-        """
-        found = self._core.voids() if self.cavities else []
-        return [{"volume": v, "point": list(p), "bounds": [list(c) for c in b]} for v, p, b in found]
+    @property
+    def voids(self) -> list[VoidReport]:
+        """The closed voids, from which powder and resin cannot drain, the largest first; as many as ``cavities``."""
+        return list(self._size.voids)
 
     @property
     def closed(self) -> bool:
         """Whether every edge has exactly two triangles, of opposite direction."""
-        return self._figures["closed"]
+        return self._size.closed
 
     @property
     def bounds(self) -> list[list[float]]:
         """Lower and upper corner, mm."""
-        return [list(c) for c in self._figures["bounds"]]
-
-    def _summary(self) -> dict:
-        """The figures that a streamed surface has too."""
-        keys = ("volume", "area", "area_lattice", "area_cut", "euler", "pieces", "cavities")
-        return {"triangles": self.counts[1], **{k: self._figures[k] for k in keys}, "islands": self._islands}
+        return [list(corner) for corner in self._size.bounds]
 
     def simplified(
         self,
@@ -353,23 +322,27 @@ class Mesh(Picture):
         return made
 
     @property
-    def simplification(self) -> dict | None:
+    def simplification(self) -> SimplifyReport | None:
         """What ``simplified`` did: triangles, volume and area before and after, and ``deviation``, a bound of the distance
         between the two surfaces in both directions, mm. None for a mesh that was not simplified.
         """
-        return None if self._simplification is None else dict(self._simplification)
+        return self._simplification
 
-    def within(self, solid_or_region) -> Mesh:
-        """The same mesh measured against a region, from the builders of that name or that of a Solid: solid fraction, lattice
-        and cut area.
+    def within(self, region: Solid | dict | str | os.PathLike[str]) -> Mesh:
+        """The same mesh measured against a region: solid fraction, lattice and cut area.
+
+        ``region`` is a Solid, a region from the builders of that name, or the path of a design, of a file with a region
+        alone, or of a closed mesh in mm. Raises DesignError for what is no region.
         """
-        region = getattr(solid_or_region, "_core", solid_or_region)
-        region = region.region if isinstance(region, _core.Solid) else region
-        if isinstance(region, dict):
-            region = _core.Region.from_data({"region": region}, os.getcwd())
-        if not isinstance(region, _core.Region):
-            raise TypeError(f"within takes a Solid or a region, found {solid_or_region!r}")
-        return Mesh(self._core.split_by(region), region, self._edge, self._islands)
+        given = getattr(region, "_core", region)
+        given = given.region if isinstance(given, _core.Solid) else given
+        if isinstance(given, (str, os.PathLike)):
+            given = _region_of_file(os.fsdecode(given))
+        if isinstance(given, dict):
+            given = _core.Region.from_data({"region": given}, os.getcwd())
+        if not isinstance(given, _core.Region):
+            raise TypeError(f"within takes a Solid, a region or a path, found {region!r}")
+        return Mesh(self._core.split_by(given), given, self._edge, self._islands)
 
     def uncapped(self) -> Mesh:
         """The lattice's own surface alone, open where the region cuts it: without the triangles that ``cut`` marks.
@@ -378,7 +351,7 @@ class Mesh(Picture):
         porosity of an open surface mean nothing. A ValueError where it is not known which triangles are cuts, as in a mesh
         from a file: ``within`` finds them.
         """
-        if self._figures["area_cut"] is None:
+        if self._size.area_cut is None:
             raise ValueError("which triangles are cuts is not known: use within(solid) first")
         made = Mesh(self._core.uncapped(), None, self._edge, self._islands)
         if not made.counts[1]:
@@ -459,3 +432,12 @@ def _revived(state: tuple, known: dict) -> Mesh:
     mesh = Mesh(_core.Mesh.of(vertices, triangles.astype("int64"), cut, design))
     mesh.__dict__.update(known)
     return mesh
+
+
+def _region_of_file(name: str) -> _core.Region:
+    """The region in a file: a design, a region alone, or a mesh."""
+    folder = os.path.dirname(os.path.abspath(name))
+    kind = extension(name, ("toml", "json", *READS))
+    if kind in READS:
+        return _core.Region.from_data({"region": {"mesh": {"path": os.path.abspath(name)}}}, folder)
+    return _core.Region.from_text(read_text(name), kind == "json", name, folder)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from . import _core
+from .files import extension, whole_file
 from .given import number, positive, three, whole
-from .output import extension, whole_file
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ __all__ = ["Quadors", "Slice"]
 class Quadors:
     """The beams of a design as quadrics: everything asked of them is answered in closed form. Made by ``Solid.quadors``.
 
-    These are the beams alone, as far as they reach: no region cuts them, no skin is added. ``whole`` says whether that is
-    the part; where it is not, ``Solid.field`` has the part's own sign.
+    These are the beams alone, uncut by the region and without a skin. ``whole`` says whether that is the part; where it is
+    not, ``Solid.field`` has the part's own sign.
     """
 
     def __init__(self, core: _core.Quadors, whole: bool):
@@ -40,9 +40,8 @@ class Quadors:
 
     @property
     def whole(self) -> bool:
-        """Whether these beams are all of the part: the region cuts none, there is no skin, kept zone or other lattice. If
-        not, what is told here is of the beams alone, uncut. Of a pattern of more than 20 000 beams it is told by a box
-        that holds it.
+        """Whether these beams are all of the part: the region cuts none, there is no skin, keep zone or other lattice. For a
+        pattern of more than 20 000 beams this is decided by its bounding box.
         """
         return self._whole
 
@@ -54,14 +53,15 @@ class Quadors:
         """Whether points (n, 3) in mm are in the beams."""
         return self._core.contains(_points("points", points))
 
-    def rays(self, origins: ArrayLike, ways: ArrayLike) -> dict[str, NDArray]:
-        """Where rays from ``origins`` (n, 3) along ``ways`` (n, 3) first enter the solid.
+    def rays(self, origins: ArrayLike, directions: ArrayLike) -> dict[str, NDArray]:
+        """Where rays from ``origins`` (n, 3), mm, along ``directions`` (n, 3) first enter the solid; arrays of n.
 
-        ``distance`` in lengths of the way, infinite without a hit; ``normals`` out of the solid; ``hubs``, -1 without.
+        ``distance`` in lengths of the direction, infinite without a hit; ``normals`` (n, 3) out of the solid; ``hubs``, -1
+        without. A ValueError for a direction of zero length.
         """
-        starts, along = _points("origins", origins), _points("ways", ways)
+        starts, along = _points("origins", origins), _points("directions", directions)
         if along.size and not along.any(axis=1).all():
-            raise ValueError(f"way {int((~along.any(axis=1)).argmax())} is (0, 0, 0): it leads nowhere")
+            raise ValueError(f"direction {int((~along.any(axis=1)).argmax())} is (0, 0, 0); give one that is not zero")
         distance, normals, hubs = self._core.rays(starts, along)
         return {"distance": distance, "normals": normals, "hubs": hubs}
 
@@ -121,7 +121,7 @@ class Slice:
 
     @property
     def hubs(self) -> int:
-        """How many hubs the plane reaches; no others were looked at."""
+        """Number of hubs that the plane reaches; the others are not evaluated."""
         return self._core.hubs
 
     @property

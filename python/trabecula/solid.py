@@ -10,11 +10,11 @@ from functools import cached_property
 
 from . import _core
 from .errors import DesignWarning
+from .files import check_place, extension, special, whole_file
 from .given import positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import WRITES, Mesh, Picture
-from .output import check_place, extension, special, whole_file
 from .quadors import Quadors
 from .thickness import Thickness
 from .transition import Transitions
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .islands import Islands
+    from .reports import DanglingReport, DesignReport, EstimateReport, RepairReport, SurfaceReport
 
     Progress = Callable[[int, int], Any]
 
@@ -78,16 +79,13 @@ class Solid(Picture):
 
     @property
     def warnings(self) -> list[dict[str, str]]:
-        """What may not be meant, as {path, message}."""
+        """Possible mistakes in the design, as {path, message}."""
         return [{"path": p, "message": m} for p, m in self._core.warnings]
 
     @property
-    def repairs(self) -> dict[str, dict[str, int | float]]:
-        """What was repaired in each mesh of the region, by the path of its table (``"region.mesh"``).
-
-        Counts of corners ``joined``, edges ``split``, ``degenerate`` triangles and ``duplicates`` left out, triangles
-        ``turned``, ``bodies_turned``, ``holes`` (with ``hole_length`` in mm, ``hole_area`` in mm² and ``hole_share`` of
-        the surface), ``crossings`` cut and ``inner`` triangles left out. All zero for a clean mesh.
+    def repairs(self) -> dict[str, RepairReport]:
+        """What was repaired in each mesh of the region, by the path of its table (``"region.mesh"``); all zero for a clean
+        mesh.
         """
         return dict(self._core.repairs)
 
@@ -105,48 +103,34 @@ class Solid(Picture):
         if name is None:
             names = list(self.beams)
             if len(names) != 1:
-                raise ValueError(f"name the beams that are meant: there are {', '.join(names) or 'none'}")
+                raise ValueError(f"name one of the beams: {', '.join(names)}" if names else "the design has no beams")
             name = names[0]
         return Quadors(self._core.quadors(name), self._core.whole_beams(name))
 
-    def report(self) -> dict:
-        """The figures without meshing: ``lattices.NAME.{iso, fraction, porosity, thickness, connected_fraction}``, and
-        ``beams.NAME`` with counts, lengths, valences, the smallest angle and what was cleaned and trimmed.
-
-        Each is a number, or [min, max] over the region where it varies; beside them the region's bounds and volume,
-        and the warnings; with a blend ``blend``: the lattices' names, ``by``, ``phases`` (locked, independent or drifting),
-        the ``width`` of the narrowest transition (mm) and ``rbf``, the conditioning of radial basis functions. Where the
-        level is a thickness, ``iso`` is the level that would have the same fraction and ``folding`` the thickness (mm)
-        beyond which the wall folds.
+    def report(self) -> DesignReport:
+        """The figures without meshing: level, fraction and thickness of each lattice, lengths and counts of beams, the region,
+        the blend and the warnings. ``str(report)`` is what ``trabecula check`` prints.
         """
-        import json
-
-        return json.loads(self._core.report())
+        return self._core.report()
 
     def transitions(self) -> Transitions:
-        """The transitions between the lattices of a blend: bodies that are loose or dangle, the narrowest neck, and the
-        fraction along each. The lattices alone are looked at, without skin and kept zones."""
-        import json
-
-        return Transitions(json.loads(self._core.transitions()))
+        """The transitions between the lattices of a blend: loose and weakly attached components, the narrowest neck, and
+        the solid fraction along each. Sampled on the lattices alone, without skin and keep zones.
+        """
+        return Transitions(self._core.transitions())
 
     def dangling(
         self, neck: float | None = None, threads: int | None = None, progress: Progress | None = None
-    ) -> dict[str, Any]:
-        """Bits that hang on the part by necks thinner than half of ``neck``, or by nothing: what the region cuts off the
-        lattice and leaves on a thread.
+    ) -> DanglingReport:
+        """Fragments attached by necks thinner than half of ``neck``, or not at all: what the region cuts off the lattice.
 
-        ``neck`` (mm) is the lattice's narrowest wall or neck unless given. ``count`` and ``volume`` (mm³) of all, ``largest``
-        (``volume`` and ``place``, mm, or None), the ``neck`` below which a bit counts (half of the one given) and the ``step``
-        of the points that were looked at, mm.
+        ``neck`` (mm) is the lattice's narrowest wall or neck unless given; a ValueError where that is not known.
         """
         own = min(self._thinnest.values(), default=None)
         if neck is None and own is None:
             raise ValueError("the lattice's narrowest neck is not known: give neck, mm")
         narrowest = own if neck is None else positive("neck", neck)
-        count, volume, largest, thin, step = self._core.dangling(narrowest, _threads(threads), progress)
-        found = None if largest is None else {"volume": largest[0], "place": list(largest[1])}
-        return {"count": count, "volume": volume, "largest": found, "neck": thin, "step": step}
+        return self._core.dangling(narrowest, _threads(threads), progress)
 
     def field(self, points: ArrayLike) -> NDArray[np.float64]:
         """Values at points (n, 3) in mm: negative in the solid, positive outside, continuous; not a distance."""
@@ -158,24 +142,24 @@ class Solid(Picture):
         flat = np.ascontiguousarray(given.reshape(-1, 3))
         return self._core.field(flat).reshape(given.shape[:-1])
 
-    def misfits(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
-        """How far a map that was solved for is from what was asked for, at points (n, 3) in mm.
+    def map_error(self, points: ArrayLike, lattice: str | None = None) -> dict[str, NDArray[np.float64]]:
+        """Deviation of a solved map (``map.phase``) from the one asked for, at points (n, 3) in mm; arrays (n,).
 
         ``angle``: between a grating and the wanted one, the worst of three, degrees; ``spacing``: the ratio of their spacings
-        or its inverse, the worst of three; ``density``: cells for each cell wanted, det J over the one wanted. ``lattice``
-        names the lattice; by default the first one with such a map.
+        or its inverse, the worst of three; ``density``: det J over the one asked for, cells for each cell wanted. ``lattice``
+        names the lattice; by default the first one with such a map. A ValueError where there is none.
         """
         import numpy as np
 
         if lattice is None:
-            solved = (name for name, it in self.report()["lattices"].items() if "distortion" in it)
+            solved = (name for name, it in self.report().lattices.items() if it.distortion)
             lattice = next(solved, None)
             if lattice is None:
                 raise ValueError("no lattice has a map that was solved for; only map.phase can be off what was asked for")
         given = np.asarray(points, dtype=np.float64)
         if given.ndim != 2 or given.shape[-1] != 3:
             raise ValueError(f"points must have shape (n, 3), found {given.shape}")
-        return self._core.misfits(lattice, np.ascontiguousarray(given))
+        return self._core.map_error(lattice, np.ascontiguousarray(given))
 
     def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
         """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell`` (32)."""
@@ -186,27 +170,34 @@ class Solid(Picture):
         edge = positive("edge", edge)
         if edge > self.wavelength / 2:
             raise ValueError(
-                f"a grid step of {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm, and shows "
-                f"nothing of the lattice; {self.wavelength / PER_CELL:.3g} mm is usual"
+                f"grid spacing {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm: the lattice is "
+                f"not resolved; {self.wavelength / PER_CELL:.3g} mm (wavelength / {PER_CELL}) is usual"
             )
         return edge
 
-    def estimate(self, edge: float | None = None, per_cell: float | None = None) -> dict:
-        """What a surface will take: grid cells, triangles, bytes of memory, bytes of a binary STL."""
+    def estimate(self, edge: float | None = None, per_cell: float | None = None) -> EstimateReport:
+        """What a surface at this spacing takes: grid cells, triangles, bytes of memory, bytes of a binary STL."""
         return self._need(self.spacing(edge, per_cell))
+
+    def region_volume(self, edge: float | None = None) -> float:
+        """Volume of the region, mm³: exact where it is known in closed form, else of its surface at grid spacing ``edge``
+        (mm), or a 200th of its extent if that is more.
+        """
+        low, high = self.bounds
+        return self._core.region.volume(max(edge or 0.0, max(b - a for a, b in zip(low, high, strict=True)) / 200))
 
     @cached_property
     def _thinnest(self) -> dict[str, float]:
         """The thinnest wall or neck of each lattice or graph of beams, mm, by its path, where there is one."""
         report = self.report()
-        kinds = {"lattice": report["lattices"], "beams": report["beams"]}
-        all_ = {f"{kind}.{name}": it["thickness"] for kind, of in kinds.items() for name, it in of.items()}
+        kinds = {"lattice": report.lattices, "beams": report.beams}
+        all_ = {f"{kind}.{name}": it.thickness for kind, of in kinds.items() for name, it in of.items()}
         ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
         return {name: t for name, t in ends.items() if t}
 
     def _is_fine(self, spacing: float) -> bool:
-        """Whether a wavelength has so many steps that what is too thin for them is a hundredth or two of the part: then
-        nothing is warned of, and `report` tells of the walls.
+        """Whether a wavelength has at least 64 grid steps: walls too thin for them are then a hundredth or two of the part, and
+        nothing is warned of.
         """
         return self.wavelength / spacing >= 64
 
@@ -243,13 +234,9 @@ class Solid(Picture):
                 stacklevel=3,
             )
 
-    def _need(self, spacing: float) -> dict:
-        """The estimate, at fine spacings scaled from a coarser one: triangles grow as spacing to the −2."""
-        coarse = max(spacing, self.wavelength / 16)
-        need = self._core.estimate(coarse)
-        for key in ("triangles", "memory", "stl"):
-            need[key] *= (coarse / spacing) ** 2
-        return need
+    def _need(self, spacing: float) -> EstimateReport:
+        """The estimate; at fine spacings scaled from a coarser one."""
+        return self._core.estimate(spacing, self.wavelength / 16)
 
     def mesh(
         self,
@@ -269,7 +256,7 @@ class Solid(Picture):
         them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
 
         ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
-        the beams' and fillets' own patches and stay within so many mm of them; ``Mesh.chord_error`` is how near they came.
+        the patches of beams and fillets at a distance of at most ``chord`` (mm); ``Mesh.chord_error`` is the distance reached.
         All pieces are kept.
         """
         check_islands(islands)
@@ -282,12 +269,12 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
-        fits(2 * need["memory"], f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
+        fits(2 * need.memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
-        core, told, words = self._core.mesh(spacing, _threads(threads), progress, islands)
-        self._warn_coarse(core.volume() + left_out(told["islands"]), spacing)
-        warn_islands(told["islands"], words)
-        return Mesh(core, self._core.region, spacing, told["islands"])
+        core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
+        self._warn_coarse(core.volume() + left_out(others), spacing)
+        warn_islands(others, words)
+        return Mesh(core, self._core.region, spacing, others)
 
     def _chord(self, chord: float, edge: float | None, per_cell: float | None, islands: str) -> float:
         """A chord error, where nothing is asked for that needs a grid."""
@@ -297,7 +284,7 @@ class Solid(Picture):
             raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
         return positive("chord", chord)
 
-    def _stream_beams(self, path: str | os.PathLike[str], chord: float, threads: int | None) -> dict:
+    def _stream_beams(self, path: str | os.PathLike[str], chord: float, threads: int | None) -> SurfaceReport:
         """Beams alone, those of equal hubs made once, hub by hub into a file."""
         need, held = self._core.expected_beams(chord)
         fits(2 * TRIANGLE * held, f"{held:.3g} triangles of hubs that differ", edge=chord, power=1, word="chord")
@@ -307,9 +294,10 @@ class Solid(Picture):
         with whole_file(path) as temporary:
             return self._core.stream_beams(temporary, chord, _threads(threads))
 
-    def _room(self, path: str | os.PathLike[str], spacing: float) -> None:
-        """Refuses a mesh file that the disk has no room for."""
-        need = self._need(spacing)["triangles"]
+    def check_room(self, path: str | os.PathLike[str], edge: float | None = None, per_cell: float | None = None) -> None:
+        """Raises ValueError if the disk has no room for the mesh file ``path`` at this spacing; meshes nothing."""
+        spacing = self.spacing(edge, per_cell)
+        need = self._need(spacing).triangles
         size = file_size(extension(path, WRITES), need)
         fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
@@ -322,10 +310,9 @@ class Solid(Picture):
         progress: Progress | None = None,
         islands: Islands = "keep",
         chord: float | None = None,
-    ) -> dict:
-        """Streams the surface to a binary STL without holding it in memory; gives its triangles, volume, areas, Euler
-        number, pieces and cavities, and what ``islands`` (as for ``mesh``) came to. ``chord`` is for beams alone, as for
-        ``mesh``: then ``chord_error`` is told too.
+    ) -> SurfaceReport:
+        """Streams the surface to a binary STL without holding it in memory, and gives its figures. ``islands`` and ``chord``
+        are as for ``mesh``.
         """
         check_islands(islands)
         extension(path, ("stl",))
@@ -336,13 +323,13 @@ class Solid(Picture):
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
             made = self.mesh(spacing, None, threads, progress, islands)
             made.write(path)
-            return made._summary()
-        self._room(path, spacing)
+            return made.summary()
+        self.check_room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
             summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
-        self._warn_coarse(summary["volume"] + left_out(summary["islands"]), spacing)
-        warn_islands(summary["islands"], words)
+        self._warn_coarse(summary.volume + left_out(summary.islands), spacing)
+        warn_islands(summary.islands, words)
         return summary
 
     def voxels(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import warnings
 from functools import cached_property
@@ -12,16 +11,15 @@ from . import _core
 from .design import Design
 from .elements import FORMATS
 from .errors import DesignError, DesignWarning
+from .files import extension, read_text, whole_file
 from .given import whole
-from .input import read_text
 from .mesh import Mesh, Picture
-from .output import extension, whole_file
 
 if TYPE_CHECKING:
-    from typing import Any
-
     import numpy as np
     from numpy.typing import NDArray
+
+    from .reports import TetMeshReport
 
 __all__ = ["READS", "WRITES", "TetMesh"]
 
@@ -44,19 +42,19 @@ class TetMesh(Picture):
         one. A design may also be the path of its file, or plain data; keys other than the region and the mesh are left
         alone. The same for any number of ``threads``.
 
-        Raises DesignError for anything wrong, and warns (DesignWarning) of what may not be meant: thin walls that are lost,
+        Raises DesignError for anything wrong, and warns (DesignWarning) of possible mistakes: thin walls that are lost,
         slivers, several pieces.
         """
         threads = None if threads is None else whole("threads", threads, 1, 4096)
         if isinstance(design, Design):
             data, folder = design.to_dict(), design.folder or os.getcwd()
-            return told(_core.TetMesh.from_data(data, folder, lattice, threads))
+            return made_of(_core.TetMesh.from_data(data, folder, lattice, threads))
         if isinstance(design, dict):
-            return told(_core.TetMesh.from_data(design, os.getcwd(), lattice, threads))
+            return made_of(_core.TetMesh.from_data(design, os.getcwd(), lattice, threads))
         name = os.fsdecode(design)
         kind = extension(name, ("toml", "json"))
         folder = os.path.dirname(os.path.abspath(name))
-        return told(_core.TetMesh.from_text(read_text(name), kind == "json", name, folder, lattice, threads))
+        return made_of(_core.TetMesh.from_text(read_text(name), kind == "json", name, folder, lattice, threads))
 
     @staticmethod
     def read(path: str | os.PathLike[str], unit: str | None = None, split: bool = False) -> TetMesh:
@@ -70,7 +68,7 @@ class TetMesh(Picture):
         name = os.path.abspath(os.fsdecode(path))
         extension(name, READS)
         try:
-            return told(_core.TetMesh.read(name, os.getcwd(), unit, split))
+            return made_of(_core.TetMesh.read(name, os.getcwd(), unit, split))
         except DesignError as error:
             raise ValueError(str(error)) from None
 
@@ -110,19 +108,17 @@ class TetMesh(Picture):
 
     @property
     def warnings(self) -> list[dict[str, str]]:
-        """What may not be meant, as {path, message}."""
+        """Possible mistakes, as {path, message}."""
         return [{"path": p, "message": m} for p, m in self._core.warnings]
 
-    def report(self) -> dict[str, Any]:
-        """The figures: ``quality`` (numbers, sizes, dihedral angles, aspect, slivers, inverted, pieces), ``fit`` to the region
-        (deviation: mean, 95 % and greatest; what is lost; None without one), ``mesher``, ``warnings``.
-        """
-        return json.loads(self._core.report())
+    def report(self) -> TetMeshReport:
+        """The figures: shapes and sizes, the fit to the region (None without one), what made the mesh, the warnings."""
+        return self._core.report()
 
     @property
     def volume(self) -> float:
         """Volume, mm³."""
-        return self.report()["quality"]["volume"]
+        return self.report().quality.volume
 
     def boundary(self) -> Mesh:
         """The boundary as a triangle mesh."""
@@ -147,8 +143,8 @@ class TetMesh(Picture):
         return self.boundary()
 
 
-def told(core: _core.TetMesh) -> TetMesh:
-    """The mesh, its warnings said."""
+def made_of(core: _core.TetMesh) -> TetMesh:
+    """The mesh; its warnings are raised."""
     made = TetMesh(core)
     for path, message in core.warnings:
         warnings.warn(f"{path}: {message}" if path else message, DesignWarning, stacklevel=3)

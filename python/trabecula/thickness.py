@@ -6,11 +6,11 @@ import os
 from functools import cached_property
 
 from . import _core
-from .output import extension, whole_file
+from .files import extension, whole_file
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from .reports import ThicknessReport, ThicknessSpread
 
 __all__ = ["Thickness"]
 
@@ -21,27 +21,34 @@ class Thickness:
     At each point it is the diameter of the largest ball that lies in the solid (or in the pores) and covers the point.
     """
 
-    def __init__(self, wall: dict[str, Any], pore: dict[str, Any] | None):
-        self.wall = wall
-        self.pore = pore
+    def __init__(self, report: ThicknessReport):
+        self._report = report
 
     def __repr__(self) -> str:
-        def told(it: dict) -> str:
-            return f"{it['mean']:.4g} ± {it['sd']:.2g} mm"
+        def mean(it: ThicknessSpread) -> str:
+            return f"{it.mean:.4g} ± {it.sd:.2g} mm"
 
-        pores = f", pores {told(self.pore)}" if self.pore else ""
-        return f"<trabecula.Thickness walls {told(self.wall)}{pores}, step {self.step:g} mm>"
+        pores = f", pores {mean(self.pore)}" if self.pore else ""
+        return f"<trabecula.Thickness walls {mean(self.wall)}{pores}, step {self.step:g} mm>"
+
+    @property
+    def wall(self) -> ThicknessSpread:
+        """The distribution over the solid, mm."""
+        return self._report.wall_thickness
+
+    @property
+    def pore(self) -> ThicknessSpread | None:
+        """The distribution over the pores, mm; None without a region."""
+        return self._report.pore_size
 
     @property
     def step(self) -> float:
         """Edge of a voxel, mm."""
-        return self.wall["step"]
+        return self.wall.step
 
-    def measure(self) -> dict:
-        """``wall_thickness`` and ``pore_size``, each {min, p05, mean, sd, max, step, accuracy, histogram: {edges,
-        share}}, mm; ``pore_size`` is None without a region.
-        """
-        return {"wall_thickness": self.wall, "pore_size": self.pore}
+    def measure(self) -> ThicknessReport:
+        """``wall_thickness`` and ``pore_size``: minimum, 5th percentile, mean, standard deviation, maximum, histogram, mm."""
+        return self._report
 
     def png(self) -> bytes:
         """The histograms as the bytes of a PNG file."""

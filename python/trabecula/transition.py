@@ -6,23 +6,19 @@ import os
 from collections.abc import Iterator, Sequence
 
 from . import _core
-from .output import extension, whole_file
+from .files import extension, whole_file
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from .reports import TransitionReport
 
 __all__ = ["Transitions"]
 
 
 class Transitions(Sequence):
-    """The transitions of a blend, each a dictionary. Made by ``Solid.transitions``.
+    """The transitions of a blend, each a ``reports.TransitionReport``. Made by ``Solid.transitions``."""
 
-    ``between`` names the two lattices; ``volume`` (mm³) is where both count; ``pieces`` the bodies that come into it, with what
-    is theirs on either side; ``loose`` and ``dangling`` have the number of
-    ``bodies`` that touch neither side, or hang by necks under half the narrowest of the widest way across, and their
-    ``volume``; ``neck`` is the ``diameter`` (mm, to within ``step``) and ``place`` of that narrowest neck, None where no way
-    leads across; ``fractions`` has for tenths of the second's ``share`` the fraction ``asked`` (None where
-    it is not known) and ``found``, in windows of two cells.
-    """
-
-    def __init__(self, found: list[dict]):
+    def __init__(self, found: list[TransitionReport]):
         self._found = found
 
     def __len__(self) -> int:
@@ -31,34 +27,34 @@ class Transitions(Sequence):
     def __getitem__(self, index):
         return self._found[index]
 
-    def __iter__(self) -> Iterator[dict]:
+    def __iter__(self) -> Iterator[TransitionReport]:
         return iter(self._found)
 
     def __repr__(self) -> str:
-        return f"<trabecula.Transitions {', '.join(' to '.join(t['between']) for t in self) or 'none'}>"
+        return f"<trabecula.Transitions {', '.join(' to '.join(t.between) for t in self) or 'none'}>"
 
     def png(self) -> bytes:
         """The fraction found along each transition as bars, what was asked for as a line across each: a PNG file's bytes."""
         drawn = []
         for it in self:
-            rows = it["fractions"]
-            first, second = it["between"]
+            rows = it.fractions
+            first, second = it.between
             half = 0.5 / 10  # rows are tenths
             edges, found, asked, at = [0.0], [], [], 0.0
             for row in rows:
-                low = row["share"] - half
-                if low > at + half:  # tenths at which nothing was looked at
+                low = row.share - half
+                if low > at + half:  # tenths without sample points
                     edges.append(low)
                     found.append(0.0)
                     asked.append(0.0)
-                at = row["share"] + half
+                at = row.share + half
                 edges.append(at)
-                found.append(row["found"])
-                asked.append(row["asked"] or 0.0)
+                found.append(row.found)
+                asked.append(row.asked or 0.0)
             worst = off(it)
             words = "found" if worst is None else f"found, line: asked for, off by {worst:+.3f} at most"
-            neck = f"neck {it['neck']['diameter']:.3g} mm" if it["neck"] else "no way across"
-            loose, dangling = it["loose"]["bodies"], it["dangling"]["bodies"]
+            neck = f"neck {it.neck.diameter:.3g} mm" if it.neck else "not connected"
+            loose, dangling = it.loose.bodies, it.dangling.bodies
             title = f"share of {second} against {first}. solid fraction {words}"
             drawn.append((title, edges, found, asked, [(f"{neck}, {loose} loose, {dangling} dangling; half at", 0.5)]))
         return _core.charts(drawn, 960, 480 * len(drawn))
@@ -75,7 +71,7 @@ class Transitions(Sequence):
             out.write(self.png())
 
 
-def off(transition: dict) -> float | None:
-    """The most by which the fraction found is off the one asked for; None where nobody knows what was."""
-    each = [r["found"] - r["asked"] for r in transition["fractions"] if r["asked"] is not None]
+def off(transition: TransitionReport) -> float | None:
+    """The greatest difference between the fraction found and the one asked for; None where that is not known."""
+    each = [r.found - r.asked for r in transition.fractions if r.asked is not None]
     return max(each, key=abs, default=None)

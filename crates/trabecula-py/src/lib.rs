@@ -2,16 +2,21 @@
 
 use pyo3::prelude::*;
 
+mod arrays;
 mod design;
 mod error;
 mod file;
-mod islands;
+mod folder;
 mod machine;
 mod mesh;
+mod node;
 mod quadors;
+mod region;
+mod report;
 mod run;
 mod solid;
 mod tets;
+mod voxels;
 
 /// Rotations and translations.
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
@@ -46,9 +51,13 @@ mod _core {
     #[pymodule_export]
     use crate::quadors::{Quadors, Slice};
     #[pymodule_export]
-    use crate::solid::{Region, Solid, Voxels};
+    use crate::region::Region;
+    #[pymodule_export]
+    use crate::solid::Solid;
     #[pymodule_export]
     use crate::tets::TetMesh;
+    #[pymodule_export]
+    use crate::voxels::Voxels;
 
     #[pymodule_init]
     fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -99,6 +108,12 @@ mod _core {
     #[pyfunction]
     fn schema() -> String {
         trabecula::design::schema()
+    }
+
+    /// The JSON Schema of all reports, as JSON text.
+    #[pyfunction]
+    fn report_schema() -> String {
+        trabecula::report::schema().to_string()
     }
 
     /// A space group: its number, its name, and its operations as rotations and translations (in parts of 24).
@@ -200,7 +215,7 @@ mod _core {
             let allowed = if to_iso { "greater than 0 and less than 1" } else { "a finite number" };
             return Err(pyo3::exceptions::PyValueError::new_err(format!("{name} is {v}; it must be {allowed}")));
         }
-        let node = crate::design::node(cell, 0)?;
+        let node = crate::node::node(cell, 0)?;
         let done = crate::run::run(py, None, None, |_| {
             let cell = trabecula::design::cell(&node)?;
             let one = |v: &f64| {

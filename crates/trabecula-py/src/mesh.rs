@@ -4,7 +4,6 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::formats;
-use geometry::math::{cross, norm, sub};
 use geometry::measure;
 use geometry::render::{Tint, View, png, render};
 use geometry::simplify::{Goal, simplify};
@@ -12,16 +11,15 @@ use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::PyBytes;
 use trabecula::analysis;
+use trabecula::report::{MeshReport, QualityReport, SimplifyReport, ThicknessReport, ThicknessSpread};
 
 use crate::error;
 use crate::file;
+use crate::region::Region;
+use crate::report::report;
 use crate::run::run;
-use crate::solid::Region;
-
-/// Volume, a point inside, corners of the bounds.
-type Void = (f64, [f64; 3], ([f64; 3], [f64; 3]));
 
 /// A triangle mesh.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -161,52 +159,19 @@ impl Mesh {
         tolerance: Option<f64>,
         triangles: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Mesh, Bound<'py, PyDict>)> {
+    ) -> PyResult<(Mesh, Bound<'py, PyAny>)> {
         let goal = Goal { tolerance, triangles };
-        let (surface, report) =
+        let (surface, done) =
             run(py, None, progress, |p| simplify(&self.surface, &goal, p))?.map_err(error::stopped)?;
-        let d = PyDict::new(py);
-        d.set_item("triangles_before", report.triangles[0])?;
-        d.set_item("triangles", report.triangles[1])?;
-        d.set_item("deviation", report.deviation)?;
-        d.set_item("volume_before", report.volume[0])?;
-        d.set_item("volume", report.volume[1])?;
-        d.set_item("area_before", report.area[0])?;
-        d.set_item("area", report.area[1])?;
         let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
-        Ok((mesh, d))
+        Ok((mesh, report(py, "SimplifyReport", &SimplifyReport::from(done))?))
     }
 
-    /// Volume, areas, Euler number, pieces, cavities, closedness, bounds.
-    fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let surface = &self.surface;
-        let (size, cut) = run(py, None, None, |_| {
-            let area = |i: usize| {
-                let [a, b, c] = surface.mesh.corners(i);
-                norm(cross(sub(b, a), sub(c, a))) / 2.0
-            };
-            let cut: f64 = (0..surface.cut.len()).filter(|i| surface.cut[*i]).map(area).sum();
-            (measure::size(&surface.mesh), cut)
-        })?;
-        let d = PyDict::new(py);
-        d.set_item("volume", size.volume)?;
-        d.set_item("area", size.area)?;
-        d.set_item("area_lattice", self.split.then_some(size.area - cut))?;
-        // Of nothing the sum is −0.
-        d.set_item("area_cut", self.split.then_some(cut + 0.0))?;
-        d.set_item("euler", size.euler)?;
-        d.set_item("pieces", size.pieces)?;
-        d.set_item("cavities", size.cavities)?;
-        d.set_item("closed", size.closed)?;
-        d.set_item("bounds", [size.bounds.min, size.bounds.max])?;
-        Ok(d)
-    }
-
-    /// The closed voids, the largest first: volume (mm³), a point inside, lower and upper corner of the bounds (mm).
-    fn voids(&self, py: Python<'_>) -> PyResult<Vec<Void>> {
-        let found = run(py, None, None, |_| measure::cavities(&self.surface.mesh))?;
-        let plain = |c: &measure::Cavity| (c.volume, c.point, (c.bounds.min, c.bounds.max));
-        Ok(found.iter().map(plain).collect())
+    /// The figures, against a region of this volume (mm³) if one is known, as `reports.MeshReport`.
+    #[pyo3(signature = (region=None))]
+    fn measure<'py>(&self, py: Python<'py>, region: Option<f64>) -> PyResult<Bound<'py, PyAny>> {
+        let made = run(py, None, None, |_| MeshReport::of(&self.surface, self.split, region))?;
+        report(py, "MeshReport", &made)
     }
 
     /// Enclosed volume, mm³.
@@ -227,11 +192,15 @@ impl Mesh {
         run(py, None, None, |_| measure::self_intersections(&self.surface.mesh, limit))
     }
 
-    /// Smallest angle and its 5th percentile (degrees), largest aspect ratio; None without triangles.
-    fn quality(&self, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
-        run(py, None, None, |_| {
-            measure::quality(&self.surface.mesh).map(|q| (q.smallest_angle, q.smallest_angle_p05, q.largest_aspect))
-        })
+    /// How well shaped the triangles are, as `reports.QualityReport`; None without triangles.
+    fn quality<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let found = run(py, None, None, |_| measure::quality(&self.surface.mesh))?;
+        let told = |q: measure::Quality| QualityReport {
+            smallest_angle: q.smallest_angle,
+            smallest_angle_p05: q.smallest_angle_p05,
+            largest_aspect: q.largest_aspect.is_finite().then_some(q.largest_aspect),
+        };
+        found.map(|q| report(py, "QualityReport", &told(q))).transpose()
     }
 
     /// Duplicate triangles, triangles without area, vertices where surfaces touch.
@@ -262,7 +231,8 @@ impl Mesh {
         .map_err(error::fault)
     }
 
-    /// Local thickness of the solid, and of the pores if there is a region, on voxels of edge `step` (mm).
+    /// Local thickness of the solid, and of the pores if there is a region, on voxels of edge `step` (mm), as
+    /// `reports.ThicknessReport`.
     #[pyo3(signature = (region, step, threads=None, progress=None))]
     fn thickness<'py>(
         &self,
@@ -271,27 +241,13 @@ impl Mesh {
         step: f64,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>)> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let region = region.map(|r| r.region.clone());
         let found = run(py, threads, progress, |p| analysis::thickness(&self.surface, region.as_ref(), step, p))?
             .map_err(error::stopped)?;
-        let dict = |s: &analysis::Spread| -> PyResult<Bound<'py, PyDict>> {
-            let d = PyDict::new(py);
-            d.set_item("min", s.min)?;
-            d.set_item("p05", s.p05)?;
-            d.set_item("mean", s.mean)?;
-            d.set_item("sd", s.sd)?;
-            d.set_item("max", s.max)?;
-            d.set_item("step", step)?;
-            d.set_item("accuracy", found.accuracy)?;
-            let histogram = PyDict::new(py);
-            histogram.set_item("edges", &s.edges)?;
-            histogram.set_item("share", &s.share)?;
-            d.set_item("histogram", histogram)?;
-            Ok(d)
-        };
-        let pore = found.pore.as_ref().map(&dict).transpose()?;
-        Ok((dict(&found.wall)?, pore))
+        let spread = |s: &analysis::Spread| ThicknessSpread::of(s, step, found.accuracy);
+        let told = ThicknessReport { wall_thickness: spread(&found.wall), pore_size: found.pore.as_ref().map(spread) };
+        report(py, "ThicknessReport", &told)
     }
 
     /// Writes the mesh to `path` in the format `extension`.

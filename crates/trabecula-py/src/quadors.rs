@@ -10,9 +10,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use rayon::prelude::*;
 
+use crate::arrays::points;
 use crate::error;
 use crate::run::run;
-use crate::solid::points;
 
 /// Beams as quadrics.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -83,25 +83,25 @@ impl Quadors {
         Ok(held.into_pyarray(py))
     }
 
-    /// First hits of rays from origins (n, 3) along ways (n, 3): distance in lengths of the way (infinite without a hit),
-    /// normal, hub (-1 without).
+    /// First hits of rays from origins (n, 3) along directions (n, 3): distance in lengths of the direction (infinite
+    /// without a hit), normal, hub (-1 without).
     fn rays<'py>(
         &self,
         py: Python<'py>,
         origins: PyReadonlyArray2<'py, f64>,
-        ways: PyReadonlyArray2<'py, f64>,
+        directions: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Hits<'py>> {
-        let (origins, ways) = (self::points(&origins)?, self::points(&ways)?);
-        if origins.len() != ways.len() {
+        let (origins, directions) = (self::points(&origins)?, self::points(&directions)?);
+        if origins.len() != directions.len() {
             return Err(PyValueError::new_err(format!(
-                "{} origins and {} ways: give one way for each origin",
+                "{} origins and {} directions: give one direction for each origin",
                 origins.len(),
-                ways.len()
+                directions.len()
             )));
         }
         let hits: Vec<_> = run(py, None, None, |_| {
-            let each = origins.par_iter().zip(&ways).with_min_len(64);
-            each.map(|(o, w)| self.quadors.ray(*o, *w)).collect()
+            let each = origins.par_iter().zip(&directions).with_min_len(64);
+            each.map(|(o, d)| self.quadors.ray(*o, *d)).collect()
         })?;
         let distance: Vec<f64> = hits.iter().map(|h| h.map_or(f64::INFINITY, |h| h.distance)).collect();
         let hubs: Vec<i64> = hits.iter().map(|h| h.map_or(-1, |h| h.hub as i64)).collect();

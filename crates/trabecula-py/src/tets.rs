@@ -3,30 +3,22 @@
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use geometry::formats::{self, Elements};
+use geometry::formats;
 use geometry::surface_mesh::SurfaceMesh;
-use geometry::tetmesh::TetMesh as Core;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
 
-use crate::design::Folder;
 use crate::error;
 use crate::file;
+use crate::folder::Folder;
 use crate::mesh::Mesh;
+use crate::node::node;
+use crate::report::report;
 use crate::run::run;
 
 /// A number for each tetrahedron.
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
-/// Points, connectivity, ends, kinds and zones of elements that Python read.
-type Read<'py> = (
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray1<'py, u32>,
-    PyReadonlyArray1<'py, u64>,
-    PyReadonlyArray1<'py, u8>,
-    PyReadonlyArray1<'py, u32>,
-);
-
 /// A tetrahedral mesh, checked.
 #[pyclass(frozen, module = "trabecula._core")]
 pub struct TetMesh {
@@ -64,7 +56,7 @@ impl TetMesh {
         lattice: Option<&str>,
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
-        let node = crate::design::node(data, 0)?;
+        let node = node(data, 0)?;
         let made = run(py, threads, None, |_| Tets::in_design(&node, lattice, &Folder(folder)))?;
         of(py, made)
     }
@@ -115,9 +107,9 @@ impl TetMesh {
         each.map(|w| (w.path.clone(), w.message.clone())).collect()
     }
 
-    /// The figures as JSON text.
-    fn report(&self, py: Python<'_>) -> PyResult<String> {
-        run(py, None, None, |_| self.tets.to_json().to_string())
+    /// The figures, as `reports.TetMeshReport`.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        report(py, "TetMeshReport", &self.tets.report())
     }
 
     /// The boundary: a closed surface, all of it cut.
@@ -148,53 +140,4 @@ impl TetMesh {
 fn of(py: Python<'_>, made: Result<Tets, DesignError>) -> PyResult<TetMesh> {
     let tets = made.map_err(|e| error::design(py, &e))?;
     Ok(TetMesh { tets })
-}
-
-/// What an exception says.
-fn words(py: Python<'_>, e: &PyErr) -> String {
-    e.value(py).to_string()
-}
-
-/// The elements of a file of a format that Python reads.
-pub fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
-    Python::attach(|py| {
-        let read = || -> PyResult<(Elements, Vec<u32>)> {
-            let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
-            let (points, connectivity, ends, kinds, zones): Read<'_> = read.extract()?;
-            let elements = Elements {
-                points: rows(&points),
-                connectivity: connectivity.as_array().to_vec(),
-                ends: ends.as_array().iter().map(|e| *e as usize).collect(),
-                kinds: kinds.as_array().to_vec(),
-            };
-            Ok((elements, zones.as_array().to_vec()))
-        };
-        read().map_err(|e| words(py, &e))
-    })
-}
-
-/// The tetrahedra that a mesher of Python's makes of a surface.
-pub fn tetrahedra(name: &str, surface: &geometry::mesh::Mesh, size: f64, limit: f64) -> Result<Core, String> {
-    Python::attach(|py| {
-        let make = || -> PyResult<Core> {
-            let flat = surface.vertices.clone().into_flattened().into_pyarray(py);
-            let points = flat.reshape([surface.vertices.len(), 3])?;
-            let flat = surface.triangles.clone().into_flattened().into_pyarray(py);
-            let triangles = flat.reshape([surface.triangles.len(), 3])?;
-            let call = py.import("trabecula.meshers")?.getattr("tetrahedra")?;
-            let made = call.call1((name, points, triangles, size, limit))?;
-            let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) = made.extract()?;
-            let tets = tets.as_array();
-            Ok(Core {
-                nodes: rows(&nodes),
-                tets: tets.rows().into_iter().map(|r| [r[0], r[1], r[2], r[3]]).collect(),
-                zones: Vec::new(),
-            })
-        };
-        make().map_err(|e| words(py, &e))
-    })
-}
-
-fn rows(of: &PyReadonlyArray2<'_, f64>) -> Vec<[f64; 3]> {
-    of.as_array().rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect()
 }

@@ -41,6 +41,7 @@ use crate::cell::Cell;
 use crate::extract::GridSurface;
 use crate::lattice::Lattice;
 use crate::region::Region;
+use crate::report::{DesignReport, TransitionReport};
 use crate::solid::Solid;
 use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
@@ -249,11 +250,8 @@ pub fn cell(node: &Node) -> Result<Cell, DesignError> {
 }
 
 impl Built {
-    /// The numbers of the design without meshing it: for each lattice iso, fraction, porosity, thickness and
-    /// connected_fraction (a number, or [min, max] over the region where it varies), the region's bounds and
-    /// volume, and the warnings. Where the level is a thickness, iso is the level of the same fraction and folding is the thickness (mm) beyond
-    /// which the wall folds, else null.
-    pub fn report(&self) -> Json {
+    /// The figures of the design, without meshing it.
+    pub fn report(&self) -> DesignReport {
         report::report(self)
     }
 
@@ -281,10 +279,8 @@ impl Built {
         found.is_some_and(|(_, made)| beams::lone(self) && beams::held(made, self))
     }
 
-    /// The transitions between the lattices of a blend, as JSON: for each the two names (`between`), `volume`, `pieces` (`loose`
-    /// and `dangling` bodies with their volumes), `neck` (diameter and place of the narrowest neck of the widest way across,
-    /// or null), and `fractions` (share of the second, fraction asked for, fraction found). Empty without a blend.
-    pub fn transitions(&self) -> Json {
+    /// The transitions between the lattices of a blend; empty without one.
+    pub fn transitions(&self) -> Vec<TransitionReport> {
         report::transitions(self)
     }
 

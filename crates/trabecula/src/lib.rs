@@ -50,6 +50,7 @@ pub mod lattice;
 pub mod map;
 pub mod mesher;
 pub mod region;
+pub mod report;
 pub mod skin;
 pub mod solid;
 pub mod surface_maker;

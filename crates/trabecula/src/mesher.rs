@@ -6,8 +6,6 @@
 //! Source: F. Labelle, J. R. Shewchuk, Isosurface stuffing, ACM Transactions on Graphics 26(3), 2007. Grading (by
 //! bisection), feature edges and corners, and shape improvement are additions.
 
-use serde::Serialize;
-
 use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
@@ -40,7 +38,7 @@ const TRIES: usize = 4;
 const FIT: f64 = 0.08;
 
 /// Quality of the fit of a mesh to its region.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// Mean distance from the centroids and edge midpoints of boundary triangles to the region's surface (mm); at edges
     /// and corners of the region an upper bound.

@@ -19,6 +19,7 @@ const LAYERS: &[&[&str]] = &[
     &["solid"],
     &["extract"],
     &["analysis"],
+    &["report"],
     &["design"],
 ];
 

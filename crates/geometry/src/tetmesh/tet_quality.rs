@@ -1,7 +1,6 @@
 //! Dihedral angles, edge lengths and volumes of tetrahedra.
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::{EDGES, FACES, TetMesh, volume};
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub};
@@ -12,7 +11,7 @@ pub const SLIVER: f64 = 10.0;
 const STEP: usize = 10;
 
 /// Least, mean and greatest.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Least.
     pub min: f64,
@@ -34,7 +33,7 @@ impl Spread {
 }
 
 /// Dihedral angles, degrees: 70.53 in a regular tetrahedron.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Dihedral {
     /// The least of all.
     pub min: f64,
@@ -53,7 +52,7 @@ pub struct Dihedral {
 }
 
 /// The shapes of a mesh's tetrahedra.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
     /// Number of tetrahedra.
     pub tets: usize,

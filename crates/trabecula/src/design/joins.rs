@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Value as Json, json};
-
 use super::{Warning, tiling::Zoned};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Stencil};
+use crate::report::ZoneJoin;
 use crate::tiling::{self, Connectivity, Tiling, ZonePair};
 
 /// Steps along the edge of a face on which ports are looked at.
@@ -89,8 +88,14 @@ impl Joins {
     }
 
     /// For the report.
-    pub(super) fn json(&self) -> Json {
-        let one = |(j, share): (&ZonePair, &f64)| json!({ "zones": j.zones, "faces": j.faces, "open": j.open, "ports": share, "joined": j.joined });
+    pub(super) fn report(&self) -> Vec<ZoneJoin> {
+        let one = |(j, ports): (&ZonePair, &f64)| ZoneJoin {
+            zones: j.zones,
+            faces: j.faces,
+            open: j.open,
+            ports: *ports,
+            joined: j.joined,
+        };
         self.connectivity.pairs.iter().zip(&self.shares).map(one).collect()
     }
 }

@@ -1,13 +1,12 @@
 //! Patterns of beams: data to a program of repeats.
 
-use serde_json::{Value as Json, json};
-
 use super::beams::{check_open, fillet, given, inside, share};
 use super::data::*;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use super::{Built, Warning};
 use crate::kind::DesignError;
+use crate::report::{BeamsReport, PatternReport};
 use ::beams::graph::{Hub, Profile};
 use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
 use geometry::fault::{counted, number};
@@ -112,7 +111,7 @@ pub(super) fn laid(
 }
 
 /// The figures of a pattern.
-pub(super) fn report(laid: &PatternField, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
+pub(super) fn report(laid: &PatternField, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> BeamsReport {
     let pattern = laid.pattern();
     let (hubs, beams) = pattern.counts();
     let radii = pattern.nodes.iter().map(|h| h.radius);
@@ -123,20 +122,23 @@ pub(super) fn report(laid: &PatternField, built: &Built, sampled: &dyn core::ops
     let volume = clear.then(|| laid.volume().ok()).flatten();
     // Of what was not looked for, nothing is sure.
     let whole = found.is_some() && inside(laid, built);
-    let (fraction, exact) = share(volume, whole, built, sampled);
-    json!({
-        "cell": null,
-        "wavelength": laid.wavelength(),
-        "repeats": pattern.steps.map(|s| s.1),
-        "hubs": hubs,
-        "beams": beams,
-        "kinds": laid.representatives().1.len(),
-        "volume": volume,
-        "collisions": found.map(|c| c.count),
-        "fraction": fraction,
-        "fraction_exact": exact,
-        "porosity": 1.0 - fraction,
-        "thickness": 2.0 * laid.min_radius(),
-        "hub_radius": [range[0] * scales[0], range[1] * scales[1]],
-    })
+    let (fraction, fraction_exact) = share(volume, whole, built, sampled);
+    BeamsReport {
+        cell: None,
+        wavelength: laid.wavelength(),
+        fraction,
+        fraction_exact,
+        porosity: 1.0 - fraction,
+        thickness: 2.0 * laid.min_radius(),
+        hub_radius: [range[0] * scales[0], range[1] * scales[1]],
+        volume,
+        graph: None,
+        pattern: Some(PatternReport {
+            hubs,
+            beams,
+            repeats: pattern.steps.map(|s| s.1),
+            kinds: laid.representatives().1.len(),
+            collisions: found.map(|c| c.count),
+        }),
+    }
 }

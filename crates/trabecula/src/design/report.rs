@@ -2,15 +2,15 @@
 
 use std::cell::LazyCell;
 
-use serde_json::{Value as Json, json};
-
+use super::blend::Functions;
 use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
-use crate::analysis;
+use crate::analysis::{self, Transition};
 use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
 use crate::map::{Distortion, Map, Spread};
+use crate::report::*;
 use crate::truss::Beams;
 
 /// The least and the greatest of a number over a region.
@@ -58,8 +58,8 @@ impl Varied {
         }
     }
 
-    fn json(self) -> Json {
-        if self.min == self.max { json!(self.min) } else { json!([self.min, self.max]) }
+    fn told(self) -> Varying {
+        if self.min == self.max { Varying::Number(self.min) } else { Varying::Range([self.min, self.max]) }
     }
 }
 
@@ -95,7 +95,7 @@ fn filling(built: &Built, beams: &Beams) -> f64 {
     solid as f64 / points.len().max(1) as f64
 }
 
-pub(super) fn report(built: &Built) -> Json {
+pub(super) fn report(built: &Built) -> DesignReport {
     let region = &built.solid.region;
     let bounds = region.bounds();
     let exact = region.volume();
@@ -103,54 +103,44 @@ pub(super) fn report(built: &Built) -> Json {
     let (mut points, share) = sample::inside(region, count);
     points.extend(sample::nodes(region));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());
-    let mut lattices = serde_json::Map::new();
-    for (name, lattice) in &built.lattices {
-        let iso = Varied::of_iso(lattice, &points);
-        let fraction = Varied::of_fraction(lattice, &points);
-        let mut entry = json!({
-            "part": word(lattice.part),
-            "wavelength": lattice.map.wavelength(),
-            // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
-            "iso": match lattice.distance() {
-                Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).json(),
-                None => iso.json(),
-            },
-            "fraction": fraction.json(),
-            "porosity": fraction.map(|f| 1.0 - f).json(),
-            "thickness": thickness(lattice, iso),
-            "folding": lattice.folding(),
-            "connected_fraction": lattice.connected_fraction(),
-        });
-        if let Some(share) = lattice.cell.truncation() {
-            entry["truncation"] = json!(share);
-        }
-        if let Map::Phase(map) = &lattice.map {
-            entry["distortion"] = distortion(map.distortion());
-        }
-        lattices.insert(name.clone(), entry);
-    }
-    for it in &built.tilings {
-        lattices.insert(it.name.clone(), tiled(it));
-    }
-    let told = |(name, made): &(String, Beams)| {
+    let lattices = built.lattices.iter().map(|(name, l)| (name.clone(), lattice(l, &points)));
+    let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it)));
+    let beams = built.beams.iter().map(|(name, made)| {
         let sampled = LazyCell::new(|| filling(built, made));
         (name.clone(), beams::report(made, built, &sampled))
-    };
-    let beams: serde_json::Map<String, Json> = (built.beams.iter()).map(told).collect();
-    let mut report = json!({
-        "lattices": lattices,
-        "beams": beams,
-        "region": {
-            "bounds": [bounds.min, bounds.max],
-            "volume": volume,
-            "volume_exact": exact.is_some(),
-        },
-        "warnings": built.warnings,
     });
-    if let Some(b) = &built.blend {
-        report["blend"] = blend(b);
+    DesignReport {
+        lattices: lattices.chain(tilings).collect(),
+        beams: beams.collect(),
+        region: RegionReport { bounds: [bounds.min, bounds.max], volume, volume_exact: exact.is_some() },
+        warnings: built.warnings.clone(),
+        blend: built.blend.as_ref().map(blend),
     }
-    report
+}
+
+fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
+    let iso = Varied::of_iso(lattice, points);
+    let fraction = Varied::of_fraction(lattice, points);
+    LatticeReport {
+        part: word(lattice.part),
+        wavelength: lattice.map.wavelength(),
+        // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
+        iso: Some(match lattice.distance() {
+            Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).told(),
+            None => iso.told(),
+        }),
+        fraction: fraction.told(),
+        porosity: fraction.map(|f| 1.0 - f).told(),
+        thickness: thickness(lattice, iso),
+        folding: lattice.folding(),
+        connected_fraction: lattice.connected_fraction(),
+        truncation: lattice.cell.truncation(),
+        distortion: match &lattice.map {
+            Map::Phase(map) => Some(distortion(map.distortion())),
+            _ => None,
+        },
+        tets: None,
+    }
 }
 
 /// How the phases of a blend go together, in a word.
@@ -163,28 +153,22 @@ fn phases(phases: Phases) -> &'static str {
 }
 
 /// The blend without its transitions.
-fn blend(b: &Blended) -> Json {
-    let functions = b
-        .functions
-        .iter()
-        .map(|f| json!({ "path": f.path, "points": f.points, "delta": f.delta, "condition": f.condition }));
-    json!({
-        "lattices": b.names,
-        "by": if b.blend.phases().is_some() { "fraction" } else { "value" },
-        "phases": b.blend.phases().map(phases),
-        "width": b.width,
-        "rbf": functions.collect::<Vec<Json>>(),
-    })
+fn blend(b: &Blended) -> BlendReport {
+    let function =
+        |f: &Functions| RbfReport { path: f.path.clone(), points: f.points, delta: f.delta, condition: f.condition };
+    BlendReport {
+        lattices: b.names.clone(),
+        by: if b.blend.phases().is_some() { "fraction" } else { "value" },
+        phases: b.blend.phases().map(phases),
+        width: b.width,
+        rbf: b.functions.iter().map(function).collect(),
+    }
 }
 
 /// A lattice over a tetrahedral mesh.
-fn tiled(it: &Tiled) -> Json {
+fn tiled(it: &Tiled) -> LatticeReport {
     let tiling = &it.tiling;
-    let stencil = &tiling.cells[0].stencil;
     let part = tiling.part;
-    let levels = tiling.levels();
-    let iso = Varied { min: levels.lo, max: levels.hi };
-    let share = iso.map(|t| stencil.fraction(part, t));
     let shares = tiling.shares();
     let sums = |zone: Option<u32>| {
         let of = (0..tiling.map.len()).filter(|t| zone.is_none_or(|z| tiling.map.zone(*t) == z));
@@ -194,62 +178,70 @@ fn tiled(it: &Tiled) -> Json {
         })
     };
     let (_, volume, solid) = sums(None);
+    let mesh = TilingReport {
+        count: tiling.map.len(),
+        mesh: (&it.mesh).into(),
+        edge: tiling.map.mean_edge(),
+        volume,
+        solid_fraction: solid / volume,
+        zones: None,
+        pieces: None,
+        joins: None,
+        overlap: tiling.map.overlap(),
+        thickness: None,
+        ports: None,
+        face_fraction: None,
+        creases: None,
+    };
+    let lattice = LatticeReport {
+        part: word(part),
+        wavelength: tiling.wavelength(),
+        iso: None,
+        fraction: Varying::Number(solid / volume),
+        porosity: Varying::Number(1.0 - solid / volume),
+        thickness: None,
+        folding: None,
+        connected_fraction: Vec::new(),
+        truncation: None,
+        distortion: None,
+        tets: None,
+    };
     if !it.zones.is_empty() {
         // Cells of zones have no level in common, and between them no fraction that they were asked for.
         let zones = it.zones.iter().map(|(zone, cell)| {
             let (count, volume, solid) = sums(zone.parse().ok());
-            let told = json!({ "cell": cell, "count": count, "volume": volume, "solid_fraction": solid / volume });
-            (zone.clone(), told)
+            (zone.clone(), ZoneReport { cell: cell.clone(), count, volume, solid_fraction: solid / volume })
         });
-        return json!({
-            "part": word(part),
-            "wavelength": tiling.wavelength(),
-            "iso": Json::Null, "fraction": solid / volume, "porosity": 1.0 - solid / volume, "thickness": Json::Null,
-            "folding": Json::Null,
-            "connected_fraction": [],
-            "tets": {
-                "count": tiling.map.len(),
-                "mesh": it.mesh,
-                "edge": tiling.map.mean_edge(),
-                "volume": volume,
-                "solid_fraction": solid / volume,
-                "zones": zones.collect::<serde_json::Map<String, Json>>(),
-                "pieces": it.joins.as_ref().map(Joins::pieces),
-                "joins": it.joins.as_ref().map(Joins::json),
-                "overlap": tiling.map.overlap(),
-                "thickness": Json::Null,
-                "ports": Json::Null,
-                "face_fraction": Json::Null,
-                "creases": Json::Null,
-            },
-        });
+        let tets = TilingReport {
+            zones: Some(zones.collect()),
+            pieces: it.joins.as_ref().map(Joins::pieces),
+            joins: it.joins.as_ref().map(Joins::report),
+            ..mesh
+        };
+        return LatticeReport { tets: Some(tets), ..lattice };
     }
+    let stencil = &tiling.cells[0].stencil;
+    let levels = tiling.levels();
+    let iso = Varied { min: levels.lo, max: levels.hi };
+    let share = iso.map(|t| stencil.fraction(part, t));
     let spread = tiling.thickness();
-    json!({
-        "part": word(part),
-        "wavelength": tiling.wavelength(),
-        "iso": iso.json(),
-        "fraction": share.json(),
-        "porosity": share.map(|f| 1.0 - f).json(),
-        "thickness": spread.map(|s| json!([s.min, s.max])),
-        "folding": Json::Null,
-        "connected_fraction": stencil.connected_fraction(part),
-        "tets": {
-            "count": tiling.map.len(),
-            "mesh": it.mesh,
-            "edge": tiling.map.mean_edge(),
-            "volume": volume,
-            "solid_fraction": solid / volume,
-            "zones": Json::Null,
-            "pieces": it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
-            "joins": Json::Null,
-            "overlap": tiling.map.overlap(),
-            "thickness": spread.map(|s| json!({ "min": s.min, "low": s.low, "mean": s.mean, "high": s.high, "max": s.max })),
-            "ports": stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports,
-            "face_fraction": iso.map(|t| stencil.face_fraction(part, t)).json(),
-            "creases": tiling.creases().map(|c| json!({ "mean": c.mean, "max": c.max })),
-        },
-    })
+    let tets = TilingReport {
+        pieces: it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
+        thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
+        ports: Some(stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports),
+        face_fraction: Some(iso.map(|t| stencil.face_fraction(part, t)).told()),
+        creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max }),
+        ..mesh
+    };
+    LatticeReport {
+        iso: Some(iso.told()),
+        fraction: share.told(),
+        porosity: share.map(|f| 1.0 - f).told(),
+        thickness: spread.map(|s| Varying::Range([s.min, s.max])),
+        connected_fraction: stencil.connected_fraction(part),
+        tets: Some(tets),
+        ..lattice
+    }
 }
 
 fn word(part: Part) -> &'static str {
@@ -261,30 +253,32 @@ fn word(part: Part) -> &'static str {
 }
 
 /// The transitions of a blend, by sampling the solid.
-pub(super) fn transitions(built: &Built) -> Json {
+pub(super) fn transitions(built: &Built) -> Vec<TransitionReport> {
     let Some(b) = &built.blend else {
-        return json!([]);
+        return Vec::new();
     };
-    let found = analysis::transitions(&built.solid, &b.blend);
-    let each = found.iter().map(|t| {
-        json!({
-            "between": t.between.map(|i| &b.names[i]),
-            "volume": t.volume,
-            "pieces": t.pieces,
-            "loose": { "bodies": t.loose.0, "volume": t.loose.1 },
-            "dangling": { "bodies": t.dangling.0, "volume": t.dangling.1 },
-            "neck": t.neck.map(|(diameter, place)| json!({ "diameter": diameter, "place": place })),
-            "fractions": t.fractions.iter().map(|f| json!({ "share": f[0], "asked": f[1], "found": f[2] })).collect::<Vec<Json>>(),
-            "step": t.step,
-        })
-    });
-    each.collect()
+    let bodies = |(bodies, volume): (usize, f64)| LooseBodies { bodies, volume };
+    let one = |t: Transition| TransitionReport {
+        between: t.between.map(|i| b.names[i].clone()),
+        volume: t.volume,
+        pieces: t.pieces,
+        loose: bodies(t.loose),
+        dangling: bodies(t.dangling),
+        neck: t.neck.map(|(diameter, place)| NarrowestNeck { diameter, place }),
+        fractions: t.fractions.iter().map(along).collect(),
+        step: t.step,
+    };
+    analysis::transitions(&built.solid, &b.blend).into_iter().map(one).collect()
 }
 
-/// The thinnest wall or narrowest neck (mm), at five levels where the level varies; null where there is none.
-fn thickness(lattice: &Lattice, iso: Varied) -> Json {
+fn along(f: &[f64; 4]) -> FractionAlong {
+    FractionAlong { share: f[0], asked: f[1].is_finite().then_some(f[1]), found: f[2] }
+}
+
+/// The thinnest wall or narrowest neck (mm), at five levels where the level varies; `None` where there is none.
+fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
     if lattice.distance().is_some() {
-        return iso.map(|t| 2.0 * t).json();
+        return Some(iso.map(|t| 2.0 * t).told());
     }
     let to_phase = lattice.map.extremes();
     let steps = if iso.min == iso.max { 1 } else { 5 };
@@ -294,20 +288,20 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Json {
         .flat_map(|m| (0..steps).map(move |i| (i, m)))
         .filter_map(|(i, m)| lattice.cell.thickness(lattice.part, level(i), m))
         .collect();
-    if found.is_empty() { Json::Null } else { Varied::of(&found).json() }
+    (!found.is_empty()).then(|| Varied::of(&found).told())
 }
 
 /// How far a solved map is from what was asked for.
-fn distortion(d: &Distortion) -> Json {
-    let spread = |s: &Spread| json!({ "mean": s.mean, "p95": s.p95, "max": s.max });
-    json!({
-        "angle": d.angle.iter().map(spread).collect::<Vec<Json>>(),
-        "spacing": d.spacing.iter().map(spread).collect::<Vec<Json>>(),
-        "outside": d.outside,
-        "shear": spread(&d.shear),
-        "anisotropy": spread(&d.anisotropy),
-        "density": d.density,
-        "curl": spread(&d.curl),
-        "turn": d.turn,
-    })
+fn distortion(d: &Distortion) -> DistortionReport {
+    let spread = |s: &Spread| MapSpread { mean: s.mean, p95: s.p95, max: s.max };
+    DistortionReport {
+        angle: d.angle.each_ref().map(spread),
+        spacing: d.spacing.each_ref().map(spread),
+        outside: d.outside,
+        shear: spread(&d.shear),
+        anisotropy: spread(&d.anisotropy),
+        density: d.density,
+        curl: spread(&d.curl),
+        turn: d.turn,
+    }
 }

@@ -2,15 +2,13 @@
 
 mod source;
 
-use serde::Serialize;
-use serde_json::Value as Json;
-
 use super::data::*;
 use super::grade::{Allowed, grade};
 use super::place::{LOOKS, Place};
 use super::{Loader, Node, Warning, read, region, sample};
 use crate::kind::DesignError;
 use crate::mesher::{self, Fit, background};
+use crate::report::{FitReport, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
@@ -36,7 +34,7 @@ pub struct Tets {
 }
 
 /// The figures of a tetrahedral mesh.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct TetReport {
     /// What made it: background, ftetwild, or the file's name.
     pub mesher: String,
@@ -44,6 +42,17 @@ pub struct TetReport {
     pub quality: Quality,
     /// How it fits the region, if it is of one.
     pub fit: Option<Fit>,
+}
+
+impl From<&TetReport> for TetMeshReport {
+    fn from(r: &TetReport) -> Self {
+        TetMeshReport {
+            mesher: r.mesher.clone(),
+            quality: (&r.quality).into(),
+            fit: r.fit.as_ref().map(FitReport::from),
+            warnings: None,
+        }
+    }
 }
 
 impl Tets {
@@ -85,11 +94,9 @@ impl Tets {
         told(mesh, &checked, file.path.clone(), None, "", "")
     }
 
-    /// The figures and the warnings as JSON.
-    pub fn to_json(&self) -> Json {
-        let mut out = serde_json::to_value(&self.report).unwrap_or(Json::Null);
-        out["warnings"] = serde_json::to_value(&self.warnings).unwrap_or(Json::Null);
-        out
+    /// The figures and the warnings.
+    pub fn report(&self) -> TetMeshReport {
+        TetMeshReport { warnings: Some(self.warnings.clone()), ..(&self.report).into() }
     }
 }
 

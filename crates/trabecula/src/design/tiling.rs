@@ -246,7 +246,7 @@ pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning
 /// Whether the surface is made without a grid.
 fn explicit(domain: &Domain, place: &Place) -> bool {
     let joined = domain.joined;
-    joined.road == Road::Explicit && joined.overlap == 0.0 && place.filled.is_empty()
+    joined.method == Method::Explicit && joined.overlap == 0.0 && place.filled.is_empty()
 }
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its

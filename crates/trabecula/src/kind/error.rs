@@ -1,6 +1,7 @@
 //! What can be wrong with a design: the place, what was found, what is allowed, the nearest right word.
 
 use geometry::fault::{Fault, nearest};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A refused design.
@@ -21,7 +22,8 @@ pub struct DesignError {
 }
 
 /// Something in a design that is allowed but may be a mistake.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(rename = "WarningReport")]
 pub struct Warning {
     /// Path of the key in the design.
     pub path: String,

@@ -1,11 +1,10 @@
 //! What is to be said of beams: warnings and figures.
 
-use serde_json::{Value as Json, json};
-
 use super::whole;
 use crate::design::data::*;
 use crate::design::place::Place;
 use crate::design::{Built, Warning, pattern};
+use crate::report::{BeamsReport, CleanedReport, GraphReport, TrimmedReport};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
 use ::beams::pattern::PatternField;
@@ -130,55 +129,58 @@ pub(in crate::design) fn share(
 }
 
 /// The figures of beams; `sampled` is the solid share of the region, by looks at points.
-pub(in crate::design) fn report(beams: &Beams, built: &Built, sampled: &dyn core::ops::Deref<Target = f64>) -> Json {
+pub(in crate::design) fn report(
+    beams: &Beams,
+    built: &Built,
+    sampled: &dyn core::ops::Deref<Target = f64>,
+) -> BeamsReport {
     let truss = match beams {
         Beams::Truss(truss) => truss,
         Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
     };
     let (frame, graph, quadors) = (&truss.report, &truss.graph, &truss.quadors);
-    let [least, most] =
-        (graph.hubs.iter().map(|h| h.radius)).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)]);
-    let valence: serde_json::Map<String, Json> =
-        (frame.valence.iter()).map(|(v, n)| (v.to_string(), json!(n))).collect();
+    let radii = graph.hubs.iter().map(|h| h.radius);
     let thin = (0..graph.beams.len()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
     // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();
-    let (fraction, exact) = share(mass.map(|m| m.volume), truss.whole, built, sampled);
-    json!({
-        "cell": truss.cell,
-        "wavelength": truss.wavelength,
-        "hubs": frame.valence.values().sum::<usize>(),
-        "beams": frame.struts,
-        "fraction": fraction,
-        "fraction_exact": exact,
-        "porosity": 1.0 - fraction,
-        "thickness": 2.0 * thin,
-        "hub_radius": [least, most],
-        "length": frame.length,
-        "total_length": frame.total_length,
-        "volume": mass.map(|m| m.volume),
-        "area": mass.map(|m| m.area),
-        "centroid": mass.map(|m| m.centroid()),
-        "inertia": mass.map(|m| m.inertia()),
-        "valence": valence,
-        "fillet_radius": truss.fillet,
-        "smallest_angle": frame.min_angle.map(|a| a.0),
-        "smallest_angle_at": frame.min_angle.map(|a| a.1),
-        "pieces": frame.components,
-        "dangling": truss.dangling,
-        "collisions": truss.collisions.len(),
-        "cleaned": {
-            "merged": truss.cleaned.merged,
-            "zero_length": truss.cleaned.short,
-            "duplicates": truss.cleaned.duplicates,
-            "isolated": truss.cleaned.isolated,
-            "dangling": truss.cleaned.dangling,
+    let volume = mass.map(|m| m.volume);
+    let (fraction, fraction_exact) = share(volume, truss.whole, built, sampled);
+    let (cleaned, trimmed) = (&truss.cleaned, &truss.trimmed);
+    let graph = GraphReport {
+        hubs: frame.valence.values().sum(),
+        beams: frame.struts,
+        length: frame.length,
+        total_length: frame.total_length,
+        area: mass.map(|m| m.area),
+        centroid: mass.map(|m| m.centroid()),
+        inertia: mass.map(|m| m.inertia()),
+        valence: frame.valence.iter().map(|(v, n)| (v.to_string(), *n)).collect(),
+        fillet_radius: truss.fillet,
+        smallest_angle: frame.min_angle.map(|a| a.0),
+        smallest_angle_at: frame.min_angle.map(|a| a.1),
+        pieces: frame.components,
+        dangling: truss.dangling,
+        collisions: truss.collisions.len(),
+        cleaned: CleanedReport {
+            merged: cleaned.merged,
+            zero_length: cleaned.short,
+            duplicates: cleaned.duplicates,
+            isolated: cleaned.isolated,
+            dangling: cleaned.dangling,
         },
-        "trimmed": {
-            "outside": truss.trimmed.outside,
-            "dropped": truss.trimmed.dropped,
-            "snapped": truss.trimmed.snapped,
-        },
-    })
+        trimmed: TrimmedReport { outside: trimmed.outside, dropped: trimmed.dropped, snapped: trimmed.snapped },
+    };
+    BeamsReport {
+        cell: truss.cell,
+        wavelength: truss.wavelength,
+        fraction,
+        fraction_exact,
+        porosity: 1.0 - fraction,
+        thickness: 2.0 * thin,
+        hub_radius: radii.fold([f64::INFINITY, 0.0], |[a, b], v| [a.min(v), b.max(v)]),
+        volume,
+        graph: Some(graph),
+        pattern: None,
+    }
 }

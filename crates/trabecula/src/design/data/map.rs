@@ -96,13 +96,13 @@ pub struct Joined {
     pub overlap: f64,
     /// How the surface is made.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub road: Road,
+    pub method: Method,
 }
 
 /// How the surface of a tetrahedral lattice is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Road {
+pub enum Method {
     /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones or overlap.
     #[default]
     Explicit,

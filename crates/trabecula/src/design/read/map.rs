@@ -73,12 +73,12 @@ pub(super) fn map(at: &At) -> Read<MapSpec> {
 const MESHERS: [(&str, &str); 3] = [("wildmeshing", "ftetwild"), ("tetwild", "ftetwild"), ("stuffing", "background")];
 
 pub(super) fn tets(at: &At) -> Read<TetsSpec> {
-    let keys = ["size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "road"];
+    let keys = ["size", "mesher", "limit", "zones", "path", "unit", "split", "overlap", "method"];
     let f = at.fields("a map over tetrahedra", &keys)?;
-    let roads = [("explicit", Road::Explicit), ("implicit", Road::Implicit)];
+    let methods = [("explicit", Method::Explicit), ("implicit", Method::Implicit)];
     let joined = Joined {
         overlap: f.read("overlap", 0.0, At::number)?,
-        road: f.read("road", Road::Explicit, |at| at.word("road", &roads))?,
+        method: f.read("method", Method::Explicit, |at| at.word("method", &methods))?,
     };
     let found = |keys: &[&str]| keys.iter().find_map(|k| f.get(k));
     let made = found(&["size", "mesher", "limit", "zones"]);

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files: text that is read whole, outputs that appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ import contextlib
 import os
 import re
 import stat
-import zlib
 from collections.abc import Iterator
 
-from . import interrupt
+from . import _core, terminal
+from .errors import DesignError
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None
-
-__all__ = ["check_place", "extension", "special", "whole_file"]
+__all__ = ["check_place", "extension", "read_text", "special", "whole_file"]
 
 #: Names of what is open already.
 OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
@@ -30,6 +25,24 @@ def extension(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
         found = f"found .{ext}" if ext else "found none"
         raise ValueError(f"{name}: the name must end in {', '.join('.' + k for k in known)}; {found}")
     return ext
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a file in UTF-8, a byte order mark left out.
+
+    Raises OSError for what is no file or cannot be read, DesignError for what is not such text.
+    """
+    name = os.fsdecode(path)
+    raw = _core.read_file(name)
+    try:
+        if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            line, message = 1, "text in UTF-16; save it as UTF-8"
+        else:
+            return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        message = f"not text in UTF-8 (byte {error.start}); save it as UTF-8"
+    raise DesignError(f"{name}:{line}: {message}", "", line, message)
 
 
 def special(name: str) -> bool:
@@ -60,7 +73,7 @@ def check_place(path: str | os.PathLike[str]) -> str:
         raise OSError(f"{name}: the directory {folder} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OSError(f"{name}: the directory {folder} cannot be written to")
-    # The administrator may write to it all the same, but that is not what was meant.
+    # The administrator may write to it all the same; a read-only file is kept.
     if os.path.exists(real) and not (os.access(real, os.W_OK) and os.stat(real).st_mode & 0o222):
         raise OSError(f"{name} is read-only; make it writable, or name another output")
     return real
@@ -68,7 +81,8 @@ def check_place(path: str | os.PathLike[str]) -> str:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
-    """Gives a temporary name beside ``path``; what is written there becomes ``path`` at the end, or vanishes on any error.
+    """Gives a temporary name in the folder of ``path``; what is written there becomes ``path`` at the end, or is removed on
+    any error or interrupt.
 
     A link stays and its target is replaced; permissions stay as they were. A device or a pipe is written as it is.
     """
@@ -78,64 +92,29 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
         try:
             yield shown
         except BaseException:
-            interrupt.left.append(f"{shown} was written in part")
+            terminal.left.append(f"{shown} was written in part")
             raise
-        interrupt.left.append(f"{shown} is written")
+        terminal.left.append(f"{shown} is written")
         return
-    temporary, lock = _temporary(real)
+    folder, name = os.path.split(real)
+    temporary = os.path.join(folder, f".{name[:100]}-{os.urandom(6).hex()}.part")
+    os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     try:
         yield temporary
         _permissions(temporary, real)
-        if fcntl is None:  # Windows moves no open file
-            lock = _closed(lock)
         os.replace(temporary, real)
-        interrupt.left.append(f"{shown} is written")
+        terminal.left.append(f"{shown} is written")
     except BaseException as error:
         try:
             os.unlink(temporary)
         except FileNotFoundError:  # it has its own name already
-            interrupt.left.append(f"{shown} is written")
+            terminal.left.append(f"{shown} is written")
         except OSError:
             pass
         if isinstance(error, OSError) and error.filename in (None, temporary):
             reason = error.strerror or str(error)
             raise OSError(f"{shown} cannot be written: {reason}") from error
         raise
-    finally:
-        _closed(lock)
-
-
-def _temporary(real: str) -> tuple[str, int | None]:
-    """A new file beside ``real``, locked for as long as it is written; those that nobody writes any more are removed."""
-    folder, name = os.path.split(real)
-    prefix, suffix = f".trabecula-{zlib.crc32(os.fsencode(name)):08x}-", ".part"
-    if fcntl is not None:
-        for other in os.listdir(folder):
-            if other.startswith(prefix) and other.endswith(suffix):
-                with contextlib.suppress(OSError):
-                    _remove_stale(os.path.join(folder, other))
-    while True:
-        temporary = os.path.join(folder, f"{prefix}{os.urandom(6).hex()}{suffix}")
-        try:
-            handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-        except FileExistsError:
-            continue
-        if fcntl is not None:
-            with contextlib.suppress(OSError):  # a file system without locks
-                fcntl.flock(handle, fcntl.LOCK_EX)
-        if os.path.exists(temporary):  # nobody took it for stale before it was locked
-            return temporary, handle
-        os.close(handle)
-
-
-def _remove_stale(name: str) -> None:
-    """Removes the temporary file of a run that was killed: no process holds its lock."""
-    handle = os.open(name, os.O_RDWR)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.unlink(name)
-    finally:
-        os.close(handle)
 
 
 def _permissions(temporary: str, real: str) -> None:
@@ -150,8 +129,3 @@ def _permissions(temporary: str, real: str) -> None:
     with contextlib.suppress(OSError, AttributeError):
         os.chown(temporary, old.st_uid, old.st_gid)
     os.chmod(temporary, stat.S_IMODE(old.st_mode))
-
-
-def _closed(handle: int | None) -> None:
-    if handle is not None:
-        os.close(handle)

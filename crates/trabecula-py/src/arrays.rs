@@ -1,0 +1,36 @@
+//! Arrays of points in, arrays of numbers out.
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use trabecula::field::Field;
+
+use crate::run::run;
+
+/// Points of Python (n, 3) as the core's.
+pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+    let a = p.as_array();
+    if a.ncols() != 3 {
+        return Err(PyValueError::new_err(format!("points must have shape (n, 3), found {:?}", a.shape())));
+    }
+    let points: Vec<[f64; 3]> = a.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect();
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(i) => Err(PyValueError::new_err(format!(
+            "points[{i}] is {:?}; a position is three finite numbers, mm",
+            points[i]
+        ))),
+        None => Ok(points),
+    }
+}
+
+/// Values of a field at points.
+pub fn values<'py>(py: Python<'py>, field: &dyn Field, points: Vec<[f64; 3]>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    const BATCH: usize = 4096;
+    let out = run(py, None, None, |_| {
+        let mut out = vec![0.0; points.len()];
+        out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
+        out
+    })?;
+    Ok(out.into_pyarray(py))
+}

@@ -1,0 +1,100 @@
+//! Files of a design: read below its folder; formats and meshers that Python has are asked there.
+
+use std::path::{Path, PathBuf};
+
+use geometry::formats::Elements;
+use geometry::mesh::Mesh;
+use geometry::tetmesh::TetMesh;
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use trabecula::design::Loader;
+
+/// Files below a folder.
+pub struct Folder(pub PathBuf);
+
+impl Loader for Folder {
+    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        crate::file::read(&self.0.join(Path::new(path))).map_err(|e| e.to_string())
+    }
+
+    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
+        let (folder, name) = pattern.rsplit_once('/').unwrap_or(("", pattern));
+        let (before, after) = name.split_once('*').unwrap_or((name, ""));
+        let found = std::fs::read_dir(self.0.join(folder)).map_err(|e| format!("{folder}: {e}"))?;
+        let names = found.filter_map(|f| f.ok()?.file_name().into_string().ok());
+        let long = before.len() + after.len();
+        let fits = |n: &String| n.len() >= long && n.starts_with(before) && n.ends_with(after);
+        let found: Vec<String> =
+            names.filter(fits).map(|n| format!("{folder}{}{n}", if folder.is_empty() { "" } else { "/" })).collect();
+        if found.is_empty() {
+            return Err(format!("no file is named {pattern}"));
+        }
+        Ok(found)
+    }
+
+    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+        elements(&self.0.join(Path::new(path)).to_string_lossy())
+    }
+
+    fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
+        tetrahedra(name, surface, size, limit)
+    }
+}
+
+/// Points, connectivity, ends, kinds and zones of elements that Python read.
+type Read<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, u8>,
+    PyReadonlyArray1<'py, u32>,
+);
+
+/// What an exception says.
+fn words(py: Python<'_>, e: &PyErr) -> String {
+    e.value(py).to_string()
+}
+
+/// The elements of a file of a format that Python reads.
+fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
+    Python::attach(|py| {
+        let read = || -> PyResult<(Elements, Vec<u32>)> {
+            let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
+            let (points, connectivity, ends, kinds, zones): Read<'_> = read.extract()?;
+            let elements = Elements {
+                points: rows(&points),
+                connectivity: connectivity.as_array().to_vec(),
+                ends: ends.as_array().iter().map(|e| *e as usize).collect(),
+                kinds: kinds.as_array().to_vec(),
+            };
+            Ok((elements, zones.as_array().to_vec()))
+        };
+        read().map_err(|e| words(py, &e))
+    })
+}
+
+/// The tetrahedra that a mesher of Python's makes of a surface.
+fn tetrahedra(name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
+    Python::attach(|py| {
+        let make = || -> PyResult<TetMesh> {
+            let flat = surface.vertices.clone().into_flattened().into_pyarray(py);
+            let points = flat.reshape([surface.vertices.len(), 3])?;
+            let flat = surface.triangles.clone().into_flattened().into_pyarray(py);
+            let triangles = flat.reshape([surface.triangles.len(), 3])?;
+            let call = py.import("trabecula.meshers")?.getattr("tetrahedra")?;
+            let made = call.call1((name, points, triangles, size, limit))?;
+            let (nodes, tets): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>) = made.extract()?;
+            let tets = tets.as_array();
+            Ok(TetMesh {
+                nodes: rows(&nodes),
+                tets: tets.rows().into_iter().map(|r| [r[0], r[1], r[2], r[3]]).collect(),
+                zones: Vec::new(),
+            })
+        };
+        make().map_err(|e| words(py, &e))
+    })
+}
+
+fn rows(of: &PyReadonlyArray2<'_, f64>) -> Vec<[f64; 3]> {
+    of.as_array().rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect()
+}

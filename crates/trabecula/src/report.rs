@@ -1,0 +1,56 @@
+//! Reports: every figure that is told of a design or a mesh, declared once. The fields are the keys of the JSON that the command
+//! prints and the attributes of the Python classes, whose text is made from the comments here (`scripts/report_classes.py`).
+
+mod beams;
+mod design;
+mod mesh;
+mod tets;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value as Json;
+
+pub use beams::{BeamsReport, CleanedReport, GraphReport, PatternReport, TrimmedReport};
+pub use design::{
+    BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
+    RbfReport, RegionReport, TransitionReport,
+};
+pub use mesh::{
+    DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,
+    RepairReport, SimplifyReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread, VoidReport,
+};
+pub use tets::{
+    Creases, DihedralReport, FitReport, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport, WallSpread,
+    ZoneJoin, ZoneReport,
+};
+
+/// A number, or its least and greatest value over the region where it varies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Varying {
+    /// It is the same everywhere.
+    Number(f64),
+    /// Least and greatest.
+    Range([f64; 2]),
+}
+
+/// All reports, so that their schemas are found in one place.
+#[derive(JsonSchema)]
+#[allow(dead_code)]
+struct Reports {
+    design: DesignReport,
+    transition: TransitionReport,
+    mesh: MeshReport,
+    surface: SurfaceReport,
+    simplified: SimplifyReport,
+    thickness: ThicknessReport,
+    dangling: DanglingReport,
+    repair: RepairReport,
+    estimate: EstimateReport,
+    tets: TetMeshReport,
+}
+
+/// The JSON Schema of all reports, by the names of their types under `$defs`.
+pub fn schema() -> Json {
+    schemars::schema_for!(Reports).to_value()
+}

@@ -1,0 +1,111 @@
+//! Figures of beams.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// A graph of beams, or a pattern of them: figures of both first, then those of a graph or of a pattern.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct BeamsReport {
+    /// Name of the unit cell; None for nodes and struts of your own and for patterns.
+    pub cell: Option<&'static str>,
+    /// The cell's edge or the mean length of struts, mm.
+    pub wavelength: f64,
+    /// Solid fraction of the part.
+    pub fraction: f64,
+    /// Whether the fraction is exact; else it is estimated at points.
+    pub fraction_exact: bool,
+    /// 1 − fraction.
+    pub porosity: f64,
+    /// Diameter of the thinnest beam, mm.
+    pub thickness: f64,
+    /// Least and greatest radius of hubs, mm.
+    pub hub_radius: [f64; 2],
+    /// Volume with fillets, mm³; None where the region cuts the beams or beams collide.
+    pub volume: Option<f64>,
+    /// What a graph has besides.
+    #[serde(flatten)]
+    pub graph: Option<GraphReport>,
+    /// What a pattern has besides.
+    #[serde(flatten)]
+    pub pattern: Option<PatternReport>,
+}
+
+/// What is known of a graph of beams alone.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct GraphReport {
+    /// Number of hubs in the region.
+    pub hubs: usize,
+    /// Number of beams in the region.
+    pub beams: usize,
+    /// Least and greatest length of beams, mm.
+    pub length: [f64; 2],
+    /// Length of all beams, mm.
+    pub total_length: f64,
+    /// Surface area, mm²; None where the volume is.
+    pub area: Option<f64>,
+    /// Centre of mass, mm.
+    pub centroid: Option<[f64; 3]>,
+    /// Inertia tensor about the centre of mass for density 1, mm⁵.
+    pub inertia: Option<[[f64; 3]; 3]>,
+    /// Number of nodes by their number of beams.
+    pub valence: BTreeMap<String, usize>,
+    /// Least and greatest radius of fillets at their tightest places, mm; None without fillets.
+    pub fillet_radius: Option<[f64; 2]>,
+    /// Least angle between two beams of a node, degrees.
+    pub smallest_angle: Option<f64>,
+    /// Position of that node, mm.
+    pub smallest_angle_at: Option<[f64; 3]>,
+    /// Number of connected components of the graph.
+    pub pieces: usize,
+    /// Number of nodes inside the region with a single beam.
+    pub dangling: usize,
+    /// Pairs of beams that run into each other without a common node.
+    pub collisions: usize,
+    /// What was cleaned.
+    pub cleaned: CleanedReport,
+    /// What the region trimmed.
+    pub trimmed: TrimmedReport,
+}
+
+/// What is known of a pattern of beams alone.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PatternReport {
+    /// Number of hubs, repeats included.
+    pub hubs: f64,
+    /// Number of beams, repeats included.
+    pub beams: f64,
+    /// Repeats of its three steps.
+    pub repeats: [u32; 3],
+    /// Number of hubs that differ in more than position and scale.
+    pub kinds: usize,
+    /// Pairs of beams that run into each other without a common node, about one hub of each kind; None if not known.
+    pub collisions: Option<usize>,
+}
+
+/// Nodes and struts left out before beams are made.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct CleanedReport {
+    /// Nodes merged into another at the same position.
+    pub merged: usize,
+    /// Struts of zero length.
+    pub zero_length: usize,
+    /// Struts that join the same nodes as another.
+    pub duplicates: usize,
+    /// Nodes without a strut.
+    pub isolated: usize,
+    /// Struts with a free end.
+    pub dangling: usize,
+}
+
+/// Struts that leave the region.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct TrimmedReport {
+    /// Struts without a part in the region.
+    pub outside: usize,
+    /// Struts left out.
+    pub dropped: usize,
+    /// Struts shortened to the surface.
+    pub snapped: usize,
+}

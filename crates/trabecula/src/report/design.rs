@@ -1,0 +1,177 @@
+//! Figures of a design, without meshing it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{BeamsReport, TilingReport, Varying};
+use crate::kind::Warning;
+
+/// The figures of a design, without meshing it.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DesignReport {
+    /// The lattices by name.
+    pub lattices: BTreeMap<String, LatticeReport>,
+    /// The graphs and patterns of beams by name.
+    pub beams: BTreeMap<String, BeamsReport>,
+    /// The region.
+    pub region: RegionReport,
+    /// Possible mistakes in the design.
+    pub warnings: Vec<Warning>,
+    /// The blend of its lattices, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blend: Option<BlendReport>,
+}
+
+/// A lattice: a number, or [least, greatest] over the region where it varies.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct LatticeReport {
+    /// sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t).
+    pub part: &'static str,
+    /// The smallest wavelength, mm.
+    pub wavelength: f64,
+    /// The level t. Where the thickness is given: the constant level of equal fraction. None for cells by zones.
+    pub iso: Option<Varying>,
+    /// Solid fraction of the cell, 0 to 1.
+    pub fraction: Varying,
+    /// 1 − fraction.
+    pub porosity: Varying,
+    /// Minimum wall (sheet) or narrowest neck diameter (lower, upper), mm; None where there is none.
+    pub thickness: Option<Varying>,
+    /// The thickness beyond which a wall of given thickness folds, mm; None for other levels.
+    pub folding: Option<f64>,
+    /// Intervals of the fraction in which the periodic solid is one connected component.
+    pub connected_fraction: Vec<[f64; 2]>,
+    /// Root mean square share of a cell from a file that the kept terms leave out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<f64>,
+    /// Deviation of a solved map from the orientation and wavelength asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<DistortionReport>,
+    /// The tetrahedral mesh of a lattice over tetrahedra, and the cells in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tets: Option<TilingReport>,
+}
+
+/// The region of a design.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct RegionReport {
+    /// Lower and upper corner of its bounds, mm.
+    pub bounds: [[f64; 3]; 2],
+    /// Volume, mm³.
+    pub volume: f64,
+    /// Whether the volume is exact; else it is estimated at points.
+    pub volume_exact: bool,
+}
+
+/// A blend of lattices.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct BlendReport {
+    /// Names of its lattices, in the order of their weights.
+    pub lattices: Vec<String>,
+    /// fraction or value: what is interpolated.
+    pub by: &'static str,
+    /// locked, independent or drifting: how the phases of its lattices go together. None for by = value.
+    pub phases: Option<&'static str>,
+    /// Width of the narrowest transition, mm.
+    pub width: Option<f64>,
+    /// The radial basis functions among its weights.
+    pub rbf: Vec<RbfReport>,
+}
+
+/// Radial basis functions.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct RbfReport {
+    /// Path of their key in the design.
+    pub path: String,
+    /// Number of control points.
+    pub points: usize,
+    /// Width δ of the functions, mm.
+    pub delta: f64,
+    /// Condition number of their equations.
+    pub condition: f64,
+}
+
+/// Mean, 95th percentile and maximum.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct MapSpread {
+    /// Mean.
+    pub mean: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Deviation of a solved map's gradients ∇Φᵢ from the wanted ones Kᵢ.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DistortionReport {
+    /// Angle between ∇Φᵢ and Kᵢ for each axis, degrees.
+    pub angle: [MapSpread; 3],
+    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
+    /// whichever is greater.
+    pub spacing: [MapSpread; 3],
+    /// Share of points and axes with a spacing ratio outside 1/1.5 to 1.5.
+    pub outside: f64,
+    /// Greatest deviation from a right angle between two gradients, degrees.
+    pub shear: MapSpread,
+    /// Greatest over least stretch of a cell.
+    pub anisotropy: MapSpread,
+    /// Least and greatest det J over the one asked for; 0 or less where the map folds.
+    pub density: [f64; 2],
+    /// |curl Kᵢ| λᵢ², what no map can follow.
+    pub curl: MapSpread,
+    /// Greatest turn of the wanted orientation within a cell, degrees.
+    pub turn: f64,
+}
+
+/// The transition between two lattices of a blend: the lattices alone, without skin and keep zones.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TransitionReport {
+    /// Names of the two lattices.
+    pub between: [String; 2],
+    /// Volume in which both have a weight, mm³.
+    pub volume: f64,
+    /// Connected components of the solid that reach into it; 1 where it holds together.
+    pub pieces: usize,
+    /// Components that touch neither side.
+    pub loose: LooseBodies,
+    /// Components attached by necks under half the narrowest neck of the widest path across.
+    pub dangling: LooseBodies,
+    /// The narrowest neck of the widest path from one lattice to the other; None where they are not connected.
+    pub neck: Option<NarrowestNeck>,
+    /// Solid fraction along the transition, by tenths of the second lattice's share.
+    pub fractions: Vec<FractionAlong>,
+    /// Distance between sample points, mm.
+    pub step: f64,
+}
+
+/// Connected components that hold to little or nothing.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct LooseBodies {
+    /// Their number.
+    pub bodies: usize,
+    /// Their volume, mm³.
+    pub volume: f64,
+}
+
+/// The narrowest place of the widest path across a transition.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct NarrowestNeck {
+    /// Diameter, mm, to within one step.
+    pub diameter: f64,
+    /// Position, mm.
+    pub place: [f64; 3],
+}
+
+/// Solid fraction in windows of two cells, at one share of the second lattice.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct FractionAlong {
+    /// Share of the second lattice, 0 to 1.
+    pub share: f64,
+    /// Fraction asked for; None where it is not known.
+    pub asked: Option<f64>,
+    /// Fraction found.
+    pub found: f64,
+}

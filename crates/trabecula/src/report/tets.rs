@@ -1,0 +1,242 @@
+//! Figures of tetrahedral meshes and of the lattices over them.
+
+use std::collections::BTreeMap;
+
+use geometry::tetmesh::{Dihedral, Quality, Spread};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::Varying;
+use crate::kind::Warning;
+use crate::mesher::Fit;
+
+/// The figures of a tetrahedral mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TetMeshReport {
+    /// What made it: background, ftetwild, or the file's name.
+    pub mesher: String,
+    /// Shapes and sizes.
+    pub quality: TetQualityReport,
+    /// How it fits its region; None without one.
+    pub fit: Option<FitReport>,
+    /// Possible mistakes; None within the report of a design, which has them itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub warnings: Option<Vec<Warning>>,
+}
+
+/// Minimum, mean and maximum.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct MinMeanMax {
+    /// Minimum.
+    pub min: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Dihedral angles, degrees: 70.53 in a regular tetrahedron.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DihedralReport {
+    /// Minimum.
+    pub min: f64,
+    /// Maximum.
+    pub max: f64,
+    /// 5th percentile of each tetrahedron's least angle.
+    pub min_p05: f64,
+    /// Median of each tetrahedron's least angle.
+    pub min_p50: f64,
+    /// Median of each tetrahedron's greatest angle.
+    pub max_p50: f64,
+    /// 95th percentile of each tetrahedron's greatest angle.
+    pub max_p95: f64,
+    /// Number of angles (six for each tetrahedron) in steps of ten degrees from 0 to 180.
+    pub histogram: Vec<usize>,
+}
+
+/// Shapes and sizes of a mesh's tetrahedra.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TetQualityReport {
+    /// Number of tetrahedra.
+    pub tets: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of triangles of the boundary.
+    pub boundary_triangles: usize,
+    /// Number of components connected by faces.
+    pub pieces: usize,
+    /// Lower and upper corner of the bounds, mm.
+    pub bounds: [[f64; 3]; 2],
+    /// Volume, mm³.
+    pub volume: f64,
+    /// Lengths of edges, mm, each counted once for each tetrahedron that has it.
+    pub edge: MinMeanMax,
+    /// Sizes, mm: the edge of a regular tetrahedron of the same volume.
+    pub size: MinMeanMax,
+    /// Dihedral angles, degrees.
+    pub dihedral: DihedralReport,
+    /// Longest edge over √24 times the radius of the inscribed ball; 1 for a regular tetrahedron.
+    pub aspect: MinMeanMax,
+    /// Number of tetrahedra with a dihedral angle below 10° or above 170°.
+    pub slivers: usize,
+    /// Number of tetrahedra of negative volume.
+    pub inverted: usize,
+}
+
+/// How a tetrahedral mesh fits its region.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct FitReport {
+    /// Mean distance between the boundary and the region's surface, mm.
+    pub deviation_mean: f64,
+    /// 95th percentile of that distance, mm.
+    pub deviation_p95: f64,
+    /// Its maximum, mm.
+    pub deviation: f64,
+    /// Position of the maximum, mm.
+    pub deviation_at: [f64; 3],
+    /// Share of the region that no tetrahedron covers.
+    pub lost: f64,
+    /// Greatest depth of such a point below the region's surface, mm.
+    pub lost_depth: f64,
+    /// Position of that point, mm.
+    pub lost_at: [f64; 3],
+    /// Volume left out where the boundary would meet itself, and of fragments, mm³.
+    pub mended: f64,
+}
+
+impl From<Spread> for MinMeanMax {
+    fn from(s: Spread) -> Self {
+        MinMeanMax { min: s.min, mean: s.mean, max: s.max }
+    }
+}
+
+impl From<&Dihedral> for DihedralReport {
+    fn from(d: &Dihedral) -> Self {
+        DihedralReport {
+            min: d.min,
+            max: d.max,
+            min_p05: d.min_p05,
+            min_p50: d.min_p50,
+            max_p50: d.max_p50,
+            max_p95: d.max_p95,
+            histogram: d.histogram.clone(),
+        }
+    }
+}
+
+impl From<&Quality> for TetQualityReport {
+    fn from(q: &Quality) -> Self {
+        TetQualityReport {
+            tets: q.tets,
+            nodes: q.nodes,
+            boundary_triangles: q.boundary_triangles,
+            pieces: q.pieces,
+            bounds: q.bounds,
+            volume: q.volume,
+            edge: q.edge.into(),
+            size: q.size.into(),
+            dihedral: (&q.dihedral).into(),
+            aspect: q.aspect.into(),
+            slivers: q.slivers,
+            inverted: q.inverted,
+        }
+    }
+}
+
+impl From<&Fit> for FitReport {
+    fn from(f: &Fit) -> Self {
+        FitReport {
+            deviation_mean: f.deviation_mean,
+            deviation_p95: f.deviation_p95,
+            deviation: f.deviation,
+            deviation_at: f.deviation_at,
+            lost: f.lost,
+            lost_depth: f.lost_depth,
+            lost_at: f.lost_at,
+            mended: f.mended,
+        }
+    }
+}
+
+/// A lattice over a tetrahedral mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TilingReport {
+    /// Number of tetrahedra.
+    pub count: usize,
+    /// The mesh.
+    pub mesh: TetMeshReport,
+    /// Mean length of edges, mm.
+    pub edge: f64,
+    /// Volume of the mesh, mm³.
+    pub volume: f64,
+    /// Volume of solid over volume of the mesh.
+    pub solid_fraction: f64,
+    /// The zones by number, where zones have cells of their own.
+    pub zones: Option<BTreeMap<String, ZoneReport>>,
+    /// Number of connected components, predicted from the ports; None where that is not known.
+    pub pieces: Option<usize>,
+    /// Which zones join, where zones have cells of their own.
+    pub joins: Option<Vec<ZoneJoin>>,
+    /// Overlap of tetrahedra, 0 to 0.2 of their size.
+    pub overlap: f64,
+    /// Thickness of the walls, mm; None for networks and for zones.
+    pub thickness: Option<WallSpread>,
+    /// Number of ports on each face of a tetrahedron; None for zones.
+    pub ports: Option<usize>,
+    /// Share of a tetrahedron's face that is solid; None for zones.
+    pub face_fraction: Option<Varying>,
+    /// Angles between walls at faces of tetrahedra; None where there are none.
+    pub creases: Option<Creases>,
+}
+
+/// A zone of a tetrahedral mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ZoneReport {
+    /// Name of its cell.
+    pub cell: String,
+    /// Number of tetrahedra.
+    pub count: usize,
+    /// Volume, mm³.
+    pub volume: f64,
+    /// Volume of solid over volume.
+    pub solid_fraction: f64,
+}
+
+/// Two zones with faces in common.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct ZoneJoin {
+    /// Numbers of the zones.
+    pub zones: [u32; 2],
+    /// Number of faces between them.
+    pub faces: usize,
+    /// Number of those that solid passes through.
+    pub open: usize,
+    /// Share of a face that is solid in both cells.
+    pub ports: f64,
+    /// Whether the largest components of both are connected.
+    pub joined: bool,
+}
+
+/// Wall thickness over a tetrahedral mesh, mm.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct WallSpread {
+    /// Minimum.
+    pub min: f64,
+    /// 5th percentile.
+    pub low: f64,
+    /// Mean.
+    pub mean: f64,
+    /// 95th percentile.
+    pub high: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Angles between walls at the faces of tetrahedra, degrees, before smoothing by overlap.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Creases {
+    /// Mean along all traces.
+    pub mean: f64,
+    /// Maximum.
+    pub max: f64,
+}

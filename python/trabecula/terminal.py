@@ -1,0 +1,133 @@
+"""What a person at a terminal sees: messages on stderr, progress, figures with few digits, and what an interrupt does.
+
+Before and after the work of a command an interrupt ends the process on the spot, during the work it is raised: an exception in
+the middle of an import can come out as almost anything, and there is nothing to clean up yet.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import time
+
+__all__ = ["Progress", "figure", "interrupts_leave", "interrupts_raise", "left", "outcome", "say", "span"]
+
+
+class Progress:
+    """Share done and time left, on stderr, a few times a second."""
+
+    def __init__(self, word: str, wanted: bool | None):
+        self.word = word
+        self.terminal = sys.stderr.isatty()
+        self.shown = self.terminal if wanted is None else wanted
+        self.start = self.last = time.monotonic()
+        self.tenth = 0
+        self.width = 0
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.clear()
+
+    def __call__(self, done: int, total: int) -> None:
+        """``done`` of ``total`` steps."""
+        now = time.monotonic()
+        if not self.shown or not total:
+            return
+        share = done / total
+        left = (now - self.start) * (1 - share) / share if share > 0 else math.inf
+        text = f"{self.word}: {100 * share:3.0f} %" + (f", {duration(left)} left" if math.isfinite(left) else "")
+        if self.terminal:
+            if now - self.last >= 0.1:
+                self.last = now
+                _write("\r" + text.ljust(self.width))
+                self.width = len(text)
+        elif int(10 * share) > self.tenth:
+            self.tenth = int(10 * share)
+            say(text)
+
+    def clear(self) -> None:
+        """Takes the line away."""
+        if self.width:
+            _write("\r" + " " * self.width + "\r")
+            self.width = 0
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words."""
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, seconds = divmod(round(seconds), 60)
+    return f"{minutes} min {seconds} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def figure(v: float) -> str:
+    """A number with six digits; what is left of a difference that should be nothing is nothing."""
+    return f"{v:.6g}" if abs(v) > 1e-12 else "0"
+
+
+def span(v) -> str:
+    """A number, a range, or none."""
+    if v is None:
+        return "none"
+    ends = [v] if isinstance(v, (int, float)) else v
+    # Adding zero takes the sign off a negative one.
+    texts = [f"{round(end, 4) + 0.0:.4f}" for end in ends]
+    return " to ".join(dict.fromkeys(texts))
+
+
+def say(text: str) -> None:
+    """A message on stderr."""
+    _write(text + "\n")
+
+
+def _write(text: str) -> None:
+    """Text on stderr; where nobody reads it, it is lost and the work goes on."""
+    try:
+        sys.stderr.write(text)
+        sys.stderr.flush()
+    except (OSError, ValueError):
+        pass
+
+
+#: What outputs have been left so far, in words.
+left: list[str] = []
+
+
+def outcome() -> str:
+    """What is said after an interrupt."""
+    return f"stopped; {' and '.join(left) or 'nothing was left behind'}"
+
+
+def interrupts_leave() -> None:
+    """From here on an interrupt ends the process."""
+    _install(_leave, signal.SIGINT)
+
+
+def interrupts_raise() -> None:
+    """From here on an interrupt, and the end of the terminal, is a KeyboardInterrupt."""
+    _install(_raise, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+
+
+def _install(handler, *signals) -> None:
+    try:
+        for which in signals:
+            if signal.getsignal(which) is not signal.SIG_IGN:  # started in the background, or by nohup
+                signal.signal(which, handler)
+    except ValueError:  # not the main thread
+        pass
+
+
+def _leave(*_) -> None:
+    try:  # noqa: SIM105  contextlib takes time to import
+        os.write(2, f"{outcome()}\n".encode(errors="replace"))
+    except OSError:
+        pass
+    os._exit(130)
+
+
+def _raise(*_) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,235 @@
+"""Reports in words: what ``str(report)`` gives and ``check``, ``measure`` and ``tets`` print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from .record import Report
+from .terminal import figure, span
+
+__all__ = ["counted", "point", "table", "text", "voids"]
+
+
+def text(report: Report) -> str:
+    """A report in words, line by line."""
+    write = {
+        "BeamsReport": _beams,
+        "BlendReport": _blend,
+        "DesignReport": _design,
+        "DistortionReport": _distortion,
+        "LatticeReport": _lattice,
+        "TetMeshReport": _tet_mesh,
+        "TilingReport": _tiling,
+        "TransitionReport": _transition,
+    }.get(type(report).__name__)
+    return "\n".join(write(report)) if write else table(report)
+
+
+def counted(n: int, what: str = "piece") -> str:
+    """A number of things."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
+def point(p: list[float]) -> str:
+    """A position."""
+    return "(" + ", ".join(figure(v) for v in p) + ")"
+
+
+def _range(v: list[float]) -> str:
+    return span(v[0] if v[0] == v[1] else v)
+
+
+def _whole(intervals: list[list[float]]) -> str:
+    return " and ".join(f"{a:.4f} to {b:.4f}" for a, b in intervals)
+
+
+def _design(it: Report) -> Iterator[str]:
+    low, high = it.region.bounds
+    extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
+    about = "" if it.region.volume_exact else "about "
+    yield f"region  {extent} mm, {about}{figure(it.region.volume)} mm³"
+    for name, lattice in it.lattices.items():
+        yield f"lattice {name}: {lattice.part}, wavelength {figure(lattice.wavelength)} mm"
+        yield from _lattice(lattice)
+    for name, beams in it.beams.items():
+        yield f"beams {name}: {_beams_title(beams)}"
+        yield from _beams(beams)
+    if it.blend:
+        yield from _blend(it.blend)
+
+
+def _lattice(it: Report) -> Iterator[str]:
+    neck = "thinnest wall" if it.part == "sheet" else "narrowest neck"
+    yield f"  iso        {span(it.iso)}{'' if it.folding is None else ' (constant-level sheet of equal fraction)'}"
+    yield f"  fraction   {span(it.fraction)}"
+    yield f"  porosity   {span(it.porosity)}"
+    yield f"  thickness  {span(it.thickness)}{'' if it.thickness is None else f' mm ({neck})'}"
+    if not (it.tets and it.tets.zones):
+        whole = _whole(it.connected_fraction)
+        yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"
+    if it.tets:
+        yield from _tiling(it.tets)
+    if it.distortion:
+        yield from _distortion(it.distortion)
+
+
+def _beams_title(it: Report) -> str:
+    if it.repeats:
+        times = " × ".join(map(str, it.repeats))
+        return f"a pattern of {times}, {it.hubs:.9g} hubs of {it.kinds} kinds, {it.beams:.9g} beams"
+    return f"{it.cell or 'nodes and struts'}, {counted(it.hubs, 'hub')}, {counted(it.beams, 'beam')}"
+
+
+def _beams(it: Report) -> Iterator[str]:
+    if it.length:
+        yield f"  length     {_range(it.length)} mm, {figure(it.total_length)} mm in all"
+    yield f"  thickness  {figure(it.thickness)} mm (thinnest beam)"
+    yield f"  hubs       radius {_range(it.hub_radius)} mm"
+    if it.fillet_radius:
+        yield f"  fillets    radius {_range(it.fillet_radius)} mm at the tightest places"
+    if it.valence:
+        yield f"  valence    {', '.join(f'{n} of {v}' for v, n in it.valence.items())}"
+    if it.smallest_angle is not None:
+        yield f"  angle      {it.smallest_angle:.1f}° at least, at {point(it.smallest_angle_at)} mm"
+    how = "exact" if it.fraction_exact else "sampled"
+    yield f"  fraction   {it.fraction:.4f}, porosity {it.porosity:.4f} of the part ({how})"
+    if it.repeats:
+        return
+    if it.volume is not None:
+        yield f"  exactly    {figure(it.volume)} mm³, surface {figure(it.area)} mm²"
+    for what, counts in (("cleaned", it.cleaned), ("trimmed", it.trimmed)):
+        done = [f"{n} {word.replace('_', ' ')}" for word, n in counts.items() if n]
+        if done:
+            yield f"  {what}    {', '.join(done)}"
+    yield f"  pieces     {it.pieces}; {counted(it.dangling, 'node')} with a free end"
+
+
+def _tiling(it: Report) -> Iterator[str]:
+    yield f"  mesh       {it.count} tetrahedra, edges {figure(it.edge)} mm on average, {figure(it.volume)} mm³"
+    for zone, z in (it.zones or {}).items():
+        yield f"  zone {zone}     {z.cell} in {z.count} tetrahedra; solid fraction {z.solid_fraction:.4f}"
+    for join in it.joins or []:
+        a, b = join.zones
+        state = "join" if join.joined else "do not join"
+        passed = f"solid passes through {join.open} of {join.faces} faces"
+        yield f"  zones {a}, {b} {state}: {passed}; their ports share {100 * join.ports:.1f} % of a face"
+    if it.pieces is not None:
+        yield f"  pieces     {it.pieces}, predicted from ports"
+    if it.ports is not None:
+        yield f"  faces      {counted(it.ports, 'port')} on each; solid fraction of the part {it.solid_fraction:.4f}"
+    if it.thickness:
+        w = it.thickness
+        yield f"  walls      {figure(w.mean)} mm on average, 90 % between {figure(w.low)} and {figure(w.high)} mm"
+    if it.creases:
+        smooth = " (before smoothing)" if it.overlap else ""
+        yield f"  creases    {it.creases.mean:.0f}° on average, {it.creases.max:.0f}° at most at faces of tetrahedra{smooth}"
+
+
+def _distortion(it: Report) -> Iterator[str]:
+    worst = max(it.angle, key=lambda a: a.max)
+    yield f"  angle      off by {worst.mean:.1f}° on average, {worst.max:.1f}° at most, along the worst axis"
+    farthest = max(it.spacing, key=lambda s: abs(s.max - 1))
+    yield (
+        f"  spacing    {farthest.mean:.2f} of what was asked for on average, off by a factor of {farthest.max:.2f} at "
+        f"most; {100 * it.outside:.1f} % outside 1/1.5 to 1.5"
+    )
+    yield f"  turn       {it.turn:.1f}° per cell at most"
+
+
+def _blend(it: Report) -> Iterator[str]:
+    phases = f", phases {it.phases}" if it.phases else ""
+    yield f"blend of {', '.join(it.lattices)} by {it.by}{phases}"
+    for f in it.rbf:
+        yield f"  {f.path}: {f.points} points, delta {figure(f.delta)} mm, condition {f.condition:.2g}"
+
+
+def _transition(it: Report) -> Iterator[str]:
+    from .transition import off
+
+    yield f"transition {it.between[0]} to {it.between[1]}: {figure(it.volume)} mm³"
+    worst = off(it)
+    error = "" if worst is None else f", off by {worst:+.4f} at most"
+    found = [row.found for row in it.fractions]
+    yield f"  fraction   {span([min(found), max(found)])}{error}"
+    yield f"  pieces     {it.pieces}"
+    neck = "none: not connected across the transition"
+    if it.neck:
+        neck = f"{it.neck.diameter:.3g} mm at {point(it.neck.place)} mm, the narrowest of the widest path across"
+    yield f"  neck       {neck}"
+    for word, bodies in (("loose", it.loose), ("dangling", it.dangling)):
+        yield f"  {word:10} {bodies.bodies}" + (f", {figure(bodies.volume)} mm³" if bodies.bodies else "")
+
+
+def _tet_mesh(it: Report) -> Iterator[str]:
+    q, fit, angles = it.quality, it.fit, it.quality.dihedral
+    extent = " × ".join(figure(b - a) for a, b in zip(*q.bounds, strict=True))
+    yield f"tetrahedra  {q.tets}, {q.nodes} nodes, {counted(q.pieces)}, by {it.mesher}"
+    yield f"extent      {extent} mm, {figure(q.volume)} mm³"
+    yield f"size        {figure(q.size.mean)} mm on average, {figure(q.size.min)} to {figure(q.size.max)} mm"
+    inner = f"9 in 10 tetrahedra lie between {angles.min_p05:.1f}° and {angles.max_p95:.1f}°"
+    yield f"dihedral    {angles.min:.1f}° to {angles.max:.1f}°; {inner}"
+    yield f"aspect      {q.aspect.mean:.2f} on average, {q.aspect.max:.2f} at most (1 is regular)"
+    yield f"slivers     {q.slivers} below 10° or above 170°; {q.inverted} inverted"
+    if fit:
+        off = f"95 % within {fit.deviation_p95:.2g} mm, {fit.deviation:.2g} mm at most"
+        yield f"fit         {fit.deviation_mean:.2g} mm off the surface on average, {off}"
+        yield f"left out    {100 * fit.lost:.2g} % of the region, up to {fit.lost_depth:.2g} mm deep"
+
+
+#: Units of the figures of a mesh.
+UNITS = {
+    "volume": " mm³",
+    "area": " mm²",
+    "area_lattice": " mm²",
+    "area_cut": " mm²",
+    "hydraulic_diameter": " mm",
+    "dangling.volume": " mm³",
+    "dangling.neck": " mm",
+    "dangling.step": " mm",
+}
+#: What stands for a figure that is missing.
+ABSENT = {"dangling.largest": "none", "quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
+
+
+def table(figures: Mapping[str, Any], absent: str = "needs a region") -> str:
+    """Figures one a line, those of a group under its name; ``absent`` stands for those that are None."""
+    lines: list[tuple[str, Any]] = []
+    for key, value in figures.items():
+        if key in ("voids", "transitions"):
+            continue
+        group = value.items() if isinstance(value, Mapping) else None
+        lines += [(f"{key}.{k}", v) for k, v in group if k != "histogram"] if group else [(key, value)]
+    width = max(15, *(len(key) for key, _ in lines))
+    return "\n".join(f"{key:{width}} {_cell(key, value, absent)}" for key, value in lines)
+
+
+def _cell(key: str, value: Any, absent: str) -> str:
+    if key == "bounds":
+        return " to ".join(map(point, value)) + " mm"
+    if value is None:
+        return ABSENT.get(key, absent)
+    if key == "dangling.largest":
+        return f"{figure(value['volume'])} mm³ at {point(value['place'])} mm"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return (figure(value) if isinstance(value, float) else str(value)) + UNITS.get(key, "")
+
+
+#: Voids that are listed one by one.
+LISTED = 20
+
+
+def voids(found: list) -> str:
+    """A warning of closed voids: powder and resin stay in them."""
+    total = figure(sum(v.volume for v in found))
+    if len(found) == 1:
+        return f"warning: one closed void of {total} mm³ at {point(found[0].point)} mm: powder or resin cannot drain from it"
+    listed = ", ".join(f"{figure(v.volume)} mm³ at {point(v.point)} mm" for v in found[:LISTED])
+    more = f", and {len(found) - LISTED} smaller ones" if len(found) > LISTED else ""
+    return (
+        f"warning: {len(found)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "
+        f"Largest first: {listed}{more}"
+    )
