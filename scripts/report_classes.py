@@ -17,6 +17,8 @@ HEAD = '''"""Reports: figures with their units, one class each. Made by scripts/
 from __future__ import annotations
 
 from .record import Report
+
+# ruff: noqa: RUF012  the parts of a class are declared by its base
 '''
 SIMPLE = {"number": "float", "integer": "int", "string": "str", "boolean": "bool", "null": "None"}
 
@@ -74,8 +76,7 @@ def written(name, schema):
             typed += " | None"
         body += [f"    {key}: {typed}", doc(part["description"], "    ")]
     if parts:
-        entries = ", ".join(f'"{k}": "{v}"' for k, v in parts.items())
-        lines += ["", f"    _parts = {{{entries}}}"]
+        lines += ["", "    _parts = {", *(f'        "{k}": "{v}",' for k, v in parts.items()), "    }"]
     if by_name:
         lines.append(f"    _by_name = frozenset({json.dumps(by_name)})")
     return [*lines, "", *body]

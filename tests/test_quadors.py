@@ -116,7 +116,7 @@ def test_planes_and_points_that_are_none_are_refused(octet, quadors):
     with pytest.raises(ValueError, match="no beams named"):
         octet.quadors("other")
     gyroid = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
-    with pytest.raises(ValueError, match="name the beams"):
+    with pytest.raises(ValueError, match="the design has no beams"):
         lt.Design(region=BOX, lattice=gyroid).build().quadors()
 
 

@@ -17,7 +17,7 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-    from . import beams, blend, cell, grade, level, map, region
+    from . import beams, blend, cell, grade, level, map, region, reports
     from .design import Beams, Design, Lattice, load, skin, spartan
     from .errors import DesignError, DesignWarning
     from .levels import fraction, iso
@@ -53,6 +53,7 @@ __all__ = [
     "load",
     "map",
     "region",
+    "reports",
     "skin",
     "spartan",
 ]
@@ -79,7 +80,7 @@ _HOMES = {
     "fraction": "levels",
     "__version__": "_core",
 }
-_MODULES = ("beams", "blend", "cell", "grade", "level", "map", "region")
+_MODULES = ("beams", "blend", "cell", "grade", "level", "map", "region", "reports")
 
 
 def __getattr__(name: str) -> Any:

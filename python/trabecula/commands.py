@@ -16,7 +16,6 @@ from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
 from .machine import fits
 from .mesh import Mesh
-from .record import Report
 from .solid import Solid
 from .starter import STARTER
 from .terminal import Progress, figure, say
@@ -237,8 +236,8 @@ def warn_measured(name: str, made: Mesh) -> None:
         )
     if made.self_intersections:
         say(
-            f"warning: the surface of {name} crosses itself, so volume in several of its bodies is counted as "
-            "often; taken as a region (region.mesh) they are united"
+            f"warning: the surface of {name} crosses itself, so volume in several of its bodies is counted "
+            "several times; taken as a region (region.mesh) they are united"
         )
 
 
@@ -322,16 +321,17 @@ def cells(args) -> None:
     if args.tet:
         names, facts, words = cell.tet_names(), cell.tet_facts, tet_cell_words
     elif args.beams:
-        names, facts, words = unit_cells.names(), unit_cells.cell, unit_cell_words
+        found = {it["name"]: it for it in unit_cells.cells()}
+        names, facts, words = list(found), found.__getitem__, unit_cell_words
     else:
         names, facts, words = cell.names(), cell_facts, cell_words
     if args.name:
         known_cell(args.name, names)
         names = [args.name]
-    found = [facts(name) for name in names]
+    made = [facts(name) for name in names]
     if args.json:
-        return put_json(found[0] if args.name else found)
-    for it in found:
+        return put_json(made[0] if args.name else made)
+    for it in made:
         print(f"{it['name']}  ({it['title']})")
         print("\n".join(f"  {line}" for line in words(it)))
 
@@ -378,7 +378,7 @@ def unit_cell_words(it: dict):
 
 def put_json(figures) -> None:
     """Figures as JSON on stdout."""
-    print(json.dumps(figures, indent=2, default=lambda report: report.to_dict() if isinstance(report, Report) else str(report)))
+    print(json.dumps(figures, indent=2))
 
 
 def known_cell(name: str, known: list[str]) -> None:

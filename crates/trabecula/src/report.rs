@@ -41,6 +41,7 @@ struct Reports {
     design: DesignReport,
     transition: TransitionReport,
     mesh: MeshReport,
+    quality: QualityReport,
     surface: SurfaceReport,
     simplified: SimplifyReport,
     thickness: ThicknessReport,

@@ -1,0 +1,811 @@
+"""Reports: figures with their units, one class each. Made by scripts/report_classes.py; do not edit."""
+
+from __future__ import annotations
+
+from .record import Report
+
+# ruff: noqa: RUF012  the parts of a class are declared by its base
+
+__all__ = [
+    "BeamsReport",
+    "BlendReport",
+    "CleanedReport",
+    "Creases",
+    "DanglingReport",
+    "DesignReport",
+    "DihedralReport",
+    "DistortionReport",
+    "EstimateReport",
+    "FitReport",
+    "FractionAlong",
+    "Histogram",
+    "IslandsReport",
+    "LargestBit",
+    "LargestIsland",
+    "LatticeReport",
+    "LooseBodies",
+    "MapSpread",
+    "MeshReport",
+    "MinMeanMax",
+    "NarrowestNeck",
+    "QualityReport",
+    "RbfReport",
+    "RegionReport",
+    "RepairReport",
+    "SimplifyReport",
+    "SpecificSurface",
+    "SurfaceReport",
+    "TetMeshReport",
+    "TetQualityReport",
+    "ThicknessReport",
+    "ThicknessSpread",
+    "TilingReport",
+    "TransitionReport",
+    "TrimmedReport",
+    "VoidReport",
+    "WallSpread",
+    "WarningReport",
+    "ZoneJoin",
+    "ZoneReport",
+]
+
+
+class BeamsReport(Report):
+    """A graph of beams, or a pattern of them: figures of both first, then those of a graph or of a pattern."""
+
+    _parts = {
+        "cleaned": "CleanedReport",
+        "trimmed": "TrimmedReport",
+    }
+
+    area: float | None
+    """Surface area, mm²; None where the volume is."""
+    beams: float | None
+    """Number of beams, repeats included."""
+    cell: str | None
+    """Name of the unit cell; None for nodes and struts of your own and for patterns."""
+    centroid: list[float] | None
+    """Centre of mass, mm."""
+    cleaned: CleanedReport | None
+    """What was cleaned."""
+    collisions: int | None
+    """Pairs of beams that run into each other without a common node, about one hub of each kind; None if not known."""
+    dangling: int | None
+    """Number of nodes inside the region with a single beam."""
+    fillet_radius: list[float] | None
+    """Least and greatest radius of fillets at their tightest places, mm; None without fillets."""
+    fraction: float
+    """Solid fraction of the part."""
+    fraction_exact: bool
+    """Whether the fraction is exact; else it is estimated at points."""
+    hub_radius: list[float]
+    """Least and greatest radius of hubs, mm."""
+    hubs: float | None
+    """Number of hubs, repeats included."""
+    inertia: list[list[float]] | None
+    """Inertia tensor about the centre of mass for density 1, mm⁵."""
+    kinds: int | None
+    """Number of hubs that differ in more than position and scale."""
+    length: list[float] | None
+    """Least and greatest length of beams, mm."""
+    pieces: int | None
+    """Number of connected components of the graph."""
+    porosity: float
+    """1 − fraction."""
+    repeats: list[int] | None
+    """Repeats of its three steps."""
+    smallest_angle: float | None
+    """Least angle between two beams of a node, degrees."""
+    smallest_angle_at: list[float] | None
+    """Position of that node, mm."""
+    thickness: float
+    """Diameter of the thinnest beam, mm."""
+    total_length: float | None
+    """Length of all beams, mm."""
+    trimmed: TrimmedReport | None
+    """What the region trimmed."""
+    valence: dict[str, int] | None
+    """Number of nodes by their number of beams."""
+    volume: float | None
+    """Volume with fillets, mm³; None where the region cuts the beams or beams collide."""
+    wavelength: float
+    """The cell's edge or the mean length of struts, mm."""
+
+
+class BlendReport(Report):
+    """A blend of lattices."""
+
+    _parts = {
+        "rbf": "RbfReport",
+    }
+
+    by: str
+    """fraction or value: what is interpolated."""
+    lattices: list[str]
+    """Names of its lattices, in the order of their weights."""
+    phases: str | None
+    """locked, independent or drifting: how the phases of its lattices go together. None for by = value."""
+    rbf: list[RbfReport]
+    """The radial basis functions among its weights."""
+    width: float | None
+    """Width of the narrowest transition, mm."""
+
+
+class CleanedReport(Report):
+    """Nodes and struts left out before beams are made."""
+
+    dangling: int
+    """Struts with a free end."""
+    duplicates: int
+    """Struts that join the same nodes as another."""
+    isolated: int
+    """Nodes without a strut."""
+    merged: int
+    """Nodes merged into another at the same position."""
+    zero_length: int
+    """Struts of zero length."""
+
+
+class Creases(Report):
+    """Angles between walls at the faces of tetrahedra, degrees, before smoothing by overlap."""
+
+    max: float
+    """Maximum."""
+    mean: float
+    """Mean along all traces."""
+
+
+class DanglingReport(Report):
+    """Weakly attached fragments."""
+
+    _parts = {
+        "largest": "LargestBit",
+    }
+
+    count: int
+    """Their number."""
+    largest: LargestBit | None
+    """The largest of them."""
+    neck: float
+    """The neck below which a fragment counts, mm."""
+    step: float
+    """Distance between sample points, mm."""
+    volume: float
+    """Their volume in all, mm³."""
+
+
+class DesignReport(Report):
+    """The figures of a design, without meshing it."""
+
+    _parts = {
+        "beams": "BeamsReport",
+        "blend": "BlendReport",
+        "lattices": "LatticeReport",
+        "region": "RegionReport",
+        "warnings": "WarningReport",
+    }
+    _by_name = frozenset(["beams", "lattices"])
+
+    beams: dict[str, BeamsReport]
+    """The graphs and patterns of beams by name."""
+    blend: BlendReport | None
+    """The blend of its lattices, where there is one."""
+    lattices: dict[str, LatticeReport]
+    """The lattices by name."""
+    region: RegionReport
+    """The region."""
+    warnings: list[WarningReport]
+    """Possible mistakes in the design."""
+
+
+class DihedralReport(Report):
+    """Dihedral angles, degrees: 70.53 in a regular tetrahedron."""
+
+    histogram: list[int]
+    """Number of angles (six for each tetrahedron) in steps of ten degrees from 0 to 180."""
+    max: float
+    """Maximum."""
+    max_p50: float
+    """Median of each tetrahedron's greatest angle."""
+    max_p95: float
+    """95th percentile of each tetrahedron's greatest angle."""
+    min: float
+    """Minimum."""
+    min_p05: float
+    """5th percentile of each tetrahedron's least angle."""
+    min_p50: float
+    """Median of each tetrahedron's least angle."""
+
+
+class DistortionReport(Report):
+    """Deviation of a solved map's gradients ∇Φᵢ from the wanted ones Kᵢ."""
+
+    _parts = {
+        "angle": "MapSpread",
+        "anisotropy": "MapSpread",
+        "curl": "MapSpread",
+        "shear": "MapSpread",
+        "spacing": "MapSpread",
+    }
+
+    angle: list[MapSpread]
+    """Angle between ∇Φᵢ and Kᵢ for each axis, degrees."""
+    anisotropy: MapSpread
+    """Greatest over least stretch of a cell."""
+    curl: MapSpread
+    """|curl Kᵢ| λᵢ², what no map can follow."""
+    density: list[float]
+    """Least and greatest det J over the one asked for; 0 or less where the map folds."""
+    outside: float
+    """Share of points and axes with a spacing ratio outside 1/1.5 to 1.5."""
+    shear: MapSpread
+    """Greatest deviation from a right angle between two gradients, degrees."""
+    spacing: list[MapSpread]
+    """|∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
+    whichever is greater."""
+    turn: float
+    """Greatest turn of the wanted orientation within a cell, degrees."""
+
+
+class EstimateReport(Report):
+    """What a surface will take, estimated on a coarse grid."""
+
+    cells: list[int]
+    """Grid cells along x, y, z."""
+    memory: float
+    """Bytes of memory of the mesh."""
+    stl: float
+    """Bytes of a binary STL."""
+    triangles: float
+    """Number of triangles."""
+
+
+class FitReport(Report):
+    """How a tetrahedral mesh fits its region."""
+
+    deviation: float
+    """Its maximum, mm."""
+    deviation_at: list[float]
+    """Position of the maximum, mm."""
+    deviation_mean: float
+    """Mean distance between the boundary and the region's surface, mm."""
+    deviation_p95: float
+    """95th percentile of that distance, mm."""
+    lost: float
+    """Share of the region that no tetrahedron covers."""
+    lost_at: list[float]
+    """Position of that point, mm."""
+    lost_depth: float
+    """Greatest depth of such a point below the region's surface, mm."""
+    mended: float
+    """Volume left out where the boundary would meet itself, and of fragments, mm³."""
+
+
+class FractionAlong(Report):
+    """Solid fraction in windows of two cells, at one share of the second lattice."""
+
+    asked: float | None
+    """Fraction asked for; None where it is not known."""
+    found: float
+    """Fraction found."""
+    share: float
+    """Share of the second lattice, 0 to 1."""
+
+
+class Histogram(Report):
+    """A histogram."""
+
+    edges: list[float]
+    """Ends of the bars, ascending from 0, mm."""
+    share: list[float]
+    """Share of the volume in each bar."""
+
+
+class IslandsReport(Report):
+    """The connected components of a solid other than the largest."""
+
+    _parts = {
+        "largest": "LargestIsland",
+    }
+
+    border: int
+    """Number of those with surface on the region's boundary: mostly fragments that it cuts off."""
+    dropped: int
+    """Number of those that were left out."""
+    found: int
+    """Their number."""
+    largest: LargestIsland | None
+    """The largest of them."""
+    share: float
+    """The largest component's share of all volume, 0 to 1."""
+    volume: float
+    """Their volume in all, mm³."""
+
+
+class LargestBit(Report):
+    """The largest weakly attached fragment."""
+
+    place: list[float]
+    """A point in it, mm."""
+    volume: float
+    """Volume, mm³."""
+
+
+class LargestIsland(Report):
+    """The largest connected component but one."""
+
+    bounds: list[list[float]]
+    """Lower and upper corner of its bounds, mm."""
+    place: list[float]
+    """Centre of its bounds, mm."""
+    volume: float
+    """Volume, mm³."""
+
+
+class LatticeReport(Report):
+    """A lattice: a number, or [least, greatest] over the region where it varies."""
+
+    _parts = {
+        "distortion": "DistortionReport",
+        "tets": "TilingReport",
+    }
+
+    connected_fraction: list[list[float]]
+    """Intervals of the fraction in which the periodic solid is one connected component."""
+    distortion: DistortionReport | None
+    """Deviation of a solved map from the orientation and wavelength asked for."""
+    folding: float | None
+    """The thickness beyond which a wall of given thickness folds, mm; None for other levels."""
+    fraction: float | list[float]
+    """Solid fraction of the cell, 0 to 1."""
+    iso: float | list[float] | None
+    """The level t. Where the thickness is given: the constant level of equal fraction. None for cells by zones."""
+    part: str
+    """sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t)."""
+    porosity: float | list[float]
+    """1 − fraction."""
+    tets: TilingReport | None
+    """The tetrahedral mesh of a lattice over tetrahedra, and the cells in it."""
+    thickness: float | list[float] | None
+    """Minimum wall (sheet) or narrowest neck diameter (lower, upper), mm; None where there is none."""
+    truncation: float | None
+    """Root mean square share of a cell from a file that the kept terms leave out."""
+    wavelength: float
+    """The smallest wavelength, mm."""
+
+
+class LooseBodies(Report):
+    """Connected components that hold to little or nothing."""
+
+    bodies: int
+    """Their number."""
+    volume: float
+    """Their volume, mm³."""
+
+
+class MapSpread(Report):
+    """Mean, 95th percentile and maximum."""
+
+    max: float
+    """Maximum."""
+    mean: float
+    """Mean."""
+    p95: float
+    """95th percentile."""
+
+
+class MeshReport(Report):
+    """The figures of a triangle mesh. Those that need a region are None for a mesh without one."""
+
+    _parts = {
+        "specific_surface": "SpecificSurface",
+        "voids": "VoidReport",
+    }
+
+    area: float
+    """Surface area, mm²."""
+    area_cut: float | None
+    """Area of cut faces, on the region's boundary, mm²."""
+    area_lattice: float | None
+    """Area on the lattice, mm²."""
+    bounds: list[list[float]]
+    """Lower and upper corner of the bounds, mm."""
+    cavities: int
+    """Number of closed voids."""
+    closed: bool
+    """Whether every edge has exactly two triangles, of opposite direction."""
+    euler: int
+    """Euler number V − E + F of the surface mesh, twice that of the solid."""
+    hydraulic_diameter: float | None
+    """4 · pore volume / area_lattice, mm. Cut faces are not counted as wetted area."""
+    pieces: int
+    """Number of solids; a cavity is not a piece."""
+    porosity: float | None
+    """1 − solid_fraction."""
+    solid_fraction: float | None
+    """Volume of the solid over volume of the region."""
+    specific_surface: SpecificSurface
+    """Area over volume, 1/mm."""
+    voids: list[VoidReport]
+    """The closed voids, the largest first."""
+    volume: float
+    """Enclosed volume, mm³."""
+
+
+class MinMeanMax(Report):
+    """Minimum, mean and maximum."""
+
+    max: float
+    """Maximum."""
+    mean: float
+    """Mean."""
+    min: float
+    """Minimum."""
+
+
+class NarrowestNeck(Report):
+    """The narrowest place of the widest path across a transition."""
+
+    diameter: float
+    """Diameter, mm, to within one step."""
+    place: list[float]
+    """Position, mm."""
+
+
+class QualityReport(Report):
+    """How well shaped the triangles of a mesh are."""
+
+    largest_aspect: float | None
+    """Longest edge over 2√3 times the inscribed circle's radius, 1 at best; None for a triangle without area."""
+    smallest_angle: float
+    """Smallest angle, degrees; 60 at best."""
+    smallest_angle_p05: float
+    """Its 5th percentile, degrees."""
+
+
+class RbfReport(Report):
+    """Radial basis functions."""
+
+    condition: float
+    """Condition number of their equations."""
+    delta: float
+    """Width δ of the functions, mm."""
+    path: str
+    """Path of their key in the design."""
+    points: int
+    """Number of control points."""
+
+
+class RegionReport(Report):
+    """The region of a design."""
+
+    bounds: list[list[float]]
+    """Lower and upper corner of its bounds, mm."""
+    volume: float
+    """Volume, mm³."""
+    volume_exact: bool
+    """Whether the volume is exact; else it is estimated at points."""
+
+
+class RepairReport(Report):
+    """What was repaired in a mesh; all zero for a clean one."""
+
+    bodies_turned: int
+    """Bodies that were inside out and were turned."""
+    crossings: int
+    """Pairs of triangles that crossed or covered each other."""
+    degenerate: int
+    """Triangles without area left out."""
+    duplicates: int
+    """Triangles given more than once left out."""
+    hole_area: float
+    """Area of the caps, mm²."""
+    hole_length: float
+    """Length of the boundary loops of the holes, mm."""
+    hole_share: float
+    """Area of the caps over that of the surface with them."""
+    holes: int
+    """Holes capped."""
+    inner: int
+    """Triangles left out because solid, or none, is on both sides."""
+    joined: int
+    """Corners of open edges joined with others."""
+    split: int
+    """Open edges split at corners that lay on them."""
+    turned: int
+    """Triangles turned to face as their neighbours do."""
+
+
+class SimplifyReport(Report):
+    """What simplification did."""
+
+    area: float
+    """Area after, mm²."""
+    area_before: float
+    """Area before, mm²."""
+    deviation: float
+    """Proven bound of the distance between the two surfaces, in both directions, mm."""
+    triangles: int
+    """Triangles after."""
+    triangles_before: int
+    """Triangles before."""
+    volume: float
+    """Volume after, mm³."""
+    volume_before: float
+    """Volume before, mm³."""
+
+
+class SpecificSurface(Report):
+    """Area over volume, 1/mm; None where there is no such volume."""
+
+    area_of_region: float | None
+    """All area over the region's volume."""
+    area_of_solid: float | None
+    """All area over the solid's volume."""
+    lattice_of_region: float | None
+    """The lattice's area, without cut faces, over the region's volume."""
+
+
+class SurfaceReport(Report):
+    """The figures of a surface that was made, streamed or held in memory."""
+
+    _parts = {
+        "islands": "IslandsReport",
+    }
+
+    area: float
+    """Surface area, mm²."""
+    area_cut: float | None
+    """Area of cut faces, on the region's boundary, mm²."""
+    area_lattice: float | None
+    """Area on the lattice, mm²."""
+    cavities: int
+    """Number of closed voids."""
+    chord_error: float | None
+    """Greatest distance between a mesh without a grid and the surface, to first order, mm."""
+    euler: int
+    """Euler number V − E + F."""
+    islands: IslandsReport | None
+    """The connected components other than the largest; None where they are not looked for."""
+    pieces: int
+    """Number of solids."""
+    triangles: int
+    """Number of triangles."""
+    volume: float
+    """Enclosed volume, mm³."""
+
+
+class TetMeshReport(Report):
+    """The figures of a tetrahedral mesh."""
+
+    _parts = {
+        "fit": "FitReport",
+        "quality": "TetQualityReport",
+        "warnings": "WarningReport",
+    }
+
+    fit: FitReport | None
+    """How it fits its region; None without one."""
+    mesher: str
+    """What made it: background, ftetwild, or the file's name."""
+    quality: TetQualityReport
+    """Shapes and sizes."""
+    warnings: list[WarningReport] | None
+    """Possible mistakes; None within the report of a design, which has them itself."""
+
+
+class TetQualityReport(Report):
+    """Shapes and sizes of a mesh's tetrahedra."""
+
+    _parts = {
+        "aspect": "MinMeanMax",
+        "dihedral": "DihedralReport",
+        "edge": "MinMeanMax",
+        "size": "MinMeanMax",
+    }
+
+    aspect: MinMeanMax
+    """Longest edge over √24 times the radius of the inscribed ball; 1 for a regular tetrahedron."""
+    boundary_triangles: int
+    """Number of triangles of the boundary."""
+    bounds: list[list[float]]
+    """Lower and upper corner of the bounds, mm."""
+    dihedral: DihedralReport
+    """Dihedral angles, degrees."""
+    edge: MinMeanMax
+    """Lengths of edges, mm, each counted once for each tetrahedron that has it."""
+    inverted: int
+    """Number of tetrahedra of negative volume."""
+    nodes: int
+    """Number of nodes."""
+    pieces: int
+    """Number of components connected by faces."""
+    size: MinMeanMax
+    """Sizes, mm: the edge of a regular tetrahedron of the same volume."""
+    slivers: int
+    """Number of tetrahedra with a dihedral angle below 10° or above 170°."""
+    tets: int
+    """Number of tetrahedra."""
+    volume: float
+    """Volume, mm³."""
+
+
+class ThicknessReport(Report):
+    """Local thickness: at each point the diameter of the largest ball that fits in and covers the point."""
+
+    _parts = {
+        "pore_size": "ThicknessSpread",
+        "wall_thickness": "ThicknessSpread",
+    }
+
+    pore_size: ThicknessSpread | None
+    """Of the pores, mm; None without a region."""
+    wall_thickness: ThicknessSpread
+    """Of the solid, mm."""
+
+
+class ThicknessSpread(Report):
+    """The distribution of local thickness over a volume."""
+
+    _parts = {
+        "histogram": "Histogram",
+    }
+
+    accuracy: float
+    """Accuracy of these figures, mm."""
+    histogram: Histogram
+    """Shares of the volume by thickness."""
+    max: float
+    """Maximum, mm."""
+    mean: float
+    """Mean, mm."""
+    min: float
+    """Minimum between opposite sides, mm; sharp edges, where local thickness ends at 0, are left out."""
+    p05: float
+    """5th percentile, mm."""
+    sd: float
+    """Standard deviation, mm."""
+    step: float
+    """Edge of a voxel, mm."""
+
+
+class TilingReport(Report):
+    """A lattice over a tetrahedral mesh."""
+
+    _parts = {
+        "creases": "Creases",
+        "joins": "ZoneJoin",
+        "mesh": "TetMeshReport",
+        "thickness": "WallSpread",
+        "zones": "ZoneReport",
+    }
+    _by_name = frozenset(["zones"])
+
+    count: int
+    """Number of tetrahedra."""
+    creases: Creases | None
+    """Angles between walls at faces of tetrahedra; None where there are none."""
+    edge: float
+    """Mean length of edges, mm."""
+    face_fraction: float | list[float] | None
+    """Share of a tetrahedron's face that is solid; None for zones."""
+    joins: list[ZoneJoin] | None
+    """Which zones join, where zones have cells of their own."""
+    mesh: TetMeshReport
+    """The mesh."""
+    overlap: float
+    """Overlap of tetrahedra, 0 to 0.2 of their size."""
+    pieces: int | None
+    """Number of connected components, predicted from the ports; None where that is not known."""
+    ports: int | None
+    """Number of ports on each face of a tetrahedron; None for zones."""
+    solid_fraction: float
+    """Volume of solid over volume of the mesh."""
+    thickness: WallSpread | None
+    """Thickness of the walls, mm; None for networks and for zones."""
+    volume: float
+    """Volume of the mesh, mm³."""
+    zones: dict[str, ZoneReport] | None
+    """The zones by number, where zones have cells of their own."""
+
+
+class TransitionReport(Report):
+    """The transition between two lattices of a blend: the lattices alone, without skin and keep zones."""
+
+    _parts = {
+        "dangling": "LooseBodies",
+        "fractions": "FractionAlong",
+        "loose": "LooseBodies",
+        "neck": "NarrowestNeck",
+    }
+
+    between: list[str]
+    """Names of the two lattices."""
+    dangling: LooseBodies
+    """Components attached by necks under half the narrowest neck of the widest path across."""
+    fractions: list[FractionAlong]
+    """Solid fraction along the transition, by tenths of the second lattice's share."""
+    loose: LooseBodies
+    """Components that touch neither side."""
+    neck: NarrowestNeck | None
+    """The narrowest neck of the widest path from one lattice to the other; None where they are not connected."""
+    pieces: int
+    """Connected components of the solid that reach into it; 1 where it holds together."""
+    step: float
+    """Distance between sample points, mm."""
+    volume: float
+    """Volume in which both have a weight, mm³."""
+
+
+class TrimmedReport(Report):
+    """Struts that leave the region."""
+
+    dropped: int
+    """Struts left out."""
+    outside: int
+    """Struts without a part in the region."""
+    snapped: int
+    """Struts shortened to the surface."""
+
+
+class VoidReport(Report):
+    """A closed void, from which powder and resin cannot drain."""
+
+    bounds: list[list[float]]
+    """Lower and upper corner of the bounds, mm."""
+    point: list[float]
+    """A point inside, mm."""
+    volume: float
+    """Volume, mm³."""
+
+
+class WallSpread(Report):
+    """Wall thickness over a tetrahedral mesh, mm."""
+
+    high: float
+    """95th percentile."""
+    low: float
+    """5th percentile."""
+    max: float
+    """Maximum."""
+    mean: float
+    """Mean."""
+    min: float
+    """Minimum."""
+
+
+class WarningReport(Report):
+    """A possible mistake in a design."""
+
+    message: str
+    """The sentence."""
+    path: str
+    """Path of the key in the design."""
+
+
+class ZoneJoin(Report):
+    """Two zones with faces in common."""
+
+    faces: int
+    """Number of faces between them."""
+    joined: bool
+    """Whether the largest components of both are connected."""
+    open: int
+    """Number of those that solid passes through."""
+    ports: float
+    """Share of a face that is solid in both cells."""
+    zones: list[int]
+    """Numbers of the zones."""
+
+
+class ZoneReport(Report):
+    """A zone of a tetrahedral mesh."""
+
+    cell: str
+    """Name of its cell."""
+    count: int
+    """Number of tetrahedra."""
+    solid_fraction: float
+    """Volume of solid over volume."""
+    volume: float
+    """Volume, mm³."""

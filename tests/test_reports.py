@@ -1,0 +1,63 @@
+"""Reports: typed, never changing, mappings, plain data; their keys are those of the JSON of the command."""
+
+import copy
+import json
+import pickle
+
+import pytest
+import trabecula as lt
+from conftest import CUBE
+from test_cli import run
+
+
+def test_attributes_keys_and_plain_data(cube):
+    """Three views of one thing."""
+    report = lt.load(cube).build().report()
+    core = report.lattices["core"]
+    assert isinstance(report, lt.reports.DesignReport) and isinstance(core, lt.reports.LatticeReport)
+    assert core.fraction == core["fraction"] == report["lattices"]["core"]["fraction"] == 0.3
+    assert report.to_dict()["region"]["volume"] == report.region.volume == 512
+    assert json.loads(json.dumps(report.to_dict())) == report == pickle.loads(pickle.dumps(report)) == copy.deepcopy(report)
+    assert "distortion" not in core and core.distortion is None
+    with pytest.raises(TypeError, match="never changes"):
+        core.fraction = 0.4
+    with pytest.raises(AttributeError, match="has no colour"):
+        _ = core.colour
+
+
+def test_the_command_prints_the_same(tmp_path, cube):
+    """`--json` has the keys and numbers of the report, its words are the report's."""
+    solid = lt.load(cube).build()
+    assert json.loads(run("check", cube, "--json", cwd=tmp_path).stdout) == solid.report()
+    assert run("check", cube, cwd=tmp_path).stdout == f"{solid.report()}\n"
+    measured = json.loads(run("measure", cube, "--edge", "0.5", "--json", cwd=tmp_path).stdout)
+    made = solid.mesh(edge=0.5).measure()
+    assert {key: measured[key] for key in made} == made
+
+
+@pytest.mark.parametrize("name", lt.reports.__all__)
+def test_every_field_is_documented(name):
+    """A class and each of its fields have a text; a length, area or volume names its unit."""
+    import ast
+    import inspect
+
+    (tree,) = ast.parse(inspect.getsource(getattr(lt.reports, name))).body
+    fields = [node for node in tree.body if isinstance(node, ast.AnnAssign)]
+    texts = [node.value.value for node in tree.body if isinstance(node, ast.Expr)]
+    assert fields and len(texts) == len(fields) + 1 and all(text.endswith(".") for text in texts)
+
+
+def test_figures_of_all_parts_of_a_design(tmp_path):
+    """Beams and a blend are reports with names of their own."""
+    (tmp_path / "a.toml").write_text(
+        CUBE
+        + '[beams.b]\ncell = "bcc"\nmap.affine.wavelength = 4\nradius = 0.4\n'
+        + "[blend]\nbetween = ['core', 'b']\nweight = { linear = { along = [0, 0, 1], stops = [[-4, 0], [4, 1]] } }\n"
+    )
+    solid = lt.load(tmp_path / "a.toml").build()
+    report = solid.report()
+    assert isinstance(report.beams["b"], lt.reports.BeamsReport) and isinstance(report.blend, lt.reports.BlendReport)
+    assert report.beams["b"].hubs > 0 and report.beams["b"].repeats is None
+    (transition,) = solid.transitions()
+    assert isinstance(transition, lt.reports.TransitionReport) and transition.between == ["core", "b"]
+    assert str(transition).startswith("transition core to b: ")
