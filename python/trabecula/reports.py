@@ -775,10 +775,10 @@ class WallSpread(Report):
 
 
 class WarningReport(Report):
-    """A possible mistake in a design."""
+    """Something in a design that is allowed but may be a mistake."""
 
     message: str
-    """The sentence."""
+    """The possible mistake, with the numbers."""
     path: str
     """Path of the key in the design."""
 
