@@ -389,7 +389,7 @@ MESH = SOLID.mesh(edge=0.25)
         (lambda: cube(cell=lt.cell.series([lt.cell.term([float("inf"), 0, 0])])).build(), "whole numbers"),
         (lambda: cube(cell=lt.cell.series([lt.cell.term("abc")])).build(), "whole numbers"),
         (lambda: cube(level=lt.level.fraction(lt.grade.linear([0, 0, 1], [1, 2]))).build(), "stops"),
-        (lambda: MESH.within(3), "within takes a Solid or a region, found 3"),
+        (lambda: MESH.within(3), "within takes a Solid, a region or a path, found 3"),
         (lambda: MESH.within(MESH), "within takes a Solid"),
         (lambda: MESH.png((10**30, 10)), "size is out of range"),
         (lambda: MESH.png((80.5, 60)), "size must be a whole number"),
