@@ -112,6 +112,8 @@ def main():
     (FILES / "octahedron.stl").write_bytes(stl(octahedron()))
     _, y, z = np.meshgrid([0, 4, 8], [0, 2, 4, 6], [0, 2, 4], indexing="ij")
     np.save(FILES / "plate.npy", plate(y, z).astype(float))
+    _, y, z = np.meshgrid([0, 2, 4, 6, 8], [0, 2, 4, 6], [0, 2, 4], indexing="ij")
+    np.save(FILES / "slab.npy", plate(y, z).astype(float))
     t = np.arange(8) / 8
     np.save(FILES / "rods.npy", np.broadcast_to(rods(t[:, None, None], t[None, :, None]), (8, 8, 8)).copy())
     rows = [f"{x:g},{y:g},{z:g},{v:g}" for x in (0, 8) for y, z, v in SCATTER]

@@ -294,14 +294,14 @@ CASES = [
     (but(GOOD, radius={"formula": "x - 5"}), "radius.formula", ["radius is -", "greater than 0"]),
     (but(GOOD, nodes=SQUARE), "nodes", ["either a cell on a map, or nodes and struts"]),
     (but(GOOD, fillet=0.3), "fillet", ["fillet = { radius = 0.5 }"]),
-    (but(GOOD, fillet={"radius": -1}), "fillet", ["above zero"]),
-    (but(GOOD, fillet={"tau": 1}), "fillet", ["up to, not including, 1"]),
+    (but(GOOD, fillet={"radius": -1}), "fillet", ["positive and finite, found -1 mm"]),
+    (but(GOOD, fillet={"tau": 1}), "fillet", ["tau must be in [0, 1), found 1"]),
     (but(GOOD, fillet="round"), "fillet", ["unknown fillet", "none, auto"]),
     (but(GOOD, profile="tube"), "profile", ["unknown profile"]),
-    (but(GOOD, profile={"waist": 2}), "profile", ["must lie between", "the beam from"]),
+    (but(GOOD, profile={"waist": 2}), "profile", ["must be between", "the beam from"]),
     (but(GOOD, merge=-1), "merge", ["0 or more"]),
     (but(GOOD, trim="clip"), "trim", ["unknown trim", "cut, drop, snap"]),
-    (but(GOOD, map={"affine": {"wavelength": 0.001}}, radius=0.0001), "map", ["at most 10000000 are made"]),
+    (but(GOOD, map={"affine": {"wavelength": 0.001}}, radius=0.0001), "map", ["the maximum is 10000000"]),
     (
         but(GOOD, map={"affine": {"wavelength": 500, "offset": [100, 100, 100]}}, radius=1),
         "map",
@@ -317,7 +317,11 @@ CASES = [
     (but(OWN, radius=None), "", ["no node has a radius"]),
     (but(OWN, map=GOOD["map"]), "map", ["a map belongs to a cell"]),
     (but(OWN, nodes="missing.csv"), "nodes", ["missing.csv"]),
-    (but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4), "radius", ["the beam from", "contains the other hub"]),
+    (
+        but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4),
+        "radius",
+        ["the beam from", "contains the other hub"],
+    ),
     (but(OWN, profile="cylinder", hub={"formula": "0.5 + x/20"}), "profile", ["cylinder needs hubs of equal radius"]),
     (but(OWN, nodes=[[x + 50, y, z] for x, y, z in SQUARE]), "trim", ["no beam lies in the region"]),
     (but(PATTERN, trim="drop"), "trim", ["leave trim out"]),
@@ -422,7 +426,7 @@ FRAME = {"nodes": SQUARE, "struts": RING, "radius": 0.5}
     ],
 )
 def test_a_chord_error_is_for_uncut_beams_alone(design, why):
-    """What cannot be had is refused with the reason and the other road."""
+    """What cannot be had is refused with the reason and the other method."""
     with pytest.raises(ValueError, match=why):
         design().mesh(chord=0.01)
 

@@ -1,4 +1,4 @@
-"""Pieces beside the largest: kept with a warning, dropped, or refused, through both doors."""
+"""Components besides the largest: kept with a warning, dropped, or refused, through both doors."""
 
 import json
 import warnings
@@ -85,7 +85,7 @@ def test_the_command_keeps_drops_and_refuses(tmp_path, balls, name):
     (tmp_path / name).unlink()
     done = run("mesh", balls, "-o", name, "--edge", 0.25, "--islands", "error", cwd=tmp_path, status=1)
     last = done.stderr.splitlines()[-1]
-    assert last.startswith("trabecula: islands: ") and f"{kept['found']} pieces beside the largest" in last
+    assert last.startswith("trabecula: islands: ") and f"{kept['found']} connected components besides the largest" in last
     assert names(tmp_path) == ["balls.toml"]
 
 
@@ -131,7 +131,7 @@ def test_a_cavity_stays_with_its_piece(tmp_path):
     (tmp_path / "hollow.toml").write_text(HOLLOW)
     solid = lt.load(tmp_path / "hollow.toml").build()
     one = solid.mesh(edge=0.2, islands="drop")
-    with pytest.warns(lt.DesignWarning, match="1 piece beside the largest"):
+    with pytest.warns(lt.DesignWarning, match="1 connected component besides the largest"):
         both = solid.mesh(edge=0.2)
     assert (both.pieces, one.pieces, one.islands["dropped"]) == (2, 1, 1)
     # The hollow and the cell's voids in the wall; the small ball has some of its own.

@@ -54,7 +54,11 @@ CASES = [
         ["no flat face", "(0, 0, 3) mm", "(0, 0, 1)"],
     ),
     ("[skin]\nthickness = 1\nopen = [{ point = [0, 0, 4], normal = [0, 0, 0] }]\n", "skin.open[0].normal", ["direction"]),
-    ("[skin]\nthickness = 1\nopen = [{ point = [0, 0, nan], normal = [0, 0, 1] }]\n", "skin.open[0].point", ["finite", "NaN"]),
+    (
+        "[skin]\nthickness = 1\nopen = [{ point = [0, 0, nan], normal = [0, 0, 1] }]\n",
+        "skin.open[0].point[2]",
+        ["finite", "NaN"],
+    ),
     ('[skin]\nthickness = 1\nopen = ["-x", "+x", "-y", "+y", "-z", "+z"]\n', "skin.open", ["no skin"]),
     ("[keep.boss.sphere]\nradius = 1\ncenter = [9, 0, 0]\n", "keep.boss", ["outside the region", "(8, -1, -1)", "(4, 4, 4)"]),
     ("[keep.boss.sphere]\nradius = 20\n", "keep.boss", ["the whole region", "the part would be solid"]),
@@ -208,7 +212,7 @@ def test_a_closed_skin_traps_powder(tmp_path):
     assert len(left) == 1 and left[0]["volume"] < 0.3 and "one closed void of 0.26" in done.stderr
 
 
-def test_the_same_bytes_by_either_road(tmp_path):
+def test_the_same_bytes_by_either_method(tmp_path):
     """A part with a skin is held in memory to look for voids; the file is the one that streaming writes."""
     file = write(tmp_path / "a.toml", CUBE + '[skin]\nthickness = 0.5\nopen = ["-z"]\n')
     command("mesh", file, "-o", tmp_path / "a.stl", "--edge", 0.2)

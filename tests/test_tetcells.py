@@ -40,7 +40,7 @@ def test_the_stream_is_the_same_surface(tmp_path):
     assert told["volume"] == pytest.approx(mesh.volume, rel=1e-12)
 
 
-def test_skins_join_by_the_implicit_road():
+def test_skins_join_by_the_implicit_method():
     lattice = lt.Lattice(cell=lt.cell.tet("diamond"), part="lower", map=lt.map.tets(size=6), level=lt.level.fraction(0.25))
     plain = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}).build()
     skinned = lt.Design(region=lt.region.sphere(radius=6), lattice={"a": lattice}, skin=lt.skin(0.8)).build()
@@ -165,7 +165,7 @@ def test_a_single_tetrahedron_sharp_or_smooth():
     assert solid.mesh(edge=0.4).closed
     with pytest.raises(lt.DesignError, match="nothing is left"):
         volume(sharpness=0.1)
-    with pytest.raises(lt.DesignError, match="four corners"):
+    with pytest.raises(lt.DesignError, match="corners: expected a list of four"):
         lt.Design(region=lt.region.tetrahedron(corners[:3]), lattice={"a": cell}).build()
 
 

@@ -149,7 +149,7 @@ def test_hexahedra_are_offered_a_split(tmp_path):
     corners += [at[:-1, :-1, 1:].ravel(), at[1:, :-1, 1:].ravel(), upper, at[:-1, 1:, 1:].ravel()]
     path = tmp_path / "bricks.inp"
     meshio.write(path, meshio.Mesh(points, [("hexahedron", np.stack(corners, axis=1))]))
-    with pytest.raises(ValueError, match="12 hexahedra beside 0 tetrahedra; give split = true"):
+    with pytest.raises(ValueError, match="12 hexahedra and 0 tetrahedra; give split = true"):
         lt.TetMesh.read(path)
     mesh = lt.TetMesh.read(path, split=True)
     assert mesh.counts[1] == 12 * 12 and np.isclose(mesh.volume, 12) and mesh.boundary().closed

@@ -39,7 +39,7 @@ def test_every_door_gives_the_same(tmp_path):
     report = json.loads(subprocess.run([*words, "--json"], capture_output=True, text=True, check=True).stdout)
     assert report == built.report()
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    assert "of a wall of levels with this fraction" in text and "thickness  0.4000 mm" in text
+    assert "constant-level sheet of equal fraction" in text and "thickness  0.4000 mm" in text
 
 
 def test_the_report():

@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_corner_on_a_straight_edge_leaves_its_run() {
-        // A roof whose ridge is in three pieces, and its mirror image below: the rim bends, the ridges do not.
+        // A roof whose ridge is in three pieces, and its mirror image below: the outline bends, the ridges do not.
         let mesh = Mesh {
             vertices: vec![
                 [0.0, 0.0, 1.0],

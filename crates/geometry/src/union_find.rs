@@ -24,7 +24,7 @@ pub fn unite(root: &mut [u32], a: u32, b: u32) -> bool {
     a != b
 }
 
-/// So many numbers, each its own.
+/// The partition of `n` numbers into singletons.
 pub fn singles(count: usize) -> Vec<u32> {
     (0..count as u32).collect()
 }

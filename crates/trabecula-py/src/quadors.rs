@@ -237,7 +237,7 @@ impl Slice {
         self.cut.moved
     }
 
-    /// How many hubs were looked at.
+    /// Number of hubs evaluated.
     #[getter]
     fn hubs(&self) -> usize {
         self.cut.hubs

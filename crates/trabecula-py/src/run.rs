@@ -1,4 +1,4 @@
-//! Long work off the interpreter: other Python threads run, Ctrl-C stops it, progress is told on the calling thread.
+//! Long work off the interpreter: other Python threads run, Ctrl-C stops it, progress is reported on the calling thread.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::error;
 
-/// How often signals are looked at and progress is told.
+/// How often signals are checked and progress is reported.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Progress that the working threads write and the calling thread reads.
@@ -52,7 +52,7 @@ pub fn run<T: Send>(
         std::thread::scope(|scope| {
             let (finished, waiting) = channel::<()>();
             let work = move || {
-                let _finished = finished; // dropped, and so told, even if the work panics
+                let _finished = finished; // dropped, and so signalled, even if the work panics
                 match pool {
                     Some(pool) => pool.install(|| work(shared)),
                     None => work(shared),

@@ -320,7 +320,7 @@ impl Field for Blend {
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        // The same each time; of few it is told how many they are.
+        // The same each time; the compiler knows the number of few.
         let one = self.levels.as_deref().is_none_or(|l| l.joint.len() == 1);
         let of = match (self.strands.len(), one) {
             (2, false) => Blend::gradients_of::<2, 8>,

@@ -87,7 +87,7 @@ pub struct Design {
     /// What closes the region's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
-    /// Regions kept fully solid as far as the region goes, such as bolt bosses, under names of your own.
+    /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[serde(default, skip_serializing_if = "Keeps::is_empty")]
     pub keep: Keeps,
     /// Where each key stands in the file it was read from.
@@ -150,7 +150,7 @@ pub struct Tiled {
     pub mesh: TetReport,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
-    /// Which zones join, where zones have cells of their own and that can be told.
+    /// Which zones join, where zones have cells of their own and it can be predicted.
     pub joins: Option<Joins>,
 }
 

@@ -34,7 +34,7 @@ impl Level {
     }
 }
 
-/// A distance under a map that varies is at most so many times the one in the table: beyond it a cell is stretched out
+/// A distance under a map that varies is at most this many times the one in the table: beyond it a cell is stretched out
 /// of all likeness.
 const STRETCHED: f64 = 8.0;
 
@@ -380,7 +380,7 @@ impl Lattice {
     }
 }
 
-/// Where a lattice is looked at to report on it: nodes of a grid over a box.
+/// Sample positions of a report on a lattice: nodes of a grid over a box.
 pub fn sample_points(b: &Aabb, n: usize) -> Vec<Vec3> {
     let step = scale(b.size(), 1.0 / n as f64);
     let node = |i: usize, a: usize| (i as f64 + 0.5) * step[a];

@@ -65,7 +65,7 @@ impl RegionKind {
     }
 }
 
-/// What is to be said of regions beside them.
+/// Warnings and notes that come with a region.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     /// Possible mistakes.
@@ -118,7 +118,7 @@ impl<'a> Context<'a> {
 }
 
 /// A signed distance function (1-Lipschitz; exact for primitives and meshes, a lower bound of the
-/// absolute distance for combinations), with what a mesher and a report need beside it.
+/// absolute distance for combinations), with what a mesher and a report need in addition.
 pub trait Shape: Field {
     /// Bounds of the solid; infinite along unbounded directions.
     fn bounds(&self) -> Aabb;

@@ -1,4 +1,4 @@
-//! Reports: every figure that is told of a design or a mesh, declared once. The fields are the keys of the JSON that the command
+//! Reports: every figure of a design or a mesh, declared once. The fields are the keys of the JSON that the command
 //! prints and the attributes of the Python classes, whose text is made from the comments here (`scripts/report_classes.py`).
 
 mod beams;

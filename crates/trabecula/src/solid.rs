@@ -16,7 +16,7 @@ pub struct Solid {
     pub region: Region,
     /// The lattice; `None` leaves the region full.
     pub field: Option<Arc<dyn Implicit>>,
-    /// What is solid whatever the lattice says, as far as the region goes: skin and keep zones.
+    /// What is solid whatever the lattice says, within the region: skin and keep zones.
     pub filled: Vec<CsgSolid>,
     /// The smallest wavelength (mm); grid spacings are given by it.
     pub wavelength: f64,

@@ -71,7 +71,7 @@ struct Known {
     slope_t: Vec3,
 }
 
-/// The most tetrahedra that are looked at for a bound.
+/// Largest number of tetrahedra that are evaluated for a bound.
 const MOST: usize = 256;
 
 impl Tiling {

@@ -1,6 +1,9 @@
 //! The house rules that a machine can check, over the sources of all crates.
 //!
 //! - *Layers*: a module of `trabecula` imports only from modules of lower layers. (Between crates cargo checks it.)
+//! - *Length*: a function has at most 100 lines, a file at most 600; tables of data apart.
+//! - *Names*: no file name occurs twice in a crate, so that a name leads to one place. (`trabecula` does not keep this yet.)
+//! - *Words*: messages and documentation use the field's terms (docs/glossary.md), not private ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -25,6 +28,30 @@ const LAYERS: &[&[&str]] = &[
 
 /// Modules that may not be imported although they are lower: what a module must work without knowing.
 const UNKNOWN: &[(&str, &[&str])] = &[("extract", &["cell", "map", "lattice", "tiling", "blend", "truss", "mesher"])];
+
+/// Most lines of a function and of a file.
+const FUNCTION: usize = 100;
+const FILE: usize = 600;
+
+/// Functions that are longer and still to be split, by file and name. None may join them.
+const LONG: &[(&str, &str)] = &[
+    ("formats/vtk/legacy.rs", "read"),
+    ("analysis/local/nearest.rs", "nearest"),
+    ("analysis/transition.rs", "transition"),
+    ("design/build.rs", "design"),
+    ("design/grade.rs", "grade"),
+];
+
+/// Words that say nothing to a reader of the field, each with what is meant.
+const PRIVATE: &[(&str, &str)] = &[
+    ("told", "reported, known"),
+    ("beside", "adjacent to, in addition to"),
+    ("looked at", "evaluated, searched"),
+    ("so many", "the number"),
+    ("as far as", "where"),
+    ("rim", "boundary loop"),
+    ("rims", "boundary loops"),
+];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("root")
@@ -59,6 +86,8 @@ fn is_test(path: &Path) -> bool {
     path.components().any(|c| ["tests", "tests.rs", "laws.rs"].iter().any(|t| c.as_os_str() == *t))
 }
 
+const CRATES: [&str; 4] = ["geometry", "beams", "trabecula", "trabecula-py"];
+
 #[test]
 fn modules_import_from_lower_layers_only() {
     let layers = LAYERS.iter().enumerate();
@@ -92,4 +121,85 @@ fn modules_import_from_lower_layers_only() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
+/// The functions of a formatted source, each with its number of lines: from `fn` to the brace in its column.
+fn functions(text: &str) -> Vec<(String, usize)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut out = Vec::new();
+    for (i, line) in lines.iter().enumerate() {
+        let body = line.trim_start();
+        let indent = &line[..line.len() - body.len()];
+        let words: Vec<&str> =
+            body.split_whitespace().take_while(|w| !w.contains('(') || w.starts_with("pub(")).collect();
+        let after = words.iter().position(|w| *w == "fn").map(|at| at + 1);
+        let Some(name) = after.and_then(|at| body.split_whitespace().nth(at)) else { continue };
+        if body.starts_with("//") || body.ends_with(['}', ';']) {
+            continue;
+        }
+        let closing = format!("{indent}}}");
+        if let Some(length) = lines[i..].iter().position(|l| *l == closing) {
+            let name = name.split(['(', '<']).next().unwrap_or(name);
+            out.push((name.to_string(), length + 1));
+        }
+    }
+    out
+}
+
+#[test]
+fn functions_and_files_are_short() {
+    let mut wrong = Vec::new();
+    let mut seen = 0;
+    for (path, text) in CRATES.iter().flat_map(|c| files(c)) {
+        let lines = text.lines().count();
+        if lines > FILE {
+            wrong.push(format!("{}: {lines} lines; at most {FILE}", path.display()));
+        }
+        for (name, length) in functions(&text) {
+            seen += 1;
+            if length > FUNCTION && !LONG.iter().any(|(file, of)| path.ends_with(file) && *of == name) {
+                wrong.push(format!("{}: {name} has {length} lines; at most {FUNCTION}", path.display()));
+            }
+        }
+    }
+    assert!(seen > 1000, "only {seen} functions found");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_file_name_occurs_once_in_a_crate() {
+    let mut wrong = Vec::new();
+    for of in ["geometry", "beams", "trabecula-py"] {
+        let mut by_name: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+        for (path, _) in files(of).into_iter().filter(|(p, _)| !is_test(p)) {
+            let name = path.file_name().and_then(|n| n.to_str()).expect("name").to_string();
+            by_name.entry(name).or_default().push(path);
+        }
+        wrong.extend(by_name.into_values().filter(|p| p.len() > 1).map(|p| format!("{p:?}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The text of a line outside code: a comment, or what stands between quotes.
+fn prose(line: &str) -> String {
+    match line.find("//") {
+        Some(at) => line[at..].to_string(),
+        None => line.split('"').skip(1).step_by(2).collect::<Vec<_>>().join(" "),
+    }
+}
+
+#[test]
+fn messages_and_comments_use_the_terms_of_the_field() {
+    let mut wrong = Vec::new();
+    for (path, text) in CRATES.iter().flat_map(|c| files(c)) {
+        for (number, line) in (1..).zip(text.lines()) {
+            let prose = format!(" {} ", prose(line).to_lowercase().replace(|c: char| !c.is_alphanumeric(), " "));
+            for (word, meant) in PRIVATE {
+                if prose.contains(&format!(" {word} ")) {
+                    wrong.push(format!("{}:{number}: \"{word}\"; say {meant}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
 }

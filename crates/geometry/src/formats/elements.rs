@@ -175,7 +175,7 @@ impl Elements {
             return Err(Fault::new(
                 "split",
                 format!(
-                    "the mesh has {} beside {} tetrahedra; give split = true to have them cut into tetrahedra that fit face \
+                    "the mesh has {} and {} tetrahedra; give split = true to have them cut into tetrahedra that fit face \
                      to face, or mesh with tetrahedra alone",
                     found.join(", "),
                     mesh.tets.len()
@@ -197,7 +197,7 @@ impl Elements {
 mod tests {
     use super::*;
 
-    /// Two hexahedra, a wedge on them, and a pyramid beside them.
+    /// Two hexahedra, a wedge on them, and a pyramid adjacent to them.
     fn mixed() -> Elements {
         let mut points = Vec::new();
         for z in 0..2 {

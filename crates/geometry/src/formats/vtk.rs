@@ -16,7 +16,7 @@ use super::xml::{Scanner, attribute};
 use crate::fault::Fault;
 use crate::math::Vec3;
 
-/// A named array with so many numbers for each point or cell.
+/// A named array with a fixed count of numbers for each point or cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
     /// Its name.

@@ -10,7 +10,7 @@ use crate::math::{Aabb, Vec3};
 use crate::mesh::{Mesh, degenerate};
 
 /// The number of pairs of triangles that meet elsewhere than in their common vertices or edge, or `limit` if there
-/// are at least so many.
+/// are at least this many.
 ///
 /// Touching counts: a vertex of one on another, a crossing, an overlap in a plane, two neighbours folded onto each
 /// other, a triangle given twice. Triangles without area are left out (`defects` counts them). Vertices are common

@@ -19,7 +19,7 @@ pub(super) struct Paper {
 }
 
 impl Paper {
-    /// Fills a rectangle from one corner to another, as far as it is on the paper.
+    /// Fills a rectangle from one corner to another, clipped to the paper.
     pub fn fill(&mut self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2], colour: Colour) {
         let [w, h] = self.size;
         for y in y0..y1.min(h) {

@@ -1,4 +1,4 @@
-//! Light: a key, a sky and a rim, and the darkness of places that see little of the sky.
+//! Light: a key light, a sky and a back light, and ambient occlusion.
 
 use std::collections::HashMap;
 

@@ -3,7 +3,7 @@
 //! A bucket holds the costs that share their exponent and five bits of their mantissa. Adding and taking are a few
 //! instructions, the order within a bucket is that of a stack, and nothing depends on anything but the calls.
 
-/// Bits of a single-precision cost that are not looked at.
+/// Low bits of a single-precision cost that are ignored.
 const DROPPED: u32 = 18;
 
 /// A candidate: half-edge, and the versions of its ends when it was put in.

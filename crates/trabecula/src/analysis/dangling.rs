@@ -1,12 +1,12 @@
 //! Bits that hang on a part by a thread: where a region cuts a lattice, what is left of a wall or a strut may be held by
 //! less than the lattice itself ever is.
 //!
-//! Near the region's surface the part is looked at on a grid. Solid points that lie at least a quarter of the lattice's
+//! Near the region's surface the part is sampled on a grid. Solid points that lie at least a quarter of the lattice's
 //! narrowest neck below the surface, cuts included, are joined along the axes to bodies. The lattice holds together as one
 //! of them, as its own necks are twice as thick. A small one that is thicker than that somewhere hangs by a neck thinner than
 //! half the lattice's, or by nothing.
 //!
-//! Blocks of the grid are looked at one by one, each with a margin, so that memory does not grow with the part. A bit is the
+//! Blocks of the grid are processed one by one, each with a margin, so that memory does not grow with the part. A bit is the
 //! block's in which its first point is.
 
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ const THIN: f64 = 0.5;
 /// Steps of the grid on that neck. The lattice's own is twice as thick, six steps: its middle is at most √3/2 steps from a point,
 /// which so lies 2.1 steps or more from any open one, above the two that are asked for.
 const STEPS: f64 = 3.0;
-/// How far a bit may reach, in such necks; at most half a wavelength. What lies deeper is not looked at, and taken as solid.
+/// How far a bit may reach, in such necks; at most half a wavelength. What lies deeper is taken as solid.
 const FAR: f64 = 5.0;
 /// Points of a block along each axis without its margins, and of the cubes that are passed over where nothing of the layer is.
 const CORE: i64 = 96;
@@ -244,7 +244,7 @@ impl Body {
         }
     }
 
-    /// Whether it reaches no farther than so many points along any axis.
+    /// Whether it spans at most this number of points along every axis.
     fn is_within(&self, most: usize) -> bool {
         (0..3).all(|a| self.max[a] - self.min[a] < most)
     }

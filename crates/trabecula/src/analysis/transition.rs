@@ -1,6 +1,6 @@
 //! Where lattices of a blend pass into each other, and how well they hold together there.
 //!
-//! The part is looked at on a grid of points. A *transition* of two lattices is where both count and no other counts
+//! The part is sampled on a grid of points. A *transition* of two lattices is where both count and no other counts
 //! more. Solid points of it, and of the two lattices where they are alone, are neighbours along the axes. Taken in the
 //! order of their depth below the surface, the deepest first, they grow together to bodies; when those of the two sides
 //! meet, the depth reached is that of the widest way across: half the thickness of its narrowest neck.
@@ -13,10 +13,10 @@ use crate::field::Field;
 use crate::solid::Solid;
 use geometry::math::Vec3;
 
-/// Most points looked at, and steps on the shortest wavelength where they suffice.
+/// Largest number of sample points, and steps on the shortest wavelength where they suffice.
 const MOST: f64 = 6e5;
 const FINE: f64 = 16.0;
-/// Shares of the second lattice at which the fraction is told.
+/// Shares of the second lattice at which the fraction is reported.
 const BINS: usize = 10;
 /// Where a lattice is alone nowhere, its side of a transition is where it counts most: a tenth of the way between the least and
 /// the greatest share, if these are so far apart that there is a way.
@@ -160,7 +160,7 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
     sums.into_iter().map(|s| [s[1] / s[0].max(1e-30), s[2] / s[0].max(1e-30)]).collect()
 }
 
-/// A body that has points in the transition itself, beside the two bits of the sides.
+/// A component with points in the transition itself, in addition to the two bits of the sides.
 const WITHIN: u8 = 4;
 /// The bits of the sides.
 const SIDES: u8 = 3;

@@ -51,7 +51,7 @@ pub(super) struct Row {
     curves: Vec<Table>,
 }
 
-/// The neighbourhoods beside a row.
+/// The neighbourhoods adjacent to a row.
 struct Beside {
     /// The first along x.
     first: usize,
@@ -143,7 +143,7 @@ impl Levels {
         sum
     }
 
-    /// The same at the i-th node of a row that has been entered: of shares that lie at `nodes`, so many times at each; where no
+    /// The same at the i-th node of a row that has been entered: of shares that lie at `nodes`, with these multiplicities; where no
     /// level varies.
     #[inline(always)]
     pub fn added_in_row(
@@ -329,7 +329,7 @@ impl Levels {
     }
 }
 
-/// Adds so many times each number.
+/// Adds a multiple of each number.
 #[inline(always)]
 fn add_to<const C: usize>(sum: &mut [f64; C], times: f64, v: &[f64; C]) {
     sum.iter_mut().zip(v).for_each(|(s, v)| *s += times * v);

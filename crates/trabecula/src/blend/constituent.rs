@@ -71,7 +71,7 @@ pub(super) fn values_of(
     (out.iter_mut().zip(other)).for_each(|(o, b)| *o = made([*o, b]));
 }
 
-/// Fills so many times the first field and the second together, and the gradient of that.
+/// Fills a multiple of the first field plus the second, and the gradient of the sum.
 pub(super) fn gradients_of(
     sides: &[Arc<dyn Implicit>; 2],
     [first, second]: [f64; 2],

@@ -22,7 +22,7 @@ pub enum Phases {
     Drifting,
 }
 
-/// Places looked at where one distribution serves all, and in each neighbourhood. A thousand even places tell a fraction
+/// Sample positions where one distribution serves all, and in each neighbourhood. A thousand even positions give a fraction
 /// to some thousandths; the sixty-four neighbourhoods in a window of two cells look at other ones each, so that what is
 /// left of their errors together is far below. Where phases drift slowly neighbourhoods are fewer, and twice as many serve.
 const EVERYWHERE: usize = 1 << 16;
@@ -36,10 +36,10 @@ const GONE: f64 = 0.9;
 const APART: usize = 4;
 /// Most neighbourhoods.
 const MOST: f64 = 100_000.0;
-/// Most waves of a series whose beats are looked at.
+/// Largest number of waves of a series whose beats are considered.
 const WAVES: usize = 64;
 
-/// Where cores are looked at together.
+/// Where cores are sampled together.
 pub(super) struct Joint {
     pub phases: Phases,
     /// Back to mm from the common cell, in turns, where one serves all.
@@ -50,7 +50,7 @@ pub(super) struct Joint {
     /// One over that.
     per: f64,
     pub shape: [usize; 3],
-    /// How far about its middle a neighbourhood is looked at, mm, and at how many places.
+    /// Half-width (mm) of the window about a neighbourhood's centre, and its number of sample positions.
     reach: f64,
     count: usize,
     /// Where solved maps end, and meshes of tetrahedra and beams may; nothing else has an end.
@@ -104,7 +104,7 @@ impl Joint {
         self.shape.iter().product()
     }
 
-    /// The places at which neighbourhood `i` is looked at: evenly over the common cell, or about its middle and
+    /// The sample positions of neighbourhood `i`: evenly over the common cell, or about its middle and
     /// ever fewer up to its reach along each axis (a raised cosine, in which whole waves leave no trace).
     pub fn places(&self, i: usize) -> Vec<Vec3> {
         if let Some(back) = &self.common {
@@ -117,7 +117,7 @@ impl Joint {
         let some = &windows()[((z * APART + y) * APART + x) * SLOWLY..][..self.count];
         let place = |s: &Vec3| -> Vec3 {
             core::array::from_fn(|a| {
-                // What ends where the region does is not looked at beyond: places there are mirrored.
+                // What ends at the region's bounds is not sampled beyond them: positions there are mirrored.
                 let p = middle[a] + self.reach * s[a];
                 let Some(b) = &self.bounds else { return p };
                 let (lo, hi) = (b.min[a], b.max[a]);

@@ -5,7 +5,7 @@
 //! fraction is Σ wᵢ (bᵢ − aᵢ), the mean of those asked for, whatever the cells. The distribution of F for shares w is that
 //! of the sum over places where the gᵢ are known together (`joint`); it is tabulated over w.
 //!
-//! What is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ is nothing where one lattice is alone, however coarsely it was looked at.
+//! What is added to Σ wᵢ loᵢ and Σ wᵢ hiᵢ is nothing where one lattice is alone, however coarsely it was sampled.
 
 use std::sync::OnceLock;
 

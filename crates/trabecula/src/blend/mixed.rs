@@ -46,7 +46,7 @@ impl Mixed {
 
     /// Fills the values at some nodes of a row.
     pub fn fill(&mut self, blend: &Blend, nodes: &[usize], line: &Line, row: &mut [f32]) {
-        // The same each time; of few lattices it is told how many they are.
+        // The same each time; the compiler knows the number of few lattices.
         match blend.strands.len() {
             2 => self.fill_of::<2>(blend, nodes, line, row),
             3 => self.fill_of::<3>(blend, nodes, line, row),
@@ -133,7 +133,7 @@ struct Numbers {
     /// Along which axes they may change.
     varies: [bool; 3],
     of: Vec<f64>,
-    /// The row that all of them are of, as far as rows differ.
+    /// The row that all of them belong to, where rows differ.
     known: Option<[usize; 2]>,
     points: Vec<Vec3>,
     found: Vec<f64>,

@@ -5,7 +5,7 @@ use super::quantile::Spot;
 use super::strand::Strand;
 use geometry::math::Vec3;
 
-/// So many cubes of neighbourhoods are remembered.
+/// Number of cubes of neighbourhoods in the cache.
 const KEPT: usize = 32;
 const NOBODY: usize = usize::MAX;
 

@@ -8,7 +8,7 @@ pub(super) const KNOTS: usize = 64;
 /// Steps in which values are counted.
 const STEPS: usize = 512;
 
-/// How many of some values lie below each of even steps of their range. Linear within a step, of which so many make the
+/// How many of some values lie below each of even steps of their range. Linear within a step, whose number makes the
 /// range that what looking at some places leaves open is far more.
 pub(super) struct Counted {
     low: f64,

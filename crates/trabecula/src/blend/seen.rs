@@ -14,7 +14,7 @@ pub(super) struct Seen {
     pub quantiles: Vec<End>,
 }
 
-/// So many numbers and slopes.
+/// Buffers of values and slopes.
 pub(super) fn zeros(n: usize) -> (Vec<f64>, Vec<Vec3>) {
     (vec![0.0; n], vec![[0.0; 3]; n])
 }
@@ -50,7 +50,7 @@ impl Seen {
         Seen { core, core_slope, high, high_slope, quantiles }
     }
 
-    /// The same among `n` points, being looked at `here`.
+    /// The same for `n` points, at index `here`.
     fn spread(self, here: &[usize], n: usize) -> Seen {
         fn among<T: Copy + Default>(of: &[T], here: &[usize], n: usize) -> Vec<T> {
             let mut all = vec![T::default(); n];

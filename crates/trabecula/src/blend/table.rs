@@ -1,6 +1,6 @@
 //! Numbers of some nodes of a grid of shares, equally many for each.
 
-/// For each node that was looked at: what is added to the lower and the upper end, or its quantile function.
+/// For each node that was evaluated: what is added to the lower and the upper end, or its quantile function.
 #[derive(Default)]
 pub(super) struct Table {
     /// Where a node's numbers begin, or `NONE`.
@@ -12,7 +12,7 @@ pub(super) struct Table {
 const NONE: u32 = u32::MAX;
 
 impl Table {
-    /// A table of so many nodes, with `width` numbers for each that will be looked at.
+    /// A table of `nodes` nodes, with `width` numbers for each one that will be evaluated.
     pub fn new(nodes: usize, width: usize) -> Table {
         Table { first: vec![NONE; nodes], width, numbers: Vec::new() }
     }
@@ -23,14 +23,14 @@ impl Table {
         self.numbers.clear();
     }
 
-    /// The numbers of a node, if it was looked at.
+    /// The numbers of a node, if it was evaluated.
     #[inline]
     pub fn get(&self, node: usize) -> Option<&[f32]> {
         let first = self.first[node];
         (first != NONE).then(|| &self.numbers[first as usize..][..self.width])
     }
 
-    /// The numbers of a node; `find` adds them to zeros if it was not looked at.
+    /// The numbers of a node; `find` adds them to zeros if it was not evaluated.
     #[inline]
     pub fn get_or(&mut self, node: usize, find: impl FnOnce(&mut [f32])) -> &[f32] {
         if self.first[node] == NONE {

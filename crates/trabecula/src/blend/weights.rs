@@ -57,7 +57,7 @@ impl Weights {
                 }
             }
         }
-        // The same each time; of two it is told how many they are.
+        // The same each time; the compiler knows the number of two.
         match n {
             2 => out.as_chunks_mut::<2>().0.iter_mut().for_each(|w| normalise(w)),
             _ => out.chunks_exact_mut(n).for_each(normalise),

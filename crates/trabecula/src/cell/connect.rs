@@ -4,7 +4,7 @@
 //! the linear interpolant's solid has the pieces and loops of the graph of its nodes. As solid grows node by node, a
 //! forest keeps the pieces and, for each, the lattice translations that its closed paths realise: the solid is one
 //! piece in R³ when there is one piece on the torus and its translations are all of Z³. Pieces appear and join at
-//! critical values of the function, so each such event is moved to the critical point beside it, and the few events
+//! critical values of the function, so each such event is moved to the adjacent critical point, and the few events
 //! that matter are played again at their exact levels.
 
 use super::Part;

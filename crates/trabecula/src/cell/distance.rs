@@ -103,7 +103,7 @@ impl Distance {
         value * (own.powi(3) + FAINT) / (own.powi(2) * here + FAINT)
     }
 
-    /// A bound of |∂d/∂x|. A distance's own is one; the spline swings beside creases, and what
+    /// A bound of |∂d/∂x|. A distance's own is one; the spline oscillates near creases, and what
     /// is proven of it is two to three.
     pub fn steepness(&self) -> f64 {
         self.steepness
@@ -216,7 +216,7 @@ pub(super) mod tests {
                 assert!(thin < 1e-3, "{name} {thin}");
                 assert!(shares[..4].iter().all(|e| *e < 2e-3), "{name} {shares:?}");
                 assert!(shares.iter().all(|e| *e < 1e-2), "{name} {shares:?}");
-                // One where the distance is smooth; beside creases the spline swings.
+                // One where the distance is smooth; near creases the spline oscillates.
                 assert!((1.0..3.5).contains(&d.steepness()), "{name} {}", d.steepness());
             }
         }
@@ -257,7 +257,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Waves too fine for the table are told by the error on the mid-surface.
+    /// Waves too fine for the table are detected by the error on the mid-surface.
     #[test]
     fn the_error_is_known() {
         let wave = |hkl| super::super::Term { hkl, amplitude: 1.0, phase: 0.1 };

@@ -1,6 +1,6 @@
 //! The nearest points of the mid-surface f = 0, in space, to the nodes of a grid on the torus.
 //!
-//! Nodes beside the surface find theirs from where the grid's edges cross it. They hand them on to their neighbours, these
+//! Nodes adjacent to the surface find theirs from where the grid's edges cross it. They hand them on to their neighbours, these
 //! to theirs, as long as that is nearer than what they have (Danielsson, Euclidean distance mapping, Computer Graphics and
 //! Image Processing 14, 1980). Then each node sharpens its own: a foot, where the way to the node stands upright on the
 //! surface, by Newton's method. The way is kept as a vector from the node, so a period is crossed like any other step.
@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
         (f, feet)
     }
 
-    /// Feet (from the node, mm) of nodes beside the surface, found from where the grid's edges cross it.
+    /// Feet (from the node, mm) of nodes adjacent to the surface, found from where the grid's edges cross it.
     fn beside(&self, f: &[f64]) -> Vec<Vec3> {
         (0..f.len())
             .into_par_iter()
@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Hands feet on from the nodes `from` to neighbours they serve better, as far as that goes. The nodes served.
+    /// Hands feet on from the nodes `from` to neighbours they are nearer to, until none changes. Returns the nodes that changed.
     fn hand_on(&self, feet: &mut [Vec3], from: Vec<usize>) -> Vec<usize> {
         let mut served = vec![false; feet.len()];
         let mut asked = vec![0u32; feet.len()];
@@ -237,7 +237,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Towards the nearest point by going to the foot on the tangent plane and back to the surface, as far as that
+    /// Towards the nearest point by going to the foot on the tangent plane and back to the surface, while that
     /// shortens the way.
     fn descend(&self, u: Vec3, from: Vec3) -> Vec3 {
         let (mut p, mut pace) = (from, 1.0);

@@ -126,7 +126,7 @@ const FINE: usize = 192;
 const BLOCK: usize = 4;
 
 /// The solid fraction at one level, to about 1e-7 where the level is not critical: only cubes near the surface are
-/// looked at, and each holds the exact volume under the plane of its mean and slope, so that what is left is the
+/// evaluated, and each holds the exact volume under the plane of its mean and slope, so that what is left is the
 /// curvature in clipped cubes, of third order in their edge. `None` for series so fine or so long that it would take
 /// more than some hundredths of a second.
 pub(super) fn fraction(series: &Series, part: Part, t: f64) -> Option<f64> {

@@ -147,7 +147,7 @@ pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: 
     radii.into_iter().reduce(f64::min).map(|r| 2.0 * r)
 }
 
-/// The places where sign · f is least, all of them that a grid shows, as far as they are solid at `iso`.
+/// The places where sign · f is least, all that a grid resolves, where they are solid at `iso`.
 fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     let n = 32;
     let points: Vec<Vec3> =

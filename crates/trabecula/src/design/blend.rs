@@ -130,7 +130,7 @@ pub(super) fn blend(
     Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
 
-/// Refuses weights that are no number, or none of which counts, anywhere that is looked at.
+/// Refuses weights that are no number, or none of which counts, at any sample position.
 fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(), DesignError> {
     let paths = spec.weights();
     let (points, _) = sample::inside(place.region, 60_000);
@@ -163,7 +163,7 @@ fn unused(blend: &Blend, names: &[&str], members: &[Member], place: &Place, warn
     blend.weights().values(place.points, &mut w);
     for (i, name) in names.iter().enumerate() {
         if w.chunks_exact(n).all(|w| w[i] == 0.0) {
-            let message = "this lattice has no weight at any place that was looked at in the region".to_string();
+            let message = "the weight of this lattice is 0 at every sample position in the region".to_string();
             let table = members.iter().find(|m| m.name == *name).map_or("lattice", |m| m.table);
             warnings.push(Warning { path: format!("{table}.{name}"), message });
         }

@@ -75,12 +75,12 @@ pub(super) fn within(spec: &WithinSpec, path: &str, place: &Place) -> Result<Sig
     }
     let mut notes = Notes::default();
     let region = region::region(&spec.of, &format!("{path}.of"), place.loader, &mut notes)?;
-    // The depth itself, as far as it matters.
+    // The depth itself, where it matters.
     let stops = vec![[-wide, -wide], [wide, wide]];
     Ok(Sigmoid::new(Grade::Depth { region, stops }, 0.0, wide))
 }
 
-/// The control points, and the values beside them if a file has such.
+/// The control points, and their values if a file has a fourth column.
 pub(super) fn control(
     spec: &ControlSpec,
     path: &str,

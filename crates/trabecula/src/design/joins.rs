@@ -1,4 +1,4 @@
-//! Whether the cells of different zones join, told before a surface is made.
+//! Whether the cells of different zones join, predicted without a surface.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::cell::tet::{Bary, Stencil};
 use crate::report::ZoneJoin;
 use crate::tiling::{self, Connectivity, Tiling, ZonePair};
 
-/// Steps along the edge of a face on which ports are looked at.
+/// Steps along the edge of a face on which ports are sampled.
 const STEPS: usize = 96;
 
 /// What hangs together, and for every two zones with faces in common the share of a face that is solid in both cells.
@@ -78,7 +78,7 @@ impl Joins {
             ));
         }
         if !any && self.connectivity.components > 1 {
-            say(format!("the lattice is in {} pieces, told by its ports", self.connectivity.components));
+            say(format!("the lattice is in {} pieces, as its ports show", self.connectivity.components));
         }
     }
 

@@ -188,7 +188,7 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
         .map_err(|f| DesignError::fault(path, f))
 }
 
-/// The same of each, the place told by its index.
+/// The same for each, with its index in the path.
 fn each<const N: usize>(
     of: &[GradeSpec; N],
     path: &str,

@@ -6,7 +6,7 @@ use crate::kind::DesignError;
 use crate::region::Region;
 use geometry::fault::number;
 
-/// Points at which a design is looked at.
+/// Number of sample points of a design.
 pub(super) const LOOKS: usize = 8_000;
 
 /// Where a part of a lattice stands, and the region it is to fill.

@@ -25,7 +25,7 @@ pub(super) fn bytes(path: &str, at: &str, place: &Place) -> Result<Vec<u8>, Desi
     place.loader.load(path).map_err(|m| DesignError::new(at, m).found(path))
 }
 
-/// Nodes along an axis of the grid on which a mesh of one cell is looked at.
+/// Nodes along an axis of the grid on which a mesh of one cell is sampled.
 const CELL: usize = 64;
 
 /// A cell from numbers or a mesh.
@@ -147,7 +147,7 @@ pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Sam
     Samples::scattered(&places, &values, spec.neighbours as usize, &place.region.bounds()).map_err(wrong)
 }
 
-/// Control points, and the values beside them if there are four columns.
+/// Control points, and their values if there are four columns.
 pub(super) fn control(file: &str, at: &str, place: &Place) -> Result<(Vec<Vec3>, Option<Vec<f64>>), DesignError> {
     let text = bytes(file, at, place)?;
     let rows = table(&String::from_utf8_lossy(&text), &[3, 4])

@@ -109,7 +109,7 @@ fn skins_and_keep_zones_survive() {
     for more in [
         "[skin]\nthickness = 1\n",
         "[skin]\nthickness = { formula = \"1 + 0.01*x\" }\nopen = [\"-z\", \"+x\", { point = [0, 0, 1], normal = [0, 0, 1] }]\n",
-        "[keep.boss.cylinder]\nbase = [0, 0, 0]\nradius = 2\nheight = 3\n[keep.rim]\nunion = [{ sphere = { radius = 2 } }]\n",
+        "[keep.boss.cylinder]\nbase = [0, 0, 0]\nradius = 2\nheight = 3\n[keep.ring]\nunion = [{ sphere = { radius = 2 } }]\n",
     ] {
         let text = format!("{GOOD}{more}");
         let d = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
@@ -163,9 +163,9 @@ fn slips_are_told_with_path_line_and_nearest_word() {
 
 #[test]
 fn several_lattices_need_a_blend() {
-    let two = GOOD.to_string() + "[lattice.rim]\ncell = \"gyroid\"\n";
+    let two = GOOD.to_string() + "[lattice.shell]\ncell = \"gyroid\"\n";
     let e = refused(&two);
-    assert!(e.path == "lattice.rim" && e.message.contains("need a blend") && e.line == Some(14), "{e}");
+    assert!(e.path == "lattice.shell" && e.message.contains("need a blend") && e.line == Some(14), "{e}");
 }
 
 #[test]

@@ -22,7 +22,7 @@ const DEEP: f64 = 0.17;
 /// The share that is warned of however shallow.
 const MUCH: f64 = 0.1;
 
-/// A tetrahedral mesh of a region, and what is to be told of it.
+/// A tetrahedral mesh of a region, and its report.
 #[derive(Clone, Debug)]
 pub struct Tets {
     /// The mesh, checked.
@@ -361,7 +361,7 @@ mod tests {
         wrong("size = 1e-4", ".size", Some(7), "use a greater one");
         wrong("path = \"none.vtk\"", ".path", Some(7), "none.vtk does not exist");
         wrong("path = \"cube.inp\"", ".path", Some(7), "only vtu and vtk");
-        wrong("path = \"hex.vtk\"", ".split", Some(6), "1 hexahedron beside 0 tetrahedra; give split = true");
+        wrong("path = \"hex.vtk\"", ".split", Some(6), "1 hexahedron and 0 tetrahedra; give split = true");
         wrong("path = \"turned.vtk\"", ".path", Some(7), "1 of 6 tetrahedra are inverted");
         let none = "[region.sphere]\nradius = 1\n[lattice.core.map.affine]\nwavelength = 1";
         let e = Tets::in_design(&Node::from_toml(none).unwrap(), None, &Files).unwrap_err();

@@ -188,7 +188,7 @@ pub(super) struct Made {
     pub tiling: Arc<Tiling>,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
-    /// Which zones join, if there are any and that can be told.
+    /// Which zones join, if there are any and it can be predicted.
     pub joins: Option<Joins>,
 }
 

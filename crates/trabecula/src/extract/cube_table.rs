@@ -1,7 +1,7 @@
 //! The triangles of a grid cell for every pattern of solid corners, generated from three rules.
 //!
 //! 1. On every face, solid corners that only touch diagonally are cut off from each other. The rule looks at the face
-//!    alone, so both cells beside it agree, and the surface is closed and oriented.
+//!    alone, so both adjacent cells agree, and the surface is closed and oriented.
 //! 2. The segments on the six faces make loops (of 3 to 7 edge points). Each is filled with a fan whose diagonals do
 //!    not lie in a face, so no triangle edge is shared with anything in the neighbouring cell.
 //! 3. Of all triangulations by rule 2, the fans are free of self-intersection wherever the points stand on their

@@ -11,7 +11,7 @@ pub const LEAST_SHARPNESS: f64 = 10.0;
 ///
 /// Exact, it is equations 21 to 24 of the hybrid paper: the distance to the nearest segment, or to its nearer end. With a
 /// sharpness k it is equation 25, in which the three cases of a segment of length L are weighted by logistic functions of
-/// k t: smooth where a segment's end takes over, and off by at most 0.2785 L/k (on the line beside the ends; it is not zero
+/// k t: smooth where a segment's end takes over, and off by at most 0.2785 L/k (on the line near its ends; it is not zero
 /// on the segment). Weights there make up to 1 + (1 + e^(k/2))⁻².
 ///
 /// With an axis all is seen along it: distances are those from a wall through the line. A closed line with an axis has an

@@ -99,7 +99,7 @@ impl Rbf {
         self.delta
     }
 
-    /// The condition number of the equations: so many times an error of the values can appear between the points.
+    /// The condition number of the equations: the factor by which an error of the values can grow between the points.
     pub fn condition(&self) -> f64 {
         self.condition
     }

@@ -21,7 +21,7 @@ pub struct Node {
 pub enum Value {
     /// true or false.
     Bool(bool),
-    /// Any number; NaN and infinities are told apart when they are used.
+    /// Any number; NaN and infinities are refused when they are used.
     Number(f64),
     /// A whole number, as it is written; one that is read is a `Number`.
     Whole(i64),
@@ -29,7 +29,7 @@ pub enum Value {
     Text(String),
     /// A list.
     List(Vec<Node>),
-    /// Keys and values; the key's own line beside each.
+    /// Keys and values; with the line of each key.
     Table(Vec<(String, Option<usize>, Node)>),
     /// Something a design has no use for (null, a date); named by the text.
     Other(String),

@@ -1,6 +1,6 @@
 //! JSON Schemas (draft 2020-12) of kinds.
 //!
-//! Beside the standard's words: `x-unit`, the unit of a number; `x-type`, the name of a type that is written out in place;
+//! In addition to the standard's words: `x-unit`, the unit of a number; `x-type`, the name of a type that is written out in place;
 //! `x-keyword`, where the keyword arguments of the Python builder begin.
 
 use super::{Key, Kind, Node, Table, Value};

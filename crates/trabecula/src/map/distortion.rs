@@ -105,7 +105,7 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
 }
 
 impl Distortion {
-    /// All but the density. |curl Kᵢ| λᵢ² comes beside.
+    /// All but the density. |curl Kᵢ| λᵢ² is separate.
     pub(super) fn of(found: &[Misfit], curl: Vec<f64>, (turn, turn_at): (f64, Vec3)) -> Distortion {
         let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(found.iter().map(f).collect());
         let outside = found.iter().flat_map(|f| f.spacing).filter(|s| s.max(1.0 / s) > 1.5).count();

@@ -226,7 +226,7 @@ fn nearest(f: &Mat3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
     all.max_by(|a, b| agree(a).total_cmp(&agree(b))).unwrap_or(*f)
 }
 
-/// The frame at a node whose neighbour has the frame `to`: the principal one nearest to it, as far as there is one. Where
+/// The frame at a node whose neighbour has the frame `to`: the principal one nearest to it, where there is one. Where
 /// two values agree only the third direction is kept to, and where all do, the neighbour's frame is.
 fn settled(f: &Mat3, gaps: &Vec3, to: &Mat3, turns: &[Mat3]) -> Mat3 {
     let sure = gaps.map(|g| g > DOUBT);

@@ -11,7 +11,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// A grid over the box with so many nodes along each axis (at least two).
+    /// A grid over the box with `nodes` nodes along each axis (at least two).
     pub fn over(b: &Aabb, shape: [usize; 3]) -> Grid {
         let size = b.size();
         Grid { origin: b.min, step: core::array::from_fn(|a| size[a] / (shape[a] - 1) as f64), shape }

@@ -42,7 +42,7 @@ impl Map {
         };
         let count = |a: usize| ranges[a][0]..=ranges[a][1];
         let reach = self.affine().map(|a| {
-            // A cell and its neighbours lie within so many of the longest diagonals.
+            // A cell and its neighbours lie within this many of the longest diagonals.
             let edges = inverse(&a.matrix);
             let edge = |i: usize| norm([edges[0][i], edges[1][i], edges[2][i]]);
             1.5 * (edge(0) + edge(1) + edge(2))

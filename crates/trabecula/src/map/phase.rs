@@ -22,7 +22,7 @@ const NODES: [f64; 2] = [2.2e6, 4e7];
 const FINE: f64 = 4.0;
 /// The most that a wavelength may change between neighbouring nodes, as a factor.
 const ABRUPT: f64 = 1.5;
-/// Weights fall off outside the region by e² for each of so many steps.
+/// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
 /// Nodes at which a solution is held against what was asked for.
 const LOOKS: usize = 60_000;

@@ -344,7 +344,7 @@ mod tests {
                 }
                 spent += start.elapsed().as_secs_f64();
                 sweeps += 32;
-                // Looked at without the clock; but for the constant, which is free.
+                // Compared without the constant, which is free.
                 let off = |i: usize| f[i] - exact[i];
                 let mean = (0..f.len()).map(|i| off(i) * g.trapezoid(i)).sum::<f64>()
                     / (0..f.len()).map(|i| g.trapezoid(i)).sum::<f64>();

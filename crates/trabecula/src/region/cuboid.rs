@@ -50,11 +50,22 @@ impl Build for BoxKind {
             BoxKind::Size(s) => {
                 s.valid()?;
                 let half = scale(s.size, 0.5);
-                Cuboid::new(sub(s.center, half), add(s.center, half))?
+                let (min, max) = (sub(s.center, half), add(s.center, half));
+                Cuboid::new(min, max).map_err(|_| unresolved(s, min, max))?
             }
             BoxKind::Corners(c) => Cuboid::new(c.min, c.max)?,
         }))
     }
+}
+
+/// A box whose size is lost to rounding at its centre.
+fn unresolved(s: &BoxSize, min: Vec3, max: Vec3) -> Fault {
+    let a = (0..3).find(|a| min[*a] >= max[*a]).unwrap_or(0);
+    let [size, center, min, max] = [s.size[a], s.center[a], min[a], max[a]].map(number);
+    let message = format!(
+        "size {size} mm about {center} mm is lost to rounding: the box would run from {min} to {max} mm; move it nearer to the origin"
+    );
+    Fault::new("center", message).found(center)
 }
 
 impl Cuboid {

@@ -96,11 +96,11 @@ impl Components {
         let place = format!("about ({x}, {y}, {z}) mm");
         match (self.others, self.border) {
             (1, b) => format!(
-                "1 piece beside the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",
+                "1 connected component besides the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",
                 if b > 0 { "at" } else { "away from" }
             ),
             (n, b) => format!(
-                "{n} pieces beside the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them at the \
+                "{n} connected components besides the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them at the \
                  region's boundary; the largest of them has {largest} mm³ and lies {place}"
             ),
         }

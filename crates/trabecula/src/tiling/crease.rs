@@ -6,9 +6,9 @@ use crate::cell::tet::{Bary, Grid};
 use crate::map::tets::NONE;
 use geometry::math::{Vec3, add, dot, norm, scale};
 
-/// Steps along the edge of a face on which traces are looked at.
+/// Steps along the edge of a face on which traces are sampled.
 const STEPS: usize = 24;
-/// The most faces that are looked at.
+/// Largest number of faces that are searched.
 const FACES: usize = 20_000;
 
 /// The angles (degrees) between the two sides of the surface at the faces between tetrahedra.

@@ -10,7 +10,7 @@ use crate::cell::tet::{Bary, Grid, Nodes, Stencil};
 use crate::map::Tets;
 use geometry::math::{Vec3, add, norm, scale};
 
-/// Steps along the edge on which the mid-surface is looked at.
+/// Steps along the edge on which the mid-surface is sampled.
 const STEPS: usize = 6;
 
 /// How much of a cell is solid.

@@ -253,7 +253,7 @@ fn what_cannot_be_done_is_refused_with_numbers() {
     crossed.mesh.vertices.extend(shifted);
     crossed.mesh.triangles.extend(fine.mesh.triangles.iter().map(|t| t.map(|v| v + n)));
     crossed.cut.extend(fine.cut.iter());
-    assert!(refused(&crossed, within(0.1)).contains("pairs of triangles that meet"));
+    assert!(refused(&crossed, within(0.1)).contains("intersecting pairs of triangles"));
 
     struct Never;
     impl Progress for Never {

@@ -131,7 +131,7 @@ fn cylinders_take_few_triangles() {
         let tessellation = q.tessellation(chord).expect("drawn");
         let n: usize = (0..q.beams()).map(|b| q.circle_size(b, chord)).sum();
         let got = tessellation.hub_mesh(0).triangles.len();
-        assert!(got < 3 * n, "{chord}: {got} for {n} points of rims");
+        assert!(got < 3 * n, "{chord}: {got} for {n} points of end circles");
     }
 }
 

@@ -44,7 +44,7 @@ impl<'a> Reader<'a> {
         Ok(out)
     }
 
-    /// So many numbers of a type.
+    /// A given count of numbers of one type.
     fn numbers(&mut self, count: usize, kind: &str) -> Result<Vec<f64>, Fault> {
         let cut = || fault("the file ends early: truncated");
         if !self.binary {

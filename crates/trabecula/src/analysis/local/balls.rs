@@ -18,7 +18,7 @@ use geometry::progress::Stopped;
 const SMOOTH: f64 = 0.866;
 /// Directions more than 150° apart are opposite: a wall, not an edge.
 const OPPOSITE: f64 = -0.866;
-/// Within this many steps beside a triangle its plane stands for the surface, which goes on smoothly.
+/// Within this many steps of a triangle its plane stands for the surface, which goes on smoothly.
 const BESIDE: f64 = 1.0;
 /// A ball belongs to a voxel if its centre is this near (steps, along each axis): half a step and some more, so that
 /// none falls between two voxels.
@@ -277,7 +277,7 @@ impl Space<'_> {
         }
     }
 
-    /// The voxel and the 26 around it, as far as the grid goes.
+    /// The voxel and its 26 neighbours, within the grid.
     fn cube(&self, v: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
         let span = |a: usize| v[a].saturating_sub(1)..(v[a] + 2).min(self.grid.shape[a]);
         let (xs, ys, zs) = (span(0), span(1), span(2));

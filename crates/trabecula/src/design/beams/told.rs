@@ -97,7 +97,7 @@ pub(in crate::design) fn lone(built: &Built) -> bool {
     built.beams.len() == 1 && built.lattices.is_empty() && built.tilings.is_empty() && built.solid.filled.is_empty()
 }
 
-/// Most beams of a pattern that are looked at one by one.
+/// Largest number of beams of a pattern that are checked one by one.
 const FEW: f64 = 2e4;
 
 /// Whether all beams lie in the region: of a large pattern, by the box that holds it.

@@ -142,7 +142,7 @@ pub enum FilletSpec {
     /// Not: they meet in creases.
     #[default]
     None,
-    /// As far as each hub allows.
+    /// The largest that each hub allows.
     Auto,
     /// With this radius (mm) in the tightest place; where it cannot be had, with the largest that can, and a warning.
     Radius(f64),

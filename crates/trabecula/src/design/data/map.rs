@@ -199,7 +199,7 @@ pub struct PhaseSpec {
     /// Angles about x, y, z (degrees): z is turned first, then y, then x. Each may vary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<[GradeSpec; 3]>,
-    /// The angle about x alone (degrees), beside or instead of `rotate_y` and `rotate_z`.
+    /// The angle about x alone (degrees), in addition to or in place of `rotate_y` and `rotate_z`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate_x: Option<GradeSpec>,
     /// The angle about y alone (degrees).

@@ -210,7 +210,7 @@ fn tensor(at: &At) -> Read<TensorSpec> {
         .map(|g| TensorSpec::Components(Box::new(g)))
 }
 
-/// So many numbers, each of which may vary.
+/// A list of numbers, each of which may vary.
 fn grades<const N: usize>(at: &At, what: &str) -> Read<[GradeSpec; N]> {
     let items = at.list(what)?;
     let found = items.len();

@@ -17,6 +17,7 @@ const UNCOVERED: f64 = 0.01;
 pub(in crate::design) fn field(spec: &FieldSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
     let at = format!("{path}.component");
     let made = components(spec, path, place, |array| match (spec.component, array.components) {
+        (_, 0) => Err(DesignError::new(path, format!("the array \"{}\" has no components", array.name))),
         (None, 1) => Ok(vec![0]),
         (None, n) => Err(DesignError::new(
             &at,

@@ -29,7 +29,7 @@ fn about(points: &[Vec3], far: f64) -> Vec<Vec3> {
 
 fn tube(line: Vec<Vec3>, closed: bool) -> (Sweep, Vec<Vec3>) {
     let looks = about(&line, 1.6);
-    // All that is looked at, and nothing that is not.
+    // All sampled positions, and no others.
     let region = Sphere::new([0.0; 3], 1e-3).expect("ball");
     (Sweep::new(&path(line, closed), &region, &looks).expect("map"), looks)
 }

@@ -22,7 +22,7 @@ pub(super) const MARGIN: f64 = 0.01;
 /// No component.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// So many points in a row that belong to a body of the surface (`NONE`: to none) and a piece of the solid.
+/// A run of points that belong to a body of the surface (`NONE`: to none) and a piece of the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Run {
     pub count: u32,
@@ -292,7 +292,7 @@ impl Piece {
         }
     }
 
-    /// Numbers bodies and pieces, puts triangles in the order of bodies, and notes what lies on faces and rims.
+    /// Numbers bodies and pieces, puts triangles in the order of bodies, and notes what lies on faces and boundary loops.
     fn sort(&mut self, template: &Template, mask: u8, scratch: &mut Scratch) {
         let count = self.places.len();
         for (n, v) in scratch.node.iter().enumerate() {
