@@ -74,7 +74,7 @@ def section(name, of):
 
 def tables():
     """All definitions."""
-    lines = ["## Every key", ""]
+    lines = ['<a id="every-key"></a>', "", "## Every key", ""]
     for name, of in {"Design": SCHEMA, **SCHEMA["$defs"]}.items():
         lines += section(name, resolved(of))
     return "\n".join(lines).rstrip() + "\n"
