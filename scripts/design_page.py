@@ -51,7 +51,7 @@ def row(name, schema, required, number, several):
 
 def section(name, of):
     """A definition: its keys, its kinds, or its words."""
-    lines = [f"### {name}", "", cell(of.get("description", "")).replace("\\|", "|"), ""]
+    lines = [f'<a id="{name.lower()}"></a>', "", f"### {name}", "", cell(of.get("description", "")).replace("\\|", "|"), ""]
     tables = [p for p in of.get("oneOf", []) if "properties" in p]
     if "properties" in of or (tables and "type" in of):
         several = len(tables) > 1
