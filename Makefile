@@ -79,13 +79,13 @@ demo/hip_stem.png: $(VENV)/.installed $(DEMO) $(PART) scripts/demo_summary.py
 test: core-test python-test docs-test
 
 core-test: $(VENV)/.made
-	cargo test --release --locked --workspace
+	cargo test --profile checked --locked --workspace
 
 CASES ?= 2000
 campaign: $(VENV)/.test-tools
-	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test laws surface::random
-	TRABECULA_CASES=$(CASES) cargo test --release --locked -p trabecula --test laws -- damage flush --nocapture
-	TRABECULA_CASES=$$(($(CASES) / 5)) cargo test --release --locked -p trabecula --test laws -- combined --nocapture
+	TRABECULA_CASES=$(CASES) cargo test --profile checked --locked -p trabecula --test laws surface::random
+	TRABECULA_CASES=$(CASES) cargo test --profile checked --locked -p trabecula --test laws -- damage flush --nocapture
+	TRABECULA_CASES=$$(($(CASES) / 5)) cargo test --profile checked --locked -p trabecula --test laws -- combined --nocapture
 	TRABECULA_CAMPAIGN=1 $(BIN)/python -m pytest -q tests/test_parts.py
 
 python-test: $(VENV)/.test-tools
