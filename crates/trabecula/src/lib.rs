@@ -24,7 +24,7 @@
 //! let built = Design::from_toml(text).and_then(|d| d.build(&NoFiles)).expect("a design without mistakes");
 //! let made = built.surface().mesh(&Options::new(0.125), &Silent).expect("a surface");
 //! let size = geometry::measure::size(&made.surface.mesh);
-//! assert!(size.closed && size.pieces == 1);
+//! assert!(size.closed);
 //! assert!((size.volume / 8.0f64.powi(3) - 0.3).abs() < 1e-3); // 2³ whole cells, 30 % solid
 //! ```
 //!
