@@ -5,6 +5,7 @@ use quote::quote;
 use syn::{DataEnum, Error, Fields, Ident, Type, Variant};
 
 use crate::attributes::{Inner, Outer};
+use crate::table::kind_of_table;
 
 /// The one field of a variant.
 fn one(variant: &Variant) -> syn::Result<&Type> {
@@ -177,8 +178,8 @@ pub fn alternatives(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Resul
     let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
     let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
     let places = (0..names.len()).collect::<Vec<_>>();
-    let (name, doc, noun) = (&outer.name, &outer.doc, outer.phrase());
-    let check = outer.check.iter();
+    let checks = quote! { match self { #(#ident::#names(of) => Kind::check(of, key)),* }?; };
+    let kind = kind_of_table(ident, outer, &checks);
     Ok(quote! {
         impl Table for #ident {
             fn keys() -> Vec<Key> {
@@ -198,30 +199,6 @@ pub fn alternatives(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Resul
                 out.choices(choices);
             }
         }
-        impl Kind for #ident {
-            const DOC: &'static str = #doc;
-            fn expected() -> String {
-                expected_table(#noun, &Self::keys())
-            }
-            fn fits(node: &Node) -> u8 {
-                u8::from(matches!(node.value, Value::Table(_)))
-            }
-            fn read(at: &At) -> Result<Self, DesignError> {
-                Self::from_fields(&at.table(&Self::expected(), Self::keys())?)
-            }
-            fn write(&self) -> Node {
-                let mut out = Vec::new();
-                self.put(&mut out);
-                Value::Table(out).into()
-            }
-            fn check(&self, key: &Key) -> Result<(), Fault> {
-                match self { #(#ident::#names(of) => Kind::check(of, key)),* }?;
-                #(#check(self, key)?;)*
-                Ok(())
-            }
-            fn schema(_: &Key, defs: &mut Defs) -> Node {
-                defs.named(#name, |defs| Open::of::<Self>(defs).closed(#doc))
-            }
-        }
+        #kind
     })
 }

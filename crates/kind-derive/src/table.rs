@@ -85,32 +85,11 @@ impl Parts {
     }
 }
 
-/// A struct with named fields.
-pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>) -> syn::Result<TokenStream> {
-    let mut parts = Parts::default();
-    for field in fields {
-        parts.field(field)?;
-    }
-    let Parts { keys, reads, puts, checks, schemas } = parts;
+/// `Kind` for a table: all but its keys and `checks`, which check the ranges of its values.
+pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> TokenStream {
     let (name, doc, noun) = (&outer.name, &outer.doc, outer.phrase());
     let check = outer.check.iter();
-    Ok(quote! {
-        impl Table for #ident {
-            fn keys() -> Vec<Key> {
-                let mut keys = Vec::new();
-                #(#keys)*
-                keys
-            }
-            fn from_fields(fields: &Fields) -> Result<Self, DesignError> {
-                Ok(#ident { #(#reads),* })
-            }
-            fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
-                #(#puts)*
-            }
-            fn open(defs: &mut Defs, out: &mut Open) {
-                #(#schemas)*
-            }
-        }
+    quote! {
         impl Kind for #ident {
             const DOC: &'static str = #doc;
             fn expected() -> String {
@@ -128,7 +107,7 @@ pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>
                 Value::Table(out).into()
             }
             fn check(&self, key: &Key) -> Result<(), Fault> {
-                #(#checks)*
+                #checks
                 #(#check(self, key)?;)*
                 Ok(())
             }
@@ -136,6 +115,35 @@ pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>
                 defs.named(#name, |defs| Open::of::<Self>(defs).closed(#doc))
             }
         }
+    }
+}
+
+/// A struct with named fields.
+pub fn named(ident: &Ident, outer: &Outer, fields: &Punctuated<Field, Token![,]>) -> syn::Result<TokenStream> {
+    let mut parts = Parts::default();
+    for field in fields {
+        parts.field(field)?;
+    }
+    let Parts { keys, reads, puts, checks, schemas } = parts;
+    let kind = kind_of_table(ident, outer, &quote! { #(#checks)* });
+    Ok(quote! {
+        impl Table for #ident {
+            fn keys() -> Vec<Key> {
+                let mut keys = Vec::new();
+                #(#keys)*
+                keys
+            }
+            fn from_fields(fields: &Fields) -> Result<Self, DesignError> {
+                Ok(#ident { #(#reads),* })
+            }
+            fn put(&self, out: &mut Vec<(String, Option<usize>, Node)>) {
+                #(#puts)*
+            }
+            fn open(defs: &mut Defs, out: &mut Open) {
+                #(#schemas)*
+            }
+        }
+        #kind
     })
 }
 
