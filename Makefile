@@ -13,7 +13,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
-EDGE   ?= 0.25
+EDGE   ?= 0.18
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 
