@@ -35,7 +35,6 @@ const FILE: usize = 600;
 
 /// Functions that are longer and still to be split, by file and name. None may join them.
 const LONG: &[(&str, &str)] = &[
-    ("formats/vtk/legacy.rs", "read"),
     ("analysis/local/nearest.rs", "nearest"),
     ("analysis/transition.rs", "transition"),
     ("design/build.rs", "design"),

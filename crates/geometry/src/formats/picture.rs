@@ -306,4 +306,28 @@ mod tests {
         assert_eq!(read_pictures(&white).expect("white").first().map(|p| p.values.clone()), Some(vec![1.0; 6]));
         assert!(read_pictures(b"GIF89a").is_err() && read_pictures(b"").is_err());
     }
+
+    #[test]
+    fn tiffs_packed_by_lzw_are_read_with_and_without_differences() {
+        use tiff::encoder::{Compression, Predictor, TiffEncoder, colortype::Gray16};
+        let (width, height) = (61, 40);
+        // Runs that repeat and noise: codes of several widths.
+        let level = |i: u32| {
+            if i % 300 < 200 { (i / 61) as u16 * 900 } else { (i * i).wrapping_mul(2654435761).to_be_bytes()[1].into() }
+        };
+        let data: Vec<u16> = (0..width * height).map(level).collect();
+        for predictor in [Predictor::None, Predictor::Horizontal] {
+            let mut file = Cursor::new(Vec::new());
+            let encoder = TiffEncoder::new(&mut file).expect("memory").with_compression(Compression::Lzw);
+            let mut encoder = encoder.with_predictor(predictor);
+            for _ in 0..2 {
+                encoder.write_image::<Gray16>(width, height, &data).expect("memory");
+            }
+            let bytes = file.into_inner();
+            assert!(predictor == Predictor::None || bytes.len() < 4 * data.len());
+            let made = read_pictures(&bytes).expect("pictures");
+            let values: Vec<f64> = data.iter().map(|v| f64::from(*v)).collect();
+            assert_eq!(made, vec![Picture { size: [61, 40], values }; 2]);
+        }
+    }
 }

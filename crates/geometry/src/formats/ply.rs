@@ -209,92 +209,172 @@ impl Numbers<'_> {
     }
 }
 
-/// Reads any PLY with vertices x, y, z and a face list `vertex_indices` or `vertex_index`.
+/// What an element of the file is to the mesh.
+#[derive(Clone, Copy, PartialEq)]
+enum Role {
+    /// A vertex, with the places of x, y and z among its properties.
+    Vertex([usize; 3]),
+    /// A polygon: a list of its corners.
+    Face,
+    /// Triangle strips: a list of vertices, −1 between one strip and the next.
+    Strips,
+    /// Passed over.
+    Other,
+}
+
+impl Role {
+    fn of(element: &Element) -> Result<Role, Fault> {
+        Ok(match &*element.name {
+            b"vertex" => {
+                let mut slots = [0; 3];
+                for (slot, axis) in slots.iter_mut().zip(["x", "y", "z"]) {
+                    let found = element.properties.iter().position(|p| p.list.is_none() && p.name == axis.as_bytes());
+                    *slot = found.ok_or_else(|| Fault::new("", format!("the vertices have no property {axis}")))?;
+                }
+                Role::Vertex(slots)
+            }
+            b"face" => Role::Face,
+            b"tristrips" => Role::Strips,
+            _ => Role::Other,
+        })
+    }
+}
+
+/// What is gathered from the elements.
+#[derive(Default)]
+struct Parts {
+    vertices: Vec<Vec3>,
+    /// Polygons, each preceded by its number of corners.
+    faces: Vec<u32>,
+    /// Vertices of triangle strips, `END` after each strip.
+    strips: Vec<u32>,
+}
+
+/// The end of a triangle strip.
+const END: u32 = u32::MAX;
+
+/// Reads any PLY with vertices x, y, z and lists `vertex_indices` or `vertex_index` of faces or triangle strips.
 pub fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
     let (header, at) = header(bytes)?;
     let mut numbers = Numbers { bytes, at, encoding: header.encoding };
-    let mut vertices: Vec<Vec3> = Vec::new();
-    let mut faces: Vec<u32> = Vec::new(); // lists, each preceded by its length
-    for element in &header.elements {
-        if element.properties.is_empty() {
-            continue;
-        }
-        let name = String::from_utf8_lossy(&element.name);
+    let mut parts = Parts::default();
+    for element in header.elements.iter().filter(|e| !e.properties.is_empty()) {
         // The least an element takes: a text number and its space, or the sizes that the header names.
-        let least: usize = element
-            .properties
-            .iter()
-            .map(|p| if header.encoding == Encoding::Text { 2 } else { p.list.unwrap_or(p.kind).size() })
-            .sum();
+        let sizes = element.properties.iter();
+        let least: usize =
+            sizes.map(|p| if header.encoding == Encoding::Text { 2 } else { p.list.unwrap_or(p.kind).size() }).sum();
         if element.count.saturating_mul(least) > numbers.left() + 1 {
             return Err(Fault::new(
                 "",
                 format!(
-                    "{} elements \"{name}\" take at least {} bytes, but {} are left: truncated",
+                    "{} elements \"{}\" take at least {} bytes, but {} are left: truncated",
                     element.count,
+                    String::from_utf8_lossy(&element.name),
                     element.count.saturating_mul(least),
                     numbers.left()
                 ),
             ));
         }
-        let is_vertex = *element.name == *b"vertex";
-        let is_face = *element.name == *b"face";
-        let mut slots = [usize::MAX; 3];
-        if is_vertex {
-            for (slot, axis) in slots.iter_mut().zip(["x", "y", "z"]) {
-                let found = element.properties.iter().position(|p| p.list.is_none() && p.name == axis.as_bytes());
-                *slot = found.ok_or_else(|| Fault::new("", format!("the vertices have no property {axis}")))?;
-            }
-        }
+        parts.read(element, &mut numbers)?;
+    }
+    parts.mesh()
+}
+
+impl Parts {
+    /// Takes in all elements of one name.
+    fn read(&mut self, element: &Element, numbers: &mut Numbers) -> Result<(), Fault> {
+        let role = Role::of(element)?;
+        let name = String::from_utf8_lossy(&element.name);
         for i in 0..element.count {
             let what = || format!("{name} {i} of {}", element.count);
             let mut position = [0.0; 3];
             for (k, property) in element.properties.iter().enumerate() {
-                let Some(length) = property.list else {
-                    let v = numbers.next(property.kind, &what)?;
-                    if let Some(a) = slots.iter().position(|s| *s == k) {
-                        if !v.is_finite() {
-                            return Err(Fault::new("", format!("{} has the coordinate {v}: not finite", what())));
-                        }
-                        position[a] = v;
-                    }
+                if let Some(length) = property.list {
+                    let n = numbers.whole(length, &what)?;
+                    let corners = matches!(&*property.name, b"vertex_indices" | b"vertex_index");
+                    self.list(if corners { role } else { Role::Other }, n, property.kind, numbers, &what)?;
                     continue;
-                };
-                let n = numbers.whole(length, &what)?;
-                let corners = is_face && matches!(&*property.name, b"vertex_indices" | b"vertex_index");
-                if corners {
-                    faces.push(n as u32);
                 }
-                for _ in 0..n {
-                    if corners {
-                        faces.push(numbers.whole(property.kind, &what)? as u32);
-                    } else {
-                        numbers.next(property.kind, &what)?;
+                let v = numbers.next(property.kind, &what)?;
+                let Role::Vertex(slots) = role else { continue };
+                if let Some(a) = slots.iter().position(|s| *s == k) {
+                    if !v.is_finite() {
+                        return Err(Fault::new("", format!("{} has the coordinate {v}: not finite", what())));
                     }
+                    position[a] = v;
                 }
             }
-            if is_vertex {
-                vertices.push(position);
+            if let Role::Vertex(_) = role {
+                self.vertices.push(position);
             }
         }
+        Ok(())
     }
-    gather(&vertices, &faces)
-}
 
-fn gather(vertices: &[Vec3], mut lists: &[u32]) -> Result<Mesh, Fault> {
-    let mut joiner = Joiner::default();
-    let mut face = 0;
-    while let [n, rest @ ..] = lists {
-        let (polygon, after) = rest.split_at(*n as usize);
-        if let Some(v) = polygon.iter().find(|v| **v as usize >= vertices.len()) {
-            let count = vertices.len();
-            return Err(Fault::new("", format!("face {face} uses vertex {v}, but there are {count} (from 0)")));
+    /// Takes in a list of `n` numbers.
+    fn list(
+        &mut self,
+        role: Role,
+        n: usize,
+        kind: Kind,
+        numbers: &mut Numbers,
+        what: &dyn Fn() -> String,
+    ) -> Result<(), Fault> {
+        match role {
+            Role::Face => {
+                self.faces.push(n as u32);
+                for _ in 0..n {
+                    self.faces.push(numbers.whole(kind, what)? as u32);
+                }
+            }
+            Role::Strips => {
+                for _ in 0..n {
+                    let before = numbers.at;
+                    if numbers.next(kind, what)? == -1.0 {
+                        self.strips.push(END);
+                        continue;
+                    }
+                    numbers.at = before;
+                    self.strips.push(numbers.whole(kind, what)? as u32);
+                }
+                self.strips.push(END);
+            }
+            _ => {
+                for _ in 0..n {
+                    numbers.next(kind, what)?;
+                }
+            }
         }
-        joiner.fan(vertices, polygon)?;
-        lists = after;
-        face += 1;
+        Ok(())
     }
-    Ok(joiner.finish())
+
+    fn mesh(&self) -> Result<Mesh, Fault> {
+        let (vertices, count) = (&self.vertices, self.vertices.len());
+        let known = |what: &str, i: usize, of: &[u32]| match of.iter().find(|v| **v as usize >= count) {
+            Some(v) => Err(Fault::new("", format!("{what} {i} uses vertex {v}, but there are {count} (from 0)"))),
+            None => Ok(()),
+        };
+        let mut joiner = Joiner::default();
+        let (mut face, mut lists) = (0, self.faces.as_slice());
+        while let [n, rest @ ..] = lists {
+            let (polygon, after) = rest.split_at(*n as usize);
+            known("face", face, polygon)?;
+            joiner.fan(vertices, polygon)?;
+            lists = after;
+            face += 1;
+        }
+        for (i, strip) in self.strips.split(|v| *v == END).enumerate() {
+            known("triangle strip", i, strip)?;
+            for (k, t) in strip.windows(3).enumerate() {
+                // Each second triangle runs the other way; one with a corner twice only turns the strip.
+                let [a, b, c] = if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                if a != b && b != c && c != a {
+                    joiner.triangle([a, b, c].map(|v| vertices[v as usize]))?;
+                }
+            }
+        }
+        Ok(joiner.finish())
+    }
 }
 
 #[cfg(test)]
@@ -355,5 +435,39 @@ mod tests {
         assert_eq!(read(&bytes).unwrap_err().message, "face 3 uses vertex 9, but there are 4 (from 0)");
         bytes[n - 4..].copy_from_slice(&(-1i32).to_le_bytes());
         assert!(read(&bytes).unwrap_err().message.contains("-1 in face 3 of 4"));
+    }
+
+    #[test]
+    fn triangle_strips_turn_alike() {
+        let head = |form: &str| {
+            format!(
+                "ply\nformat {form} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nelement \
+                 tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+            )
+        };
+        let places = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.5, 0.5, 1.0f32]];
+        // A square of two triangles; a strip that turns by a corner given twice; two corners, which are no triangle.
+        let strips = [0i32, 1, 2, 3, -1, 4, 1, 0, 0, 2, 3, -1, 3, 4];
+        let mut text = head("ascii");
+        places.iter().for_each(|p| text += &format!("{} {} {}\n", p[0], p[1], p[2]));
+        text += &format!("{}{}\n", strips.len(), strips.map(|v| format!(" {v}")).concat());
+        let mut bytes = head("binary_little_endian").into_bytes();
+        bytes.extend(places.iter().flatten().flat_map(|v| v.to_le_bytes()));
+        bytes.extend((strips.len() as i32).to_le_bytes());
+        bytes.extend(strips.iter().flat_map(|v| v.to_le_bytes()));
+        let triangles = [[0, 1, 2], [2, 1, 3], [4, 1, 0], [2, 0, 3]];
+        for file in [text.as_bytes(), &bytes] {
+            let mesh = read(file).unwrap();
+            let at = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize].map(|x| x as f32));
+            let found: Vec<_> = mesh.triangles.iter().map(at).collect();
+            assert_eq!(found, triangles.map(|t: [usize; 3]| t.map(|v| places[v])));
+        }
+        refuses_damage("ply", &bytes, bytes.len());
+        let wrong = text.replace(" -1 3 4\n", " -1 3 9\n");
+        let words = "triangle strip 2 uses vertex 9, but there are 5 (from 0)";
+        assert_eq!(read(wrong.as_bytes()).unwrap_err().message, words);
+        assert!(
+            read(text.replace(" -1 3 4\n", " -2 3 4\n").as_bytes()).unwrap_err().message.contains("-2 in tristrips 0")
+        );
     }
 }
