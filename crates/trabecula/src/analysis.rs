@@ -1,13 +1,13 @@
 //! Measures that need the field, the region or the design: cut triangles, local thickness, transitions of blends, dangling
 //! fragments. Those of a mesh alone are in [`geometry::measure`].
 
-mod cut;
+mod cut_triangles;
 mod dangling;
 mod depth;
-mod local;
+mod local_thickness;
 mod transition;
 
-pub use cut::cut_triangles;
+pub use cut_triangles::cut_triangles;
 pub use dangling::{Dangling, dangling};
-pub use local::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
+pub use local_thickness::{BYTES_PER_VOXEL, Spread, Thickness, thickness, usual_step, voxels_for};
 pub use transition::{Transition, transitions};

@@ -1,9 +1,10 @@
 //! Where lattices of a blend pass into each other, and how well they hold together there.
 //!
-//! The part is sampled on a grid of points. A *transition* of two lattices is where both count and no other counts
-//! more. Solid points of it, and of the two lattices where they are alone, are neighbours along the axes. Taken in the
-//! order of their depth below the surface, the deepest first, they grow together to bodies; when those of the two sides
-//! meet, the depth reached is that of the widest way across: half the thickness of its narrowest neck.
+//! The part is sampled on a grid of points. A *transition* of two lattices is where both have a weight and no other has a
+//! larger one; its two *sides* are where either lattice is alone. Solid points of the transition and its sides make a graph,
+//! adjacent along the axes. Added in descending order of their depth below the surface, they form connected components
+//! (union-find, as in Kruskal's algorithm). When a component first touches both sides, the depth reached is that of the widest
+//! path from side to side: half the thickness of its narrowest neck.
 
 use rayon::prelude::*;
 
@@ -12,39 +13,40 @@ use crate::blend::Blend;
 use crate::field::Field;
 use crate::solid::Solid;
 use geometry::math::Vec3;
+use geometry::union_find::{find, singles, unite};
 
 /// Largest number of sample points, and steps on the shortest wavelength where they suffice.
 const MOST: f64 = 6e5;
 const FINE: f64 = 16.0;
 /// Shares of the second lattice at which the fraction is reported.
 const BINS: usize = 10;
-/// Where a lattice is alone nowhere, its side of a transition is where it counts most: a tenth of the way between the least and
-/// the greatest share, if these are so far apart that there is a way.
+/// Where a lattice is alone nowhere, its side of a transition is where its share is greatest: within this part of the range of
+/// shares, if that range is not narrower than `LEAST_RANGE`.
 const END: f32 = 0.1;
-const WAY: f32 = 0.05;
-/// What hangs by a neck thinner than this share of the widest way's neck is dangling.
+const LEAST_RANGE: f32 = 0.05;
+/// Components attached by a neck thinner than this multiple of the widest path's neck are dangling.
 const THIN: f64 = 0.5;
 
 /// How two lattices pass into each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
-    /// Which two, by their places in the blend.
+    /// The two lattices, by their indices in the blend.
     pub between: [usize; 2],
-    /// Volume in which both count, mm³.
+    /// Volume in which both have a weight, mm³.
     pub volume: f64,
-    /// Bodies of solid, with what is theirs on either side, that come into it: one where it holds together.
+    /// Connected components of solid, their parts on either side included, that reach into it: one where it holds together.
     pub pieces: usize,
-    /// Bodies of solid that touch neither side, and their volume, mm³. A side is where a lattice is alone, or else where it
-    /// counts most.
+    /// Number of components that touch neither side, and their volume, mm³. A side is where a lattice is alone, or else where
+    /// its share is greatest.
     pub loose: (usize, f64),
-    /// Bodies that hang by necks thinner than half the narrowest of the widest way, and their volume, mm³.
+    /// Number of components attached by necks thinner than half the narrowest neck of the widest path, and their volume, mm³.
     pub dangling: (usize, f64),
-    /// The narrowest neck of the widest way from one lattice to the other: its diameter (mm, to within a step) and place;
-    /// `None` where no way leads across.
+    /// The narrowest neck of the widest path from one lattice to the other: its diameter (mm, to within a step) and position;
+    /// `None` where no path leads across.
     pub neck: Option<(f64, Vec3)>,
-    /// For tenths of the second's share from 0 to 1: the share in the middle, the solid fraction asked for and found, both
-    /// in windows of two of the largest cells about the points (raised cosines, at half their height), and the number of
-    /// points.
+    /// For tenths of the second lattice's share from 0 to 1: the middle of the tenth, the solid fraction asked for and found, both
+    /// means over windows of two of the largest cells about the points (raised cosines, at half their height), and the number
+    /// of points.
     pub fractions: Vec<[f64; 4]>,
     /// Distance between points, mm.
     pub step: f64,
@@ -53,21 +55,23 @@ pub struct Transition {
 /// The points of a grid over a region.
 struct Points {
     shape: [usize; 3],
-    /// For each point the lattices that count most and second, the share of the second among both, the fraction asked
-    /// for, and whether it is solid; `None` outside.
+    /// `None` outside the region.
     of: Vec<Option<Point>>,
 }
 
 #[derive(Clone, Copy)]
 struct Point {
+    /// The lattices of greatest and second greatest weight.
     first: u8,
     second: u8,
+    /// The share of the second among both.
     share: f32,
+    /// The solid fraction asked for.
     asked: f32,
     solid: bool,
 }
 
-/// Looks at every transition of the blend in the region; lattices alone, without skin and kept zones.
+/// Every transition of the blend in the region, of the lattices alone, without skin and keep zones.
 pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     let b = solid.region.bounds();
     let size = b.size();
@@ -78,8 +82,8 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
         let n = [i % shape[0], i / shape[0] % shape[1], i / shape[0] / shape[1]];
         core::array::from_fn(|a| b.min[a] + (n[a] as f64 + 0.5) * size[a] / shape[a] as f64)
     };
-    let points = look(solid, blend, shape, &at);
-    // The region's surface is a cut and no surface of the lattice: what lies outside is as good as solid.
+    let points = sample(solid, blend, shape, &at);
+    // The region's surface is a cut and no surface of the lattice: points outside count as solid.
     let open = |p: &Option<Point>| p.is_some_and(|p| !p.solid);
     let open: Vec<bool> = points.of.iter().map(open).collect();
     let depth = depths(&open, shape, step);
@@ -91,11 +95,13 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
         }
     }
     pairs.sort_unstable();
-    let found = windows(&points, 2.0 * blend.longest() / step);
-    pairs.into_iter().map(|pair| transition(&points, &depth, &found, pair, step, &at)).collect()
+    let means = windows(&points, 2.0 * blend.longest() / step);
+    let grid = Grid { points: &points, depth: &depth, step, at: &at };
+    pairs.into_iter().map(|pair| grid.transition(&Pair::new(&points, pair), &means)).collect()
 }
 
-fn look(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -> Vec3 + Sync)) -> Points {
+/// Samples the blend at the points of the grid, in parallel by rows along x.
+fn sample(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -> Vec3 + Sync)) -> Points {
     let n = blend.weights().len();
     let row = shape[0];
     let rows: Vec<Vec<Option<Point>>> = (0..shape[1] * shape[2])
@@ -133,8 +139,8 @@ fn look(solid: &Solid, blend: &Blend, shape: [usize; 3], at: &(dyn Fn(usize) -> 
     Points { shape, of: rows.into_iter().flatten().collect() }
 }
 
-/// The fractions asked for and found about each point: means over a window that is a raised cosine along each axis and ends
-/// `reach` points away, of what lies in the region.
+/// The fractions asked for and found about each point: means over the points of the region in a window that is a raised cosine
+/// along each axis and ends `reach` points away.
 fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
     let [nx, ny, nz] = points.shape;
     let most = reach.floor() as usize;
@@ -160,48 +166,142 @@ fn windows(points: &Points, reach: f64) -> Vec<[f32; 2]> {
     sums.into_iter().map(|s| [s[1] / s[0].max(1e-30), s[2] / s[0].max(1e-30)]).collect()
 }
 
-/// A component with points in the transition itself, in addition to the two bits of the sides.
+/// Marks of points and components: in the first lattice's side, in the second's, in the transition itself.
+const FIRST: u8 = 1;
+const SECOND: u8 = 2;
+const SIDES: u8 = FIRST | SECOND;
 const WITHIN: u8 = 4;
-/// The bits of the sides.
-const SIDES: u8 = 3;
 
-/// A body that grows: its points, whether it reaches either side.
-struct Bodies {
-    parent: Vec<u32>,
-    sides: Vec<u8>,
+/// Two lattices, and where the sides of their transition are.
+struct Pair {
+    of: [u8; 2],
+    /// The least and greatest share of the second in the transition.
+    range: [f32; 2],
+    /// How far from the least and the greatest share the sides extend; negative where a lattice is alone somewhere, or where the
+    /// range is too narrow.
+    ends: [f32; 2],
+}
+
+impl Pair {
+    fn new(points: &Points, of: [u8; 2]) -> Pair {
+        let mut pair = Pair { of, range: [1.0, 0.0], ends: [-1.0; 2] };
+        let all = || points.of.iter().flatten();
+        let shares = all().filter(|p| pair.contains(p)).map(|p| pair.share_of_second(p));
+        let (least, most) = shares.fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
+        pair.range = [least, most];
+        let end = if most - least > LEAST_RANGE { END * (most - least) } else { -1.0 };
+        let alone = |i: usize| all().any(|p| p.share == 0.0 && p.first == of[i]);
+        pair.ends = [0, 1].map(|i| if alone(i) { -1.0 } else { end });
+        pair
+    }
+
+    /// Whether a point lies in the transition.
+    fn contains(&self, p: &Point) -> bool {
+        p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == self.of
+    }
+
+    /// The share of the second of the pair at a point of the transition.
+    fn share_of_second(&self, p: &Point) -> f32 {
+        if p.first == self.of[0] { p.share } else { 1.0 - p.share }
+    }
+
+    /// The marks of a point; none where other lattices are.
+    fn marks(&self, p: &Point) -> u8 {
+        match p.share {
+            0.0 if p.first == self.of[0] => FIRST,
+            0.0 if p.first == self.of[1] => SECOND,
+            _ if self.contains(p) => {
+                let [least, most] = self.range;
+                let first = self.share_of_second(p) - least <= self.ends[0];
+                let second = most - self.share_of_second(p) <= self.ends[1];
+                let mark = |in_side, mark| if in_side { mark } else { 0 };
+                WITHIN | mark(first, FIRST) | mark(second, SECOND)
+            }
+            _ => 0,
+        }
+    }
+
+    /// Fills `Transition::fractions`, and the number of points in the transition; `means` are the fractions asked for and found
+    /// about each point.
+    fn fractions(&self, points: &Points, means: &[[f32; 2]]) -> (Vec<[f64; 4]>, usize) {
+        let mut sums = vec![[0.0; 3]; BINS];
+        let mut count = 0;
+        for (p, [asked, found]) in points.of.iter().zip(means) {
+            let Some(p) = p.as_ref().filter(|p| self.contains(p)) else { continue };
+            let share = f64::from(self.share_of_second(p));
+            let s = &mut sums[((share * BINS as f64) as usize).min(BINS - 1)];
+            *s = [s[0] + 1.0, s[1] + f64::from(*asked), s[2] + f64::from(*found)];
+            count += 1;
+        }
+        let filled = sums.iter().enumerate().filter(|(_, s)| s[0] > 0.0);
+        let each = filled.map(|(i, s)| [(i as f64 + 0.5) / BINS as f64, s[1] / s[0], s[2] / s[0], s[0]]);
+        (each.collect(), count)
+    }
+}
+
+/// Connected components of the points added so far.
+struct Components {
+    shape: [usize; 3],
+    root: Vec<u32>,
+    added: Vec<bool>,
+    /// Of each root: the marks of its component's points, and their number.
+    marks: Vec<u8>,
     size: Vec<u32>,
 }
 
-impl Bodies {
-    fn find(&mut self, mut i: u32) -> u32 {
-        while self.parent[i as usize] != i {
-            let up = self.parent[self.parent[i as usize] as usize];
-            self.parent[i as usize] = up;
-            i = up;
+impl Components {
+    fn new(points: &Points, pair: &Pair) -> Components {
+        let count = points.of.len();
+        Components {
+            shape: points.shape,
+            root: singles(count),
+            added: vec![false; count],
+            marks: points.of.iter().map(|p| p.as_ref().map_or(0, |p| pair.marks(p))).collect(),
+            size: vec![1; count],
         }
-        i
     }
 
-    /// Joins two; which sides the whole reaches.
-    fn join(&mut self, a: u32, b: u32) -> u8 {
-        let (a, b) = (self.find(a), self.find(b));
-        if a != b {
-            let (big, small) = if self.size[a as usize] >= self.size[b as usize] { (a, b) } else { (b, a) };
-            self.parent[small as usize] = big;
-            self.size[big as usize] += self.size[small as usize];
-            self.sides[big as usize] |= self.sides[small as usize];
-            return self.sides[big as usize];
+    /// Adds a point and joins it to its neighbours along the axes; the marks of its component.
+    fn add(&mut self, i: u32) -> u8 {
+        let n = i as usize;
+        self.added[n] = true;
+        let [nx, ny, nz] = self.shape;
+        let (x, y, z) = (n % nx, n / nx % ny, n / nx / ny);
+        for (exists, other) in [
+            (x > 0, n.wrapping_sub(1)),
+            (x + 1 < nx, n + 1),
+            (y > 0, n.wrapping_sub(nx)),
+            (y + 1 < ny, n + nx),
+            (z > 0, n.wrapping_sub(nx * ny)),
+            (z + 1 < nz, n + nx * ny),
+        ] {
+            if exists && self.added[other] {
+                self.join(i, other as u32);
+            }
         }
-        self.sides[a as usize]
+        self.marks[find(&mut self.root, i) as usize]
     }
 
-    /// Bodies that reach neither side and the points in them, of the points that are in. Where there are no sides the
-    /// greatest body stands for them.
-    fn apart(&mut self, inside: &[bool]) -> (usize, u64) {
+    fn join(&mut self, a: u32, b: u32) {
+        let [a, b] = [a, b].map(|i| find(&mut self.root, i));
+        if unite(&mut self.root, a, b) {
+            let (root, other) = (a.min(b) as usize, a.max(b) as usize);
+            self.size[root] += self.size[other];
+            self.marks[root] |= self.marks[other];
+        }
+    }
+
+    fn roots(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.root.len()).filter(|i| self.added[*i] && self.root[*i] as usize == *i)
+    }
+
+    /// Number of components that touch neither side, and of their points. Where there are no sides the largest component takes
+    /// their place.
+    fn loose(&self) -> (usize, u64) {
         let (mut count, mut all, mut most, mut sides) = (0usize, 0, 0, 0);
-        for i in (0..self.parent.len()).filter(|i| inside[*i] && self.parent[*i] as usize == *i) {
-            sides |= self.sides[i] & SIDES;
-            if self.sides[i] & SIDES == 0 {
+        for i in self.roots() {
+            sides |= self.marks[i] & SIDES;
+            if self.marks[i] & SIDES == 0 {
                 let size = u64::from(self.size[i]);
                 (count, all, most) = (count + 1, all + size, most.max(size));
             }
@@ -212,117 +312,69 @@ impl Bodies {
         }
     }
 
-    /// Bodies that come into the transition, of the points that are in.
-    fn pieces(&self, inside: &[bool]) -> usize {
-        let own = |i: &usize| inside[*i] && self.parent[*i] as usize == *i;
-        (0..inside.len()).filter(|i| own(i) && self.sides[*i] & WITHIN > 0).count()
+    /// Number of components that reach into the transition.
+    fn pieces(&self) -> usize {
+        self.roots().filter(|i| self.marks[*i] & WITHIN > 0).count()
     }
 }
 
-fn transition(
-    points: &Points,
-    depth: &[f32],
-    found: &[[f32; 2]],
-    pair: [u8; 2],
+/// The sampled part.
+struct Grid<'a> {
+    points: &'a Points,
+    /// Depth of each point below the surface, mm.
+    depth: &'a [f32],
+    /// Distance between points, mm.
     step: f64,
-    at: &(dyn Fn(usize) -> Vec3 + Sync),
-) -> Transition {
-    let [nx, ny, nz] = points.shape;
-    let of_pair = |p: &Point| p.share > 0.0 && [p.first.min(p.second), p.first.max(p.second)] == pair;
-    // The share of the second of the pair.
-    let second = |p: &Point| match p.first == pair[0] {
-        true => p.share,
-        false => 1.0 - p.share,
-    };
-    let all = || points.of.iter().flatten();
-    let (least, most) = all().filter(|p| of_pair(p)).map(second).fold((1f32, 0f32), |(l, m), s| (l.min(s), m.max(s)));
-    let alone = |i: usize| all().any(|p| p.share == 0.0 && p.first == pair[i]);
-    let reach = match most - least > WAY {
-        true => END * (most - least),
-        false => -1.0,
-    };
-    let ends = [0, 1].map(|i| if alone(i) { -1.0 } else { reach });
-    let side = |p: &Point| match p.share {
-        0.0 if p.first == pair[0] => 1u8,
-        0.0 if p.first == pair[1] => 2,
-        _ if of_pair(p) => {
-            let first = second(p) - least <= ends[0];
-            let last = most - second(p) <= ends[1];
-            WITHIN | u8::from(first) | u8::from(last) << 1
-        }
-        _ => 0,
-    };
-    let cell = step.powi(3);
-    let mut sums = vec![[0.0; 3]; BINS];
-    let mut count = 0usize;
-    let each = points.of.iter().zip(found);
-    for (p, f) in each.filter_map(|(p, f)| p.as_ref().filter(|p| of_pair(p)).map(|p| (p, f))) {
-        let share = f64::from(second(p));
-        let s = &mut sums[((share * BINS as f64) as usize).min(BINS - 1)];
-        *s = [s[0] + 1.0, s[1] + f64::from(f[0]), s[2] + f64::from(f[1])];
-        count += 1;
+    /// Position of a point, mm.
+    at: &'a dyn Fn(usize) -> Vec3,
+}
+
+impl Grid<'_> {
+    /// The solid points of a transition and its sides, the deepest first.
+    fn deepest_first(&self, pair: &Pair) -> Vec<u32> {
+        let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && pair.marks(&p) > 0);
+        let mut order: Vec<u32> =
+            (0..self.points.of.len() as u32).filter(|i| wanted(&self.points.of[*i as usize])).collect();
+        order.sort_unstable_by(|a, b| self.depth[*b as usize].total_cmp(&self.depth[*a as usize]).then(a.cmp(b)));
+        order
     }
-    let wanted = |p: &Option<Point>| p.is_some_and(|p| p.solid && (of_pair(&p) || side(&p) > 0));
-    let mut order: Vec<u32> = (0..points.of.len() as u32).filter(|i| wanted(&points.of[*i as usize])).collect();
-    order.sort_unstable_by(|a, b| depth[*b as usize].total_cmp(&depth[*a as usize]).then(a.cmp(b)));
-    let anew = || Bodies {
-        parent: (0..points.of.len() as u32).collect(),
-        sides: points.of.iter().map(|p| p.as_ref().map_or(0, &side)).collect(),
-        size: vec![1; points.of.len()],
-    };
-    let grow = |bodies: &mut Bodies, inside: &mut [bool], i: u32| {
-        inside[i as usize] = true;
-        let n = i as usize;
-        let (x, y, z) = (n % nx, n / nx % ny, n / nx / ny);
-        let own = bodies.find(i) as usize;
-        let mut sides = bodies.sides[own];
-        for (there, other) in [
-            (x > 0, n.wrapping_sub(1)),
-            (x + 1 < nx, n + 1),
-            (y > 0, n.wrapping_sub(nx)),
-            (y + 1 < ny, n + nx),
-            (z > 0, n.wrapping_sub(nx * ny)),
-            (z + 1 < nz, n + nx * ny),
-        ] {
-            if there && inside[other] {
-                sides = bodies.join(i, other as u32);
+
+    /// Thickness of the solid at a point. (A point's half step stands for its extent.)
+    fn thickness(&self, i: u32) -> f64 {
+        2.0 * f64::from(self.depth[i as usize])
+    }
+
+    fn transition(&self, pair: &Pair, means: &[[f32; 2]]) -> Transition {
+        let order = self.deepest_first(pair);
+        let mut components = Components::new(self.points, pair);
+        let mut neck = None;
+        for i in &order {
+            if components.add(*i) & SIDES == SIDES && neck.is_none() {
+                neck = Some((self.thickness(*i), (self.at)(*i as usize)));
             }
         }
-        sides
-    };
-    let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
-    let mut neck = None;
-    for i in &order {
-        if grow(&mut bodies, &mut inside, *i) & SIDES == SIDES && neck.is_none() {
-            // Its own half step stands for the point's extent.
-            neck = Some((2.0 * f64::from(depth[*i as usize]), at(*i as usize)));
+        let (loose, loose_points) = components.loose();
+        let mut dangling = (0, 0);
+        if let Some((wide, _)) = neck {
+            let mut thick = Components::new(self.points, pair);
+            for i in order.iter().filter(|i| self.thickness(**i) >= THIN * wide) {
+                thick.add(*i);
+            }
+            let (apart, points) = thick.loose();
+            // Loose components are not attached at all.
+            dangling = (apart.saturating_sub(loose), points.saturating_sub(loose_points));
         }
-    }
-    let (loose, lost) = bodies.apart(&inside);
-    let pieces = bodies.pieces(&inside);
-    let mut dangling = (0, 0.0);
-    if let Some((wide, _)) = neck {
-        let (mut bodies, mut inside) = (anew(), vec![false; points.of.len()]);
-        for i in order.iter().filter(|i| 2.0 * f64::from(depth[**i as usize]) >= THIN * wide) {
-            grow(&mut bodies, &mut inside, *i);
+        let (fractions, count) = pair.fractions(self.points, means);
+        let volume = self.step.powi(3);
+        Transition {
+            between: pair.of.map(usize::from),
+            volume: count as f64 * volume,
+            pieces: components.pieces(),
+            loose: (loose, loose_points as f64 * volume),
+            dangling: (dangling.0, dangling.1 as f64 * volume),
+            neck,
+            fractions,
+            step: self.step,
         }
-        let (many, all) = bodies.apart(&inside);
-        // Those that are loose hang by nothing.
-        dangling = (many.saturating_sub(loose), (all.saturating_sub(lost)) as f64 * cell);
-    }
-    Transition {
-        between: pair.map(usize::from),
-        volume: count as f64 * cell,
-        pieces,
-        loose: (loose, lost as f64 * cell),
-        dangling,
-        neck,
-        fractions: sums
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| s[0] > 0.0)
-            .map(|(i, s)| [(i as f64 + 0.5) / BINS as f64, s[1] / s[0], s[2] / s[0], s[0]])
-            .collect(),
-        step,
     }
 }

@@ -23,7 +23,7 @@ use geometry::surface_mesh::SurfaceMesh;
 mod balls;
 mod bits;
 mod lines;
-mod nearest;
+mod nearest_site;
 
 use balls::Space;
 use bits::Bits;
@@ -202,7 +202,7 @@ pub fn thickness(
     let nz = shape[2];
     let middle = bounds(surface, region).center();
     let first = [0, 1, 2].map(|a| middle[a] - (shape[a] - 1) as f64 * step / 2.0);
-    let steps = nearest::PASSES.iter().zip(shape).map(|(p, n)| p * n).sum::<usize>();
+    let steps = nearest_site::PASSES.iter().zip(shape).map(|(p, n)| p * n).sum::<usize>();
     let painted = nz * if region.is_some() { 4 } else { 2 };
     let watch = Watch::new(progress, (steps + painted) as u64);
 
@@ -224,7 +224,7 @@ pub fn thickness(
             "no voxel of {step} mm has its centre in the solid: it is thinner than they are; use a smaller step"
         ));
     }
-    let nearest = nearest::nearest(shape, &sites, &lines, &watch)?;
+    let nearest = nearest_site::nearest_sites(shape, &sites, &lines, &watch)?;
     drop(lines);
 
     let lattice = surface.cut.iter().any(|c| !*c);

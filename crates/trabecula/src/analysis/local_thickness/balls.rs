@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::bits::{Bits, masks, ones};
 use super::lines::{NONE, Shape, Site};
-use super::nearest::apart;
+use super::nearest_site::distance_squared;
 use super::{Grid, Watch};
 use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
 use geometry::progress::Stopped;
@@ -372,7 +372,7 @@ impl Space<'_> {
                 break;
             }
             // Where the surface is nearer than the ball allows, its end lies behind.
-            let away = self.site(w).map_or(0.0, |s| apart(w.map(|c| c as f32), s).sqrt());
+            let away = self.site(w).map_or(0.0, |s| distance_squared(w.map(|c| c as f32), s).sqrt());
             if k > 0 && away < own.distance + f64::from(k) - 1.0 {
                 break;
             }

@@ -60,7 +60,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn a_ball_cut_by_a_box_is_told_apart() {
+    fn the_cut_of_a_ball_by_a_box_is_recognised() {
         let solid = |region: crate::region::Region| Solid::new(region, None, 1.0);
         let ball = Sphere::new([0.0; 3], 1.0).expect("ball");
         let mesh = surface(&solid(Arc::new(ball)), 0.07, &Silent).expect("surface").mesh;
