@@ -3,96 +3,69 @@
 use std::sync::Arc;
 
 use crate::field::Field;
-use geometry::fault::Fault;
-use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
+use geometry::math::{Aabb, Interval, Vec3};
 
+mod depth;
 mod formula;
+mod linear;
 mod polyline;
+mod radial;
 mod rbf;
+mod region_step;
+mod remapped;
 mod samples;
 mod sigmoid;
+mod stops;
+
+pub use depth::Depth;
 pub use formula::Formula;
+pub use linear::Linear;
 pub use polyline::Polyline;
+pub use radial::Radial;
 pub use rbf::Rbf;
+pub use region_step::region_step;
+pub use remapped::Remapped;
 pub use samples::Samples;
 pub use sigmoid::Sigmoid;
+use stops::Stops;
+
+/// A number that varies in space.
+pub trait Varying: Field {
+    /// The axes along which it may change: false, where moving along one leaves every bit as it is.
+    fn varies(&self) -> [bool; 3] {
+        [true; 3]
+    }
+}
 
 /// A number that may vary in space. Its unit is that of the key it stands under.
 #[derive(Clone)]
 pub enum Grade {
     /// The same everywhere.
     Constant(f64),
-    /// Piecewise linear in s = along · x (mm), constant beyond the first and last stop.
-    Linear {
-        /// Direction; s is measured in multiples of its length.
-        along: Vec3,
-        /// (s, value), s ascending.
-        stops: Vec<[f64; 2]>,
-    },
-    /// Piecewise linear in the depth (mm) below the surface of a region, constant beyond the stops.
-    Depth {
-        /// Signed distance of the region, negative inside.
-        region: Arc<dyn Field>,
-        /// (depth, value), depth ascending.
-        stops: Vec<[f64; 2]>,
-    },
-    /// A formula in x, y, z (mm).
-    Formula(Formula),
-    /// Piecewise linear in the distance (mm) from a point, or from a line through it, constant beyond the stops.
-    Radial {
-        /// The point.
-        center: Vec3,
-        /// Direction of the line, a unit vector; none for the distance from the point.
-        axis: Option<Vec3>,
-        /// (distance, value), distance ascending.
-        stops: Vec<[f64; 2]>,
-    },
-    /// Numbers on a grid.
-    Samples {
-        /// The numbers.
-        of: Arc<Samples>,
-        /// What they stand for: (number, value), number ascending; empty if for themselves.
-        remap: Vec<[f64; 2]>,
-    },
-    /// Any other function of position: a distance to a line, radial basis functions, a smooth step.
-    Function(Arc<dyn Field>),
+    /// A function of position.
+    Varying(Arc<dyn Varying>),
+}
+
+impl<V: Varying + 'static> From<V> for Grade {
+    fn from(of: V) -> Grade {
+        Grade::Varying(Arc::new(of))
+    }
 }
 
 impl Grade {
-    /// Piecewise linear in s = along · x (mm).
-    ///
-    /// **Errors** where `along` is zero or not finite, or the stops are none, not finite or not ascending in s.
-    pub fn linear(along: Vec3, stops: Vec<[f64; 2]>) -> Result<Grade, Fault> {
-        if along.iter().any(|v| !v.is_finite()) || along == [0.0; 3] {
-            return Err(Fault::new("along", format!("found {along:?}; give three finite numbers, not all zero")));
-        }
-        check_stops(&stops, "s")?;
-        Ok(Grade::Linear { along, stops })
-    }
-
-    /// Piecewise linear in the depth (mm) below the surface of `region` (its signed distance, negative inside).
-    ///
-    /// **Errors** where the stops are none, not finite or not ascending in depth.
-    pub fn depth(region: Arc<dyn Field>, stops: Vec<[f64; 2]>) -> Result<Grade, Fault> {
-        check_stops(&stops, "depth")?;
-        Ok(Grade::Depth { region, stops })
-    }
-
     /// The value everywhere, if it does not vary.
     pub fn constant(&self) -> Option<f64> {
         match self {
             Grade::Constant(v) => Some(*v),
-            _ => None,
+            Grade::Varying(_) => None,
         }
     }
 
-    /// Along which axes it may change; no, where moving along one leaves every bit as it is.
+    /// The axes along which it may change: false, where moving along one leaves every bit as it is.
     pub fn varies(&self) -> [bool; 3] {
         match self {
             Grade::Constant(_) => [false; 3],
-            Grade::Linear { along, .. } => along.map(|c| c != 0.0),
-            Grade::Formula(f) => f.varies(),
-            _ => [true; 3],
+            Grade::Varying(of) => of.varies(),
         }
     }
 
@@ -100,29 +73,7 @@ impl Grade {
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         match self {
             Grade::Constant(v) => out.fill(*v),
-            Grade::Linear { along, stops } => {
-                for (o, p) in out.iter_mut().zip(points) {
-                    *o = interpolate(stops, dot(*along, *p)).0;
-                }
-            }
-            Grade::Depth { region, stops } => {
-                region.values(points, out);
-                for o in out.iter_mut() {
-                    *o = interpolate(stops, -*o).0;
-                }
-            }
-            Grade::Formula(f) => f.values(points, out),
-            Grade::Function(f) => f.values(points, out),
-            Grade::Radial { center, axis, stops } => {
-                for (o, p) in out.iter_mut().zip(points) {
-                    *o = interpolate(stops, norm(off(*p, *center, *axis))).0;
-                }
-            }
-            Grade::Samples { of, remap } => {
-                for (o, p) in out.iter_mut().zip(points) {
-                    *o = remapped(remap, of.at(*p).0).0;
-                }
-            }
+            Grade::Varying(of) => of.values(points, out),
         }
     }
 
@@ -133,39 +84,7 @@ impl Grade {
                 values.fill(*v);
                 gradients.fill([0.0; 3]);
             }
-            Grade::Linear { along, stops } => {
-                for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-                    let (value, slope) = interpolate(stops, dot(*along, *p));
-                    *v = value;
-                    *g = scale(*along, slope);
-                }
-            }
-            Grade::Depth { region, stops } => {
-                region.gradients(points, values, gradients);
-                for (v, g) in values.iter_mut().zip(gradients) {
-                    let (value, slope) = interpolate(stops, -*v);
-                    *v = value;
-                    *g = scale(*g, -slope);
-                }
-            }
-            Grade::Formula(f) => f.gradients(points, values, gradients),
-            Grade::Function(f) => f.gradients(points, values, gradients),
-            Grade::Radial { center, axis, stops } => {
-                for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-                    let off = off(*p, *center, *axis);
-                    let (value, slope) = interpolate(stops, norm(off));
-                    *v = value;
-                    *g = scale(unit(off), slope);
-                }
-            }
-            Grade::Samples { of, remap } => {
-                for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
-                    let (number, slope) = of.at(*p);
-                    let (value, by) = remapped(remap, number);
-                    *v = value;
-                    *g = scale(slope, by);
-                }
-            }
+            Grade::Varying(of) => of.gradients(points, values, gradients),
         }
     }
 
@@ -173,107 +92,17 @@ impl Grade {
     pub fn bound(&self, b: &Aabb) -> Interval {
         match self {
             Grade::Constant(v) => Interval::new(*v, *v),
-            Grade::Linear { along, stops } => {
-                // Rounded sums and products are monotone, so these ends hold for every rounded s as well.
-                let end = |low: bool| {
-                    let term = |a: usize| match along[a] {
-                        0.0 => 0.0,
-                        c if (c > 0.0) == low => c * b.min[a],
-                        c => c * b.max[a],
-                    };
-                    term(0) + term(1) + term(2)
-                };
-                range(stops, Interval::new(end(true), end(false)))
-            }
-            Grade::Depth { region, stops } => range(stops, -region.bound(b)),
-            Grade::Formula(f) => f.bound(b),
-            Grade::Function(f) => f.bound(b),
-            Grade::Radial { center, axis, stops } => {
-                if !b.is_finite() {
-                    return range(stops, Interval::new(0.0, f64::INFINITY));
-                }
-                // Distances from points and lines change by no more than the way between two places.
-                let r = norm(off(b.center(), *center, *axis));
-                let reach = norm(b.size()) / 2.0 * (1.0 + 1e-12) + 1e-12 * r;
-                range(stops, Interval::new((r - reach).max(0.0), r + reach))
-            }
-            Grade::Samples { of, remap } => {
-                let r = of.bound(b);
-                if remap.is_empty() { r } else { range(remap, r) }
-            }
+            Grade::Varying(of) => of.bound(b),
         }
     }
-}
-
-/// From the point, or from the nearest place on the line, to `p`.
-fn off(p: Vec3, center: Vec3, axis: Option<Vec3>) -> Vec3 {
-    let d = sub(p, center);
-    match axis {
-        None => d,
-        Some(n) => sub(d, scale(n, dot(d, n))),
-    }
-}
-
-/// What a number stands for, and the slope.
-fn remapped(remap: &[[f64; 2]], v: f64) -> (f64, f64) {
-    if remap.is_empty() { (v, 1.0) } else { interpolate(remap, v) }
-}
-
-/// Refuses stops that are no function of their first number.
-fn check_stops(stops: &[[f64; 2]], name: &str) -> Result<(), Fault> {
-    if stops.is_empty() {
-        return Err(Fault::new("stops", format!("found none; give at least one [{name}, value]")));
-    }
-    for (i, [s, v]) in stops.iter().enumerate() {
-        if !s.is_finite() || !v.is_finite() {
-            return Err(Fault::new(format!("stops[{i}]"), format!("found [{s}, {v}]; both numbers must be finite")));
-        }
-        if i > 0 && *s <= stops[i - 1][0] {
-            let before = stops[i - 1][0];
-            return Err(Fault::new(
-                format!("stops[{i}]"),
-                format!("{name} = {s} follows {name} = {before}; {name} must grow from stop to stop"),
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// Value and slope of the piecewise linear function at `s`; constant beyond its ends, NaN without stops.
-fn interpolate(stops: &[[f64; 2]], s: f64) -> (f64, f64) {
-    let i = stops.partition_point(|p| p[0] <= s);
-    match (i.checked_sub(1).and_then(|j| stops.get(j)), stops.get(i)) {
-        (Some([s0, v0]), Some([s1, v1])) => {
-            let slope = (v1 - v0) / (s1 - s0);
-            ((v0 + slope * (s - s0)).clamp(v0.min(*v1), v0.max(*v1)), slope)
-        }
-        (Some([_, v]), None) | (None, Some([_, v])) => (*v, 0.0),
-        (None, None) => (f64::NAN, 0.0),
-    }
-}
-
-/// The values that the piecewise linear function takes on an interval, widened by the rounding of `interpolate`.
-fn range(stops: &[[f64; 2]], s: Interval) -> Interval {
-    if stops.is_empty() || s.lo.is_nan() || s.hi.is_nan() {
-        return Interval::new(f64::NEG_INFINITY, f64::INFINITY);
-    }
-    let mut largest = 0.0f64;
-    let (a, b) = (interpolate(stops, s.lo).0, interpolate(stops, s.hi).0);
-    let mut r = Interval::new(a.min(b), a.max(b));
-    for [at, v] in stops {
-        largest = largest.max(v.abs());
-        if (s.lo..=s.hi).contains(at) {
-            r = r.union(Interval::new(*v, *v));
-        }
-    }
-    let slack = largest * 4.0 * f64::EPSILON;
-    Interval::new(r.lo - slack, r.hi + slack)
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use geometry::fault::Fault;
+    use geometry::math::{norm, scale};
 
     /// Distance to the unit sphere.
     struct Ball;
@@ -295,42 +124,36 @@ mod tests {
         }
     }
 
-    fn all() -> Vec<Grade> {
-        vec![
-            Grade::Constant(0.3),
-            Grade::linear([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap(),
-            Grade::depth(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap(),
-            Grade::Formula(Formula::parse("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)").unwrap()),
-            Grade::Radial { center: [0.2, 0.1, 0.0], axis: None, stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]] },
-            Grade::Radial {
-                center: [0.2, 0.1, 0.0],
-                axis: Some([0.6, 0.0, 0.8]),
-                stops: vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]],
-            },
-            Grade::Samples {
-                of: Arc::new(
-                    Samples::new(
-                        [-1.0; 3],
-                        [0.7, 0.5, 1.0],
-                        [4, 4, 3],
-                        (0..48).map(|i| f64::from(i * 7 % 13)).collect(),
-                    )
-                    .unwrap(),
-                ),
-                remap: vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]],
-            },
-            Grade::Function(Arc::new(Sigmoid::new(Grade::Formula(Formula::parse("x + y*z").unwrap()), 0.2, 1.5))),
-        ]
+    fn grid() -> Samples {
+        let values = (0..48).map(|i| f64::from(i * 7 % 13)).collect();
+        Samples::new([-1.0; 3], [0.7, 0.5, 1.0], [4, 4, 3], values).unwrap()
     }
 
-    fn samples(n: usize) -> impl Iterator<Item = f64> {
-        let mut s = 12345u64;
-        (0..n).map(move |_| (geometry::random::random(&mut s) + 1.0) / 2.0)
+    fn all() -> Vec<Grade> {
+        let stops = || vec![[0.3, 0.1], [1.0, 0.6], [1.4, 0.2]];
+        let chain = || vec![[-1.2, -0.4, 0.1], [0.3, 0.5, -0.8], [1.1, -0.7, 0.6], [-0.2, 1.0, 1.0]];
+        let formula = |text: &str| Grade::from(Formula::parse(text).unwrap());
+        let values = [0.4, -0.1, 0.9, 0.3];
+        vec![
+            Grade::Constant(0.3),
+            Linear::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
+            Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
+            formula("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)"),
+            Radial::new([0.2, 0.1, 0.0], None, stops()).unwrap().into(),
+            Radial::new([0.2, 0.1, 0.0], Some([0.6, 0.0, 0.8]), stops()).unwrap().into(),
+            grid().into(),
+            Remapped::new(grid(), vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]]).unwrap().into(),
+            Sigmoid::new(formula("x + y*z"), 0.2, 1.5).unwrap().into(),
+            region_step(Arc::new(Ball), 0.7).unwrap().into(),
+            Polyline::new(chain(), false, None, None).unwrap().into(),
+            Polyline::new(chain(), true, Some([0.1, -0.2, 1.0]), None).unwrap().into(),
+            Rbf::new(chain(), &values, Some(1.1), None).unwrap().into(),
+        ]
     }
 
     #[test]
     fn linear_is_exact_at_stops_between_and_beyond() {
-        let g = Grade::linear([0.0, 0.0, 2.0], vec![[0.0, 1.0], [4.0, 3.0]]).unwrap();
+        let g = Linear::new([0.0, 0.0, 2.0], vec![[0.0, 1.0], [4.0, 3.0]]).unwrap();
         let mut v = [0.0; 5];
         g.values(&[[9.0, 9.0, -1.0], [0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 7.0]], &mut v);
         assert_eq!(v, [1.0, 1.0, 2.0, 3.0, 3.0]);
@@ -338,7 +161,7 @@ mod tests {
 
     #[test]
     fn depth_counts_from_the_surface_inwards() {
-        let g = Grade::depth(Arc::new(Ball), vec![[0.0, 0.6], [0.5, 0.2]]).unwrap();
+        let g = Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.5, 0.2]]).unwrap();
         let mut v = [0.0; 4];
         g.values(&[[2.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.75, 0.0], [0.0, 0.0, 0.1]], &mut v);
         for (v, want) in v.iter().zip([0.6, 0.6, 0.4, 0.2]) {
@@ -348,8 +171,8 @@ mod tests {
 
     #[test]
     fn gradients_agree_with_differences_and_bounds_hold() {
-        let mut r = samples(20_000);
-        let mut next = || r.next().unwrap_or(0.5);
+        let mut seed = 12345;
+        let mut next = || (geometry::random::random(&mut seed) + 1.0) / 2.0;
         for (k, g) in all().iter().enumerate() {
             for _ in 0..200 {
                 let p = [next() * 3.0 - 1.5, next() * 3.0 - 1.5, next() * 3.0 - 1.5];
@@ -387,23 +210,29 @@ mod tests {
 
     #[test]
     fn an_unbounded_box_gives_the_whole_range() {
-        let g = Grade::linear([0.0, 0.0, 1.0], vec![[0.0, 0.2], [1.0, 0.7], [2.0, 0.1]]).unwrap();
+        let g = Linear::new([0.0, 0.0, 1.0], vec![[0.0, 0.2], [1.0, 0.7], [2.0, 0.1]]).unwrap();
         let b = g.bound(&Aabb::ALL);
         assert!((b.lo - 0.1).abs() < 1e-14 && (b.hi - 0.7).abs() < 1e-14, "{b:?}");
     }
 
     #[test]
-    fn bad_stops_are_refused_where_they_stand() {
-        let at = |r: Result<Grade, Fault>| r.err().map(|f| f.at);
-        assert_eq!(at(Grade::linear([0.0; 3], vec![[0.0, 1.0]])).as_deref(), Some("along"));
-        assert_eq!(at(Grade::linear([f64::NAN, 0.0, 1.0], vec![[0.0, 1.0]])).as_deref(), Some("along"));
+    fn what_is_no_function_is_refused_by_its_key() {
+        fn at<G>(made: Result<G, Fault>) -> Option<String> {
+            made.err().map(|f| f.at)
+        }
+        let one = || vec![[0.0, 1.0]];
+        assert_eq!(at(Linear::new([0.0; 3], one())).as_deref(), Some("along"));
+        assert_eq!(at(Linear::new([f64::NAN, 0.0, 1.0], one())).as_deref(), Some("along"));
         let z = [0.0, 0.0, 1.0];
-        assert_eq!(at(Grade::linear(z, vec![])).as_deref(), Some("stops"));
-        assert_eq!(at(Grade::linear(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(), Some("stops[1]"));
-        assert_eq!(at(Grade::linear(z, vec![[0.0, f64::NAN]])).as_deref(), Some("stops[0]"));
-        assert_eq!(
-            at(Grade::depth(Arc::new(Ball), vec![[0.0, 1.0], [f64::INFINITY, 2.0]])).as_deref(),
-            Some("stops[1]")
-        );
+        assert_eq!(at(Linear::new(z, vec![])).as_deref(), Some("stops"));
+        assert_eq!(at(Linear::new(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(), Some("stops[1]"));
+        assert_eq!(at(Linear::new(z, vec![[0.0, f64::NAN]])).as_deref(), Some("stops[0]"));
+        let late = vec![[0.0, 1.0], [f64::INFINITY, 2.0]];
+        assert_eq!(at(Depth::new(Arc::new(Ball), late)).as_deref(), Some("stops[1]"));
+        assert_eq!(at(Remapped::new(grid(), vec![])).as_deref(), Some("stops"));
+        assert_eq!(at(Radial::new([0.0; 3], Some([0.0; 3]), one())).as_deref(), Some("axis"));
+        assert_eq!(at(Radial::new([f64::INFINITY; 3], None, one())).as_deref(), Some("center"));
+        assert_eq!(at(Sigmoid::new(Grade::Constant(0.0), 0.0, 0.0)).as_deref(), Some("width"));
+        assert_eq!(at(region_step(Arc::new(Ball), -1.0)).as_deref(), Some("width"));
     }
 }

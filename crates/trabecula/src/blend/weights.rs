@@ -179,7 +179,7 @@ mod tests {
     use crate::grade::Formula;
 
     fn grade(text: &str) -> Grade {
-        Grade::Formula(Formula::parse(text).unwrap_or_else(|f| panic!("{f}")))
+        Grade::from(Formula::parse(text).unwrap_or_else(|f| panic!("{f}")))
     }
 
     fn all() -> Vec<Weights> {

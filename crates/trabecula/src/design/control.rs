@@ -9,14 +9,14 @@ use super::place::{Place, finite};
 use super::region;
 use super::samples;
 use crate::field::Field;
-use crate::grade::{Grade, Polyline, Rbf, Sigmoid};
+use crate::grade::{Grade, Polyline, Rbf, Sigmoid, Varying, region_step};
 use crate::kind::DesignError;
 use crate::region::Notes;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, norm, scale};
 
 /// One less a number.
-struct Rest(Arc<dyn Field>);
+struct Rest(Arc<dyn Varying>);
 
 impl Field for Rest {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
@@ -36,16 +36,18 @@ impl Field for Rest {
     }
 }
 
+impl Varying for Rest {}
+
 /// The grade, checked in the region against what is allowed; `1 − value` if `complement`.
 pub(super) fn checked(
-    of: Arc<dyn Field>,
+    of: Arc<dyn Varying>,
     path: &str,
     place: &Place,
     allowed: Allowed,
     complement: bool,
 ) -> Result<Grade, DesignError> {
     let of = if complement { Arc::new(Rest(of)) } else { of };
-    let made = Grade::Function(of);
+    let made = Grade::Varying(of);
     check_varied(&made, path, allowed, complement, place)?;
     Ok(made)
 }
@@ -54,7 +56,7 @@ pub(super) fn checked(
 pub(super) fn sigmoid(spec: &SigmoidSpec, path: &str, place: &Place) -> Result<Sigmoid, DesignError> {
     let of = grade(&spec.of, &format!("{path}.of"), place, Allowed::Finite, false)?;
     let at = finite(&format!("{path}.at"), spec.at)?;
-    Ok(Sigmoid::new(of, at, width(spec.width, path)?))
+    Sigmoid::new(of, at, width(spec.width, path)?).map_err(|f| DesignError::fault(path, f))
 }
 
 /// A width that is one.
@@ -75,9 +77,7 @@ pub(super) fn within(spec: &WithinSpec, path: &str, place: &Place) -> Result<Sig
     }
     let mut notes = Notes::default();
     let region = region::region(&spec.of, &format!("{path}.of"), place.loader, &mut notes)?;
-    // The depth itself, where it matters.
-    let stops = vec![[-wide, -wide], [wide, wide]];
-    Ok(Sigmoid::new(Grade::Depth { region, stops }, 0.0, wide))
+    region_step(region, wide).map_err(|f| DesignError::fault(path, f))
 }
 
 /// The control points, and their values if a file has a fourth column.

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::data::{GradeKind, GradeSpec};
 use super::place::{Place, finite};
 use super::{control, samples};
-use crate::grade::{Formula, Grade};
+use crate::grade::{Depth, Formula, Grade, Linear, Radial, Varying};
 use crate::kind::DesignError;
-use geometry::fault::number;
-use geometry::math::{norm, unit};
+use geometry::fault::{Fault, number};
+use geometry::math::norm;
 
 /// What values an amount may take.
 #[derive(Clone, Copy, PartialEq)]
@@ -60,6 +60,11 @@ fn hint(name: &str, v: f64) -> String {
     }
 }
 
+/// The grade of a kind; a fault of its constructor stands below `path`.
+fn made<G: Varying + 'static>(path: &str, made: Result<G, Fault>) -> Result<Grade, DesignError> {
+    made.map(Grade::from).map_err(|f| DesignError::fault(path, f))
+}
+
 /// The grade, with `1 − value` instead of the value if `complement`. Stops are checked here; a formula is checked
 /// where it is sampled.
 pub(super) fn grade(
@@ -102,30 +107,28 @@ pub(super) fn grade(
             if l.along == [0.0; 3] {
                 return Err(DesignError::new(below, "the direction is zero; give one such as [0, 0, 1]"));
             }
-            Ok(Grade::Linear { along: l.along, stops: stops(&format!("{path}.linear.stops"), &l.stops)? })
+            let stops = stops(&format!("{path}.linear.stops"), &l.stops)?;
+            made(path, Linear::new(l.along, stops))
         }
         GradeKind::Depth(d) => {
-            Ok(Grade::Depth { region: place.region.clone(), stops: stops(&format!("{path}.depth.stops"), &d.stops)? })
+            let stops = stops(&format!("{path}.depth.stops"), &d.stops)?;
+            made(path, Depth::new(place.region.clone(), stops))
         }
         GradeKind::Radial(r) => {
             let below = |key: &str| format!("{path}.radial.{key}");
             for v in r.center {
                 finite(&below("center"), v)?;
             }
-            let axis = match r.axis {
-                Some(axis) => {
-                    for v in axis {
-                        finite(&below("axis"), v)?;
-                    }
-                    if norm(axis) == 0.0 {
-                        let message = "the direction is zero; give one such as [0, 0, 1]";
-                        return Err(DesignError::new(below("axis"), message));
-                    }
-                    Some(unit(axis))
+            if let Some(axis) = r.axis {
+                for v in axis {
+                    finite(&below("axis"), v)?;
                 }
-                None => None,
-            };
-            Ok(Grade::Radial { center: r.center, axis, stops: stops(&below("stops"), &r.stops)? })
+                if norm(axis) == 0.0 {
+                    let message = "the direction is zero; give one such as [0, 0, 1]";
+                    return Err(DesignError::new(below("axis"), message));
+                }
+            }
+            made(path, Radial::new(r.center, r.axis, stops(&below("stops"), &r.stops)?))
         }
         GradeKind::Grid(g) => {
             let at = format!("{path}.grid");
@@ -166,10 +169,10 @@ pub(super) fn grade(
             let place = format!("{path}.formula");
             let own = Formula::parse(text).map_err(|f| DesignError::fault(&place, f).found(text))?;
             if !complement {
-                return Ok(Grade::Formula(own));
+                return Ok(Grade::from(own));
             }
             let turned = format!("1 - ({text})");
-            Formula::parse(&turned).map(Grade::Formula).map_err(|f| DesignError::fault(&place, f).found(text))
+            Formula::parse(&turned).map(Grade::from).map_err(|f| DesignError::fault(&place, f).found(text))
         }
     }
 }

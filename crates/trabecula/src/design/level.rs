@@ -1,6 +1,6 @@
 //! How much is solid: data to [`Level`].
 
-use super::data::{AmountSpec, Fit, LevelSpec, Of, PartSpec};
+use super::data::{AmountSpec, Fit, GradeKind, GradeSpec, LevelSpec, Of, PartSpec};
 use super::grade::{Allowed, grade};
 use super::place::{Place, finite};
 use super::sample;
@@ -82,7 +82,7 @@ pub(super) fn level(
     if key == "iso" {
         return Ok(Level::Iso(amount));
     }
-    if let Grade::Formula(_) = &amount {
+    if let GradeSpec::Kind(GradeKind::Formula(_)) = value {
         let at = path(&format!("{key}.formula"));
         let complement = key == "porosity";
         check_varied(&amount, &at, allowed, complement, place)?;

@@ -3,15 +3,13 @@
 mod field;
 mod grid;
 
-use std::sync::Arc;
-
 use super::Loader;
 use super::data::*;
 use super::grade::Allowed;
 use super::place::{Place, finite};
 use crate::cell::{Cell, Series};
 use crate::field::Field;
-use crate::grade::{Grade, Samples};
+use crate::grade::{Grade, Remapped, Samples};
 use crate::kind::DesignError;
 use crate::region::{MeshRegion, Shape as _};
 pub(super) use field::{field, several};
@@ -97,7 +95,10 @@ pub(super) fn grade(
         }
         stops.iter_mut().for_each(|s| s[1] = 1.0 - s[1]);
     }
-    let grade = Grade::Samples { of: Arc::new(samples), remap: stops };
+    let grade = match stops.is_empty() {
+        true => Grade::from(samples),
+        false => Grade::from(Remapped::new(samples, stops).map_err(|f| DesignError::fault(path, f))?),
+    };
     super::level::check_varied(&grade, path, allowed, complement, place)?;
     Ok(grade)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::data::{OpenSpec, SkinSpec};
+use super::data::{GradeKind, GradeSpec, OpenSpec, SkinSpec};
 use super::grade::{Allowed, grade};
 use super::level::check_varied;
 use super::place::{LOOKS, Place};
@@ -10,7 +10,6 @@ use super::report::Varied;
 use super::{Design, Loader, region, sample};
 use crate::csg_tree::CsgSolid;
 use crate::field::Field;
-use crate::grade::Grade;
 use crate::kind::DesignError;
 use crate::region::{HalfSpace, Intersection, Region};
 use crate::skin::skin;
@@ -73,7 +72,7 @@ fn grown(spec: &SkinSpec, place: &Place) -> Result<(CsgSolid, f64), DesignError>
     let path = "skin.thickness";
     let allowed = Allowed::Positive("thickness");
     let thickness = grade(&spec.thickness, path, place, allowed, false)?;
-    if let Grade::Formula(_) = &thickness {
+    if let GradeSpec::Kind(GradeKind::Formula(_)) = &spec.thickness {
         let at = format!("{path}.formula");
         check_varied(&thickness, &at, allowed, false, place)?;
     }

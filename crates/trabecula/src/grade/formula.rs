@@ -1,5 +1,7 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
 
+use super::Varying;
+use crate::field::Field;
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -87,27 +89,7 @@ impl Formula {
         Ok(Formula { program: parse(text)? })
     }
 
-    /// Fills `out[i]` with the value at `points[i]` (mm).
-    pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        let mut stack = Vec::new();
-        for (points, out) in points.chunks(LANES).zip(out.chunks_mut(LANES)) {
-            let variable = |lane: usize, axis: usize| points.get(lane).map_or(0.0, |p| p[axis]);
-            let values = self.run_lanes(variable, &mut stack);
-            out.copy_from_slice(&values[..out.len()]);
-        }
-    }
-
-    /// Fills values and gradients (per mm).
-    pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        match self.varies() {
-            [_, false, false] => self.slopes([0], points, values, gradients),
-            [false, true, false] => self.slopes([1], points, values, gradients),
-            [false, false, true] => self.slopes([2], points, values, gradients),
-            _ => self.slopes([0, 1, 2], points, values, gradients),
-        }
-    }
-
-    /// The same, where it varies along these axes alone.
+    /// Values and gradients (per mm), where it varies along these axes alone.
     fn slopes<const N: usize>(&self, axes: [usize; N], points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         let mut stack = Vec::new();
         let out = values.chunks_mut(LANES).zip(gradients.chunks_mut(LANES));
@@ -124,24 +106,6 @@ impl Formula {
                 }
             }
         }
-    }
-
-    /// Value and gradient at a point.
-    pub fn gradient(&self, p: Vec3) -> (f64, Vec3) {
-        let (mut v, mut g) = ([0.0], [[0.0; 3]]);
-        self.gradients(&[p], &mut v, &mut g);
-        (v[0], g[0])
-    }
-
-    /// Along which axes it may change: those that it names.
-    pub fn varies(&self) -> [bool; 3] {
-        [0, 1, 2].map(|a| self.program.iter().any(|i| matches!(i, Instruction::Variable(n) if *n == a)))
-    }
-
-    /// Contains every value in the box, by interval arithmetic; everything where the formula may be undefined.
-    pub fn bound(&self, b: &Aabb) -> Interval {
-        let at = [0, 1, 2].map(|a| Interval::new(b.min[a], b.max[a]));
-        self.run(at, &mut Vec::new())
     }
 
     /// Runs the program on some points at once, instruction by instruction.
@@ -187,6 +151,39 @@ impl Formula {
     }
 }
 
+impl Field for Formula {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        let mut stack = Vec::new();
+        for (points, out) in points.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            let variable = |lane: usize, axis: usize| points.get(lane).map_or(0.0, |p| p[axis]);
+            let values = self.run_lanes(variable, &mut stack);
+            out.copy_from_slice(&values[..out.len()]);
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        match self.varies() {
+            [_, false, false] => self.slopes([0], points, values, gradients),
+            [false, true, false] => self.slopes([1], points, values, gradients),
+            [false, false, true] => self.slopes([2], points, values, gradients),
+            _ => self.slopes([0, 1, 2], points, values, gradients),
+        }
+    }
+
+    /// By interval arithmetic; everything where the formula may be undefined.
+    fn bound(&self, b: &Aabb) -> Interval {
+        let at = [0, 1, 2].map(|a| Interval::new(b.min[a], b.max[a]));
+        self.run(at, &mut Vec::new())
+    }
+}
+
+impl Varying for Formula {
+    /// The axes that it names.
+    fn varies(&self) -> [bool; 3] {
+        [0, 1, 2].map(|a| self.program.iter().any(|i| matches!(i, Instruction::Variable(n) if *n == a)))
+    }
+}
+
 /// Applies an operation to each lane, in place of its first argument. Each of the quick ones has a loop of its own.
 fn apply_lanes<T: Quantity>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c: &[T; LANES]) {
     macro_rules! lanes {
@@ -206,8 +203,14 @@ fn apply_lanes<T: Quantity>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c
 mod tests {
     use super::*;
 
+    fn gradient(f: &Formula, p: Vec3) -> (f64, Vec3) {
+        let (mut v, mut g) = ([0.0], [[0.0; 3]]);
+        f.gradients(&[p], &mut v, &mut g);
+        (v[0], g[0])
+    }
+
     fn at(text: &str, p: Vec3) -> f64 {
-        Formula::parse(text).map_or(f64::NAN, |f| f.gradient(p).0)
+        Formula::parse(text).map_or(f64::NAN, |f| f.value(p))
     }
 
     #[test]
@@ -224,7 +227,7 @@ mod tests {
         for (i, p) in points.iter().enumerate() {
             let alone: f64 = f.run(*p, &mut Vec::new());
             assert!(v[i] == alone && w[i] == alone, "{} {} {alone}", v[i], w[i]);
-            assert_eq!(f.gradient(*p), (w[i], g[i]));
+            assert_eq!(gradient(&f, *p), (w[i], g[i]));
         }
     }
 
@@ -263,13 +266,13 @@ mod tests {
     fn gradients_follow_the_chain_rule() {
         let f = Formula::parse("x^2*sin(y) + exp(z)/x").unwrap_or(Formula { program: vec![] });
         let [x, y, z] = [1.3, 0.7, 0.2f64];
-        let (_, g) = f.gradient([x, y, z]);
+        let (_, g) = gradient(&f, [x, y, z]);
         let want = [2.0 * x * y.sin() - z.exp() / (x * x), x * x * y.cos(), z.exp() / x];
         for a in 0..3 {
             assert!((g[a] - want[a]).abs() < 1e-14);
         }
         // A constant exponent gives no logarithm of a negative number, a standing argument no 0 · ∞.
-        let (v, g) = Formula::parse("x^3 + sqrt(0*y)").map_or((0.0, [0.0; 3]), |f| f.gradient([-2.0, 1.0, 0.0]));
+        let (v, g) = Formula::parse("x^3 + sqrt(0*y)").map_or((0.0, [0.0; 3]), |f| gradient(&f, [-2.0, 1.0, 0.0]));
         assert_eq!((v, g[0]), (-8.0, 12.0));
     }
 
@@ -287,7 +290,7 @@ mod tests {
                 let bound = f.bound(&Aabb { min, max });
                 for _ in 0..8 {
                     let p = [0, 1, 2].map(|a| min[a] + (max[a] - min[a]) * next());
-                    let v = f.gradient(p).0;
+                    let v = f.value(p);
                     assert!(bound.lo <= v && v <= bound.hi, "{text} at {p:?}: {v} not in {bound:?}");
                 }
             }

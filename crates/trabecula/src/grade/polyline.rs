@@ -1,5 +1,6 @@
 //! Distance to a line of control points.
 
+use super::Varying;
 use crate::field::Field;
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -171,6 +172,8 @@ impl Field for Polyline {
         }
     }
 }
+
+impl Varying for Polyline {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -1,5 +1,6 @@
 //! Gaussian radial basis functions through control points.
 
+use super::Varying;
 use crate::field::Field;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
@@ -229,6 +230,8 @@ impl Field for Rbf {
         Interval::new(lo.max(value - slope * reach) - slack, hi.min(value + slope * reach) + slack)
     }
 }
+
+impl Varying for Rbf {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use super::Varying;
+use crate::field::Field;
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Interval, Vec3, cross, determinant, dot, norm, sub};
 
@@ -116,27 +118,6 @@ impl Samples {
             if inz { (back - front) / self.step[2] } else { 0.0 },
         ];
         (mix(front, back, z), slope)
-    }
-
-    /// An interval that contains the values in a box.
-    pub fn bound(&self, b: &Aabb) -> Interval {
-        let mut range = [(0, 0); 3];
-        for a in 0..3 {
-            let at = |x: f64| self.place(x, a).0 / BLOCK;
-            // Infinite ends are clamped as all others.
-            range[a] = (at(b.min[a]).min(self.blocks[a] - 1), at(b.max[a]).min(self.blocks[a] - 1));
-        }
-        let mut all = [f64::INFINITY, f64::NEG_INFINITY];
-        for k in range[2].0..=range[2].1 {
-            for j in range[1].0..=range[1].1 {
-                for i in range[0].0..=range[0].1 {
-                    let r = self.ranges[(k * self.blocks[1] + j) * self.blocks[0] + i];
-                    all = [all[0].min(r[0]), all[1].max(r[1])];
-                }
-            }
-        }
-        let slack = 8.0 * f64::EPSILON * all[0].abs().max(all[1].abs());
-        Interval::new(all[0] - slack, all[1] + slack)
     }
 
     /// Numbers given at points, put on a grid over `bounds`: the mean of the nearest `neighbours`, weighted by one over
@@ -280,6 +261,42 @@ impl Samples {
         Ok((made.collect::<Result<Vec<Samples>, Fault>>()?, share))
     }
 }
+
+impl Field for Samples {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        for (o, p) in out.iter_mut().zip(points) {
+            *o = self.at(*p).0;
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        for ((v, g), p) in values.iter_mut().zip(gradients).zip(points) {
+            (*v, *g) = self.at(*p);
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let mut range = [(0, 0); 3];
+        for a in 0..3 {
+            let at = |x: f64| self.place(x, a).0 / BLOCK;
+            // Infinite ends are clamped as all others.
+            range[a] = (at(b.min[a]).min(self.blocks[a] - 1), at(b.max[a]).min(self.blocks[a] - 1));
+        }
+        let mut all = [f64::INFINITY, f64::NEG_INFINITY];
+        for k in range[2].0..=range[2].1 {
+            for j in range[1].0..=range[1].1 {
+                for i in range[0].0..=range[0].1 {
+                    let r = self.ranges[(k * self.blocks[1] + j) * self.blocks[0] + i];
+                    all = [all[0].min(r[0]), all[1].max(r[1])];
+                }
+            }
+        }
+        let slack = 8.0 * f64::EPSILON * all[0].abs().max(all[1].abs());
+        Interval::new(all[0] - slack, all[1] + slack)
+    }
+}
+
+impl Varying for Samples {}
 
 /// Steps of about `h`, and nodes, over a box.
 fn grid(bounds: &Aabb, h: f64) -> (Vec3, [usize; 3]) {

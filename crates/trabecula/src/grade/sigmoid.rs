@@ -1,7 +1,8 @@
 //! A smooth step: how a weight passes from 0 to 1 across a boundary.
 
-use super::Grade;
+use super::{Grade, Varying};
 use crate::field::Field;
+use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// The share of a logistic curve that is left out at either end, so that the step has ends.
@@ -16,10 +17,19 @@ pub struct Sigmoid {
 }
 
 impl Sigmoid {
-    /// The step of `of` about `at` (where it is one half) over `width`, neither in another unit than `of`. The width is
-    /// finite and not zero; the caller guarantees that.
-    pub fn new(of: Grade, at: f64, width: f64) -> Sigmoid {
-        Sigmoid { of, at, width }
+    /// The step of `of` about `at` (where it is one half) over `width`, both in the unit of `of`.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; a width of 0.
+    pub fn new(of: Grade, at: f64, width: f64) -> Result<Sigmoid, Fault> {
+        if !at.is_finite() {
+            return Err(Fault::new("at", format!("found {at}; give a finite number")));
+        }
+        if width == 0.0 || width.is_subnormal() || !width.is_finite() {
+            let message = format!("found {}; a step needs a finite width that is not 0 to rise in", number(width));
+            return Err(Fault::new("width", message));
+        }
+        Ok(Sigmoid { of, at, width })
     }
 
     /// Value and slope where the number is `v`.
@@ -65,13 +75,16 @@ impl Field for Sigmoid {
     }
 }
 
+impl Varying for Sigmoid {}
+
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_step_is_half_in_the_middle_and_ends() {
-        let s = Sigmoid::new(Grade::Constant(0.0), 2.0, 4.0);
+        let s = Sigmoid::new(Grade::Constant(0.0), 2.0, 4.0).unwrap();
         assert_eq!([0.0, 2.0, 4.0, 9.0].map(|v| s.step(v).0), [0.0, 0.5, 1.0, 1.0]);
         for i in 1..40 {
             let v = 0.1 * f64::from(i);
@@ -80,7 +93,7 @@ mod tests {
             // Point-symmetric about its middle.
             assert!((s.step(v).0 + s.step(4.0 - v).0 - 1.0).abs() < 1e-14);
         }
-        let falls = Sigmoid::new(Grade::Constant(0.0), 2.0, -4.0);
+        let falls = Sigmoid::new(Grade::Constant(0.0), 2.0, -4.0).unwrap();
         assert_eq!([0.0, 2.0, 4.0].map(|v| falls.step(v).0), [1.0, 0.5, 0.0]);
     }
 }

@@ -328,11 +328,11 @@ impl FirstOf for Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grade::Formula;
+    use crate::grade::{Formula, Samples};
     use geometry::math::{Aabb, apply};
 
     fn formula(text: &str) -> Grade {
-        Grade::Formula(Formula::parse(text).expect("formula"))
+        Grade::from(Formula::parse(text).expect("formula"))
     }
 
     fn grid() -> (Grid, Vec<Vec3>) {
@@ -395,12 +395,7 @@ mod tests {
         };
         let component = |c: usize| {
             let values = nodes.iter().map(|p| tensor(*p)[c]).collect();
-            Grade::Samples {
-                of: std::sync::Arc::new(
-                    crate::grade::Samples::new(g.origin, g.step, g.shape, values).expect("samples"),
-                ),
-                remap: Vec::new(),
-            }
+            Grade::from(Samples::new(g.origin, g.step, g.shape, values).expect("samples"))
         };
         let frames = Orientation::Stress(core::array::from_fn(component)).frames(&g, &nodes).expect("frames");
         for (n, f) in frames.iter().enumerate() {

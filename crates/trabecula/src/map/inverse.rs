@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn positions_have_the_phases_that_were_asked_for() {
         let bounds = Aabb { min: [-10.0; 3], max: [10.0; 3] };
-        let turn = Grade::Formula(Formula::parse("3*x").expect("formula"));
+        let turn = Grade::from(Formula::parse("3*x").expect("formula"));
         let still = Grade::Constant(0.0);
         let wave = Grade::Constant(3.0);
         let wanted = Wanted {

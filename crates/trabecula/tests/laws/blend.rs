@@ -9,7 +9,7 @@ use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
-use trabecula::grade::{Formula, Grade, Sigmoid};
+use trabecula::grade::{Formula, Grade, Linear, Sigmoid};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
@@ -29,12 +29,14 @@ fn share(name: &str, part: Part, fraction: f64, wavelength: f64) -> Arc<Lattice>
 }
 
 fn formula(text: &str) -> Grade {
-    Grade::Formula(Formula::parse(text).expect(text))
+    Grade::from(Formula::parse(text).expect(text))
 }
 
 /// From the first to the second over `width` mm about x = 0.
 fn step(width: f64) -> Weights {
-    Weights::between(Grade::linear([1.0, 0.0, 0.0], vec![[-width / 2.0, 0.0], [width / 2.0, 1.0]]).expect("ramp"))
+    Weights::between(Grade::from(
+        Linear::new([1.0, 0.0, 0.0], vec![[-width / 2.0, 0.0], [width / 2.0, 1.0]]).expect("ramp"),
+    ))
 }
 
 const BOUNDS: Aabb = Aabb { min: [-24.0, -14.0, -14.0], max: [24.0, 14.0, 14.0] };
@@ -335,8 +337,8 @@ fn surfaces_of_blends_are_whole() {
     let region = cuboid([-7.0, -3.0, -3.0], [7.0, 3.0, 3.0]);
     for (what, of, _) in pairs() {
         let of = of.map(Constituent::Lattice).to_vec();
-        let weight = Sigmoid::new(formula("x + 0.2*y"), 0.0, 9.0);
-        let weights = Weights::between(Grade::Function(Arc::new(weight)));
+        let weight = Sigmoid::new(formula("x + 0.2*y"), 0.0, 9.0).expect("step");
+        let weights = Weights::between(Grade::from(weight));
         let blend = Blend::new(of, weights, By::Fraction, &BOUNDS).expect("blend");
         let solid = Solid::new(region.clone(), Some(Arc::new(blend)), 4.0);
         let made = surface(&solid, 0.31, &Silent).expect(what);

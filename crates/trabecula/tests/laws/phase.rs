@@ -16,7 +16,7 @@ use trabecula::region::{Cuboid, Region};
 use trabecula::solid::Solid;
 
 fn formula(text: &str) -> Grade {
-    Grade::Formula(Formula::parse(text).expect("formula"))
+    Grade::from(Formula::parse(text).expect("formula"))
 }
 
 fn cell(name: &str) -> Arc<Cell> {

@@ -12,7 +12,7 @@ use trabecula::cell::Part;
 use trabecula::csg_tree::CsgSolid;
 use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
-use trabecula::grade::{Formula, Grade};
+use trabecula::grade::{Formula, Grade, Linear};
 use trabecula::implicit::Implicit;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
 use trabecula::skin::skin;
@@ -163,7 +163,7 @@ fn a_thickness_that_varies_is_met() {
     // Wedges: the inner planes of a box lean where the thickness is linear along x.
     let region = cuboid([0.0; 3], [10.0, 8.0, 6.0]);
     let stops = vec![[0.0, 0.5], [10.0, 1.5]];
-    let w = Grade::linear([1.0, 0.0, 0.0], stops).expect("grade");
+    let w = Grade::from(Linear::new([1.0, 0.0, 0.0], stops).expect("grade"));
     // From x = w(x) to 10 - w(x): x0 = 0.5 / 0.9, x1 = 9.5 / 1.1; the section is (8 - 2w)(6 - 2w).
     let (x0, x1) = (0.5 / 0.9, 9.5 / 1.1);
     let whole = |x: f64| 35.0 * x - 1.2 * x * x + 0.04 / 3.0 * x * x * x;
@@ -174,7 +174,7 @@ fn a_thickness_that_varies_is_met() {
     let v = volume(&shell(&region, &w, &open), 0.25, "graded open box");
     close(v, 480.0 - (whole(10.0) - whole(x0)), 1e-4, "graded open box");
     // (The faces are moved by hairs of 1e-6 of the size.) A constant, said as a formula.
-    let constant = Grade::Formula(Formula::parse("0.2 + 0*x").expect("formula"));
+    let constant = Grade::from(Formula::parse("0.2 + 0*x").expect("formula"));
     let ball = |w: &Grade| volume(&shell(&ball([0.0; 3], 1.0), w, &[]), 0.05, "ball");
     close(ball(&constant), ball(&Grade::Constant(0.2)), 1e-4, "formula");
 }
@@ -385,7 +385,9 @@ fn the_field_is_membership_by_set_logic() {
         let (w, slope) = (0.2 + 0.1 * random(), 0.05 * random());
         let grade = match n % 2 {
             0 => Grade::Constant(w),
-            _ => Grade::linear([0.0, 1.0, 0.0], vec![[-9.0, w - 9.0 * slope], [9.0, w + 9.0 * slope]]).expect("grade"),
+            _ => Grade::from(
+                Linear::new([0.0, 1.0, 0.0], vec![[-9.0, w - 9.0 * slope], [9.0, w + 9.0 * slope]]).expect("grade"),
+            ),
         };
         let slope = if n % 2 == 0 { 0.0 } else { slope };
         if n % 2 == 1 && w - 2.0 * slope.abs() < 0.05 {
@@ -457,7 +459,7 @@ proptest! {
         let (w, slope, graded) = thickness;
         let grade = if graded {
             let stops = vec![[-1.6, (w - 1.6 * slope).max(0.01)], [1.6, (w + 1.6 * slope).max(0.01)]];
-            Grade::linear([0.3, 1.0, -0.2], stops).expect("grade")
+            Grade::from(Linear::new([0.3, 1.0, -0.2], stops).expect("grade"))
         } else {
             Grade::Constant(w)
         };

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{surface, voxels};
 use trabecula::field::Field;
-use trabecula::grade::Grade;
+use trabecula::grade::{Grade, Linear};
 use trabecula::lattice::Level;
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Region, Sphere};
 use trabecula::surface_maker::Islands;
@@ -273,7 +273,7 @@ fn every_named_cell_and_part_has_its_fraction() {
 #[test]
 fn a_graded_fraction_is_met() {
     let stops = vec![[0.0, 0.15], [8.0, 0.6]];
-    let grade = Grade::linear([0.0, 0.0, 1.0], stops).expect("grade");
+    let grade = Grade::from(Linear::new([0.0, 0.0, 1.0], stops).expect("grade"));
     for (name, part) in [("gyroid", Part::Sheet), ("diamond", Part::Lower), ("primitive", Part::Sheet)] {
         let field = lattice_at(name, part, Level::Fraction(grade.clone()), [1.0; 3], [0.0; 3]);
         let region = Arc::new(Cuboid::new([0.0; 3], [1.0, 1.0, 8.0]).expect("box"));

@@ -6,7 +6,7 @@ use crate::common::{Random, ball, cases, cuboid, fault, region};
 use geometry::math::{Aabb, Interval, Vec3, dot, scale};
 use geometry::tetmesh::TetMesh;
 use trabecula::field::Field;
-use trabecula::grade::Grade;
+use trabecula::grade::{Grade, Linear};
 use trabecula::mesher::{ANGLES, Fit, background};
 use trabecula::region::{Difference, HalfSpace, Intersection, Region};
 
@@ -172,7 +172,7 @@ fn graded_meshes_of_random_regions_keep_their_shapes() {
         let space = region(i % 7, r, s, t);
         let [small, large] = [some.between(0.08, 0.15), some.between(0.2, 0.4)];
         let along = some.point(1.0);
-        let size = Grade::linear(along, vec![[-0.8, small], [0.8, large]]).expect("grade");
+        let size = Grade::from(Linear::new(along, vec![[-0.8, small], [0.8, large]]).expect("grade"));
         let what = format!("kind {} {r} {s} {t}, sizes {small} to {large}", i % 7);
         let (mesh, _) = mesh(&space, &size);
         sound(&what, &mesh);
@@ -201,7 +201,7 @@ fn a_grade_of_sizes_is_followed() {
     let mut spaces = vec![cuboid([0.0; 3], [2.0; 3]), ball([1.0; 3], 1.0)];
     spaces.push(Arc::new(Difference::new(vec![spaces[0].clone(), ball([1.0; 3], 0.5)]).expect("difference")));
     for space in spaces {
-        let size = Grade::linear([1.0, 0.0, 0.0], vec![[0.0, 0.06], [2.0, 0.3]]).expect("grade");
+        let size = Grade::from(Linear::new([1.0, 0.0, 0.0], vec![[0.0, 0.06], [2.0, 0.3]]).expect("grade"));
         let (mesh, fit) = mesh(&space, &size);
         sound("graded", &mesh);
         assert!(fit.lost < 0.02);
@@ -243,7 +243,7 @@ fn thin_walls_are_told() {
 #[test]
 fn any_number_of_threads_gives_the_same_mesh() {
     let space = region(5, 1.0, 0.9, 1.1);
-    let size = Grade::linear([0.0, 1.0, 0.0], vec![[-1.0, 0.1], [1.0, 0.2]]).expect("grade");
+    let size = Grade::from(Linear::new([0.0, 1.0, 0.0], vec![[-1.0, 0.1], [1.0, 0.2]]).expect("grade"));
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| mesh(&space, &size))

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use trabecula::cell::{Cell, Distance, Part, Series, catalogue, named};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
-use trabecula::grade::Grade;
+use trabecula::grade::{Grade, Linear};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
@@ -165,7 +165,7 @@ fn walls_of_stretched_and_turned_lattices_are_as_thick_as_asked() {
 fn graded_walls_are_as_thick_as_asked_where_they_stand() {
     let s = series("gyroid");
     let map = rigid([5.0; 3], [20.0, 35.0, 50.0]);
-    let grade = Grade::linear([0.0, 0.6, 0.8], vec![[0.0, 0.25], [7.0, 1.5]]).expect("grade");
+    let grade = Grade::from(Linear::new([0.0, 0.6, 0.8], vec![[0.0, 0.25], [7.0, 1.5]]).expect("grade"));
     within("graded", judged(&s, map, grade, 5.0 / 48.0));
 }
 
@@ -239,7 +239,7 @@ proptest! {
     ) {
         let name = catalogue()[which].name;
         let grade = if graded {
-            Grade::linear([0.0, 0.0, 1.0], vec![[-5.0, 0.2], [5.0, 1.0]]).expect("grade")
+            Grade::from(Linear::new([0.0, 0.0, 1.0], vec![[-5.0, 0.2], [5.0, 1.0]]).expect("grade"))
         } else {
             Grade::Constant(0.5)
         };

@@ -9,7 +9,7 @@ use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::design::{Design, NoFiles};
 use trabecula::extract::surface;
 use trabecula::field::{Block, Field};
-use trabecula::grade::{Formula, Grade};
+use trabecula::grade::{Formula, Grade, Linear};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
 use trabecula::map::{Affine, Map};
@@ -23,7 +23,7 @@ fn sheet(name: &str, fraction: &str, wavelength: f64) -> Arc<Lattice> {
     let map = Affine::rigid([wavelength; 3], [0.0; 3], [0.0; 3], &[]).expect("map");
     let fraction = match fraction.parse() {
         Ok(p) => Grade::Constant(p),
-        Err(_) => Grade::Formula(Formula::parse(fraction).expect(fraction)),
+        Err(_) => Grade::from(Formula::parse(fraction).expect(fraction)),
     };
     let level = Level::Fraction(fraction);
     let map = Map::Affine(map);
@@ -41,7 +41,7 @@ fn wall(of: &Arc<Lattice>) -> Constituent {
 
 fn blended(first: Constituent, second: &Arc<Lattice>, by: By) -> Blend {
     let stops = vec![[-8.0, 0.0], [8.0, 1.0]];
-    let weights = Weights::between(Grade::linear([1.0, 0.2, 0.0], stops).expect("ramp"));
+    let weights = Weights::between(Grade::from(Linear::new([1.0, 0.2, 0.0], stops).expect("ramp")));
     let of = vec![first, Constituent::Lattice(second.clone())];
     Blend::new(of, weights, by, &BOUNDS).expect("blend")
 }

@@ -51,7 +51,7 @@ pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii<Grade>, Des
         let path = format!("{}.{key}", place.path);
         let allowed = Allowed::Positive(key);
         let made = grade(spec, &path, place, allowed, false)?;
-        if let Grade::Formula(_) = &made {
+        if let GradeSpec::Kind(GradeKind::Formula(_)) = spec {
             check_varied(&made, &format!("{path}.formula"), allowed, false, place)?;
         }
         Ok(Some(made))

@@ -1,7 +1,5 @@
 //! Results on meshes: an array of points or cells.
 
-use std::sync::Arc;
-
 use super::{bytes, extension, percent, pick};
 use crate::design::data::*;
 use crate::design::place::Place;
@@ -49,7 +47,7 @@ pub(in crate::design) fn several<const N: usize>(
             )
         })
     })?;
-    let mut made = made.into_iter().map(|s| Grade::Samples { of: Arc::new(s), remap: Vec::new() });
+    let mut made = made.into_iter().map(Grade::from);
     Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
 }
 

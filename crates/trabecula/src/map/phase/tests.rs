@@ -1,12 +1,12 @@
 use super::*;
-use crate::grade::Formula;
+use crate::grade::{Formula, Linear};
 use crate::map::{Affine, Map};
 use geometry::math::rotation;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 fn formula(text: &str) -> Grade {
-    Grade::Formula(Formula::parse(text).expect("formula"))
+    Grade::from(Formula::parse(text).expect("formula"))
 }
 
 fn bounds(min: Vec3, max: Vec3) -> Aabb {
@@ -241,8 +241,8 @@ fn what_cannot_be_solved_is_refused_with_its_place() {
     };
     refused(&about_z("x", formula("5 - x")), "wavelength", "(5.0000, 0.0000, 0.0000)");
     refused(&about_z("1/(x-5)", Grade::Constant(2.0)), "rotate", "(5.0000, 0.0000, 0.0000)");
-    let jump = Grade::linear([1.0, 0.0, 0.0], vec![[5.0, 2.0], [5.001, 4.0]]).expect("grade");
-    refused(&about_z("0*x", jump), "wavelength", "faster than the grid");
+    let jump = Linear::new([1.0, 0.0, 0.0], vec![[5.0, 2.0], [5.001, 4.0]]).expect("grade");
+    refused(&about_z("0*x", jump.into()), "wavelength", "faster than the grid");
     refused(&about_z("0*x", formula("4 + 3*sin(40*x*y*z)")), "wavelength", "faster than the grid");
     let fine = solve(&about_z("x", Grade::Constant(2.0)), Some(1e-4)).expect("refused");
     assert!(fine.at == "step" && fine.message.contains("use a step above"));

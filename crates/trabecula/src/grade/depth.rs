@@ -1,0 +1,48 @@
+//! A grade by depth below a surface.
+
+use std::sync::Arc;
+
+use super::{Stops, Varying};
+use crate::field::Field;
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, scale};
+
+/// Piecewise linear in the depth (mm) below the surface of a region, constant beyond the first and last stop.
+#[derive(Clone)]
+pub struct Depth {
+    region: Arc<dyn Field>,
+    stops: Stops,
+}
+
+impl Depth {
+    /// Below the surface of `region`, a signed distance (mm, negative inside); stops `[depth, value]`.
+    ///
+    /// # Errors
+    /// Stops that are none, not finite or not ascending in depth.
+    pub fn new(region: Arc<dyn Field>, stops: Vec<[f64; 2]>) -> Result<Depth, Fault> {
+        Ok(Depth { region, stops: Stops::new(stops, "depth")? })
+    }
+}
+
+impl Field for Depth {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.region.values(points, out);
+        for o in out.iter_mut() {
+            *o = self.stops.at(-*o).0;
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.region.gradients(points, values, gradients);
+        for (v, g) in values.iter_mut().zip(gradients) {
+            let (value, slope) = self.stops.at(-*v);
+            (*v, *g) = (value, scale(*g, -slope));
+        }
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        self.stops.range(-self.region.bound(b))
+    }
+}
+
+impl Varying for Depth {}

@@ -1,0 +1,68 @@
+//! Stops: a function of one number, given by pairs.
+
+use geometry::fault::Fault;
+use geometry::math::Interval;
+
+/// Pairs `[s, value]`, at least one, finite, s ascending. Between them a function is linear ([`Stops::at`]); before the
+/// first and after the last it is constant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stops(Vec<[f64; 2]>);
+
+impl Stops {
+    /// The stops; `name` is what s is called in errors.
+    ///
+    /// # Errors
+    /// No stop; numbers that are not finite; an s that does not exceed the one before.
+    pub fn new(stops: Vec<[f64; 2]>, name: &str) -> Result<Stops, Fault> {
+        if stops.is_empty() {
+            return Err(Fault::new("stops", format!("found none; give at least one [{name}, value]")));
+        }
+        for (i, [s, v]) in stops.iter().enumerate() {
+            if !s.is_finite() || !v.is_finite() {
+                return Err(Fault::new(
+                    format!("stops[{i}]"),
+                    format!("found [{s}, {v}]; both numbers must be finite"),
+                ));
+            }
+            if i > 0 && *s <= stops[i - 1][0] {
+                let before = stops[i - 1][0];
+                return Err(Fault::new(
+                    format!("stops[{i}]"),
+                    format!("{name} = {s} follows {name} = {before}; {name} must grow from stop to stop"),
+                ));
+            }
+        }
+        Ok(Stops(stops))
+    }
+
+    /// Value and slope of the piecewise linear function at `s`. At a stop, the slope of the piece that begins there.
+    pub fn at(&self, s: f64) -> (f64, f64) {
+        let i = self.0.partition_point(|p| p[0] <= s);
+        match (i.checked_sub(1).and_then(|j| self.0.get(j)), self.0.get(i)) {
+            (Some([s0, v0]), Some([s1, v1])) => {
+                let slope = (v1 - v0) / (s1 - s0);
+                ((v0 + slope * (s - s0)).clamp(v0.min(*v1), v0.max(*v1)), slope)
+            }
+            (Some([_, v]), None) | (None, Some([_, v])) => (*v, 0.0),
+            (None, None) => (f64::NAN, 0.0),
+        }
+    }
+
+    /// An interval that contains every value of the piecewise linear function on an interval: exact but for rounding.
+    pub fn range(&self, s: Interval) -> Interval {
+        if s.lo.is_nan() || s.hi.is_nan() {
+            return Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let mut largest = 0.0f64;
+        let (a, b) = (self.at(s.lo).0, self.at(s.hi).0);
+        let mut r = Interval::new(a.min(b), a.max(b));
+        for [at, v] in &self.0 {
+            largest = largest.max(v.abs());
+            if (s.lo..=s.hi).contains(at) {
+                r = r.union(Interval::new(*v, *v));
+            }
+        }
+        let slack = largest * 4.0 * f64::EPSILON;
+        Interval::new(r.lo - slack, r.hi + slack)
+    }
+}
