@@ -15,6 +15,7 @@ mod region_step;
 mod remapped;
 mod samples;
 mod sigmoid;
+mod steps;
 mod stops;
 
 pub use depth::Depth;
@@ -27,6 +28,7 @@ pub use region_step::region_step;
 pub use remapped::Remapped;
 pub use samples::Samples;
 pub use sigmoid::Sigmoid;
+pub use steps::Steps;
 use stops::Stops;
 
 /// A number that varies in space.
@@ -137,6 +139,7 @@ mod tests {
         vec![
             Grade::Constant(0.3),
             Linear::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
+            Steps::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
             Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
             formula("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)"),
             Radial::new([0.2, 0.1, 0.0], None, stops()).unwrap().into(),

@@ -3,8 +3,8 @@
 use geometry::fault::Fault;
 use geometry::math::Interval;
 
-/// Pairs `[s, value]`, at least one, finite, s ascending. Between them a function is linear ([`Stops::at`]); before the
-/// first and after the last it is constant.
+/// Pairs `[s, value]`, at least one, finite, s ascending. Between them a function is linear ([`Stops::at`]) or constant
+/// ([`Stops::step`]); before the first and after the last it is constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stops(Vec<[f64; 2]>);
 
@@ -36,6 +36,7 @@ impl Stops {
     }
 
     /// Value and slope of the piecewise linear function at `s`. At a stop, the slope of the piece that begins there.
+    #[inline]
     pub fn at(&self, s: f64) -> (f64, f64) {
         let i = self.0.partition_point(|p| p[0] <= s);
         match (i.checked_sub(1).and_then(|j| self.0.get(j)), self.0.get(i)) {
@@ -64,5 +65,27 @@ impl Stops {
         }
         let slack = largest * 4.0 * f64::EPSILON;
         Interval::new(r.lo - slack, r.hi + slack)
+    }
+
+    /// The index of the last stop at or below `s`, else of the first stop.
+    #[inline]
+    fn below(&self, s: f64) -> usize {
+        self.0.partition_point(|p| p[0] <= s).max(1) - 1
+    }
+
+    /// The value of the last stop at or below `s`, else of the first stop.
+    #[inline]
+    pub fn step(&self, s: f64) -> f64 {
+        self.0[self.below(s)][1]
+    }
+
+    /// The least and the greatest value of the piecewise constant function on an interval; exact.
+    pub fn step_range(&self, s: Interval) -> Interval {
+        let taken = match s.lo.is_nan() || s.hi.is_nan() {
+            true => &self.0[..],
+            false => &self.0[self.below(s.lo.min(s.hi))..=self.below(s.hi.max(s.lo))],
+        };
+        let [lo, hi] = taken.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p[1]), h.max(p[1])]);
+        Interval::new(lo, hi)
     }
 }
