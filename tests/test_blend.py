@@ -214,15 +214,15 @@ def test_check_tells_and_draws_the_transitions(tmp_path):
     run = [sys.executable, "-m", "trabecula", "check", str(file)]
     told = subprocess.run(run, capture_output=True, text=True, check=True).stdout
     assert "transition a to b" in told and "neck" in told and "phases locked" in told
-    picture = tmp_path / "bar.png"
+    picture = tmp_path / "bar.svg"
     run += ["--json", "--transitions", str(picture)]
     report = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     assert report["blend"]["transitions"][0]["between"] == ["a", "b"]
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "Transition from a to b" in picture.read_text(encoding="utf-8")
     run = [sys.executable, "-m", "trabecula", "measure", str(file), "--per-cell", "10"]
     told = subprocess.run(run, capture_output=True, text=True, check=True).stdout
     assert "transition a to b" in told and "pieces" in told and "dangling" in told
-    drawn = tmp_path / "measured.png"
+    drawn = tmp_path / "measured.svg"
     run += ["--json", "--transitions", str(drawn)]
     figures = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     # The same grid is looked at, whatever the mesh.

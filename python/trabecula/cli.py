@@ -7,6 +7,7 @@ import math
 import os
 import sys
 
+from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
 from .terminal import interrupts_leave, interrupts_raise, outcome, say
 
 __all__ = ["main"]
@@ -22,13 +23,7 @@ examples:
 exit status: 0 done, 1 the design or a file is wrong, 2 wrong usage.
 Set TRABECULA_DEBUG=1 for the traceback of an internal error.
 """
-DESIGNS = ("toml", "json")
-MESH_OUT = ("stl", "3mf", "ply", "obj")
-MESH_IN = (*MESH_OUT, "off")
-VOXELS_OUT = ("npy", "vti")
 SHOWN = ("angle", "spacing", "density")
-TETS_OUT = ("vtu", "msh", "inp", "med", "mesh")
-TETS_IN = (*TETS_OUT, "vtk", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
 UNITS = ("mm", "micron", "cm", "m", "inch", "foot")
 
 
@@ -96,15 +91,20 @@ def ending(known: tuple[str, ...]):
     """A file name that ends in one of the known extensions."""
 
     def check(text: str) -> str:
-        ext = os.path.splitext(text)[1].lower().lstrip(".")
-        if ext not in known:
-            listed = ", ".join("." + k for k in known)
-            raise argparse.ArgumentTypeError(f"the name must end in {listed}; found {os.path.basename(text)!r}")
+        if kind_of(text) not in known:
+            found = os.path.basename(text)
+            raise argparse.ArgumentTypeError(f"the name must end in {dotted(known)}; found {found!r}")
         return text
 
     return check
 
 
+#: The mesh formats that are written, each with what is particular to it.
+WRITTEN = ", ".join(
+    f".{suffix}" + (f" ({', '.join(words)})" if (words := [w for w in ("binary", "streams") if getattr(row, w)]) else "")
+    for suffix, row in MESHES.items()
+    if row.writes
+)
 DESIGN = "a design file (.toml or .json)"
 JSON = "print the figures as JSON on stdout"
 THREADS = "threads (default: all); the result is the same for any number"
@@ -123,7 +123,7 @@ def design_in(p: argparse.ArgumentParser, text: str = DESIGN) -> None:
 
 def file_in(p: argparse.ArgumentParser) -> None:
     """The design or mesh that a command reads."""
-    p.add_argument("file", type=ending((*DESIGNS, *MESH_IN)), metavar="FILE", help="a design or a mesh file")
+    p.add_argument("file", type=ending((*DESIGNS, *MESH_READS)), metavar="FILE", help="a design or a mesh file")
 
 
 def output(p: argparse.ArgumentParser, known: tuple[str, ...], text: str, needed: bool = True) -> None:
@@ -168,8 +168,8 @@ def lighter(p: argparse.ArgumentParser) -> None:
 
 def drawn_transitions(p: argparse.ArgumentParser) -> None:
     """A drawing of the transitions of a blend."""
-    text = "draw the solid fraction along the transitions of a blend to OUT.png"
-    p.add_argument("--transitions", metavar="OUT", type=ending(("png",)), help=text)
+    text = "draw the solid fraction along the transitions of a blend to OUT.svg"
+    p.add_argument("--transitions", metavar="OUT.svg", type=ending(("svg",)), help=text)
 
 
 def add_new(p: argparse.ArgumentParser) -> None:
@@ -189,7 +189,7 @@ def add_check(p: argparse.ArgumentParser) -> None:
 def add_mesh(p: argparse.ArgumentParser) -> None:
     """Options of ``mesh``."""
     design_in(p)
-    output(p, MESH_OUT, "the mesh to write")
+    output(p, MESH_WRITES, "the mesh to write")
     resolution(p, chord=True)
     text = "connected components other than the largest: keep them with a warning (default), drop them, or refuse"
     p.add_argument("--islands", choices=("keep", "drop", "error"), default="keep", help=text)
@@ -200,8 +200,8 @@ def add_mesh(p: argparse.ArgumentParser) -> None:
 
 def add_simplify(p: argparse.ArgumentParser) -> None:
     """Options of ``simplify``."""
-    p.add_argument("file", type=ending(MESH_IN), metavar="FILE", help="a mesh file, mm")
-    output(p, MESH_OUT, "the mesh to write")
+    p.add_argument("file", type=ending(MESH_READS), metavar="FILE", help="a mesh file, mm")
+    output(p, MESH_WRITES, "the mesh to write")
     lighter(p)
     progress(p)
     json_out(p)
@@ -210,15 +210,15 @@ def add_simplify(p: argparse.ArgumentParser) -> None:
 def add_voxels(p: argparse.ArgumentParser) -> None:
     """Options of ``voxels``."""
     design_in(p)
-    output(p, VOXELS_OUT, "the voxels to write")
+    output(p, VOXEL_WRITES, "the voxels to write")
     resolution(p, "--step")
     json_out(p)
 
 
 def add_tets(p: argparse.ArgumentParser) -> None:
     """Options of ``tets``."""
-    p.add_argument("file", type=ending((*DESIGNS, *TETS_IN)), metavar="FILE", help="a design or a file of tetrahedra")
-    output(p, TETS_OUT, "the mesh to write (.vtu, .msh, .inp, .med, .mesh)", needed=False)
+    p.add_argument("file", type=ending((*DESIGNS, *TET_READS)), metavar="FILE", help="a design or a file of tetrahedra")
+    output(p, TET_WRITES, f"the mesh to write ({dotted(TET_WRITES)})", needed=False)
     p.add_argument("--lattice", metavar="NAME", help="the lattice whose mesh is made (default: the first that has one)")
     p.add_argument("--unit", choices=UNITS, help="unit of a file's coordinates (default: mm)")
     p.add_argument("--split", action="store_true", help="split a file's hexahedra, wedges and pyramids into tetrahedra")
@@ -241,13 +241,13 @@ def add_measure(p: argparse.ArgumentParser) -> None:
     """Options of ``measure``."""
     file_in(p)
     text = "region of the solid fraction: a design, a file with a [region] alone, or a closed mesh in mm"
-    p.add_argument("--region", type=ending((*DESIGNS, *MESH_IN)), metavar="R", help=text)
+    p.add_argument("--region", type=ending((*DESIGNS, *MESH_READS)), metavar="R", help=text)
     resolution(p)
     p.add_argument("--thickness", action="store_true", help="also distributions of wall thickness and pore size")
     text = "voxel edge for the thickness, mm (default: an eighth of the mean wall)"
     p.add_argument("--step", type=length, metavar="MM", help=text)
     text = "draw the distributions (with --thickness)"
-    p.add_argument("--histogram", type=ending(("png",)), metavar="OUT.png", help=text)
+    p.add_argument("--histogram", type=ending(("svg",)), metavar="OUT.svg", help=text)
     text = "also weakly attached fragments of a design: necks under half the lattice's narrowest"
     p.add_argument("--dangling", action="store_true", help=text)
     drawn_transitions(p)
@@ -284,7 +284,7 @@ COMMANDS = {
     "mesh": (
         add_mesh,
         "Mesh a design: closed, oriented, free of self-intersection.",
-        "The name of OUT decides the format: .stl (binary, streamed: memory stays bounded), .3mf, .ply, .obj.\n"
+        f"The name of OUT decides the format: {WRITTEN}. A file that streams needs bounded memory.\n"
         "With --tolerance or --triangles the mesh is held in memory and simplified, whatever the format. --open leaves out\n"
         "the faces on the region's boundary: the lattice's own surface, for shells; not a solid, and not to be printed.\n\n"
         "examples:\n  trabecula mesh part.toml -o part.3mf --edge 0.25\n"
@@ -328,7 +328,7 @@ COMMANDS = {
         "Local thickness is the diameter of the largest ball that fits in and covers a point (Hildebrand, Rueegsegger).\n\n"
         "examples:\n  trabecula measure part.toml --edge 0.25 --json\n"
         "  trabecula measure part.stl --region part.toml\n  trabecula measure part.stl --region hull.stl --json\n"
-        "  trabecula measure part.toml --thickness --step 0.05 --histogram part.png",
+        "  trabecula measure part.toml --thickness --step 0.05 --histogram part.svg",
     ),
     "cells": (
         add_cells,

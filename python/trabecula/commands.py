@@ -14,6 +14,7 @@ from .catalogue import cell_facts
 from .design import load
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
+from .formats import DESIGNS, STREAMS, kind_of
 from .machine import fits
 from .mesh import Mesh
 from .solid import Solid
@@ -23,7 +24,6 @@ from .texts import counted, point, table, voids
 
 __all__ = ["cells", "check", "measure", "mesh", "new", "render", "simplify", "slice", "tets", "voxels"]
 
-DESIGNS = ("toml", "json")
 #: Deviations of a solved map: names on the scale of a picture.
 SHOWN = {"angle": "angle off, degrees", "spacing": "spacing off, ratio", "density": "cells for each one wanted"}
 
@@ -87,7 +87,7 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     lighter = args.tolerance is not None or args.triangles is not None
     options = {**resolution(args), "threads": args.threads, "progress": progress, "islands": args.islands}
     asked = {} if args.chord is None else {"chord": args.chord}
-    streams = not (lighter or args.open) and kind_of(args.output) == "stl"
+    streams = not (lighter or args.open) and kind_of(args.output) in STREAMS
     if streams and (asked or not closes(solid, resolution(args))):
         made = solid.save_stl(args.output, **options).to_dict() | asked
         if made["cavities"]:
@@ -389,11 +389,6 @@ def known_cell(name: str, known: list[str]) -> None:
         near = get_close_matches(name, known, 1)
         hint = f'; did you mean "{near[0]}"?' if near else "."
         raise Refused(f'no cell is named "{name}"{hint} There are: {", ".join(known)}')
-
-
-def kind_of(path: str) -> str:
-    """The extension in small letters."""
-    return os.path.splitext(path)[1].lower().lstrip(".")
 
 
 def same_file(a: str, b: str) -> bool:

@@ -7,14 +7,13 @@ import shutil
 import tempfile
 from typing import TYPE_CHECKING
 
+from .formats import MESHIO_READS, MESHIO_WRITES, TET_READS, dotted, kind_of
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["FORMATS", "read", "write"]
-
-#: Formats that people keep tetrahedra in, beside vtu and vtk.
-FORMATS = ("msh", "inp", "med", "mesh", "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+__all__ = ["read", "write"]
 
 #: VTK's numbers of the cell types that are volumes, by meshio's names.
 VOLUMES = {
@@ -63,11 +62,9 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray, NDArray, NDArray, NDArr
     import io
 
     name = os.fsdecode(path)
-    kind = os.path.splitext(name)[1].lower().lstrip(".")
-    if kind not in FORMATS:
-        raise ValueError(
-            f"{name}: the name must end in .vtu, .vtk, {', '.join('.' + f for f in FORMATS)}; found .{kind or ' none'}"
-        )
+    kind = kind_of(name)
+    if kind not in MESHIO_READS:
+        raise ValueError(f"{name}: the name must end in {dotted(TET_READS)}; found .{kind or ' none'}")
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
     meshio = needed(kind)
@@ -108,9 +105,8 @@ def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uin
     meshio = needed(kind)
     import numpy as np
 
-    names = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
     data = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
-    form = names[kind]
+    form = MESHIO_WRITES[kind]
     whole = zones.astype(np.int32) if len(zones) else np.zeros(len(tets), dtype=np.int32)
     fields = {data[form]: [whole]} if form in data and len(zones) else {}
     if form == "gmsh":

@@ -6,12 +6,13 @@ import contextlib
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from . import _core, terminal
 from .errors import DesignError
+from .formats import dotted, kind_of
 
-__all__ = ["check_place", "extension", "read_text", "special", "whole_file"]
+__all__ = ["check_place", "extension", "read_text", "special", "whole_file", "write_svg"]
 
 #: Names of what is open already.
 OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
@@ -20,11 +21,11 @@ OPEN = re.compile(r"/dev/(std(out|err)|fd/\d+)|/proc/[^/]+/fd/\d+")
 def extension(path: str | os.PathLike[str], known: tuple[str, ...]) -> str:
     """The file name's extension in small letters; one that is not in ``known`` is refused."""
     name = os.fsdecode(path)
-    ext = os.path.splitext(name)[1].lower().lstrip(".")
-    if ext not in known:
-        found = f"found .{ext}" if ext else "found none"
-        raise ValueError(f"{name}: the name must end in {', '.join('.' + k for k in known)}; {found}")
-    return ext
+    kind = kind_of(name)
+    if kind not in known:
+        found = f"found .{kind}" if kind else "found none"
+        raise ValueError(f"{name}: the name must end in {dotted(known)}; {found}")
+    return kind
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -115,6 +116,14 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[str]:
             reason = error.strerror or str(error)
             raise OSError(f"{shown} cannot be written: {reason}") from error
         raise
+
+
+def write_svg(path: str | os.PathLike[str], drawing: Callable[[], str]) -> None:
+    """Writes a drawing to a .svg file."""
+    extension(path, ("svg",))
+    text = drawing()
+    with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
+        out.write(text)
 
 
 def _permissions(temporary: str, real: str) -> None:

@@ -7,16 +7,14 @@ import os
 
 from . import _core
 from .files import check_place, special
+from .formats import MESHES
 
 __all__ = ["file_size", "fits"]
-
-#: Bytes of a file for each triangle and each vertex; those of text as they come out for parts of some hundred mm.
-SIZES = {"stl": (50, 0), "ply": (13, 24), "obj": (27, 50), "3mf": (7, 9)}
 
 
 def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
     """Bytes of a mesh file. A closed surface has half as many vertices as triangles."""
-    per_triangle, per_vertex = SIZES[kind]
+    per_triangle, per_vertex = MESHES[kind].bytes
     return 1000 + per_triangle * triangles + per_vertex * (triangles / 2 if vertices is None else vertices)
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from . import _core
 from .files import extension, read_text, whole_file
+from .formats import DESIGNS, MESH_READS, MESH_WRITES
 from .given import number, positive, whole
 from .machine import file_size, fits
 from .thickness import Thickness
@@ -31,12 +32,10 @@ if TYPE_CHECKING:
     )
     from .solid import Solid
 
-__all__ = ["READS", "WRITES", "Mesh"]
+__all__ = ["Mesh"]
 
-WRITES = ("stl", "3mf", "ply", "obj")
 #: Pairs of triangles after which self-intersections are counted no further.
 MANY = 1_000_000
-READS = ("stl", "3mf", "ply", "obj", "off")
 
 
 class Picture:
@@ -106,7 +105,7 @@ class Mesh(Picture):
         Corners of an STL file that differ by no more than single precision rounds are one, if it would not be closed else.
         """
         name = os.fsdecode(path)
-        kind = extension(name, READS)
+        kind = extension(name, MESH_READS)
         data = _core.read_file(name)
         try:
             return Mesh(_core.Mesh.read(data, kind))
@@ -360,7 +359,7 @@ class Mesh(Picture):
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh: .stl (binary), .3mf, .ply (binary) or .obj, in any letter case."""
-        kind = extension(path, WRITES)
+        kind = extension(path, MESH_WRITES)
         vertices, triangles = self._core.counts
         fits(file_size(kind, triangles, vertices), f"{triangles:.3g} triangles", path)
         title = "Lattice part"  # not the file's name: the same solid is the same bytes
@@ -437,7 +436,7 @@ def _revived(state: tuple, known: dict) -> Mesh:
 def _region_of_file(name: str) -> _core.Region:
     """The region in a file: a design, a region alone, or a mesh."""
     folder = os.path.dirname(os.path.abspath(name))
-    kind = extension(name, ("toml", "json", *READS))
-    if kind in READS:
+    kind = extension(name, (*DESIGNS, *MESH_READS))
+    if kind in MESH_READS:
         return _core.Region.from_data({"region": {"mesh": {"path": os.path.abspath(name)}}}, folder)
     return _core.Region.from_text(read_text(name), kind == "json", name, folder)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from . import _core
-from .files import extension, whole_file
+from .files import write_svg
 from .given import number, positive, three, whole
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -158,10 +158,7 @@ class Slice:
 
     def write(self, path: str | os.PathLike[str], chord: float = 0.01) -> None:
         """Writes the drawing (.svg)."""
-        extension(path, ("svg",))
-        drawn = self.svg(chord)
-        with whole_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-            out.write(drawn)
+        write_svg(path, lambda: self.svg(chord))
 
 
 def _points(name: str, given: ArrayLike) -> NDArray[np.float64]:

@@ -97,7 +97,7 @@ def mesh(
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
 ) -> dict:
-    """A triangle mesh from a file (stl, obj, ply, off, 3mf).
+    """A triangle mesh from a file (stl, 3mf, ply, obj, off).
 
     path: Path of the file, relative to the design file.
     unit: Unit of the file's coordinates (mm unless given); a 3MF file names its own. [optional]

@@ -11,10 +11,11 @@ from functools import cached_property
 from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
+from .formats import MESH_WRITES, VOXEL_WRITES
 from .given import positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits
-from .mesh import WRITES, Mesh, Picture
+from .mesh import Mesh, Picture
 from .quadors import Quadors
 from .thickness import Thickness
 from .transition import Transitions
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Solid", "Voxels"]
 
-VOXEL_FORMATS = ("npy", "vti")
 PER_CELL = 32
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
@@ -298,7 +298,7 @@ class Solid(Picture):
         """Raises ValueError if the disk has no room for the mesh file ``path`` at this spacing; meshes nothing."""
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing).triangles
-        size = file_size(extension(path, WRITES), need)
+        size = file_size(extension(path, MESH_WRITES), need)
         fits(size, f"{need:.3g} triangles", path, spacing, coarsest=self.wavelength / 2)
 
     def save_stl(
@@ -405,7 +405,7 @@ class Voxels:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the voxels: .npy (indexed [x, y, z]) or .vti (an image for ParaView, with origin and step)."""
-        kind = extension(path, VOXEL_FORMATS)
+        kind = extension(path, VOXEL_WRITES)
         count = math.prod(self.shape)
         fits(1000.0 + count, f"{count:.3g} voxels", path, self.step, 3, "step")
         with whole_file(path) as temporary:

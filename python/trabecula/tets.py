@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from . import _core
 from .design import Design
-from .elements import FORMATS
 from .errors import DesignError, DesignWarning
 from .files import extension, read_text, whole_file
+from .formats import TET_READS, TET_WRITES
 from .given import whole
 from .mesh import Mesh, Picture
 
@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
     from .reports import TetMeshReport
 
-__all__ = ["READS", "WRITES", "TetMesh"]
-
-READS = ("vtu", "vtk", *FORMATS)
-WRITES = ("vtu", "msh", "inp", "med", "mesh")
+__all__ = ["TetMesh"]
 
 
 class TetMesh(Picture):
@@ -66,7 +63,7 @@ class TetMesh(Picture):
         Raises ValueError for what is no conforming mesh: inverted or flat tetrahedra, hanging nodes, nodes in one place.
         """
         name = os.path.abspath(os.fsdecode(path))
-        extension(name, READS)
+        extension(name, TET_READS)
         try:
             return made_of(_core.TetMesh.read(name, os.getcwd(), unit, split))
         except DesignError as error:
@@ -128,7 +125,7 @@ class TetMesh(Picture):
         """Writes the mesh: vtu (with ``least_dihedral`` and ``size`` of each tetrahedron); with the extra ``fe`` msh, inp, med,
         mesh.
         """
-        kind = extension(path, WRITES)
+        kind = extension(path, TET_WRITES)
         if kind == "vtu":
             with whole_file(path) as temporary:
                 self._core.write_vtu(temporary)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-from functools import cached_property
 
-from . import _core
-from .files import extension, whole_file
+from .files import write_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -50,25 +48,23 @@ class Thickness:
         """``wall_thickness`` and ``pore_size``: minimum, 5th percentile, mean, standard deviation, maximum, histogram, mm."""
         return self._report
 
-    def png(self) -> bytes:
-        """The histograms as the bytes of a PNG file."""
-        named = [("wall thickness, mm", self.wall), ("pore size, mm", self.pore)]
-        drawn = [
-            (title, it["histogram"]["edges"], it["histogram"]["share"], [], [(k, it[k]) for k in ("min", "p05", "mean")])
-            for title, it in named
-            if it
-        ]
-        return _core.charts(drawn, 960, 480 * len(drawn))
+    def svg(self) -> str:
+        """The histograms as the text of an SVG file, the share of the volume over the thickness."""
+        from .chart import Chart, svg
 
-    @cached_property
-    def _png(self) -> bytes:
-        return self.png()
+        def chart(title: str, of: str, it: ThicknessSpread) -> Chart:
+            facts = f"mean {it.mean:.3g} ± {it.sd:.2g} mm, from {it.min:.3g} to {it.max:.3g} mm; accuracy {it.accuracy:.2g} mm"
+            marks = [("minimum", it.min), ("5th percentile", it.p05), ("mean", it.mean)]
+            named = [(f"{name} {at:.3g} mm", at) for name, at in marks]
+            across, up = f"{title.lower()}, mm", f"share of the {of} volume, %"
+            return Chart(title, facts, across, up, it.histogram.edges, it.histogram.share, named)
 
-    def _repr_png_(self) -> bytes:
-        return self._png
+        drawn = [chart("Wall thickness", "solid", self.wall)]
+        return svg(drawn + ([chart("Pore size", "pore", self.pore)] if self.pore else []))
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
 
     def render(self, path: str | os.PathLike[str]) -> None:
-        """Writes the histograms to a .png file."""
-        extension(path, ("png",))
-        with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png())
+        """Writes the histograms to a .svg file."""
+        write_svg(path, self.svg)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 
-from . import _core
-from .files import extension, whole_file
+from .files import extension, write_svg
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -33,42 +33,48 @@ class Transitions(Sequence):
     def __repr__(self) -> str:
         return f"<trabecula.Transitions {', '.join(' to '.join(t.between) for t in self) or 'none'}>"
 
-    def png(self) -> bytes:
-        """The fraction found along each transition as bars, what was asked for as a line across each: a PNG file's bytes."""
-        drawn = []
-        for it in self:
-            rows = it.fractions
-            first, second = it.between
-            half = 0.5 / 10  # rows are tenths
-            edges, found, asked, at = [0.0], [], [], 0.0
-            for row in rows:
-                low = row.share - half
-                if low > at + half:  # tenths without sample points
-                    edges.append(low)
-                    found.append(0.0)
-                    asked.append(0.0)
-                at = row.share + half
-                edges.append(at)
-                found.append(row.found)
-                asked.append(row.asked or 0.0)
-            worst = off(it)
-            words = "found" if worst is None else f"found, line: asked for, off by {worst:+.3f} at most"
-            neck = f"neck {it.neck.diameter:.3g} mm" if it.neck else "not connected"
-            loose, dangling = it.loose.bodies, it.dangling.bodies
-            title = f"share of {second} against {first}. solid fraction {words}"
-            drawn.append((title, edges, found, asked, [(f"{neck}, {loose} loose, {dangling} dangling; half at", 0.5)]))
-        return _core.charts(drawn, 960, 480 * len(drawn))
+    def svg(self) -> str:
+        """The fraction found along each transition as bars, what was asked for as a line across each: an SVG file's text."""
+        from .chart import Chart, svg
 
-    def _repr_png_(self) -> bytes | None:
-        return self.png() if self._found else None
+        return svg([Chart(**_chart(it)) for it in self])
+
+    def _repr_svg_(self) -> str | None:
+        return self.svg() if self._found else None
 
     def render(self, path: str | os.PathLike[str]) -> None:
-        """Writes the fractions along the transitions to a .png file."""
-        extension(path, ("png",))
+        """Writes the fractions along the transitions to a .svg file."""
+        extension(path, ("svg",))
         if not self._found:
             raise ValueError("there is no transition: the design has no blend, or one lattice alone counts everywhere")
-        with whole_file(path) as temporary, open(temporary, "wb") as out:
-            out.write(self.png())
+        write_svg(path, self.svg)
+
+
+def _chart(it: TransitionReport) -> dict:
+    first, second = it.between
+    half = 0.5 / 10  # rows are tenths
+    edges, found, asked = [0.0], [], []
+    for row in it.fractions:
+        if row.share - half > edges[-1] + half:  # tenths without sample points
+            edges.append(row.share - half)
+            found.append(0.0)
+            asked.append(math.nan)
+        edges.append(row.share + half)
+        found.append(row.found)
+        asked.append(math.nan if row.asked is None else row.asked)
+    worst = off(it)
+    error = "" if worst is None else f"line: asked for, off by {worst:+.3f} at most; "
+    neck = f"neck {it.neck.diameter:.3g} mm" if it.neck else "not connected"
+    return {
+        "title": f"Transition from {first} to {second}",
+        "facts": f"{error}{neck}, {it.loose.bodies} loose, {it.dangling.bodies} dangling",
+        "across": f"share of {second} (0 is {first} alone)",
+        "up": "solid fraction, %",
+        "edges": edges,
+        "share": found,
+        "asked": asked,
+        "marks": [("equal shares", 0.5)],
+    }
 
 
 def off(transition: TransitionReport) -> float | None:

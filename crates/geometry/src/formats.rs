@@ -31,10 +31,105 @@ pub use vti::write_vti;
 pub use vtk::{Array, Data, Shape, read_vtk};
 pub use vtu::write_vtu;
 
-/// Extensions of the mesh formats that can be read.
-pub const READABLE: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
-/// Extensions of the mesh formats that can be written.
-pub const WRITABLE: [&str; 4] = ["stl", "ply", "obj", "3mf"];
+/// A format of mesh files. A new one is a file in this folder and a row in [`FORMATS`].
+pub struct Format {
+    /// End of the file's name, in small letters, without the dot.
+    pub suffix: &'static str,
+    /// Whether coordinates are in mm once read, because files name their unit.
+    pub in_mm: bool,
+    /// Whether each triangle of a file has corners of its own, in single precision: what belongs together has to be found.
+    pub soup: bool,
+    /// Reads a file.
+    read: fn(&[u8]) -> Result<Mesh, Fault>,
+    /// How files are written, if they are.
+    pub writer: Option<Writer>,
+}
+
+/// How files of a format are written.
+pub struct Writer {
+    /// Whether numbers are bytes rather than text.
+    pub binary: bool,
+    /// Whether a solid can be written while it is meshed, in bounded memory.
+    pub streams: bool,
+    /// Bytes of a file for each triangle and each vertex; those of text for parts of some hundred mm.
+    pub bytes: [f64; 2],
+    /// Writes a file.
+    write: fn(&Mesh, &Metadata, &mut dyn io::Write) -> io::Result<()>,
+}
+
+/// The mesh formats, in the order in which texts name them.
+pub const FORMATS: &[Format] = &[
+    Format {
+        suffix: "stl",
+        in_mm: false,
+        soup: true,
+        read: stl::read,
+        writer: Some(Writer {
+            binary: true,
+            streams: true,
+            bytes: [50.0, 0.0],
+            write: |mesh, _, mut out| stl::write(mesh, &mut out),
+        }),
+    },
+    Format {
+        suffix: "3mf",
+        in_mm: true,
+        soup: false,
+        read: threemf::read,
+        writer: Some(Writer {
+            binary: false,
+            streams: false,
+            bytes: [7.0, 9.0],
+            write: |mesh, meta, mut out| threemf::write(mesh, meta, &mut out),
+        }),
+    },
+    Format {
+        suffix: "ply",
+        in_mm: false,
+        soup: false,
+        read: |bytes| ply::read(without_mark(bytes)),
+        writer: Some(Writer {
+            binary: true,
+            streams: false,
+            bytes: [13.0, 24.0],
+            write: |mesh, _, mut out| ply::write(mesh, &mut out),
+        }),
+    },
+    Format {
+        suffix: "obj",
+        in_mm: false,
+        soup: false,
+        read: |bytes| obj::read(without_mark(bytes)),
+        writer: Some(Writer {
+            binary: false,
+            streams: false,
+            bytes: [27.0, 50.0],
+            write: |mesh, meta, mut out| obj::write(mesh, meta, &mut out),
+        }),
+    },
+    Format { suffix: "off", in_mm: false, soup: false, read: |bytes| off::read(without_mark(bytes)), writer: None },
+];
+
+impl Format {
+    /// The format with a suffix, in any letter case.
+    pub fn of(suffix: &str) -> Option<&'static Format> {
+        FORMATS.iter().find(|f| f.suffix.eq_ignore_ascii_case(suffix))
+    }
+
+    /// The suffixes of all formats, for messages: "stl, 3mf, …".
+    pub fn listed() -> String {
+        suffixes(FORMATS.iter())
+    }
+}
+
+fn suffixes(of: impl Iterator<Item = &'static Format>) -> String {
+    of.map(|f| f.suffix).collect::<Vec<_>>().join(", ")
+}
+
+/// Text without the byte order mark that some editors put before it.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
 
 /// What a mesh file held.
 #[derive(Clone, Debug)]
@@ -45,35 +140,23 @@ pub struct Loaded {
     pub in_mm: bool,
 }
 
-fn unknown(extension: &str, known: &[&str]) -> String {
-    let found = if extension.is_empty() { "no extension".to_string() } else { format!("extension \"{extension}\"") };
-    format!("{found}: known mesh formats are {}", known.join(", "))
+fn unknown(suffix: &str, known: &str) -> String {
+    let found = if suffix.is_empty() { "no extension".to_string() } else { format!("extension \"{suffix}\"") };
+    format!("{found}: known mesh formats are {known}")
 }
 
-/// Reads a mesh from the bytes of a file whose name ends in `extension` (any letter case, no dot): stl, obj, ply,
-/// off, 3mf.
+/// Reads a mesh from the bytes of a file whose name ends in `suffix` (any letter case, no dot): one of [`FORMATS`].
 ///
 /// Polygons become fans of triangles; vertices that no face uses are dropped.
 ///
-/// **Errors**: an unknown extension; an empty, truncated or malformed file (with line or byte); coordinates that
+/// **Errors**: an unknown suffix; an empty, truncated or malformed file (with line or byte); coordinates that
 /// are not finite; indices out of range; a file without faces.
-pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
-    let kind = extension.to_ascii_lowercase();
-    if !READABLE.contains(&kind.as_str()) {
-        return Err(Fault::new("", unknown(extension, &READABLE)));
-    }
+pub fn read_mesh(bytes: &[u8], suffix: &str) -> Result<Loaded, Fault> {
+    let format = Format::of(suffix).ok_or_else(|| Fault::new("", unknown(suffix, &Format::listed())))?;
     if bytes.is_empty() {
         return Err(Fault::new("", "the file is empty (0 bytes)"));
     }
-    // Some editors put a byte order mark before text.
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mesh = match kind.as_str() {
-        "stl" => stl::read(bytes),
-        "obj" => obj::read(text),
-        "ply" => ply::read(text),
-        "off" => off::read(text),
-        _ => threemf::read(bytes),
-    };
+    let mesh = (format.read)(bytes);
     let wide = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
     let mesh = mesh.map_err(|f| match wide {
         true => Fault::new("", "the file is text in UTF-16; save it as UTF-8"),
@@ -82,7 +165,7 @@ pub fn read_mesh(bytes: &[u8], extension: &str) -> Result<Loaded, Fault> {
     if mesh.triangles.is_empty() {
         return Err(Fault::new("", "the file holds no triangle"));
     }
-    Ok(Loaded { mesh, in_mm: kind == "3mf" })
+    Ok(Loaded { mesh, in_mm: format.in_mm })
 }
 
 /// Facts written into formats that carry metadata.
@@ -96,17 +179,17 @@ pub struct Metadata {
     pub application: String,
 }
 
-/// Writes a mesh in the format of `extension` (any letter case, no dot): stl (binary), ply (binary), obj, 3mf.
+/// Writes a mesh in the format of `suffix` (any letter case, no dot): one of [`FORMATS`] that has a writer.
 ///
 /// The bytes do not depend on the number of threads.
 ///
-/// **Errors**: whatever `out` reports, unchanged; `InvalidInput` for an unknown extension, an index out of range, a
+/// **Errors**: whatever `out` reports, unchanged; `InvalidInput` for an unknown suffix, an index out of range, a
 /// coordinate that is not finite in single precision, or more triangles or vertices than the format can count.
-pub fn write_mesh<W: io::Write>(mesh: &Mesh, extension: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    let kind = extension.to_ascii_lowercase();
-    if !WRITABLE.contains(&kind.as_str()) {
-        return Err(invalid(unknown(extension, &WRITABLE)));
-    }
+pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out: &mut W) -> io::Result<()> {
+    let Some(writer) = Format::of(suffix).and_then(|f| f.writer.as_ref()) else {
+        let written = FORMATS.iter().filter(|f| f.writer.is_some());
+        return Err(invalid(unknown(suffix, &suffixes(written))));
+    };
     let count = mesh.vertices.len();
     if let Some(i) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= count)) {
         return Err(invalid(format!("triangle {i} is {:?}, but there are {count} vertices", mesh.triangles[i])));
@@ -115,12 +198,7 @@ pub fn write_mesh<W: io::Write>(mesh: &Mesh, extension: &str, meta: &Metadata, o
     if let Some(i) = mesh.vertices.par_iter().position_first(outside) {
         return Err(invalid(format!("vertex {i} at {:?} is not finite in single precision", mesh.vertices[i])));
     }
-    match kind.as_str() {
-        "stl" => stl::write(mesh, out),
-        "ply" => ply::write(mesh, out),
-        "obj" => obj::write(mesh, meta, out),
-        _ => threemf::write(mesh, meta, out),
-    }
+    (writer.write)(mesh, meta, out)
 }
 
 fn invalid(message: String) -> io::Error {
@@ -187,19 +265,24 @@ mod tests {
     #[test]
     fn extensions_in_any_case_and_unknown_ones_named() {
         let mesh = tetrahedron();
-        for kind in WRITABLE {
+        for format in FORMATS {
             let mut bytes = Vec::new();
-            let upper = kind.to_uppercase();
-            write_mesh(&mesh, &upper, &Metadata::default(), &mut bytes).unwrap();
+            let upper = format.suffix.to_uppercase();
+            let written = write_mesh(&mesh, &upper, &Metadata::default(), &mut bytes);
+            assert_eq!(written.is_ok(), format.writer.is_some());
+            if let Err(e) = written {
+                assert_eq!(e.to_string(), "extension \"OFF\": known mesh formats are stl, 3mf, ply, obj");
+                continue;
+            }
             let back = read_mesh(&bytes, &upper).unwrap();
-            assert_eq!(back.mesh.volume(), mesh.volume(), "{kind}");
-            assert_eq!(back.in_mm, kind == "3mf");
+            assert_eq!(back.mesh.volume(), mesh.volume(), "{upper}");
+            assert_eq!(back.in_mm, upper == "3MF");
         }
         let fault = read_mesh(b"x", "step").unwrap_err();
-        assert_eq!(fault.message, "extension \"step\": known mesh formats are stl, obj, ply, off, 3mf");
+        assert_eq!(fault.message, "extension \"step\": known mesh formats are stl, 3mf, ply, obj, off");
         assert!(write_mesh(&mesh, "", &Metadata::default(), &mut Vec::new()).is_err());
-        for kind in READABLE {
-            assert_eq!(read_mesh(b"", kind).unwrap_err().message, "the file is empty (0 bytes)");
+        for format in FORMATS {
+            assert_eq!(read_mesh(b"", format.suffix).unwrap_err().message, "the file is empty (0 bytes)");
         }
     }
 

@@ -15,7 +15,7 @@
 //!   near each other; [`union_find`] joins sets.
 //! - **Symmetry**: [`symmetry`] has the 230 space groups by Hall symbol; [`math`] has vectors, matrices and intervals,
 //!   [`cubic_spline`] tricubic interpolation on grids.
-//! - **Pictures**: [`render`] draws meshes and charts.
+//! - **Pictures**: [`render`] draws meshes.
 //!
 //! A part with a hole, from its file to a lighter one:
 //!

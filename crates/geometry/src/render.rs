@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
-mod chart;
 mod font;
 mod paper;
 mod png;
@@ -13,7 +12,6 @@ mod raster;
 mod shade;
 mod tint;
 
-pub use chart::{Chart, charts};
 use paper::Paper;
 pub use png::png;
 use raster::Raster;

@@ -20,8 +20,6 @@ mod voxels;
 
 /// Rotations and translations.
 type Operations = Vec<([[i32; 3]; 3], [i32; 3])>;
-/// Title, edges, shares, marks.
-type Histogram = (String, Vec<f64>, Vec<f64>, Vec<f64>, Vec<(String, f64)>);
 /// For each part, intervals of the fraction.
 type Connected = Vec<(&'static str, Vec<[f64; 2]>)>;
 /// Name, title, group, aspect; nodes and beams of a cell; its valences; Maxwell's count; length of the beams.
@@ -42,12 +40,12 @@ type BeamCell = (
 mod _core {
     use pyo3::prelude::*;
 
-    use crate::{BeamCell, Connected, Histogram, Operations};
+    use crate::{BeamCell, Connected, Operations};
 
     #[pymodule_export]
     use crate::design::Design;
     #[pymodule_export]
-    use crate::mesh::Mesh;
+    use crate::mesh::{Mesh, MeshFormat};
     #[pymodule_export]
     use crate::quadors::{Quadors, Slice};
     #[pymodule_export]
@@ -84,24 +82,10 @@ mod _core {
         crate::machine::free_memory(&root)
     }
 
-    /// Histograms one above the other as PNG bytes: (title, edges, shares, what these are held against or nothing, marks).
+    /// The mesh formats, in the order in which texts name them.
     #[pyfunction]
-    fn charts<'py>(
-        py: Python<'py>,
-        charts: Vec<Histogram>,
-        width: usize,
-        height: usize,
-    ) -> PyResult<Bound<'py, pyo3::types::PyBytes>> {
-        use geometry::render::{self, Chart};
-        let bytes = crate::run::run(py, None, None, |_| {
-            let charts: Vec<Chart> = charts
-                .into_iter()
-                .map(|(title, edges, share, wanted, marks)| Chart { title, edges, share, wanted, marks })
-                .collect();
-            let size = [width, height];
-            render::png(&render::charts(&charts, size), size)
-        })?;
-        Ok(pyo3::types::PyBytes::new(py, &bytes))
+    fn mesh_formats() -> Vec<MeshFormat> {
+        geometry::formats::FORMATS.iter().map(MeshFormat::of).collect()
     }
 
     /// The JSON Schema of a design, as JSON text.

@@ -30,6 +30,34 @@ pub struct Mesh {
     design: String,
 }
 
+/// A row of the table of mesh formats.
+#[pyclass(frozen, get_all)]
+pub struct MeshFormat {
+    /// End of the file's name.
+    suffix: &'static str,
+    /// Whether meshes are written in it.
+    writes: bool,
+    /// Whether numbers are bytes rather than text in what is written.
+    binary: bool,
+    /// Whether a solid can be written while it is meshed.
+    streams: bool,
+    /// Bytes of a file for each triangle and each vertex.
+    bytes: [f64; 2],
+}
+
+impl MeshFormat {
+    pub fn of(row: &formats::Format) -> Self {
+        let writer = row.writer.as_ref();
+        MeshFormat {
+            suffix: row.suffix,
+            writes: writer.is_some(),
+            binary: writer.is_some_and(|w| w.binary),
+            streams: writer.is_some_and(|w| w.streams),
+            bytes: writer.map_or([0.0; 2], |w| w.bytes),
+        }
+    }
+}
+
 impl Mesh {
     pub fn new(surface: SurfaceMesh, design: String) -> Self {
         Mesh { surface, split: true, design }
@@ -47,7 +75,7 @@ impl Mesh {
     /// Reads the bytes of a mesh file; `extension` names the format.
     #[staticmethod]
     fn read(py: Python<'_>, bytes: &[u8], extension: &str) -> PyResult<Mesh> {
-        let by_place = extension.eq_ignore_ascii_case("stl");
+        let by_place = formats::Format::of(extension).is_some_and(|f| f.soup);
         let read = run(py, None, None, |_| match formats::read_mesh(bytes, extension) {
             Ok(loaded) if by_place => Ok(loaded.mesh.joined_where_open()),
             Ok(loaded) => Ok(loaded.mesh),

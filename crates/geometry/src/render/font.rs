@@ -1,4 +1,4 @@
-//! Letters of five by seven dots, enough for the words and numbers of a chart.
+//! Letters of five by seven dots, enough for the words and numbers of a colour scale.
 
 /// Dots across and down.
 pub(super) const WIDE: usize = 5;

@@ -89,7 +89,7 @@ pub struct TetCellSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileCellSpec {
-    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, obj, ply, off, 3mf), whose bounds are the
+    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, 3mf, ply, obj, off), whose bounds are the
     /// cell and whose inside has the value 1, the outside 0.
     pub path: String,
     /// How many waves are kept.

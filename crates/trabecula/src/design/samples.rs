@@ -43,7 +43,7 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
             wrong(Fault::new("", message))
         })?;
         (shape, values)
-    } else if formats::READABLE.contains(&kind.as_str()) {
+    } else if formats::Format::of(&kind).is_some() {
         let mesh = formats::read_mesh(&file, &kind).map_err(wrong)?.mesh;
         let solid = MeshRegion::new(mesh, Repair::Auto).map_err(wrong)?;
         let (b, size) = (solid.bounds(), solid.bounds().size());
@@ -56,7 +56,7 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
         let inside = |v: &f64| if *v < 0.0 { 1.0 } else { 0.0 };
         ([CELL; 3], values.iter().map(inside).collect())
     } else {
-        let known = formats::READABLE.join(", ");
+        let known = formats::Format::listed();
         let message = format!("the name must end in npy, {known}; found \"{}\"", spec.path);
         return Err(DesignError::new(at, message).found(&spec.path));
     };

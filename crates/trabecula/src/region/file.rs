@@ -12,10 +12,7 @@ use geometry::repair::Repair;
 /// A mesh without a unit that is smaller than this (mm) is warned of: no part with a lattice in it is.
 const SMALL: f64 = 1.0;
 
-/// Mesh formats a region may come from.
-const FORMATS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
-
-/// A triangle mesh from a file (stl, obj, ply, off, 3mf).
+/// A triangle mesh from a file (stl, 3mf, ply, obj, off).
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Mesh", noun = "a mesh")]
 pub struct MeshFile {
@@ -44,8 +41,9 @@ pub enum RepairKind {
 impl Build for MeshFile {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let extension = self.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
-        if !FORMATS.contains(&extension.as_str()) {
-            let message = format!("the name must end in one of {}; found \"{}\"", FORMATS.join(", "), self.path);
+        if formats::Format::of(&extension).is_none() {
+            let known = formats::Format::listed();
+            let message = format!("the name must end in one of {known}; found \"{}\"", self.path);
             return Err(Fault::new("path", message).found(&self.path));
         }
         self.valid()?;

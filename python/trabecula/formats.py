@@ -1,0 +1,36 @@
+"""File formats by the end of the name: what each command and method reads and writes. Meshes are the core's table."""
+
+from __future__ import annotations
+
+import os
+
+from . import _core
+
+__all__ = [
+    *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "STREAMS", "TET_READS", "TET_WRITES"),
+    *("VOXEL_WRITES", "dotted", "kind_of"),
+]
+
+DESIGNS = ("toml", "json")
+#: The mesh formats by suffix.
+MESHES = {row.suffix: row for row in _core.mesh_formats()}
+MESH_READS = tuple(MESHES)
+MESH_WRITES = tuple(suffix for suffix, row in MESHES.items() if row.writes)
+#: Mesh formats into which a solid is written while it is meshed.
+STREAMS = tuple(suffix for suffix, row in MESHES.items() if row.streams)
+VOXEL_WRITES = ("npy", "vti")
+#: Formats of tetrahedra that meshio reads and writes, by the names it has for those that are written.
+MESHIO_WRITES = {"msh": "gmsh", "inp": "abaqus", "med": "med", "mesh": "medit"}
+MESHIO_READS = (*MESHIO_WRITES, "meshb", "bdf", "nas", "fem", "e", "exo", "xdmf", "cgns", "ugrid", "su2", "avs")
+TET_READS = ("vtu", "vtk", *MESHIO_READS)
+TET_WRITES = ("vtu", *MESHIO_WRITES)
+
+
+def kind_of(path: str) -> str:
+    """The suffix in small letters, without the dot."""
+    return os.path.splitext(path)[1].lower().lstrip(".")
+
+
+def dotted(suffixes: tuple[str, ...]) -> str:
+    """Suffixes for a message: ".stl, .3mf, …"."""
+    return ", ".join("." + s for s in suffixes)
