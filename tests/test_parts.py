@@ -14,6 +14,7 @@ import numpy as np
 import parts
 import pytest
 import trabecula as lt
+from trabecula.formats import MESH_READS, kind_of
 
 EVERYTHING = "TRABECULA_CAMPAIGN" in os.environ
 WAVELENGTH = 3.6
@@ -155,7 +156,7 @@ def test_damaged_parts_are_filled_alike(tmp_path, name, damage, cell, skin):
 
 
 FOLDER = Path(os.environ["TRABECULA_PARTS"]) if "TRABECULA_PARTS" in os.environ else None
-FILES = sorted(p for p in FOLDER.iterdir() if p.suffix.lower() in (".stl", ".obj", ".ply", ".off", ".3mf")) if FOLDER else []
+FILES = sorted(p for p in FOLDER.iterdir() if kind_of(p) in MESH_READS) if FOLDER else []
 
 
 @quiet

@@ -11,21 +11,19 @@ from contextlib import contextmanager
 from . import beams as unit_cells
 from . import cell
 from .catalogue import cell_facts
+from .cli import SHOWN
 from .design import load
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
-from .formats import DESIGNS, STREAMS, kind_of
+from .formats import DESIGNS, MESH_READS, STREAMS, kind_of
 from .machine import fits
 from .mesh import Mesh
 from .solid import Solid
 from .starter import STARTER
 from .terminal import Progress, figure, say
-from .texts import counted, point, table, voids
+from .texts import counted, intervals, point, table, voids
 
 __all__ = ["cells", "check", "measure", "mesh", "new", "render", "simplify", "slice", "tets", "voxels"]
-
-#: Deviations of a solved map: names on the scale of a picture.
-SHOWN = {"angle": "angle off, degrees", "spacing": "spacing off, ratio", "density": "cells for each one wanted"}
 
 
 def new(args) -> None:
@@ -35,7 +33,8 @@ def new(args) -> None:
         raise Refused(f"{args.file} exists; choose another name, or replace it with --force")
     check_place(args.file)
     with whole_file(args.file) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        out.write(STARTER.format(cell=args.cell, file=os.path.basename(args.file)))
+        meshes = "/".join(MESH_READS).upper()
+        out.write(STARTER.format(cell=args.cell, file=os.path.basename(args.file), meshes=meshes))
     say(f"{args.file} written; next: trabecula check {args.file}")
 
 
@@ -336,18 +335,13 @@ def cells(args) -> None:
         print("\n".join(f"  {line}" for line in words(it)))
 
 
-def intervals(of: list[list[float]]) -> str:
-    """Intervals of fractions."""
-    return " and ".join(f"{a:.4f} to {b:.4f}" for a, b in of) or "never"
-
-
 def cell_words(it: dict):
     """A periodic cell."""
     yield f"f       {it['formula']}"
     yield f"group   {it['group']}"
     yield f"range   {it['range'][0]:.6g} to {it['range'][1]:.6g}"
     for part, whole in it["connected_fraction"].items():
-        yield f"{part:7} in one piece at fractions {intervals(whole)}"
+        yield f"{part:7} in one piece at fractions {intervals(whole) or 'never'}"
     yield f"source  {it['source']}"
 
 
@@ -360,7 +354,7 @@ def tet_cell_words(it: dict):
     yield f"part    {it['part']} at fraction {it['fraction']:g} (iso {it['iso']:.4f})"
     yield f"faces   {counted(it['ports'], 'port')} on each, {100 * it['face_fraction']:.1f} % of it"
     for part, whole in it["connected_fraction"].items():
-        yield f"{part:7} in one piece that reaches all faces at fractions {intervals(whole)}"
+        yield f"{part:7} in one piece that reaches all faces at fractions {intervals(whole) or 'never'}"
 
 
 def unit_cell_words(it: dict):

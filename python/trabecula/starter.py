@@ -10,7 +10,7 @@ STARTER = """\
 schema = 1
 units  = "mm"
 
-# Where the part may be. Other regions: cylinder, sphere, mesh (a closed STL, OBJ, PLY, OFF or 3MF file),
+# Where the part may be. Other regions: cylinder, sphere, mesh (a closed {meshes} file),
 # union, intersection, difference, offset. For a part of your own:
 #   [region.mesh]
 #   path = "part.stl"

@@ -8,7 +8,7 @@ from typing import Any
 from .record import Report
 from .terminal import figure, span
 
-__all__ = ["counted", "point", "table", "text", "voids"]
+__all__ = ["counted", "intervals", "point", "table", "text", "voids"]
 
 
 def text(report: Report) -> str:
@@ -40,8 +40,9 @@ def _range(v: list[float]) -> str:
     return span(v[0] if v[0] == v[1] else v)
 
 
-def _whole(intervals: list[list[float]]) -> str:
-    return " and ".join(f"{a:.4f} to {b:.4f}" for a, b in intervals)
+def intervals(of: list[list[float]]) -> str:
+    """Intervals of fractions; empty if there is none."""
+    return " and ".join(f"{a:.4f} to {b:.4f}" for a, b in of)
 
 
 def _design(it: Report) -> Iterator[str]:
@@ -66,7 +67,7 @@ def _lattice(it: Report) -> Iterator[str]:
     yield f"  porosity   {span(it.porosity)}"
     yield f"  thickness  {span(it.thickness)}{'' if it.thickness is None else f' mm ({neck})'}"
     if not (it.tets and it.tets.zones):
-        whole = _whole(it.connected_fraction)
+        whole = intervals(it.connected_fraction)
         yield f"  one piece  {'at fractions ' + whole if whole else 'at no fraction'}"
     if it.tets:
         yield from _tiling(it.tets)
