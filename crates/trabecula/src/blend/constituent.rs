@@ -11,7 +11,7 @@ use geometry::math::{Vec3, add, scale};
 pub enum Constituent {
     /// A lattice, by its core.
     Lattice(Arc<Lattice>),
-    /// Any other field: solid where it is negative, and its fraction is found by looking.
+    /// Any other field: solid where it is negative, and its fraction is measured in the windows about a point.
     Field {
         /// The field.
         field: Arc<dyn Implicit>,
@@ -58,17 +58,17 @@ impl Constituent {
     }
 }
 
-/// Fills what two fields make together.
+/// Fills a function of two fields' values.
 pub(super) fn values_of(
     sides: &[Arc<dyn Implicit>; 2],
     points: &[Vec3],
     out: &mut [f64],
-    made: impl Fn([f64; 2]) -> f64,
+    function: impl Fn([f64; 2]) -> f64,
 ) {
     let mut other = vec![0.0; points.len()];
     sides[0].values(points, out);
     sides[1].values(points, &mut other);
-    (out.iter_mut().zip(other)).for_each(|(o, b)| *o = made([*o, b]));
+    (out.iter_mut().zip(other)).for_each(|(o, b)| *o = function([*o, b]));
 }
 
 /// Fills a multiple of the first field plus the second, and the gradient of the sum.

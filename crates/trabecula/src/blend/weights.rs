@@ -1,13 +1,13 @@
-//! How much each lattice of a blend counts: shares that make one everywhere.
+//! The shares of the lattices of a blend: a partition of unity from grades.
 
 use crate::grade::Grade;
 use geometry::math::{Aabb, Interval, Vec3, add, scale, sub};
 
-/// Shares up to this count as none and the others are stretched to make one again, so that a weight with a long tail
+/// Shares up to this become 0 and the others are normalised again, so that a weight with a long tail
 /// (a logistic) has an end, continuously.
 const FAINT: f64 = 1e-6;
 
-/// A partition of unity: one share for each lattice, none negative, together one.
+/// A partition of unity: a share of each lattice, wᵢ ≥ 0, Σ wᵢ = 1.
 #[derive(Clone)]
 pub struct Weights {
     of: Vec<Grade>,
@@ -21,8 +21,8 @@ impl Weights {
         Weights { of: vec![weight], between: true }
     }
 
-    /// One number for each lattice, cut off at 0 and divided by their sum. Where all are 0 all count the same: what
-    /// asks for that is refused before.
+    /// One number for each lattice, cut off at 0 and divided by their sum. Where all are 0 the shares are equal; designs
+    /// with such weights are refused.
     pub fn shares(of: Vec<Grade>) -> Weights {
         Weights { of, between: false }
     }
@@ -42,7 +42,7 @@ impl Weights {
         &self.of
     }
 
-    /// Fills the shares at points (mm), those of a point side by side.
+    /// Fills the shares at points (mm), those of a point one after another.
     pub fn values(&self, points: &[Vec3], out: &mut [f64]) {
         let n = self.len();
         let mut raw = vec![0.0; points.len()];
@@ -57,7 +57,7 @@ impl Weights {
                 }
             }
         }
-        // The same each time; the compiler knows the number of two.
+        // The same function, compiled for two.
         match n {
             2 => out.as_chunks_mut::<2>().0.iter_mut().for_each(|w| normalise(w)),
             _ => out.chunks_exact_mut(n).for_each(normalise),
@@ -106,7 +106,7 @@ impl Weights {
         }
         divide(out);
         for o in out.iter_mut() {
-            // A share that rounding puts at the limit is let go only well below it.
+            // A share at the limit may be rounded: it becomes 0 only well below it.
             let faint = FAINT * (1.0 - 1e-9);
             *o = Interval::new((o.lo - FAINT).max(0.0), (o.hi - faint).max(0.0));
         }
@@ -114,7 +114,7 @@ impl Weights {
     }
 }
 
-/// Makes shares of numbers.
+/// Normalises numbers to shares.
 #[inline(always)]
 fn normalise(w: &mut [f64]) {
     let sum: f64 = w.iter().sum();
@@ -126,10 +126,10 @@ fn normalise(w: &mut [f64]) {
     w.iter_mut().for_each(|w| *w /= sum);
 }
 
-/// Makes shares of numbers, and gradients of shares of theirs.
+/// Normalises numbers and their gradients to shares.
 #[inline(always)]
 fn normalise_gradients(w: &mut [f64], g: &mut [Vec3]) {
-    // The gradient of r / Σr, twice: before and after the faint ones are left out.
+    // The gradient of r / Σr, twice: before and after faint shares are set to 0.
     let divide = |w: &mut [f64], g: &mut [Vec3], sum: f64| {
         let whole = g.iter().fold([0.0; 3], |a, b| add(a, *b));
         if sum == 1.0 && whole == [0.0; 3] {
@@ -158,7 +158,7 @@ fn normalise_gradients(w: &mut [f64], g: &mut [Vec3]) {
     }
 }
 
-/// Makes intervals of shares of intervals of numbers: each against the least and the most of the others.
+/// Intervals of numbers to intervals of shares: each with the least and the greatest sum of the others.
 fn divide(r: &mut [Interval]) {
     const SLACK: f64 = 1e-12;
     let sums = r.iter().fold([0.0; 2], |s, r| [s[0] + r.lo, s[1] + r.hi]);
@@ -195,7 +195,7 @@ mod tests {
         ]
     }
 
-    fn places() -> impl Iterator<Item = Vec3> {
+    fn points() -> impl Iterator<Item = Vec3> {
         (0..400).map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 8.0 - 4.0))
     }
 
@@ -203,7 +203,7 @@ mod tests {
     fn shares_make_one_and_their_gradients_nothing() {
         for weights in all() {
             let n = weights.len();
-            for p in places() {
+            for p in points() {
                 let (mut w, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
                 weights.gradients(&[p], &mut w, &mut g);
                 let mut plain = vec![0.0; n];
@@ -232,11 +232,11 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_and_tell_who_is_absent() {
+    fn bounds_hold_and_find_absent_lattices() {
         let mut absent = 0;
         for weights in all() {
             let n = weights.len();
-            for (i, p) in places().enumerate() {
+            for (i, p) in points().enumerate() {
                 let size = 0.01 + 0.02 * (i % 40) as f64;
                 let b = Aabb { min: p, max: p.map(|x| x + size) };
                 let mut bound = vec![Interval::new(0.0, 0.0); n];
@@ -253,7 +253,7 @@ mod tests {
                 assert!(bound.iter().filter(|b| b.lo == 1.0).count() <= 1);
             }
         }
-        // The tail of the logistic alone is a fifth of its places.
+        // The tail of the logistic alone is a fifth of its points.
         assert!(absent > 1000, "{absent}");
     }
 

@@ -1,60 +1,67 @@
-//! What a blend is made of: a function and the interval of it that is solid.
+//! One summand gᵢ of a blend F = Σ wᵢ gᵢ: a lattice's core, signed and scaled so that it is solid where loᵢ ≤ gᵢ ≤ hiᵢ.
+//!
+//! gᵢ = ± fᵢ/σᵢ. A sheet of half-level t has both ends, ∓ t/σ. A network has the upper end alone; its lower end is below all its
+//! values, so that the second face of a sheet vanishes inside the solid before the network is reached. The quantiles [aᵢ, bᵢ] of
+//! the ends are the fractions of the cell in which gᵢ lies below each.
 
-use super::added::{End, HIGH, LOW};
 use super::constituent::{Constituent, gradients_of, values_of};
+use super::ends::{EndQuantiles, HIGH, LOW};
 use crate::cell::Part;
 use crate::field::{Block, Field};
 use crate::implicit::Implicit;
 use crate::lattice::{self, Lattice, Level};
 use geometry::math::{Aabb, Interval, Vec3, add, scale};
 
-/// How far below all its values the lower end of a network's interval lies, in shares of its range; also how far below
-/// zero its quantile is counted.
-pub(super) const BELOW: f64 = 0.1;
+/// How far the lower end of a network lies below all its values, per range of values; its quantile is −`BELOW`.
+const BELOW: f64 = 0.1;
 
-/// A constituent whose core is turned and scaled so that solid is where lo ≤ g ≤ hi. A sheet has two ends, −t and t. A
-/// network has one: its lower end is below all values of g, so that a sheet's second side sinks into the network's
-/// heart on the way there and is gone where the network is alone.
+/// A constituent with its core g signed and scaled.
 #[derive(Clone)]
-pub(super) struct Strand {
+pub(super) struct Summand {
     of: Constituent,
-    /// The sign of the core in g over its scale.
+    /// g over the core: the sign over the scale.
     factor: f64,
-    /// The lower end of a network where it is blended.
-    least: f64,
-    /// Its lower end where it is alone: below all values, proven.
-    floor: f64,
-    /// Some steps of a lattice's table of fractions.
-    fine: f64,
+    /// The lower end of a network in a blend.
+    lower: f64,
+    /// The lower end of a network that is alone: below all values, proven.
+    lower_alone: f64,
+    /// Step of the core in finite differences of its distribution.
+    difference: f64,
 }
 
-/// Below all values of a field of which no bound is known; its square is a number in single precision too.
-const BOTTOM: f64 = -1e18;
+/// Least lower end, for fields without a bound; its square is finite in single precision too.
+const LEAST: f64 = -1e18;
 
-impl Strand {
-    /// g is the core over `unit`. Of a field whose fraction is found by looking the range is, too: `seen` are its values, and
-    /// `bounds` is where it is.
-    pub fn new(of: Constituent, unit: f64, seen: &[f64], bounds: &Aabb) -> Strand {
-        let turned = matches!(&of, Constituent::Lattice(l) if l.part == Part::Upper);
-        let mut made = Strand { factor: if turned { -1.0 } else { 1.0 } / unit, of, least: 0.0, floor: 0.0, fine: 0.0 };
+impl Summand {
+    /// g is the core over `unit`, or its negative for `Part::Upper`. The range of a field that is no lattice is that of `samples`,
+    /// values of it in `bounds`.
+    pub fn new(of: Constituent, unit: f64, samples: &[f64], bounds: &Aabb) -> Summand {
+        let negated = matches!(&of, Constituent::Lattice(l) if l.part == Part::Upper);
+        let mut made = Summand {
+            factor: if negated { -1.0 } else { 1.0 } / unit,
+            of,
+            lower: 0.0,
+            lower_alone: 0.0,
+            difference: 0.0,
+        };
         let below = |range: Interval| range.lo - BELOW * (range.hi - range.lo);
         match &made.of {
             Constituent::Lattice(l) => {
                 let range = l.distance().map_or_else(|| l.cell.range(), |d| d.range());
-                made.least = below(made.turned(range));
-                made.floor = made.least;
+                made.lower = below(made.scaled(range));
+                made.lower_alone = made.lower;
                 let most = l.distance().map_or(f64::INFINITY, |d| d.range().abs().hi);
-                made.fine = 2e-4 * l.cell.series().amplitude().min(most);
+                made.difference = 2e-4 * l.cell.series().amplitude().min(most);
             }
             Constituent::Field { field, .. } => {
-                // A bound of the whole part is far below all values: a sheet's second side would be gone at once.
+                // The proven bound is far below all values: with it a sheet's second face would vanish at once.
                 let (lo, hi) =
-                    (seen.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+                    (samples.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
                 let proven = made.factor * field.bound(bounds).lo;
-                made.least = below(made.turned(Interval::new(lo.min(hi), hi)));
-                made.floor = made.least.min(proven.max(BOTTOM) - made.factor);
+                made.lower = below(made.scaled(Interval::new(lo.min(hi), hi)));
+                made.lower_alone = made.lower.min(proven.max(LEAST) - made.factor);
             }
-            // Both its ends count.
+            // It has both ends.
             Constituent::Wall { .. } => {}
         }
         made
@@ -95,7 +102,7 @@ impl Strand {
     }
 
     /// g at points (mm), in single precision.
-    pub fn samples(&self, points: &[Vec3]) -> Vec<f32> {
+    pub fn single_values(&self, points: &[Vec3]) -> Vec<f32> {
         let mut out = vec![0f32; points.len()];
         match &self.of {
             Constituent::Lattice(l) if l.distance().is_none() => {
@@ -130,7 +137,7 @@ impl Strand {
 
     /// An interval that contains g in the box.
     pub fn bound(&self, b: &Aabb) -> Interval {
-        self.turned(match &self.of {
+        self.scaled(match &self.of {
             Constituent::Lattice(l) => l.core_bound(b),
             Constituent::Field { field, .. } => field.bound(b),
             Constituent::Wall { sides, .. } => (sides[0].bound(b) - sides[1].bound(b)).times(Interval::new(0.5, 0.5)),
@@ -138,27 +145,28 @@ impl Strand {
     }
 
     /// An interval that contains the upper end in the box.
-    pub fn high_bound(&self, b: &Aabb) -> Interval {
-        if let Some(high) = self.uniform() {
+    pub fn upper_end_bound(&self, b: &Aabb) -> Interval {
+        if let Some(high) = self.uniform_upper_end() {
             return Interval::new(high, high);
         }
         match &self.of {
-            Constituent::Lattice(l) => self.turned(l.iso_bound(b)),
+            Constituent::Lattice(l) => self.scaled(l.iso_bound(b)),
             Constituent::Field { .. } => Interval::new(0.0, 0.0),
             Constituent::Wall { sides, .. } => {
                 let sum = sides[0].bound(b) + sides[1].bound(b);
-                self.turned(sum.times(Interval::new(-0.5, -0.5)))
+                self.scaled(sum.times(Interval::new(-0.5, -0.5)))
             }
         }
     }
 
-    fn turned(&self, r: Interval) -> Interval {
+    /// Core to g.
+    fn scaled(&self, r: Interval) -> Interval {
         let ends = [self.factor * r.lo, self.factor * r.hi];
         Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
     }
 
     /// The upper end, where it does not vary.
-    pub fn uniform(&self) -> Option<f64> {
+    pub fn uniform_upper_end(&self) -> Option<f64> {
         match &self.of {
             Constituent::Lattice(l) => l.uniform().map(|t| self.factor * t),
             Constituent::Field { .. } => Some(0.0),
@@ -167,7 +175,7 @@ impl Strand {
     }
 
     /// Fills the upper end at points (mm).
-    pub fn highs(&self, points: &[Vec3], out: &mut [f64]) {
+    pub fn upper_ends(&self, points: &[Vec3], out: &mut [f64]) {
         match &self.of {
             Constituent::Lattice(l) => l.isos(points, out),
             Constituent::Field { .. } => out.fill(0.0),
@@ -180,7 +188,7 @@ impl Strand {
     }
 
     /// Fills the upper end and its gradient (per mm).
-    pub fn high_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    pub fn upper_end_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         match &self.of {
             Constituent::Lattice(l) => l.iso_gradients(points, values, gradients),
             Constituent::Field { .. } => {
@@ -199,27 +207,27 @@ impl Strand {
         gradients.iter_mut().for_each(|g| *g = scale(*g, self.factor));
     }
 
-    /// The lower end where the upper one is `high`.
-    pub fn low(&self, high: f64) -> f64 {
-        if self.is_sheet() { -high } else { self.least }
+    /// The lower end in a blend, where the upper end is `high`.
+    pub fn lower_end(&self, high: f64) -> f64 {
+        if self.is_sheet() { -high } else { self.lower }
     }
 
-    /// The lower end where it is alone.
-    pub fn low_alone(&self, high: f64) -> f64 {
-        if self.is_sheet() { -high } else { self.floor }
+    /// The lower end where this summand is alone.
+    pub fn lower_end_alone(&self, high: f64) -> f64 {
+        if self.is_sheet() { -high } else { self.lower_alone }
     }
 
-    /// The lower or the upper end (`added::LOW`, `HIGH`), the latter being `high`.
+    /// One end (`LOW` or `HIGH`), where the upper end is `high`.
     #[inline]
     pub fn end(&self, end: usize, high: f64, alone: bool) -> f64 {
         match (end, alone) {
             (HIGH, _) => high,
-            (_, true) => self.low_alone(high),
-            (_, false) => self.low(high),
+            (_, true) => self.lower_end_alone(high),
+            (_, false) => self.lower_end(high),
         }
     }
 
-    /// How that changes with the upper end.
+    /// The derivative of an end by the upper end.
     pub fn end_slope(&self, end: usize) -> f64 {
         match end {
             HIGH => 1.0,
@@ -228,23 +236,23 @@ impl Strand {
         }
     }
 
-    /// The shares of the cell in which g is below the lower and the upper end, the latter being `high`; `None` where that is
-    /// known by looking only.
+    /// The quantiles of both ends, where the upper end is `high`: the fractions of the cell in which g is below them. `None` of
+    /// fields that are no lattices, whose distribution is known from samples alone.
     pub fn quantiles(&self, high: f64) -> Option<[f64; 2]> {
         let l = self.lattice()?;
         let t = high / self.factor;
         Some(match l.part {
             Part::Lower => [-BELOW, l.below(t)],
-            // g = −f: what is below the end is above t.
+            // g = −f: below the end is where f is above t.
             Part::Upper => [-BELOW, 1.0 - l.below(t)],
             Part::Sheet => [l.below(-t), l.below(t)],
         })
     }
 
-    /// The same by looking: of its values at some places, which are `samples`.
-    pub fn quantiles_of(&self, places: &[Vec3], samples: &[f32]) -> [f64; 2] {
-        let mut high = vec![0.0; places.len()];
-        self.highs(places, &mut high);
+    /// The same from `samples`, the values of g at positions (mm).
+    pub fn empirical_quantiles(&self, positions: &[Vec3], samples: &[f32]) -> [f64; 2] {
+        let mut high = vec![0.0; positions.len()];
+        self.upper_ends(positions, &mut high);
         let mut count = [0usize; 2];
         for (v, high) in samples.iter().zip(high) {
             count[0] += usize::from(f64::from(*v) < -high);
@@ -254,9 +262,9 @@ impl Strand {
         if self.is_sheet() { share } else { [-BELOW, share[1]] }
     }
 
-    /// How the quantiles change with `high`.
+    /// The derivatives of the quantiles by `high`, by central differences.
     fn quantile_slopes(&self, l: &Lattice, high: f64) -> [f64; 2] {
-        let h = self.fine;
+        let h = self.difference;
         let t = high / self.factor;
         let slope = |t: f64| (l.below(t + h) - l.below(t - h)) / (2.0 * h) / self.factor;
         match l.part {
@@ -266,11 +274,10 @@ impl Strand {
         }
     }
 
-    /// Fills the upper end at points (mm) and the quantiles of both; the latter not, and says so, where they are known by
-    /// looking only.
+    /// Fills the upper end at points (mm) and, of a lattice, the quantiles of both ends; returns whether it is one.
     pub fn ends(&self, points: &[Vec3], high: &mut [f64], quantiles: &mut [[f64; 2]]) -> bool {
         let Some(l) = self.lattice() else {
-            self.highs(points, high);
+            self.upper_ends(points, high);
             return false;
         };
         let both = |high: f64| self.quantiles(high).unwrap_or_default();
@@ -284,11 +291,11 @@ impl Strand {
                 for (t, q) in high.iter_mut().zip(quantiles) {
                     let p = *t;
                     *t = self.factor * l.iso(p).0;
-                    *q = self.holding(l, *t, p);
+                    *q = self.quantiles_of_fraction(l, *t, p);
                 }
             }
             _ => {
-                self.highs(points, high);
+                self.upper_ends(points, high);
                 (quantiles.iter_mut().zip(high)).for_each(|(q, high)| *q = both(*high));
             }
         }
@@ -296,13 +303,19 @@ impl Strand {
     }
 
     /// The same with gradients (per mm).
-    pub fn end_gradients(&self, points: &[Vec3], high: &mut [f64], slopes: &mut [Vec3], quantiles: &mut [End]) -> bool {
+    pub fn end_gradients(
+        &self,
+        points: &[Vec3],
+        high: &mut [f64],
+        slopes: &mut [Vec3],
+        quantiles: &mut [EndQuantiles],
+    ) -> bool {
         let Some(l) = self.lattice() else {
-            self.high_gradients(points, high, slopes);
+            self.upper_end_gradients(points, high, slopes);
             return false;
         };
         let (Level::Fraction(grade), None) = (&l.level, l.uniform()) else {
-            self.high_gradients(points, high, slopes);
+            self.upper_end_gradients(points, high, slopes);
             for ((high, slope), q) in high.iter().zip(slopes).zip(quantiles) {
                 q.quantiles = self.quantiles(*high).unwrap_or_default();
                 q.slopes = self.quantile_slopes(l, *high).map(|by| scale(*slope, by));
@@ -314,7 +327,7 @@ impl Strand {
             let (p, dp) = (*t, *dt);
             let (iso, slope) = l.iso(p);
             (*t, *dt) = (self.factor * iso, scale(dp, self.factor * slope));
-            q.quantiles = self.holding(l, *t, p);
+            q.quantiles = self.quantiles_of_fraction(l, *t, p);
             q.slopes = match l.part {
                 Part::Sheet => {
                     let low = scale(*dt, self.quantile_slopes(l, *t)[LOW]);
@@ -326,8 +339,8 @@ impl Strand {
         true
     }
 
-    /// The quantiles where a lattice's fraction is p and its upper end `high`: no table need be asked for both.
-    fn holding(&self, l: &Lattice, high: f64, p: f64) -> [f64; 2] {
+    /// The quantiles of a lattice of fraction p, whose upper end is `high`: one of them without its table of fractions.
+    fn quantiles_of_fraction(&self, l: &Lattice, high: f64, p: f64) -> [f64; 2] {
         let p = p.clamp(0.0, 1.0);
         match l.part {
             Part::Sheet => {
@@ -362,7 +375,7 @@ impl Strand {
     }
 }
 
-/// A strand's core on the rows of a block.
+/// The core of a summand on the rows of a block.
 pub(super) struct Rows<'a> {
     of: Kind<'a>,
     factor: f64,

@@ -1,9 +1,9 @@
-//! How the cores of a blend go together: their values at the same places.
+//! Which phases of the lattices of a blend meet, and the windows in which their joint distribution is sampled.
 //!
-//! Every core is a function of its own phase, so what matters is which phases meet. Where the maps are affine and one is
-//! a whole multiple of the other, the same phases meet in every cell: one cell tells all. Where the beats between
-//! their waves are shorter than a cell, all phases meet everywhere. Else phases drift past each other, slowly, and
-//! each neighbourhood has a distribution of its own.
+//! Every core is a function of its own phase, so the distribution of Σ wᵢ gᵢ depends on the joint distribution of the phases.
+//! Where the maps are affine with a common period (*locked*) it is that over one common cell. Where all beats between their waves
+//! are shorter than a cell (*independent*) it is the product of uniform distributions. Else phases *drift*: it is sampled in
+//! windows, raised cosines about the nodes of a grid over the part, and interpolated trilinearly between them.
 
 use std::sync::OnceLock;
 
@@ -16,52 +16,52 @@ use geometry::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, trans
 pub enum Phases {
     /// The same in every cell.
     Locked,
-    /// All combinations in every neighbourhood.
+    /// All combinations of phases within a few cells.
     Independent,
-    /// Their combination changes from place to place.
+    /// Their combination changes from simplex to simplex.
     Drifting,
 }
 
-/// Sample positions where one distribution serves all, and in each neighbourhood. A thousand even positions give a fraction
-/// to some thousandths; the sixty-four neighbourhoods in a window of two cells look at other ones each, so that what is
-/// left of their errors together is far below. Where phases drift slowly neighbourhoods are fewer, and twice as many serve.
-const EVERYWHERE: usize = 1 << 16;
-const NEARBY: usize = 1 << 10;
-const SLOWLY: usize = 2 * NEARBY;
-/// Beats longer than six of the longest cells are slow: linear between neighbourhoods a cell apart. Of those shorter than a
-/// cell and a ninth the window leaves less than a twentieth.
+/// Number of sample positions where one distribution serves everywhere, and in each window. A thousand positions of a
+/// low-discrepancy sequence give a fraction to some thousandths; adjacent windows use different ones, so that the mean over the
+/// sixty-four about a point is far more accurate. Where phases drift slowly windows are fewer and have twice as many.
+const COMMON_SAMPLES: usize = 1 << 16;
+const SAMPLES: usize = 1 << 10;
+const SLOW_SAMPLES: usize = 2 * SAMPLES;
+/// Wave numbers of beats, per longest cell. Beats of at most `SLOW` are linear between windows a cell apart; those of at least
+/// `AVERAGED` the window reduces to less than a twentieth.
 const SLOW: f64 = 1.0 / 6.0;
-const GONE: f64 = 0.9;
-/// Neighbourhoods along an axis after which places are the same again.
-const APART: usize = 4;
-/// Most neighbourhoods.
+const AVERAGED: f64 = 0.9;
+/// Period of the sample positions, in windows along an axis.
+const PERIOD: usize = 4;
+/// Largest number of windows.
 const MOST: f64 = 100_000.0;
 /// Largest number of waves of a series whose beats are considered.
 const WAVES: usize = 64;
 
-/// Where cores are sampled together.
-pub(super) struct Joint {
+/// The windows: one that serves everywhere, or those of a grid.
+pub(super) struct Windows {
     pub phases: Phases,
-    /// Back to mm from the common cell, in turns, where one serves all.
+    /// From the unit cube to the common cell (mm), where one window serves everywhere.
     common: Option<Mat3>,
-    /// Middle of the first neighbourhood, distance between them, and how many along each axis.
-    pub origin: Vec3,
-    pub step: f64,
+    /// Centre of the first window, distance between adjacent ones (mm), and their number along each axis.
+    origin: Vec3,
+    step: f64,
     /// One over that.
     per: f64,
     pub shape: [usize; 3],
-    /// Half-width (mm) of the window about a neighbourhood's centre, and its number of sample positions.
+    /// Half-width of a window (mm), and its number of sample positions.
     reach: f64,
     count: usize,
-    /// Where solved maps end, and meshes of tetrahedra and beams may; nothing else has an end.
+    /// The part's bounds, where a lattice may end with it: solved maps, meshes of tetrahedra, beams.
     bounds: Option<Aabb>,
 }
 
-/// The neighbourhoods about a point: each with its share and the gradient of that (per mm).
-pub(super) type Corners = [(usize, f64, Vec3); 8];
+/// The windows about a point, each with its trilinear weight and the gradient of that (per mm).
+pub(super) type Adjacent = [(usize, f64, Vec3); 8];
 
-impl Joint {
-    pub fn new(of: &[Constituent], bounds: &Aabb) -> Joint {
+impl Windows {
+    pub fn new(of: &[Constituent], bounds: &Aabb) -> Windows {
         let longest = of.iter().map(Constituent::longest).fold(0.0, f64::max);
         let maps: Option<Vec<Mat3>> = of.iter().map(|s| Some(s.lattice()?.map.affine()?.matrix)).collect();
         let found = maps.as_ref().and_then(|m| locked(m, 2.0 * longest));
@@ -69,24 +69,24 @@ impl Joint {
             (Some(back), _) => (Phases::Locked, Some(back)),
             (None, Some(maps)) if beats(of, maps, longest, |k| k >= 1.0 - 1e-9) => {
                 let mut wide = [[0.0; 3]; 3];
-                // So far that what is met there has no memory.
+                // Many cells, so that phases are independent of each other.
                 (0..3).for_each(|a| wide[a][a] = 12_345.6 * longest);
                 (Phases::Independent, Some(wide))
             }
             _ => (Phases::Drifting, None),
         };
-        let ended = |s: &Constituent| s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)));
+        let may_end = |s: &Constituent| s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)));
         let size = bounds.size();
-        let fine = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
-        // Half a cell: the fastest beats that a window two cells wide lets through are about two thirds of a cell long.
-        let slow = (maps.as_ref()).is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= GONE));
+        let nodes = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
+        // Half a cell: the shortest beats that a window two cells wide does not average out are about two thirds of a cell long.
+        let slow = (maps.as_ref()).is_some_and(|maps| beats(of, maps, longest, |k| k <= SLOW || k >= AVERAGED));
         let mut step = if slow { longest } else { 0.5 * longest };
-        while fine(step).iter().product::<f64>() > MOST {
+        while nodes(step).iter().product::<f64>() > MOST {
             step *= 1.1;
         }
-        let shape = if common.is_some() { [1; 3] } else { fine(step).map(|n| n as usize) };
+        let shape = if common.is_some() { [1; 3] } else { nodes(step).map(|n| n as usize) };
         let origin = core::array::from_fn(|a| 0.5 * (bounds.min[a] + bounds.max[a] - step * (shape[a] - 1) as f64));
-        Joint {
+        Windows {
             phases,
             common,
             origin,
@@ -94,31 +94,31 @@ impl Joint {
             per: 1.0 / step,
             shape,
             reach: if slow { step } else { 2.0 * step },
-            count: if slow { SLOWLY } else { NEARBY },
-            bounds: of.iter().any(ended).then_some(*bounds),
+            count: if slow { SLOW_SAMPLES } else { SAMPLES },
+            bounds: of.iter().any(may_end).then_some(*bounds),
         }
     }
 
-    /// Number of neighbourhoods.
+    /// Number of windows.
     pub fn len(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// The sample positions of neighbourhood `i`: evenly over the common cell, or about its middle and
-    /// ever fewer up to its reach along each axis (a raised cosine, in which whole waves leave no trace).
-    pub fn places(&self, i: usize) -> Vec<Vec3> {
+    /// The sample positions (mm) of window `i`: uniform over the common cell, or with the density of a raised cosine along each
+    /// axis about its centre, over which a wave has mean 0 where two or more whole wavelengths fit in.
+    pub fn samples(&self, i: usize) -> Vec<Vec3> {
         if let Some(back) = &self.common {
-            return (0..EVERYWHERE).map(even).map(|u| apply(back, u)).collect();
+            return (0..COMMON_SAMPLES).map(low_discrepancy).map(|u| apply(back, u)).collect();
         }
         let [nx, ny, _] = self.shape;
         let at = [i % nx, i / nx % ny, i / nx / ny];
-        let middle: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
-        let [x, y, z] = at.map(|n| n % APART);
-        let some = &windows()[((z * APART + y) * APART + x) * SLOWLY..][..self.count];
-        let place = |s: &Vec3| -> Vec3 {
+        let centre: Vec3 = core::array::from_fn(|a| self.origin[a] + self.step * at[a] as f64);
+        let [x, y, z] = at.map(|n| n % PERIOD);
+        let offsets = &window_offsets()[((z * PERIOD + y) * PERIOD + x) * SLOW_SAMPLES..][..self.count];
+        let position = |s: &Vec3| -> Vec3 {
             core::array::from_fn(|a| {
-                // What ends at the region's bounds is not sampled beyond them: positions there are mirrored.
-                let p = middle[a] + self.reach * s[a];
+                // Lattices that end with the part are not sampled beyond its bounds: positions there are mirrored.
+                let p = centre[a] + self.reach * s[a];
                 let Some(b) = &self.bounds else { return p };
                 let (lo, hi) = (b.min[a], b.max[a]);
                 let p = if p > hi { 2.0 * hi - p } else { p };
@@ -126,28 +126,28 @@ impl Joint {
                 p.clamp(lo, hi)
             })
         };
-        some.iter().map(place).collect()
+        offsets.iter().map(position).collect()
     }
 
-    /// How many neighbourhoods a coordinate lies past the first along an axis.
+    /// A coordinate along an axis, in steps from the first window.
     #[inline]
-    pub fn steps(&self, a: usize, v: f64) -> f64 {
+    pub fn in_steps(&self, a: usize, v: f64) -> f64 {
         (v - self.origin[a]) * self.per
     }
 
-    /// Between which neighbourhoods along an axis a coordinate lies: the first, the share of the second, and the slope of
-    /// that (per mm).
+    /// The interval between windows along an axis in which a coordinate lies: its first window, the weight of the second, and the
+    /// slope of that weight (per mm), 0 beyond the outermost.
     #[inline]
-    pub fn along(&self, a: usize, v: f64) -> (usize, f64, f64) {
+    pub fn interval(&self, a: usize, v: f64) -> (usize, f64, f64) {
         let last = (self.shape[a] - 1) as f64;
-        let s = self.steps(a, v);
+        let s = self.in_steps(a, v);
         let inside = s.clamp(0.0, last);
         let i = (inside as usize).min(self.shape[a].saturating_sub(2));
         let within = s == inside && last > 0.0;
         (i, inside - i as f64, if within { self.per } else { 0.0 })
     }
 
-    /// The box in which points have a neighbourhood among theirs, if there are several.
+    /// The box of the points that window `i` is interpolated to, if there are several.
     pub fn support(&self, i: usize) -> Aabb {
         let [nx, ny, _] = self.shape;
         let at = [i % nx, i / nx % ny, i / nx / ny];
@@ -158,22 +158,22 @@ impl Joint {
         }
     }
 
-    /// How many neighbourhoods points of a box have; `None` if it reaches beyond them.
+    /// Number of windows about the points of a box; `None` if it extends beyond the outermost.
     pub fn count_in(&self, b: &Aabb) -> Option<usize> {
         if self.common.is_some() {
             return Some(1);
         }
         let ends = |a: usize| (self.origin[a], self.origin[a] + self.step * (self.shape[a] - 1) as f64);
         let within = (0..3).all(|a| b.min[a] >= ends(a).0 && b.max[a] <= ends(a).1);
-        let along = |a: usize| self.along(a, b.max[a]).0 - self.along(a, b.min[a]).0 + 2;
+        let along = |a: usize| self.interval(a, b.max[a]).0 - self.interval(a, b.min[a]).0 + 2;
         within.then(|| (0..3).map(along).product())
     }
 
-    /// Calls `each` with the neighbourhoods about the points of a box.
+    /// Calls `each` with the windows about the points of a box.
     pub fn each_in(&self, b: &Aabb, mut each: impl FnMut(usize)) {
         let [x, y, z] = core::array::from_fn(|a| {
             let last = self.shape[a] - 1;
-            let (lo, hi) = (self.along(a, b.min[a]).0, self.along(a, b.max[a]).0);
+            let (lo, hi) = (self.interval(a, b.min[a]).0, self.interval(a, b.max[a]).0);
             lo..=(hi + 1).min(last)
         });
         for k in z {
@@ -185,17 +185,17 @@ impl Joint {
         }
     }
 
-    /// The neighbourhoods about a point.
-    pub fn corners(&self, p: Vec3) -> Corners {
+    /// The windows about a point.
+    pub fn adjacent(&self, p: Vec3) -> Adjacent {
         let mut out = [(0, 0.0, [0.0; 3]); 8];
         if self.common.is_some() {
             out[0].1 = 1.0;
             return out;
         }
         let [nx, ny, _] = self.shape;
-        // Along each axis: number, share and slope of the two.
+        // Along each axis: index, weight and slope of the two.
         let [xs, ys, zs]: [[(usize, f64, f64); 2]; 3] = core::array::from_fn(|a| {
-            let (i, share, slope) = self.along(a, p[a]);
+            let (i, share, slope) = self.interval(a, p[a]);
             let next = (i + 1).min(self.shape[a] - 1);
             [(i, 1.0 - share, -slope), (next, share, slope)]
         });
@@ -208,13 +208,14 @@ impl Joint {
     }
 }
 
-/// The k-th place of an even sequence in the unit cube: multiples of the powers of the root of x⁴ = x + 1.
-fn even(k: usize) -> Vec3 {
+/// The k-th point of the R₃ sequence in the unit cube: multiples of the inverse powers of the root of x⁴ = x + 1.
+fn low_discrepancy(k: usize) -> Vec3 {
     [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3].map(|a| (0.5 + a * k as f64).fract())
 }
 
-/// Places of neighbourhoods, one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³.
-fn windows() -> &'static [Vec3] {
+/// Sample positions of `PERIOD`³ windows one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³ (by the inverse of its
+/// cumulative distribution).
+fn window_offsets() -> &'static [Vec3] {
     static TABLE: OnceLock<Vec<Vec3>> = OnceLock::new();
     TABLE.get_or_init(|| {
         const N: usize = 512;
@@ -233,11 +234,11 @@ fn windows() -> &'static [Vec3] {
             let j = (x as usize).min(N - 1);
             table[j] + (table[j + 1] - table[j]) * (x - j as f64)
         };
-        (0..APART.pow(3) * SLOWLY).map(|k| even(k).map(warp)).collect()
+        (0..PERIOD.pow(3) * SLOW_SAMPLES).map(|k| low_discrepancy(k).map(warp)).collect()
     })
 }
 
-/// Back to mm from a cell that all maps share and that is at most `most` mm long, if there is one.
+/// From the unit cube to a common period of all maps at most `most` mm long, if there is one.
 fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     let back = inverse(maps.first()?);
     for size in 1..=4 {
@@ -251,8 +252,9 @@ fn locked(maps: &[Mat3], most: f64) -> Option<Mat3> {
     None
 }
 
-/// Whether every beat between waves of two of the lattices meets a condition on its wave number (per `longest`); the waves
-/// that products of two make count too, since what is solid is no linear matter. No, where there are too many.
+/// Whether every beat between waves of two of the lattices meets a condition on its wave number (per `longest`); the waves of
+/// products of two waves of a series count too, since the indicator of the solid is not linear. False for other fields and where
+/// there are too many waves.
 fn beats(of: &[Constituent], maps: &[Mat3], longest: f64, meets: impl Fn(f64) -> bool) -> bool {
     let mut waves: Vec<Vec<Vec3>> = Vec::new();
     for (s, m) in of.iter().zip(maps) {
@@ -271,7 +273,7 @@ fn beats(of: &[Constituent], maps: &[Mat3], longest: f64, meets: impl Fn(f64) ->
         let back = transpose(m);
         waves.push(all.into_iter().map(|h| apply(&back, h.map(f64::from))).collect());
     }
-    // Each list has the opposite of every wave, so differences are all there is.
+    // Each list has the opposite of every wave, so differences include sums.
     let meet = |a: &Vec3, b: &Vec3| meets(norm(sub(*a, *b)) * longest);
     (0..waves.len()).all(|i| (0..i).all(|j| waves[i].iter().all(|a| waves[j].iter().all(|b| meet(a, b)))))
 }

@@ -1,11 +1,11 @@
-//! Numbers tabulated over all ways to divide one among n lattices, linear between.
+//! A grid over the shares of n lattices, the simplex w ≥ 0, Σ wᵢ = 1, for piecewise linear interpolation.
 //!
-//! Shares w₁ … wₙ are placed by y_k = m (w_k + … + wₙ), k = 2 … n, which fall: m ≥ y₂ ≥ … ≥ yₙ ≥ 0. Kuhn's division of the
-//! unit cubes into simplices keeps that order, so every corner that is asked for is a node of the table, and the
-//! interpolation is continuous.
+//! Coordinates are the partial sums y_k = m (w_k + … + wₙ), k = 2 … n, which descend: m ≥ y₂ ≥ … ≥ yₙ ≥ 0. Kuhn's (Freudenthal's)
+//! triangulation of the unit cubes keeps that order, so every vertex of the simplex about a point is a node of the grid, and
+//! interpolation by barycentric coordinates is continuous.
 
-/// Steps along an edge of the table for n lattices, so that it has a few hundred nodes.
-pub(super) fn steps(n: usize) -> usize {
+/// Steps along an edge of the grid for n lattices, so that it has a few hundred nodes.
+fn steps(n: usize) -> usize {
     match n {
         0..=2 => 24,
         3 => 12,
@@ -18,27 +18,27 @@ pub(super) fn steps(n: usize) -> usize {
     }
 }
 
-/// The nodes of the table.
-pub(super) struct Grid {
+/// The grid.
+pub(super) struct ShareGrid {
     n: usize,
     steps: usize,
     /// binomial[a][k] = C(a, k).
     binomial: Vec<Vec<usize>>,
 }
 
-/// Where shares lie in the table: the corners of the simplex about them, each with its share of the value.
+/// The small simplex in which shares lie: its nodes, and the barycentric coordinates of the shares.
 #[derive(Default)]
-pub(super) struct Place {
+pub(super) struct Simplex {
     pub nodes: Vec<usize>,
-    pub shares: Vec<f64>,
-    /// For each corner but the first: the y that has risen by one since the corner before it.
+    pub coordinates: Vec<f64>,
+    /// For each node but the first: index (from 0) of the y that rises by one from the node before it.
     pub axes: Vec<usize>,
     floor: Vec<usize>,
     order: Vec<(f64, usize)>,
 }
 
-impl Grid {
-    pub fn new(n: usize) -> Grid {
+impl ShareGrid {
+    pub fn new(n: usize) -> ShareGrid {
         let steps = steps(n);
         let mut binomial = vec![vec![0usize; n + 1]; steps + n + 1];
         for a in 0..binomial.len() {
@@ -47,7 +47,7 @@ impl Grid {
                 binomial[a][k] = binomial[a - 1][k - 1] + if k < a { binomial[a - 1][k] } else { 0 };
             }
         }
-        Grid { n, steps, binomial }
+        ShareGrid { n, steps, binomial }
     }
 
     /// Number of nodes.
@@ -56,14 +56,14 @@ impl Grid {
         self.binomial[self.steps + self.n - 1][self.n - 1]
     }
 
-    /// The number of the node with these falling y.
-    fn rank(&self, y: &[usize]) -> usize {
+    /// The index of the node with these descending y: their rank in the combinatorial number system.
+    fn index(&self, y: &[usize]) -> usize {
         let d = self.n - 1;
         (0..d).map(|k| self.binomial[y[k] + d - 1 - k][d - k]).sum()
     }
 
-    /// Calls `each` with every node's number and shares.
-    pub fn each(&self, mut each: impl FnMut(usize, &[f64])) {
+    /// Calls `each` with every node's index and shares.
+    pub fn each_node(&self, mut each: impl FnMut(usize, &[f64])) {
         let (d, m) = (self.n - 1, self.steps);
         let mut y = vec![0usize; d];
         loop {
@@ -73,8 +73,8 @@ impl Grid {
                 let below = if i == d { 0 } else { y[i] };
                 *w = (above - below) as f64 / m as f64;
             }
-            each(self.rank(&y), &w);
-            // The next falling sequence: the last that may rise does, what follows starts again.
+            each(self.index(&y), &w);
+            // The next descending sequence: the last that may rise does, those after it start from 0.
             let Some(i) = (0..d).rev().find(|&i| y[i] < if i == 0 { m } else { y[i - 1] }) else {
                 return;
             };
@@ -83,18 +83,18 @@ impl Grid {
         }
     }
 
-    /// Finds where shares lie.
-    pub fn place(&self, w: &[f64], at: &mut Place) {
+    /// Finds the simplex in which shares `w` lie.
+    pub fn locate(&self, w: &[f64], at: &mut Simplex) {
         let (d, m) = (self.n - 1, self.steps as f64);
         if d == 1 {
-            // The nodes of two lattices stand in a row.
+            // For two lattices node k is y = k.
             let y = (m * w[1]).clamp(0.0, m);
             let low = (y as usize).min(self.steps - 1);
             let share = y - low as f64;
             at.nodes.clear();
             at.nodes.extend([low, low + 1]);
-            at.shares.clear();
-            at.shares.extend([1.0 - share, share]);
+            at.coordinates.clear();
+            at.coordinates.extend([1.0 - share, share]);
             at.axes.clear();
             return at.axes.push(0);
         }
@@ -108,25 +108,25 @@ impl Grid {
             let low = (y as usize).min(self.steps - 1);
             at.floor[k] = low;
             node += self.binomial[low + d - 1 - k][d - k];
-            // The furthest first; of equal ones the first axis, so that the order of the y is kept.
+            // The farthest first; of equal ones the first axis, so that the order of the y is kept.
             let share = y - low as f64;
             let before = at.order.iter().position(|o| o.0 <= share);
             at.order.insert(before.unwrap_or(at.order.len()), (share, k));
         }
         at.nodes.clear();
-        at.shares.clear();
+        at.coordinates.clear();
         at.axes.clear();
         let mut before = 1.0;
         at.nodes.push(node);
         for &(share, k) in &at.order {
-            at.shares.push(before - share);
+            at.coordinates.push(before - share);
             before = share;
             // A y that rises by one: C(y + 1, d − k) = C(y, d − k) + C(y, d − k − 1).
             node += self.binomial[at.floor[k] + d - 1 - k][d - k - 1];
             at.nodes.push(node);
             at.axes.push(k);
         }
-        at.shares.push(before);
+        at.coordinates.push(before);
     }
 
     /// Steps along an edge.
@@ -140,18 +140,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nodes_are_numbered_once_and_linear_functions_are_met() {
+    fn nodes_are_numbered_once_and_linear_functions_are_exact() {
         for n in 2..=6 {
-            let grid = Grid::new(n);
+            let grid = ShareGrid::new(n);
             let slope: Vec<f64> = (0..n).map(|i| (i as f64 * 1.7).sin()).collect();
             let f = |w: &[f64]| w.iter().zip(&slope).map(|(w, s)| w * s).sum::<f64>();
             let mut table = vec![f64::NAN; grid.len()];
-            grid.each(|i, w| {
+            grid.each_node(|i, w| {
                 assert!(table[i].is_nan() && (w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
                 table[i] = f(w);
             });
             assert!(table.iter().all(|v| v.is_finite()));
-            let mut at = Place::default();
+            let mut at = Simplex::default();
             for i in 0..2000 {
                 let mut w: Vec<f64> = (0..n)
                     .map(|k| ((i * (k + 3)) as f64 * 0.7548776662466927).fract())
@@ -160,9 +160,9 @@ mod tests {
                 w[i % n] += 1e-3;
                 let sum: f64 = w.iter().sum();
                 w.iter_mut().for_each(|w| *w /= sum);
-                grid.place(&w, &mut at);
-                let found: f64 = at.nodes.iter().zip(&at.shares).map(|(i, s)| table[*i] * s).sum();
-                assert!(at.shares.iter().all(|s| *s >= -1e-12));
+                grid.locate(&w, &mut at);
+                let found: f64 = at.nodes.iter().zip(&at.coordinates).map(|(i, s)| table[*i] * s).sum();
+                assert!(at.coordinates.iter().all(|s| *s >= -1e-12));
                 assert!((found - f(&w)).abs() < 1e-12, "{n} {w:?}");
             }
         }

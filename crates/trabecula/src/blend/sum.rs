@@ -1,0 +1,197 @@
+//! The weighted sum F = Σ wᵢ gᵢ and the interval [LO, HI] of it that is solid.
+
+use std::sync::Arc;
+
+use super::constituent::Constituent;
+use super::ends::{HIGH, LOW};
+use super::levels::Levels;
+use super::summand::Summand;
+use super::weights::Weights;
+use super::windows::{Phases, Windows};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Vec3};
+
+/// Largest number of lattices: one bit of a word for each.
+const MOST: usize = 64;
+/// Sample positions for the root mean square of a core.
+const SAMPLES: usize = 4096;
+
+/// What a blend keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum By {
+    /// The fractions asked for.
+    #[default]
+    Fraction,
+    /// The weighted sum of the levels.
+    Value,
+}
+
+/// One of the two inequalities of a blend with sheets in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// F ≤ HI.
+    High,
+    /// F ≥ LO.
+    Low,
+}
+
+/// A blend of lattices, as a field: the greater of F − HI and LO − F.
+#[derive(Clone)]
+pub struct Blend {
+    pub(super) summands: Arc<[Summand]>,
+    pub(super) weights: Weights,
+    /// Set where the fraction is kept.
+    pub(super) levels: Option<Arc<Levels>>,
+    /// Whether any summand is a sheet, so that there is a lower end.
+    pub(super) two_sided: bool,
+    /// Set for one side alone.
+    pub(super) side: Option<Side>,
+    /// A Lipschitz bound, per mm.
+    pub(super) lipschitz: f64,
+}
+
+impl Blend {
+    /// The blend of these lattices in a part with these bounds (mm).
+    ///
+    /// # Errors
+    /// Fewer than two lattices, more than 64, or another number of them than of weights.
+    pub fn new(of: Vec<Constituent>, weights: Weights, by: By, bounds: &Aabb) -> Result<Blend, Fault> {
+        if of.len() < 2 || of.len() != weights.len() || of.len() > MOST {
+            let message = format!(
+                "{} lattices and {} weights; a blend is of 2 to {} lattices with a weight each",
+                of.len(),
+                weights.len(),
+                MOST
+            );
+            return Err(Fault::new("", message));
+        }
+        let windows = Windows::new(&of, bounds);
+        let normalise = by == By::Fraction;
+        let summands: Arc<[Summand]> = summands(of, normalise, &windows, bounds).into();
+        let levels = normalise.then(|| Arc::new(Levels::new(&summands, windows, &weights)));
+        // Half as much again for the gradients of the shares: transitions are longer than cells.
+        let lipschitz = summands.iter().map(Summand::lipschitz).fold(0.0, f64::max) * 1.5;
+        Ok(Blend {
+            two_sided: summands.iter().any(Summand::is_sheet),
+            summands,
+            weights,
+            levels,
+            side: None,
+            lipschitz,
+        })
+    }
+
+    /// The shares.
+    pub fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// The greatest length of a cell, mm.
+    pub fn longest(&self) -> f64 {
+        self.summands.iter().map(Summand::longest).fold(0.0, f64::max)
+    }
+
+    /// Which phases meet, where the fraction is kept.
+    pub fn phases(&self) -> Option<Phases> {
+        self.levels.as_ref().map(|l| l.windows.phases)
+    }
+
+    /// Fills the fraction asked for at points (mm), Σ wᵢ pᵢ. That of a field that is no lattice is measured in the windows about the
+    /// point; by value there are none, and where such a field has a weight the fraction is NaN.
+    pub fn fractions(&self, points: &[Vec3], out: &mut [f64]) {
+        let n = self.summands.len();
+        let mut w = vec![0.0; n * points.len()];
+        self.weights.values(points, &mut w);
+        let mut own = vec![0.0; points.len()];
+        out.fill(0.0);
+        for (i, s) in self.summands.iter().enumerate() {
+            match (s.lattice(), &self.levels) {
+                (Some(l), _) => l.fractions(points, &mut own),
+                (None, Some(levels)) => {
+                    for (k, o) in own.iter_mut().enumerate().filter(|(k, _)| w[k * n + i] > 0.0) {
+                        let [a, b] = levels.measured_quantiles(&self.summands, points[k], i).quantiles;
+                        *o = b - a.max(0.0);
+                    }
+                }
+                (None, None) => own.fill(f64::NAN),
+            }
+            for (k, (o, p)) in out.iter_mut().zip(&own).enumerate() {
+                if w[k * n + i] > 0.0 {
+                    *o += w[k * n + i] * p;
+                }
+            }
+        }
+    }
+
+    /// The ends (`LOW`, `HIGH`) whose inequalities this field has.
+    pub(super) fn ends(&self) -> &'static [usize] {
+        match self.side {
+            Some(Side::High) => &[HIGH],
+            Some(Side::Low) => &[LOW],
+            None if self.two_sided => &[HIGH, LOW],
+            None => &[HIGH],
+        }
+    }
+
+    /// The levels, where quantiles vary in space.
+    pub(super) fn varied(&self) -> Option<&Levels> {
+        self.levels.as_deref().filter(|l| !l.is_uniform())
+    }
+
+    /// Fills the upper end of summand `s` at points (mm), and the quantiles of both ends where levels vary.
+    pub(super) fn ends_of(&self, s: usize, points: &[Vec3], high: &mut [f64], quantiles: &mut [[f64; 2]]) {
+        let summand = &self.summands[s];
+        let Some(levels) = self.varied() else {
+            return summand.upper_ends(points, high);
+        };
+        if !summand.ends(points, high, quantiles) {
+            for (q, p) in quantiles.iter_mut().zip(points) {
+                *q = levels.measured_quantiles(&self.summands, *p, s).quantiles;
+            }
+        }
+    }
+
+    /// The value where F, LO and HI are these.
+    pub(super) fn value_of(&self, [f, lo, hi]: [f64; 3]) -> f64 {
+        match self.side {
+            Some(Side::High) => f - hi,
+            Some(Side::Low) => lo - f,
+            None if self.two_sided => (f - hi).max(lo - f),
+            None => f - hi,
+        }
+    }
+
+    /// The value where summand `s` is alone, with value `g` and upper end `high`.
+    #[inline]
+    pub(super) fn alone(&self, s: usize, g: f64, high: f64) -> f64 {
+        self.value_of([g, self.summands[s].lower_end_alone(high), high])
+    }
+}
+
+/// The summands; if `normalise`, with their cores divided by their root mean square deviation from the mean.
+fn summands(of: Vec<Constituent>, normalise: bool, windows: &Windows, bounds: &Aabb) -> Vec<Summand> {
+    let mut points = match windows.phases {
+        Phases::Drifting => Vec::new(),
+        Phases::Locked | Phases::Independent => windows.samples(0),
+    };
+    if points.is_empty() {
+        let each = SAMPLES.div_ceil(windows.len()).max(64);
+        // Of windows evenly spaced among all.
+        let some = (SAMPLES / each).min(windows.len()).max(1);
+        let sampled =
+            (0..some).flat_map(|i| windows.samples((2 * i + 1) * windows.len() / (2 * some)).into_iter().take(each));
+        points.extend(sampled);
+    } else {
+        points.truncate(SAMPLES);
+    }
+    let mut values = vec![0.0; points.len()];
+    let each = of.into_iter().map(|c| {
+        c.cores(&points, &mut values);
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+        let scale = if normalise && square > 0.0 { square.sqrt() } else { 1.0 };
+        Summand::new(c, scale, &values, bounds)
+    });
+    each.collect()
+}
