@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use trabecula::analysis;
 use trabecula::design::Built;
 use trabecula::extract;
-use trabecula::map::{Map, Misfit};
+use trabecula::map::Misfit;
 use trabecula::report::{DanglingReport, EstimateReport, IslandsReport, RepairReport, SurfaceReport};
 use trabecula::surface_maker::{Islands, Options, SurfaceMaker};
 use trabecula::truss::Beams;
@@ -180,7 +180,7 @@ impl Solid {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let found = self.built.lattices.iter().find(|(name, _)| name == lattice);
-        let Some(Map::Phase(map)) = found.map(|(_, l)| &l.map) else {
+        let Some(map) = found.and_then(|(_, l)| l.map.solved()) else {
             let message = format!("lattice.{lattice} has no map that was solved for");
             return Err(PyValueError::new_err(message));
         };

@@ -148,9 +148,9 @@ impl Cell {
         if step.abs() <= most { t + step } else { t }
     }
 
-    /// A bound of |∂f/∂x| (per mm) where phases are u = `to_phase` · x: the largest of a grid of samples, plus what
+    /// A Lipschitz bound: an upper bound of |∂f/∂x| (per mm) where phases are u = `to_phase` · x: the largest of a grid of samples, plus what
     /// the curvature can add between them.
-    pub fn steepness(&self, to_phase: &Mat3) -> f64 {
+    pub fn lipschitz(&self, to_phase: &Mat3) -> f64 {
         const N: usize = 24;
         let (_, _, g) = torus(&self.series, N);
         let back = transpose(to_phase);

@@ -54,8 +54,8 @@ pub struct Lattice {
     pub level: Level,
     /// The core, where it is a distance.
     distance: Option<Arc<Distance>>,
-    /// A bound of |∇f|: per mm if the map is affine, else per turn.
-    steepness: f64,
+    /// A Lipschitz bound of the core: per mm if the map is affine, else per turn.
+    core_lipschitz: f64,
     /// t, where it does not vary.
     uniform: Option<f64>,
     /// The part, or one side of it alone.
@@ -70,19 +70,19 @@ impl Lattice {
             Level::Thickness(_) => Some(Arc::new(Distance::new(cell.series(), &typical))),
             _ => None,
         };
-        let steepness = match (&distance, map.affine()) {
-            (Some(d), Some(_)) => d.steepness(),
+        let core_lipschitz = match (&distance, map.affine()) {
+            (Some(d), Some(_)) => d.lipschitz(),
             // Per turn of the direction in which a turn is longest.
-            (Some(d), None) => d.steepness() * spectral_norm(&inverse(&typical)),
-            (None, Some(map)) => cell.steepness(&map.matrix),
-            (None, None) => cell.steepness(&IDENTITY),
+            (Some(d), None) => d.lipschitz() * spectral_norm(&inverse(&typical)),
+            (None, Some(map)) => cell.lipschitz(&map.matrix),
+            (None, None) => cell.lipschitz(&IDENTITY),
         };
         let uniform = match &level {
             Level::Iso(g) => g.constant(),
             Level::Fraction(g) => g.constant().map(|p| cell.level(part, p)),
             Level::Thickness(g) => g.constant().map(|w| 0.5 * w),
         };
-        Lattice { cell, map, part, level, distance, steepness, uniform, cut: Cut::new(part) }
+        Lattice { cell, map, part, level, distance, core_lipschitz, uniform, cut: Cut::new(part) }
     }
 
     /// The signed distance to the mid-surface, where the level is a thickness.
@@ -180,19 +180,19 @@ impl Lattice {
         if self.map.affine().is_some() {
             self.cores(&[b.center()], &mut v);
             let all = self.distance.as_ref().map_or(waves, |d| d.range());
-            return around(v[0], self.steepness * reach, all);
+            return around(v[0], self.core_lipschitz * reach, all);
         }
-        let turns = self.map.stretch(b) * reach;
+        let turns = self.map.lipschitz(b) * reach;
         let Some(d) = &self.distance else {
             self.cores(&[b.center()], &mut v);
-            return around(v[0], self.steepness * turns, waves);
+            return around(v[0], self.core_lipschitz * turns, waves);
         };
         let mut u = [[0.0; 3]];
         self.map.phases(&[b.center()], &mut u);
         d.values(&u, &mut v);
-        let r = around(v[0], self.steepness * turns, d.range());
+        let r = around(v[0], self.core_lipschitz * turns, d.range());
         // No gradient is lengthened by more than this, so no distance is multiplied by less than its inverse.
-        let longest = self.map.stretch(b) * spectral_norm(&inverse(&self.map.typical()));
+        let longest = self.map.lipschitz(b) * spectral_norm(&inverse(&self.map.typical()));
         let least = (1.0 / longest).min(1.0);
         let lo = if r.lo > 0.0 { r.lo * least } else { r.lo * STRETCHED };
         let hi = if r.hi < 0.0 { r.hi * least } else { r.hi * STRETCHED };
@@ -333,8 +333,8 @@ impl Implicit for Lattice {
 
     fn lipschitz(&self) -> f64 {
         match self.map.affine() {
-            Some(_) => self.steepness,
-            None => self.steepness * self.map.steepest(),
+            Some(_) => self.core_lipschitz,
+            None => self.core_lipschitz * self.map.max_lipschitz(),
         }
     }
 }
@@ -395,7 +395,7 @@ mod tests {
 
     fn lattice(part: Part, level: Level, map: Affine) -> Lattice {
         let cell = Cell::new(Series::new(named("gyroid").expect("named").terms()).expect("series"));
-        Lattice::new(Arc::new(cell), Map::Affine(map), part, level)
+        Lattice::new(Arc::new(cell), Arc::new(map), part, level)
     }
 
     #[test]

@@ -56,8 +56,8 @@ pub struct Tiling {
     pub part: Part,
     /// The level of f.
     pub level: Level,
-    /// For each tetrahedron, a bound of the steepness of f (per mm).
-    steep: Arc<Vec<f64>>,
+    /// For each tetrahedron, a Lipschitz bound of f (per mm).
+    lipschitz: Arc<Vec<f64>>,
     /// The part, or one side of it alone.
     cut: Cut,
 }
@@ -83,16 +83,16 @@ impl Tiling {
 
     /// Several cells over a mesh.
     pub fn of(map: Arc<Tets>, cells: Vec<Share>, part: Part, level: Level) -> Tiling {
-        // |∇f| ≤ Σ amplitude 2π|h| in phase, times the stretch of the map.
-        let steep = cells.iter().map(|c| {
+        // |∇f| ≤ Σ amplitude 2π|h| in phase, times |du/dx|.
+        let own = cells.iter().map(|c| {
             let waves = c.stencil.series().terms().iter();
             let sum: f64 = waves.map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from))).sum();
             core::f64::consts::TAU * sum / c.scale
         });
-        let steep = steep.fold(0.0, f64::max);
+        let own = own.fold(0.0, f64::max);
         let corners = cells[0].stencil.corners();
         let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
-        // All tetrahedra of cells are regular: with edges of another length the stretch is that much more.
+        // All tetrahedra of cells are regular: with edges of another length the Jacobian is that much larger.
         let size = |s: &Stencil| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
         let longest = cells.iter().map(|c| size(&c.stencil)).fold(0.0, f64::max);
         let more = longest / size(&cells[0].stencil);
@@ -107,10 +107,10 @@ impl Tiling {
                 let most = c.stencil.series().amplitude() / c.scale;
                 Some(most * norm(linear_slope(&map, w, t)))
             };
-            steep * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
+            own * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
         };
-        let steep: Vec<f64> = (0..map.len()).map(of).collect();
-        Tiling { map, cells, part, level, steep: Arc::new(steep), cut: Cut::new(part) }
+        let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
+        Tiling { map, cells, part, level, lipschitz: Arc::new(lipschitz), cut: Cut::new(part) }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.
@@ -335,7 +335,7 @@ impl Field for Tiling {
                 f = f.union(match here.get(i) {
                     None => all,
                     Some(k) => {
-                        let by = self.steep[*n] * reach;
+                        let by = self.lipschitz[*n] * reach;
                         Interval::new((k.f - by).max(-most), (k.f + by).min(most))
                     }
                 });
@@ -363,6 +363,6 @@ impl Implicit for Tiling {
     }
 
     fn lipschitz(&self) -> f64 {
-        self.steep.iter().copied().fold(0.0, f64::max)
+        self.lipschitz.iter().copied().fold(0.0, f64::max)
     }
 }

@@ -8,7 +8,6 @@
 use std::sync::OnceLock;
 
 use super::constituent::Constituent;
-use crate::map::Map;
 use geometry::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
 
 /// How the phases of the lattices of a blend go together.
@@ -75,7 +74,7 @@ impl Windows {
             }
             _ => (Phases::Drifting, None),
         };
-        let may_end = |s: &Constituent| s.lattice().is_none_or(|l| matches!(l.map, Map::Phase(_)));
+        let may_end = |s: &Constituent| s.lattice().is_none_or(|l| l.map.solved().is_some());
         let size = bounds.size();
         let nodes = |h: f64| size.map(|s| (s / h).ceil().max(0.0) + 1.0);
         // Half a cell: the shortest beats that a window two cells wide does not average out are about two thirds of a cell long.

@@ -30,7 +30,7 @@ pub struct Distance {
     /// The metric it was measured in: phases are M x.
     to_phase: Mat3,
     /// A bound of |∂d/∂x|.
-    steepness: f64,
+    lipschitz: f64,
     /// Least radius of curvature of the mid-surface, mm.
     radius: Option<f64>,
     /// Largest distance found on the mid-surface itself, mm.
@@ -65,7 +65,7 @@ impl Distance {
         };
         let error = least(&|u, v, g| series.gradients(u, v, g), &error).map_or(0.0, f64::abs);
         Distance {
-            steepness: spline.steepness(to_phase),
+            lipschitz: spline.lipschitz(to_phase),
             spline,
             to_phase: *to_phase,
             radius,
@@ -103,10 +103,10 @@ impl Distance {
         value * (own.powi(3) + FAINT) / (own.powi(2) * here + FAINT)
     }
 
-    /// A bound of |∂d/∂x|. A distance's own is one; the spline oscillates near creases, and what
-    /// is proven of it is two to three.
-    pub fn steepness(&self) -> f64 {
-        self.steepness
+    /// A Lipschitz bound: an upper bound of |∂d/∂x| (mm per mm). A distance's own is one; the spline oscillates near
+    /// creases, and what is proven of it is two to three.
+    pub fn lipschitz(&self) -> f64 {
+        self.lipschitz
     }
 
     /// An interval that contains every distance.
@@ -217,7 +217,7 @@ pub(super) mod tests {
                 assert!(shares[..4].iter().all(|e| *e < 2e-3), "{name} {shares:?}");
                 assert!(shares.iter().all(|e| *e < 1e-2), "{name} {shares:?}");
                 // One where the distance is smooth; near creases the spline oscillates.
-                assert!((1.0..3.5).contains(&d.steepness()), "{name} {}", d.steepness());
+                assert!((1.0..3.5).contains(&d.lipschitz()), "{name} {}", d.lipschitz());
             }
         }
     }

@@ -59,11 +59,11 @@ impl Spline {
         Interval::new(f64::from(lo), f64::from(hi))
     }
 
-    /// A bound of |∂S/∂x| (per mm) where phases are u = `to_phase` · x.
+    /// A Lipschitz bound: an upper bound of |∂S/∂x| (per mm) where phases are u = `to_phase` · x.
     ///
     /// In one knot interval the spline is a polynomial with Bernstein's coefficients, and each derivative a mean of their
     /// differences along its axis. So the gradient lies in the box that the differences span, and is longest at a corner.
-    pub(super) fn steepness(&self, to_phase: &Mat3) -> f64 {
+    pub(super) fn lipschitz(&self, to_phase: &Mat3) -> f64 {
         use rayon::prelude::*;
         let back = transpose(to_phase);
         let [nx, ny, nz] = self.shape;
@@ -336,7 +336,7 @@ mod tests {
         s.gradients(&u, &mut w, &mut g);
         assert_eq!(v, w);
         let m = [[0.3, 0.1, 0.0], [0.0, 0.5, -0.2], [0.1, 0.0, 0.25]];
-        let steepest = s.steepness(&m);
+        let lipschitz = s.lipschitz(&m);
         for i in 0..300 {
             for a in 0..3 {
                 let mut q = [u[i], u[i]];
@@ -346,7 +346,7 @@ mod tests {
                 // The third derivative jumps at knots: the difference is of first order in 1e-5 there, times 2π³ squared.
                 assert!(((d[1] - d[0]) / 2e-5 - g[i][a]).abs() < 1e-5);
             }
-            assert!(norm(apply(&transpose(&m), g[i])) <= steepest);
+            assert!(norm(apply(&transpose(&m), g[i])) <= lipschitz);
             assert!(s.range().lo <= v[i] && v[i] <= s.range().hi);
         }
         let xs: Vec<f64> = (0..77).map(|i| 0.13 * f64::from(i) - 5.0).collect();

@@ -50,13 +50,13 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
             };
             let radii = radii(c.center, c.axis, place);
             let map = Round::cylinder(c.center, c.axis, wavelength, c.around, radii);
-            return map.map(Map::Round).map_err(|f| DesignError::fault(&path, f));
+            return map.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f));
         }
         MapSpec::Sweep(s) => return sweep(s, &path, place),
         MapSpec::Sphere(s) => {
             let radii = radii(s.center, s.axis, place);
             let map = Round::sphere(s.center, s.axis, s.wavelength, s.around, radii);
-            return map.map(Map::Round).map_err(|f| DesignError::fault(&path, f));
+            return map.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f));
         }
     };
     let below = |key: &str| format!("{path}.{key}");
@@ -95,14 +95,14 @@ pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
         }
         _ => Affine::spartan(wavelength.three(), rotate, offset),
     };
-    affine.map(Map::Affine).map_err(|f| DesignError::fault(&path, f))
+    affine.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f))
 }
 
 fn sweep(spec: &SweepSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
     let (points, _) = control::control(&spec.points, path, place)?;
     let line = Path { points, closed: spec.closed, wavelength: spec.wavelength.three(), normal: spec.normal };
     Sweep::new(&line, &**place.region, place.points)
-        .map(|s| Map::Sweep(Arc::new(s)))
+        .map(|s| Arc::new(s) as Map)
         .map_err(|f| control::wrong(&spec.points, path, f))
 }
 
@@ -184,7 +184,7 @@ fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError
     let settings =
         Settings { step: spec.step, region: (spec.domain == Domain::Region).then_some(region), folds: spec.folds };
     Phase::solve(&place.region.bounds(), &wanted, &settings)
-        .map(|p| Map::Phase(Arc::new(p)))
+        .map(|p| Arc::new(p) as Map)
         .map_err(|f| DesignError::fault(path, f))
 }
 
@@ -201,7 +201,7 @@ fn each<const N: usize>(
 
 /// Warns of a map that is far from what was asked for.
 pub(super) fn warn(map: &Map, spec: &MapSpec, lattice: &str, warnings: &mut Vec<Warning>) {
-    let Map::Phase(phase) = map else { return };
+    let Some(phase) = map.solved() else { return };
     let d = phase.distortion();
     let mut say = |message: String| {
         warnings.push(Warning { path: format!("{lattice}.map.{}", kind(spec)), message });

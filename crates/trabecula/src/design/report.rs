@@ -9,7 +9,7 @@ use crate::blend::Phases;
 use crate::cell::Part;
 use crate::field::Field;
 use crate::lattice::{Lattice, Level};
-use crate::map::{Distortion, Map, Spread};
+use crate::map::{Distortion, Spread};
 use crate::report::*;
 use crate::truss::Beams;
 
@@ -135,10 +135,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         folding: lattice.folding(),
         connected_fraction: lattice.connected_fraction(),
         truncation: lattice.cell.truncation(),
-        distortion: match &lattice.map {
-            Map::Phase(map) => Some(distortion(map.distortion())),
-            _ => None,
-        },
+        distortion: lattice.map.solved().map(|map| distortion(map.distortion())),
         tets: None,
     }
 }

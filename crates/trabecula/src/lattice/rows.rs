@@ -16,7 +16,7 @@ use geometry::math::{Complex, Vec3, add, apply, complex_product, dot, sin_cos_tu
 pub(crate) enum Rows<'a> {
     Waves(RowWaves),
     Distance(&'a Distance, &'a Affine, Block<'a>),
-    Phases(&'a Series, Box<map::Rows<'a>>, [Vec<f64>; 3]),
+    Phases(&'a Series, Box<dyn map::Rows + 'a>, [Vec<f64>; 3]),
     Points(&'a Lattice, Block<'a>),
 }
 
@@ -29,7 +29,7 @@ impl<'a> Rows<'a> {
             (Some(_), None) => Rows::Points(lattice, *block),
             (None, None) => {
                 let row = || vec![0.0; block.axes[0].len()];
-                Rows::Phases(series, Box::new(lattice.map.rows(block)), [row(), row(), row()])
+                Rows::Phases(series, lattice.map.rows(block), [row(), row(), row()])
             }
         }
     }

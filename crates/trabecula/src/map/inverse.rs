@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Map, Phase};
+use super::{Mapping, Phase};
 use geometry::math::{Aabb, Vec3, add, apply, determinant, inverse, norm, scale, sub};
 
 /// Steps of Newton's method, after which a phase counts as not found.
@@ -12,67 +12,23 @@ const NEAR: f64 = 1e-11;
 /// Looks on a wavelength for the cells that a solved map has in a box.
 const FINE: f64 = 2.0;
 
-impl Map {
-    /// The position (mm) that has the phase u, if there is one. A solved map has it looked for from `near` on, and gives
-    /// the one that is found.
-    pub fn position(&self, u: Vec3, near: Vec3) -> Option<Vec3> {
-        match self {
-            Map::Affine(a) => {
-                let x = apply(&inverse(&a.matrix), sub(u, a.shift));
-                x.iter().all(|v| v.is_finite()).then_some(x)
-            }
-            Map::Round(r) => r.position(u),
-            Map::Sweep(s) => s.position(u),
-            Map::Phase(p) => found(p, u, near),
-        }
-    }
-
-    /// The cells that may have a part in the box, or a neighbour that has, each with a place near it.
-    pub fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
-        let ranges = match self {
-            Map::Affine(_) => {
-                let mut u = [[0.0; 3]; 8];
-                self.phases(&corners(b), &mut u);
-                let box_ = u.iter().fold(Aabb::EMPTY, |b, u| b.with(*u));
-                core::array::from_fn(|a| [whole(box_.min[a]) - 1, whole(box_.max[a]) + 1])
-            }
-            Map::Round(r) => r.cells(b),
-            Map::Sweep(s) => s.cells(b),
-            Map::Phase(p) => return seeds(p, b),
-        };
-        let count = |a: usize| ranges[a][0]..=ranges[a][1];
-        let reach = self.affine().map(|a| {
-            // A cell and its neighbours lie within this many of the longest diagonals.
-            let edges = inverse(&a.matrix);
-            let edge = |i: usize| norm([edges[0][i], edges[1][i], edges[2][i]]);
-            1.5 * (edge(0) + edge(1) + edge(2))
-        });
-        let mut cells = Vec::new();
-        for k in count(2) {
-            for j in count(1) {
-                for i in count(0) {
-                    let middle = [i, j, k].map(|c| f64::from(c) + 0.5);
-                    let near = self.position(middle, b.center()).unwrap_or(b.center());
-                    if reach.is_none_or(|r| b.distance(near) <= r) {
-                        cells.push(([i, j, k], near));
-                    }
+/// The cells in ranges of indices along each phase, each with a position (mm) near it: that of its middle, or else the
+/// middle of the box. Those whose position is farther than `reach` (mm) from the box are left out.
+pub(super) fn listed(map: &impl Mapping, ranges: [[i32; 2]; 3], b: &Aabb, reach: Option<f64>) -> Vec<([i32; 3], Vec3)> {
+    let count = |a: usize| ranges[a][0]..=ranges[a][1];
+    let mut cells = Vec::new();
+    for k in count(2) {
+        for j in count(1) {
+            for i in count(0) {
+                let middle = [i, j, k].map(|c| f64::from(c) + 0.5);
+                let near = map.position(middle, b.center()).unwrap_or(b.center());
+                if reach.is_none_or(|r| b.distance(near) <= r) {
+                    cells.push(([i, j, k], near));
                 }
             }
         }
-        cells
     }
-
-    /// One name for the cells that are one and the same: round an axis they close.
-    pub fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
-        match self {
-            Map::Round(r) => [cell[0], cell[1].rem_euclid(r.around()), cell[2]],
-            Map::Sweep(s) => match s.around() {
-                Some(n) => [cell[0], cell[1], cell[2].rem_euclid(n)],
-                None => cell,
-            },
-            Map::Affine(_) | Map::Phase(_) => cell,
-        }
-    }
+    cells
 }
 
 /// The whole number below, within what a cell may be called.
@@ -84,9 +40,9 @@ pub(super) fn corners(b: &Aabb) -> [Vec3; 8] {
     core::array::from_fn(|i| core::array::from_fn(|a| if i >> a & 1 == 0 { b.min[a] } else { b.max[a] }))
 }
 
-/// Newton's method, no step longer than a wavelength.
-fn found(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
-    let longest = map.wavelength()[1];
+/// The position (mm) of the phase u by Newton's method from `near`, no step longer than a wavelength.
+pub(super) fn search(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
+    let longest = map.longest();
     let mut x = near;
     let mut at = [[0.0; 3]];
     for _ in 0..STEPS {
@@ -107,8 +63,8 @@ fn found(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
 }
 
 /// The cells of a solved map that have a place in the box, and those about them.
-fn seeds(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
-    let step = map.wavelength()[0] / FINE;
+pub(super) fn searched(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
+    let step = map.wavelength() / FINE;
     let count = b.size().map(|s| (s / step).ceil().max(1.0) as usize);
     let at = |i: usize, a: usize| b.min[a] + b.size()[a] * i as f64 / count[a] as f64;
     let mut nearest: BTreeMap<[i32; 3], (f64, Vec3)> = BTreeMap::new();
@@ -141,7 +97,7 @@ fn seeds(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
 mod tests {
     use super::*;
     use crate::grade::{Formula, Grade};
-    use crate::map::{Affine, Orientation, Round, Settings, Wanted};
+    use crate::map::{Affine, Map, Orientation, Round, Settings, Wanted};
     use std::sync::Arc;
 
     #[test]
@@ -168,8 +124,8 @@ mod tests {
             .expect("map")
         };
         let affine = Affine::spartan([2.0, 3.0, 4.0], [10.0, 20.0, 30.0], [0.5; 3]).expect("map");
-        for map in [Map::Affine(affine), Map::Phase(Arc::new(phase)), Map::Round(round(false)), Map::Round(round(true))]
-        {
+        let maps: [Map; 4] = [Arc::new(affine), Arc::new(phase), Arc::new(round(false)), Arc::new(round(true))];
+        for map in maps {
             let cells = map.cells(&bounds);
             for i in 1..200 {
                 let p = [0.8191725, 0.6710436, 0.5497005].map(|s| 18.0 * (s * f64::from(i)).fract() - 9.0);

@@ -11,10 +11,13 @@ use super::grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
 use super::tilt::Tilt;
-use crate::field::Field;
+use super::{Mapping, Rows, inverse};
+use crate::field::{Block, Field};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit};
+use geometry::math::{
+    Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
+};
 
 /// Most nodes of a grid that is chosen, and of one that is asked for.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -63,9 +66,12 @@ pub struct Phase {
     spline: Spline,
     wanted: Wanted,
     shift: Vec3,
-    wavelength: [f64; 2],
+    /// Least and greatest wavelength asked for, mm.
+    wavelengths: [f64; 2],
+    /// The mean wavelengths along the three axes of the cell, mm.
     mean: Vec3,
-    steepest: f64,
+    /// A Lipschitz bound in the region's bounds, turns per mm.
+    max_lipschitz: f64,
     distortion: Distortion,
     extremes: [Mat3; 2],
     steps: usize,
@@ -142,7 +148,7 @@ impl Phase {
         }
         let shift = mean.map(|m| -dot(m, wanted.offset));
         let average = (within.iter()).fold([0.0; 3], |s, &n| add(s, wavelength[n]));
-        let steepest = spline.stretch(bounds);
+        let max_lipschitz = spline.lipschitz(bounds);
         let lengths: Vec<f64> = jacobians.par_iter().map(spectral_norm).collect();
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let typical = spline.jacobian(bounds.center()).1;
@@ -151,23 +157,13 @@ impl Phase {
             spline,
             wanted: wanted.clone(),
             shift,
-            wavelength: range,
+            wavelengths: range,
             mean: if within.is_empty() { wavelength[0] } else { scale(average, 1.0 / within.len() as f64) },
-            steepest,
+            max_lipschitz,
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
         })
-    }
-
-    /// Least and greatest wavelength asked for, mm.
-    pub fn wavelength(&self) -> [f64; 2] {
-        self.wavelength
-    }
-
-    /// The mean wavelengths along the three axes of the cell, mm.
-    pub fn mean_wavelength(&self) -> Vec3 {
-        self.mean
     }
 
     /// How far the map is from what was asked for.
@@ -195,40 +191,81 @@ impl Phase {
             .collect())
     }
 
-    /// The Jacobians at the nodes in the region where cells are largest and smallest.
-    pub fn extremes(&self) -> &[Mat3; 2] {
-        &self.extremes
-    }
-
     /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
     pub fn effort(&self) -> ([usize; 3], usize) {
         (self.spline.grid().shape, self.steps)
     }
+}
 
-    /// Fills phases (turns) of points (mm).
-    pub fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
+impl Mapping for Phase {
+    /// As asked for.
+    fn wavelengths(&self) -> [f64; 2] {
+        self.wavelengths
+    }
+
+    fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
         self.spline.values(points, out);
         out.iter_mut().for_each(|u| *u = add(*u, self.shift));
     }
 
-    /// du/dx at a point, turns per mm.
-    pub fn jacobian(&self, at: Vec3) -> Mat3 {
+    fn jacobian(&self, at: Vec3) -> Mat3 {
         self.spline.jacobian(at).1
     }
 
-    /// A bound of the spectral norm of du/dx in a box, turns per mm.
-    pub fn stretch(&self, b: &Aabb) -> f64 {
-        self.spline.stretch(b)
+    fn solved(&self) -> Option<&Phase> {
+        Some(self)
     }
 
-    /// A bound of the spectral norm of du/dx in the region's bounds, turns per mm.
-    pub fn steepest(&self) -> f64 {
-        self.steepest
+    /// That of the mean wavelengths.
+    fn typical(&self) -> Mat3 {
+        core::array::from_fn(|a| scale(IDENTITY[a], 1.0 / self.mean[a]))
     }
 
-    /// The map on the rows of a block, but for `shift`.
-    pub(super) fn rows<'a>(&'a self, block: &crate::field::Block<'a>) -> (spline::Rows<'a>, Vec3) {
-        (self.spline.rows(block), self.shift)
+    /// At nodes in the region.
+    fn extremes(&self) -> Vec<Mat3> {
+        self.extremes.to_vec()
+    }
+
+    fn lipschitz(&self, b: &Aabb) -> f64 {
+        self.spline.lipschitz(b)
+    }
+
+    /// In the region's bounds.
+    fn max_lipschitz(&self) -> f64 {
+        self.max_lipschitz
+    }
+
+    fn position(&self, u: Vec3, near: Vec3) -> Option<Vec3> {
+        inverse::search(self, u, near)
+    }
+
+    fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
+        inverse::searched(self, b)
+    }
+
+    fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
+        Box::new(SplineRows { rows: self.spline.rows(block), shift: self.shift })
+    }
+}
+
+/// The phases of a solved map along the rows of a block.
+struct SplineRows<'a> {
+    rows: spline::Rows<'a>,
+    shift: Vec3,
+}
+
+impl Rows for SplineRows<'_> {
+    fn enter_layer(&mut self, k: usize) {
+        self.rows.enter_layer(k);
+    }
+
+    fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
+        self.rows.fill(j, out);
+        for (out, shift) in out.iter_mut().zip(self.shift) {
+            if shift != 0.0 {
+                out.iter_mut().for_each(|u| *u += shift);
+            }
+        }
     }
 }
 

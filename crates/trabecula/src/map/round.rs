@@ -1,6 +1,7 @@
 //! Maps that wrap a lattice round an axis or a centre, with a whole number of cells around, so that it closes.
 
-use super::inverse::{corners, whole};
+use super::Mapping;
+use super::inverse::{corners, listed, whole};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
 
@@ -99,7 +100,7 @@ impl Round {
     }
 
     /// Phases (turns) of a point (mm).
-    pub fn phase(&self, p: Vec3) -> Vec3 {
+    fn phase(&self, p: Vec3) -> Vec3 {
         let (l, r) = self.local(p);
         let turn = |a: f64| self.around * a / core::f64::consts::TAU;
         let round = turn(l[1].atan2(l[0]));
@@ -110,8 +111,79 @@ impl Round {
         }
     }
 
-    /// The position (mm) that has the phases u, if there is one: radii are not negative, and end at the poles.
-    pub fn position(&self, u: Vec3) -> Option<Vec3> {
+    /// How many cells there are round the axis.
+    fn around(&self) -> i32 {
+        self.around as i32
+    }
+
+    /// The spectral norm of du/dx at a distance (mm) from the axis, turns per mm.
+    fn lipschitz_at(&self, radius: f64) -> f64 {
+        let lengths = if self.sphere { &self.wavelength[..1] } else { &self.wavelength[..] };
+        let along = lengths.iter().map(|w| 1.0 / w).fold(0.0, f64::max);
+        along.max(self.around / (core::f64::consts::TAU * radius))
+    }
+
+    /// The edge of a cell round the axis at a distance from it, mm.
+    fn arc(&self, radius: f64) -> f64 {
+        core::f64::consts::TAU * radius / self.around
+    }
+}
+
+impl Mapping for Round {
+    fn wavelengths(&self) -> [f64; 2] {
+        let [a, b] = self.wavelength;
+        [a.min(b).min(self.arc(self.radii[1])), a.max(b).max(self.arc(self.radii[2]))]
+    }
+
+    fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
+        for (o, &p) in out.iter_mut().zip(points) {
+            *o = self.phase(p);
+        }
+    }
+
+    /// Within a billionth of a wavelength of the axis, that at this distance.
+    fn jacobian(&self, p: Vec3) -> Mat3 {
+        let (l, r) = self.local(p);
+        let r = r.max(1e-9 * self.wavelength[0]);
+        let out = [l[0] / r, l[1] / r, 0.0];
+        let turn = self.around / core::f64::consts::TAU;
+        let round = [-l[1] / (r * r) * turn, l[0] / (r * r) * turn, 0.0];
+        let local = if self.sphere {
+            let s = r.hypot(l[2]);
+            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
+            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
+            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
+        } else {
+            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
+        };
+        product(&local, &self.frame)
+    }
+
+    fn typical(&self) -> Mat3 {
+        let arc = self.arc(self.radii[1]);
+        let last = if self.sphere { arc } else { self.wavelength[1] };
+        [[1.0 / self.wavelength[0], 0.0, 0.0], [0.0, 1.0 / arc, 0.0], [0.0, 0.0, 1.0 / last]]
+    }
+
+    /// Nearest to the axis and farthest from it in the region.
+    fn extremes(&self) -> Vec<Mat3> {
+        let at = |r: f64| self.jacobian(add(self.center, scale(self.frame[0], r)));
+        vec![at(self.radii[2]), at(self.radii[0])]
+    }
+
+    /// Infinite where the axis may meet the box.
+    fn lipschitz(&self, b: &Aabb) -> f64 {
+        let least = self.local(b.center()).1 - 0.5 * norm(b.size());
+        self.lipschitz_at(least.max(0.0)) * (1.0 + 1e-12)
+    }
+
+    /// At the mean distance from the axis.
+    fn max_lipschitz(&self) -> f64 {
+        self.lipschitz_at(self.radii[1])
+    }
+
+    /// Radii are not negative, and end at the poles.
+    fn position(&self, u: Vec3, _: Vec3) -> Option<Vec3> {
         let r = u[0] * self.wavelength[0];
         let angle = |u: f64| u * core::f64::consts::TAU / self.around;
         let (s, c) = angle(u[1]).sin_cos();
@@ -129,8 +201,7 @@ impl Round {
         (r >= -slack).then(|| add(self.center, add(along(0), add(along(1), along(2)))))
     }
 
-    /// Least and greatest cell along each phase that may have a part in the box, neighbours included.
-    pub(super) fn cells(&self, b: &Aabb) -> [[i32; 2]; 3] {
+    fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
         let places = corners(b).map(|p| self.local(p));
         let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| places.iter().map(v).fold(f64::NEG_INFINITY, f64::max);
         let away = |l: &(Vec3, f64)| if self.sphere { l.1.hypot(l.0[2]) } else { l.1 };
@@ -144,70 +215,11 @@ impl Round {
             [low, high].map(|z| whole(z / self.wavelength[1]))
         };
         let last = if self.sphere { last } else { [last[0] - 1, last[1] + 1] };
-        [radial, [0, self.around() - 1], last]
+        listed(self, [radial, [0, self.around() - 1], last], b, None)
     }
 
-    /// How many cells there are round the axis.
-    pub(super) fn around(&self) -> i32 {
-        self.around as i32
-    }
-
-    /// du/dx, turns per mm. Within a billionth of a wavelength of the axis, that at this distance.
-    pub fn jacobian(&self, p: Vec3) -> Mat3 {
-        let (l, r) = self.local(p);
-        let r = r.max(1e-9 * self.wavelength[0]);
-        let out = [l[0] / r, l[1] / r, 0.0];
-        let turn = self.around / core::f64::consts::TAU;
-        let round = [-l[1] / (r * r) * turn, l[0] / (r * r) * turn, 0.0];
-        let local = if self.sphere {
-            let s = r.hypot(l[2]);
-            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
-            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
-            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
-        } else {
-            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
-        };
-        product(&local, &self.frame)
-    }
-
-    /// A bound of the spectral norm of du/dx in a box; infinite where the axis may meet it.
-    pub fn stretch(&self, b: &Aabb) -> f64 {
-        let least = self.local(b.center()).1 - 0.5 * norm(b.size());
-        self.stretch_at(least.max(0.0)) * (1.0 + 1e-12)
-    }
-
-    fn stretch_at(&self, radius: f64) -> f64 {
-        let lengths = if self.sphere { &self.wavelength[..1] } else { &self.wavelength[..] };
-        let along = lengths.iter().map(|w| 1.0 / w).fold(0.0, f64::max);
-        along.max(self.around / (core::f64::consts::TAU * radius))
-    }
-
-    /// The edge of a cell round the axis at a distance from it, mm.
-    fn arc(&self, radius: f64) -> f64 {
-        core::f64::consts::TAU * radius / self.around
-    }
-
-    /// Least and greatest edge of a cell in the region, mm, the least at the mean distance from the axis.
-    pub fn wavelengths(&self) -> [f64; 2] {
-        let [a, b] = self.wavelength;
-        [a.min(b).min(self.arc(self.radii[1])), a.max(b).max(self.arc(self.radii[2]))]
-    }
-
-    /// A Jacobian typical of the map, but for its rotation.
-    pub fn typical(&self) -> Mat3 {
-        let arc = self.arc(self.radii[1]);
-        let last = if self.sphere { arc } else { self.wavelength[1] };
-        [[1.0 / self.wavelength[0], 0.0, 0.0], [0.0, 1.0 / arc, 0.0], [0.0, 0.0, 1.0 / last]]
-    }
-
-    /// The Jacobians nearest to the axis and farthest from it in the region.
-    pub fn extremes(&self) -> [Mat3; 2] {
-        [self.radii[2], self.radii[0]].map(|r| self.jacobian(add(self.center, scale(self.frame[0], r))))
-    }
-
-    /// The largest stretch at the mean distance from the axis, turns per mm.
-    pub fn steepest(&self) -> f64 {
-        self.stretch_at(self.radii[1])
+    fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
+        [cell[0], cell[1].rem_euclid(self.around()), cell[2]]
     }
 }
 
@@ -246,14 +258,14 @@ mod tests {
                 let b = Aabb { min: p, max: p }.grown(0.1);
                 for q in places().take(20) {
                     let q = core::array::from_fn(|a| p[a] + 0.01 * q[a]);
-                    assert!(spectral_norm(&map.jacobian(q)) <= map.stretch(&b));
+                    assert!(spectral_norm(&map.jacobian(q)) <= map.lipschitz(&b));
                 }
             }
         }
         let plain = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder");
         let u = plain.phase([0.0, 4.0, 6.0]);
         assert!(norm(sub(u, [2.0, 3.0, 2.0])) < 1e-14, "{u:?}");
-        assert_eq!(plain.stretch(&Aabb { min: [-1.0; 3], max: [1.0; 3] }), f64::INFINITY);
+        assert_eq!(plain.lipschitz(&Aabb { min: [-1.0; 3], max: [1.0; 3] }), f64::INFINITY);
     }
 
     #[test]

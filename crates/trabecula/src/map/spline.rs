@@ -26,7 +26,7 @@ pub(super) struct Spline {
     coefficients: [Vec<f64>; 3],
     /// For each block of intervals between nodes, x fastest: a bound of |J − J₀| (Frobenius) and one of |J₀| (spectral), J₀ the
     /// middle of what the entries can be.
-    stretch: Vec<[f32; 2]>,
+    lipschitz: Vec<[f32; 2]>,
 }
 
 /// Where a coordinate falls: the interval, and the weights of its four coefficients in the value and in the slope.
@@ -47,10 +47,12 @@ impl Spline {
             let mut made = made.into_iter();
             core::array::from_fn(|_| made.next().unwrap_or_default())
         };
-        let mut spline = Spline { grid, shape, coefficients, stretch: Vec::new() };
+        let mut spline = Spline { grid, shape, coefficients, lipschitz: Vec::new() };
         let [nx, ny, nz] = spline.blocks();
-        spline.stretch =
-            (0..nx * ny * nz).into_par_iter().map(|i| spline.stretch_of([i % nx, i / nx % ny, i / nx / ny])).collect();
+        spline.lipschitz = (0..nx * ny * nz)
+            .into_par_iter()
+            .map(|i| spline.lipschitz_of([i % nx, i / nx % ny, i / nx / ny]))
+            .collect();
         spline
     }
 
@@ -126,7 +128,7 @@ impl Spline {
     }
 
     /// [|J − J₀|, |J₀|] over a block. A derivative is a mean of differences of coefficients along its axis.
-    fn stretch_of(&self, at: [usize; 3]) -> [f32; 2] {
+    fn lipschitz_of(&self, at: [usize; 3]) -> [f32; 2] {
         let s = self.strides();
         let base = BLOCK * (at[0] + at[1] * s[1] + at[2] * s[2]);
         // Coefficients that count.
@@ -156,7 +158,7 @@ impl Spline {
     }
 
     /// A bound of |J| (spectral norm) in the box.
-    pub fn stretch(&self, b: &Aabb) -> f64 {
+    pub fn lipschitz(&self, b: &Aabb) -> f64 {
         let mut range = [(0, 0); 3];
         // Beyond a face the weights are those of a straight line; they add up to one, their sizes to more.
         let mut beyond = 1.0;
@@ -174,7 +176,7 @@ impl Spline {
         let mut most = 0.0f64;
         for k in range[2].0..=range[2].1 {
             for j in range[1].0..=range[1].1 {
-                let row = &self.stretch[(k * ny + j) * nx..][range[0].0..=range[0].1];
+                let row = &self.lipschitz[(k * ny + j) * nx..][range[0].0..=range[0].1];
                 for [half, middle] in row {
                     most = most.max(f64::from(*half) * beyond + f64::from(*middle));
                 }
@@ -432,7 +434,7 @@ mod tests {
         let p = places();
         for pair in p.windows(2) {
             let b = Aabb { min: pair[0], max: pair[0] }.with(pair[1]);
-            let bound = s.stretch(&b);
+            let bound = s.lipschitz(&b);
             for i in 0..27 {
                 let t = [i % 3, i / 3 % 3, i / 9].map(|v| f64::from(v) / 2.0);
                 let q = core::array::from_fn(|a| b.min[a] + t[a] * (b.max[a] - b.min[a]));

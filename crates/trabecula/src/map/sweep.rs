@@ -12,7 +12,8 @@ mod room;
 #[cfg(test)]
 mod tests;
 
-use super::inverse::whole;
+use super::Mapping;
+use super::inverse::{listed, whole};
 use crate::field::Field;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
@@ -130,7 +131,7 @@ impl Sweep {
     }
 
     /// The length from t₀ to t, mm.
-    fn stretch_of(&self, t0: f64, t: f64) -> f64 {
+    fn length_between(&self, t0: f64, t: f64) -> f64 {
         let half = 0.5 * (t - t0);
         let at = |x: f64| norm(self.curve(t0 + half * (1.0 + x)).1);
         half * GAUSS.iter().map(|(x, w)| w * at(*x)).sum::<f64>()
@@ -160,7 +161,7 @@ impl Sweep {
             // An end that is the start again is not taken round it.
             let (place, slope, _) = self.curve(if self.closed && t == end { 0.0 } else { t });
             let tangent = unit(slope);
-            let s = last.s + self.stretch_of(last.t, t);
+            let s = last.s + self.length_between(last.t, t);
             let normal = carried(&last, place, tangent);
             knots.push(Knot { t, place, tangent, normal, s });
         }
@@ -234,7 +235,7 @@ impl Sweep {
         } else if !self.closed && round < 0.0 {
             round * speed
         } else {
-            self.knots[i].s + self.stretch_of(self.knots[i].t, round)
+            self.knots[i].s + self.length_between(self.knots[i].t, round)
         };
         let normals = self.frame(i, round, c, tangent, s);
         Local { s, across: normals.map(|n| dot(d, n)), tangent, normals, room: 1.0 - dot(bend, d) }
@@ -256,31 +257,39 @@ impl Sweep {
         self.length
     }
 
-    /// Least and greatest cell edge in the region, mm.
-    pub fn wavelengths(&self) -> [f64; 2] {
-        let [a, b, _] = self.wavelength;
-        [a.min(b).min(self.along[0]), a.max(b).max(self.along[1])]
-    }
-
-    /// A Jacobian typical of the map, but for its rotation.
-    pub fn typical(&self) -> Mat3 {
-        core::array::from_fn(|i| core::array::from_fn(|j| if i == j { 1.0 / self.wavelength[i] } else { 0.0 }))
-    }
-
-    /// The Jacobians where cells are shortest and longest.
-    pub fn extremes(&self) -> &[Mat3; 2] {
-        &self.extremes
-    }
-
     /// The phase (turns) at a point (mm).
-    pub fn phase(&self, p: Vec3) -> Vec3 {
+    fn phase(&self, p: Vec3) -> Vec3 {
         let l = self.local(p);
         let w = self.wavelength;
         [l.across[0] / w[0], l.across[1] / w[1], l.s / w[2]]
     }
 
-    /// du/dx at a point, turns per mm.
-    pub fn jacobian(&self, p: Vec3) -> Mat3 {
+    /// A Lipschitz bound (turns per mm) where the room is at least `room` and the distance from the line at most `away`.
+    fn lipschitz_within(&self, room: f64, away: f64) -> f64 {
+        let [a, b, c] = self.wavelength;
+        // Rows at right angles but for the twist, whose norm is added.
+        (1.0 / a.min(b)).max(1.0 / (room * c)) + self.twist.abs() * away / (room * a.min(b))
+    }
+
+    /// How many cells a line that closes has along it.
+    pub fn around(&self) -> Option<i32> {
+        self.closed.then(|| (self.length / self.wavelength[2]).round() as i32)
+    }
+}
+
+impl Mapping for Sweep {
+    fn wavelengths(&self) -> [f64; 2] {
+        let [a, b, _] = self.wavelength;
+        [a.min(b).min(self.along[0]), a.max(b).max(self.along[1])]
+    }
+
+    fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
+        for (o, &p) in out.iter_mut().zip(points) {
+            *o = self.phase(p);
+        }
+    }
+
+    fn jacobian(&self, p: Vec3) -> Mat3 {
         let l = self.local(p);
         let along = scale(l.tangent, 1.0 / l.room.max(1e-6));
         let [a, b] = l.across;
@@ -292,31 +301,30 @@ impl Sweep {
         ]
     }
 
-    /// A bound of the spectral norm of du/dx in a box, turns per mm: none where the nearest point may not be one.
-    pub fn stretch(&self, b: &Aabb) -> f64 {
+    fn typical(&self) -> Mat3 {
+        core::array::from_fn(|i| core::array::from_fn(|j| if i == j { 1.0 / self.wavelength[i] } else { 0.0 }))
+    }
+
+    fn extremes(&self) -> Vec<Mat3> {
+        self.extremes.to_vec()
+    }
+
+    /// Infinite where a position may have more than one nearest point of the line.
+    fn lipschitz(&self, b: &Aabb) -> f64 {
         let reach = norm(b.size()) / 2.0;
         let away = self.away(b.center()) + reach;
         if away >= self.reach {
             return f64::INFINITY;
         }
-        self.steep(1.0 - away / self.reach, away)
+        self.lipschitz_within(1.0 - away / self.reach, away)
     }
 
-    /// A bound of the spectral norm where the room is at least `room` and the distance from the line at most `away`.
-    fn steep(&self, room: f64, away: f64) -> f64 {
-        let [a, b, c] = self.wavelength;
-        // Rows at right angles but for the twist, whose norm is added.
-        (1.0 / a.min(b)).max(1.0 / (room * c)) + self.twist.abs() * away / (room * a.min(b))
-    }
-
-    /// A bound of the spectral norm of du/dx where the lattice is wanted, turns per mm.
-    pub fn steepest(&self) -> f64 {
+    fn max_lipschitz(&self) -> f64 {
         let room = self.along[0] / self.wavelength[2];
-        self.steep(room.max(1e-3), self.reach)
+        self.lipschitz_within(room.max(1e-3), self.reach)
     }
 
-    /// The position (mm) that has the phase u.
-    pub fn position(&self, u: Vec3) -> Option<Vec3> {
+    fn position(&self, u: Vec3, _: Vec3) -> Option<Vec3> {
         let w = self.wavelength;
         let mut s = u[2] * w[2];
         if self.closed {
@@ -330,7 +338,7 @@ impl Sweep {
             let have = if t > self.end && !self.closed {
                 self.length + (t - self.end) * norm(self.curve(t).1)
             } else {
-                self.knots[i].s + self.stretch_of(self.knots[i].t, t)
+                self.knots[i].s + self.length_between(self.knots[i].t, t)
             };
             t += (s - have) / norm(self.curve(t).1);
         }
@@ -339,13 +347,7 @@ impl Sweep {
         Some(add(c, add(scale(n[0], u[0] * w[0]), scale(n[1], u[1] * w[1]))))
     }
 
-    /// How many cells a line that closes has along it.
-    pub fn around(&self) -> Option<i32> {
-        self.closed.then(|| (self.length / self.wavelength[2]).round() as i32)
-    }
-
-    /// The range of cells that may have a part in the box.
-    pub(super) fn cells(&self, b: &Aabb) -> [[i32; 2]; 3] {
+    fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
         let away = self.away(b.center()) + norm(b.size());
         let w = self.wavelength;
         let across = |a: usize| [whole(-away / w[a]) - 1, whole(away / w[a]) + 1];
@@ -353,6 +355,13 @@ impl Sweep {
             Some(n) => [0, n - 1],
             None => [whole(-away / w[2]) - 1, whole((self.length + away) / w[2]) + 1],
         };
-        [across(0), across(1), along]
+        listed(self, [across(0), across(1), along], b, None)
+    }
+
+    fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
+        match self.around() {
+            Some(n) => [cell[0], cell[1], cell[2].rem_euclid(n)],
+            None => cell,
+        }
     }
 }

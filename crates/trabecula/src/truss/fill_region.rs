@@ -76,9 +76,10 @@ mod tests {
     use crate::map::{Affine, Round};
     use beams::graph::{catalogue, named};
     use geometry::math::{norm, sub};
+    use std::sync::Arc;
 
     fn affine(w: f64) -> Map {
-        Map::Affine(Affine::rigid([w; 3], [10.0, 20.0, 30.0], [0.3, 0.1, 0.2], &[]).expect("map"))
+        Arc::new(Affine::rigid([w; 3], [10.0, 20.0, 30.0], [0.3, 0.1, 0.2], &[]).expect("map"))
     }
 
     #[test]
@@ -113,7 +114,7 @@ mod tests {
     fn a_cylinder_closes() {
         let graph = named("sc").and_then(|u| u.graph().ok()).expect("a graph");
         let round = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0; 2], 12.0, [0.0, 4.0, 6.0]);
-        let map = Map::Round(round.expect("map"));
+        let map: Map = Arc::new(round.expect("map"));
         let bounds = Aabb { min: [-6.0, -6.0, -0.5], max: [6.0, 6.0, 1.5] };
         let mut wireframe = fill(&graph, &map, &bounds, 0.0).expect("a wireframe");
         let done = wireframe.clean(1e-6, &mut Vec::new());

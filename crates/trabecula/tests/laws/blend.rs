@@ -12,7 +12,7 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Formula, Grade, Linear, Sigmoid};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
+use trabecula::map::Affine;
 use trabecula::solid::Solid;
 
 use crate::common::{check, cuboid};
@@ -20,7 +20,7 @@ use crate::common::{check, cuboid};
 fn made(name: &str, part: Part, level: Level, wavelength: f64, rotate: Vec3) -> Arc<Lattice> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid([wavelength; 3], rotate, [0.0; 3], &[]).expect("map");
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
+    Arc::new(Lattice::new(Arc::new(cell), Arc::new(map), part, level))
 }
 
 fn share(name: &str, part: Part, fraction: f64, wavelength: f64) -> Arc<Lattice> {

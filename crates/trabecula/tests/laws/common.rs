@@ -15,7 +15,7 @@ use trabecula::extract::GridSurface;
 use trabecula::grade::Grade;
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
+use trabecula::map::Affine;
 use trabecula::region::{Cuboid, Cylinder, Difference, HalfSpace, Intersection, Region, Sphere, Union};
 use trabecula::solid::Solid;
 use trabecula::surface_maker::{Components, Islands, Options, Summary, SurfaceMaker};
@@ -57,7 +57,7 @@ pub fn lattice(name: &str, part: Part, fraction: f64, wavelength: Vec3, rotate: 
 pub fn lattice_at(name: &str, part: Part, level: Level, wavelength: Vec3, rotate: Vec3) -> Arc<dyn Implicit> {
     let cell = Cell::new(Series::new(named(name).expect(name).terms()).expect(name));
     let map = Affine::rigid(wavelength, rotate, [0.0; 3], &[]).expect("map");
-    Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level))
+    Arc::new(Lattice::new(Arc::new(cell), Arc::new(map), part, level))
 }
 
 /// What a lattice is made of.

@@ -12,7 +12,7 @@ use trabecula::cell::{Cell, Part, Series, named};
 use trabecula::extract::surface;
 use trabecula::grade::Grade;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
+use trabecula::map::Affine;
 use trabecula::region::{Cuboid, Cylinder, Difference, Region, Sphere};
 use trabecula::solid::Solid;
 
@@ -48,7 +48,7 @@ fn gyroid(part: Part, fraction: f64, edge: f64) -> (SurfaceMesh, Region) {
     let cell = Cell::new(Series::new(named("gyroid").expect("gyroid").terms()).expect("series"));
     let map = Affine::rigid([4.0; 3], [0.0; 3], [0.0; 3], &[]).expect("map");
     let level = Level::Fraction(Grade::Constant(fraction));
-    let field = Arc::new(Lattice::new(Arc::new(cell), Map::Affine(map), part, level));
+    let field = Arc::new(Lattice::new(Arc::new(cell), Arc::new(map), part, level));
     let region: Region = Arc::new(Cuboid::new([0.0; 3], [8.0; 3]).expect("box"));
     let solid = Solid::new(region.clone(), Some(field), 4.0);
     (surface(&solid, edge, &Silent).expect("surface"), region)

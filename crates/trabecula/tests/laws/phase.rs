@@ -31,7 +31,7 @@ fn map(b: &Aabb, wavelength: [&str; 3], angles: [&str; 3]) -> Map {
         angle_weight: 1.0,
         offset: [0.1, 0.2, 0.3],
     };
-    Map::Phase(Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved")))
+    Arc::new(Phase::solve(b, &wanted, &Settings::default()).expect("solved"))
 }
 
 fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
@@ -144,7 +144,7 @@ fn a_tube_closes_over_its_seam() {
     let map = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [1.0, 2.0], 20.0, [5.0, 6.5, 8.0]).expect("map");
     for level in [Level::Fraction(Grade::Constant(0.35)), Level::Thickness(Grade::Constant(0.25))] {
         let exact = matches!(level, Level::Fraction(_));
-        let l: Arc<dyn Implicit> = Arc::new(Lattice::new(cell("gyroid"), Map::Round(map), Part::Sheet, level));
+        let l: Arc<dyn Implicit> = Arc::new(Lattice::new(cell("gyroid"), Arc::new(map), Part::Sheet, level));
         let solid = Solid::new(region.clone(), Some(l), 1.0);
         let m = size(&surface(&solid, 0.12, &Silent).expect("surface").mesh);
         let share = m.volume / (std::f64::consts::PI * 39.0 * 8.0);

@@ -13,7 +13,7 @@ use trabecula::field::{Block, Field};
 use trabecula::grade::{Grade, Linear};
 use trabecula::implicit::Implicit;
 use trabecula::lattice::{Lattice, Level};
-use trabecula::map::{Affine, Map};
+use trabecula::map::Affine;
 use trabecula::region::Cuboid;
 use trabecula::solid::Solid;
 
@@ -25,7 +25,7 @@ fn series(name: &str) -> Series {
 
 fn wall(series: Series, level: Level, map: Affine) -> Lattice {
     let cell = Arc::new(Cell::new(series));
-    Lattice::new(cell, Map::Affine(map), Part::Sheet, level)
+    Lattice::new(cell, Arc::new(map), Part::Sheet, level)
 }
 
 fn rigid(wavelength: [f64; 3], rotate: [f64; 3]) -> Affine {

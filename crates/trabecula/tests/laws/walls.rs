@@ -26,7 +26,7 @@ fn sheet(name: &str, fraction: &str, wavelength: f64) -> Arc<Lattice> {
         Err(_) => Grade::from(Formula::parse(fraction).expect(fraction)),
     };
     let level = Level::Fraction(fraction);
-    let map = Map::Affine(map);
+    let map: Map = Arc::new(map);
     Arc::new(Lattice::new(Arc::new(cell), map, Part::Sheet, level))
 }
 

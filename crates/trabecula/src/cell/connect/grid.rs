@@ -69,7 +69,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Samples f as finely as its steepness asks for, within 48³ and 96³ nodes.
+    /// Samples f as finely as its gradient asks for, within 48³ and 96³ nodes.
     pub(super) fn sample(f: Function) -> Grid {
         let coarse = Grid::of(f, 48);
         // A hundredth of the range keeps apart what an engineer would call apart.
@@ -86,8 +86,8 @@ impl Grid {
                 (0..n * n).map(|i| [(i % n) as f64 * h, (i / n) as f64 * h, z as f64 * h]).collect();
             f(&points, v, g);
         });
-        let steepness = slopes.iter().map(|g| norm(*g)).collect();
-        let mut grid = Grid { n, values, slopes: steepness, error: 0.0, bend: 0.0 };
+        let lengths = slopes.iter().map(|g| norm(*g)).collect();
+        let mut grid = Grid { n, values, slopes: lengths, error: 0.0, bend: 0.0 };
         let bend = (0..slopes.len() as u32).into_par_iter().map(|i| {
             let step = grid.steps(i);
             let change = |d: Int3| norm(sub(slopes[step(d).0 as usize], slopes[i as usize])) / h;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::grade::{Formula, Linear};
-use crate::map::{Affine, Map};
+use crate::map::Affine;
 use geometry::math::rotation;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -45,10 +45,10 @@ fn what_does_not_vary_is_the_affine_map() {
         offset,
     };
     let ball = crate::region::Sphere::new([3.0, 5.0, 12.0], 2.0).expect("ball");
-    let affine = Map::Affine(Affine::rigid(wavelength, angles, offset, &[]).expect("map"));
+    let affine = Affine::rigid(wavelength, angles, offset, &[]).expect("map");
     for region in [None, Some(&ball as &dyn Field)] {
         let settings = Settings { region, ..Settings::default() };
-        let map = Map::Phase(Arc::new(Phase::solve(&b, &wanted, &settings).expect("solved")));
+        let map = Phase::solve(&b, &wanted, &settings).expect("solved");
         for i in 0..200 {
             let s = [0.371, 0.713, 0.193].map(|s| (s * f64::from(i)).fract());
             let p = core::array::from_fn(|a| b.min[a] - 1.0 + s[a] * (b.size()[a] + 2.0));
@@ -275,7 +275,7 @@ fn solving_three_phases_at_128_cubed() {
         println!(
             "{n}: {:.3} s for the splines, {:.3}",
             start.elapsed().as_secs_f64(),
-            spline.stretch(&bounds([1.0; 3], [2.0; 3]))
+            spline.lipschitz(&bounds([1.0; 3], [2.0; 3]))
         );
         // One sweep of the iteration, in three phases, for comparison.
         let start = std::time::Instant::now();

@@ -2,6 +2,7 @@
 
 use super::{FINE, Knot, Sweep};
 use crate::field::Field;
+use crate::map::Mapping;
 use geometry::fault::Fault;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 

@@ -68,11 +68,11 @@ fn slopes_places_and_bounds_agree() {
                     assert!((d[i] / 2e-5 - j[i][a]).abs() < 2e-4, "{closed} {p:?} {i}{a}");
                 }
             }
-            let back = map.position(map.phase(*p)).expect("place");
+            let back = map.position(map.phase(*p), *p).expect("place");
             assert!(norm(sub(back, *p)) < 1e-7, "{closed} {p:?} {back:?}");
             let b = Aabb { min: *p, max: p.map(|x| x + 0.2) };
             let steep = geometry::math::spectral_norm(&map.jacobian(p.map(|x| x + 0.13)));
-            assert!(steep <= map.stretch(&b) * (1.0 + 1e-9), "{closed} {p:?}");
+            assert!(steep <= map.lipschitz(&b) * (1.0 + 1e-9), "{closed} {p:?}");
         }
     }
 }
