@@ -148,7 +148,7 @@ mod _core {
     /// The ready tetrahedral cells.
     #[pyfunction]
     fn tet_cells() -> Vec<&'static str> {
-        let all = trabecula::cell::tet::ready_cells();
+        let all = trabecula::cell::tet::tet_catalogue();
         all.iter().map(|r| r.name).collect()
     }
 
@@ -156,18 +156,18 @@ mod _core {
     /// which it is one piece that reaches all faces.
     #[pyfunction]
     fn tet_cell_facts(py: Python<'_>, name: &str) -> PyResult<String> {
-        let ready = trabecula::cell::tet::ready(name)
+        let named = trabecula::cell::tet::named_tet_cell(name)
             .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}")))?;
-        let told = crate::run::run(py, None, None, |_| ready.facts())?;
-        told.map(|json| json.to_string()).map_err(crate::error::fault)
+        let facts = crate::run::run(py, None, None, |_| named.facts())?;
+        facts.map(|json| json.to_string()).map_err(crate::error::fault)
     }
 
     /// The surface of a ready tetrahedral cell in the regular tetrahedron of edge 1 mm, in `steps` steps.
     #[pyfunction]
     fn tet_cell_mesh(py: Python<'_>, name: &str, steps: usize) -> PyResult<Mesh> {
-        let ready = trabecula::cell::tet::ready(name)
+        let named = trabecula::cell::tet::named_tet_cell(name)
             .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(format!("no tetrahedral cell is named {name}")))?;
-        let made = crate::run::run(py, None, None, |p| trabecula::tiling::stencil(ready, steps, p))?;
+        let made = crate::run::run(py, None, None, |p| trabecula::tiling::cell_surface(named, steps, p))?;
         let surface = made.map_err(crate::error::stopped)?;
         Ok(Mesh::new(surface, String::new()))
     }

@@ -3,7 +3,7 @@
 
 mod cut_triangles;
 mod dangling;
-mod depth;
+mod grid_depth;
 mod local_thickness;
 mod transition;
 

@@ -13,7 +13,7 @@
 //! summand · windows                                                     gᵢ and its ends · where phases are sampled together
 //! levels                                                                LO and HI, tabulated by shares and windows
 //! window_cache · row_cache                                              tables about a point, along a row
-//! offset                                                                LO and HI at a point, with gradients
+//! level_offset                                                          LO and HI at a point, with gradients
 //! sum                                                                   F, and the blend's data
 //! evaluated · grid_row                                                  summands at points, on a row of a block
 //! points · mixed_rows                                                   the blend at points, on rows with several lattices
@@ -26,10 +26,10 @@ mod ends;
 mod evaluated;
 mod fill_block;
 mod grid_row;
+mod level_offset;
 mod levels;
 mod mixed_rows;
 mod node_table;
-mod offset;
 mod points;
 mod row_cache;
 mod share_grid;

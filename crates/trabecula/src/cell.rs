@@ -1,21 +1,21 @@
 //! Cells: functions on the torus R³/Z³, positions in turns.
 
-mod connect;
 mod curvature;
 mod cut;
 mod distance;
 mod named;
 mod nearest;
+mod periodic_components;
+mod periodic_spline;
 mod quantile;
 mod series;
-mod spline;
 pub mod tet;
 mod thickness;
 
-pub use connect::{connected, necks};
 pub(crate) use cut::Cut;
 pub use distance::Distance;
 pub use named::{Named, catalogue, named};
+pub use periodic_components::{connected, necks};
 pub use series::{Series, Term};
 
 use std::sync::OnceLock;

@@ -12,10 +12,10 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::tetmesh::{TetMesh, conformity};
 
+mod bcc_grid;
 mod boundary_repair;
 mod creases;
 mod features;
-mod grid;
 mod isosurface_stuffing;
 mod region_fit;
 mod smooth;
@@ -79,7 +79,7 @@ pub fn background(region: &dyn Field, bounds: &Aabb, size: &Grade, inside: &[Vec
     let extent = bounds.size().into_iter().fold(0.0, f64::max);
     // A cube holds twelve tetrahedra: ∛√2 times the edge of the regular tetrahedron of a twelfth of its volume.
     let cube = fitted(bounds, 2f64.powf(1.0 / 6.0) * largest.min(extent));
-    let mut grid = grid::Grid::new(region, bounds, cube, MOST)?;
+    let mut grid = bcc_grid::Grid::new(region, bounds, cube, MOST)?;
     if size.constant().is_none() {
         grid.refine(region, size, MOST)?;
     }

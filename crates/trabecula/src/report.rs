@@ -1,25 +1,25 @@
 //! Reports: every figure of a design or a mesh, declared once. The fields are the keys of the JSON that the command
 //! prints and the attributes of the Python classes, whose text is made from the comments here (`scripts/report_classes.py`).
 
-mod beams;
-mod design;
-mod mesh;
-mod tets;
+mod beams_report;
+mod design_report;
+mod mesh_report;
+mod tets_report;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-pub use beams::{BeamsReport, CleanedReport, GraphReport, PatternReport, TrimmedReport};
-pub use design::{
+pub use beams_report::{BeamsReport, CleanedReport, GraphReport, PatternReport, TrimmedReport};
+pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     RbfReport, RegionReport, TransitionReport,
 };
-pub use mesh::{
+pub use mesh_report::{
     DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,
     RepairReport, SimplifyReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread, VoidReport,
 };
-pub use tets::{
+pub use tets_report::{
     Creases, DihedralReport, FitReport, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport, WallSpread,
     ZoneJoin, ZoneReport,
 };

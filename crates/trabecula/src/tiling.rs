@@ -8,13 +8,13 @@
 //! which leaves no crease; the surface then moves by some of the overlap, but not where it meets the faces themselves.
 
 mod crease;
-mod level;
 mod mixture;
+mod node_levels;
 mod surface;
 
 use std::sync::Arc;
 
-use crate::cell::tet::{Bary, Stencil};
+use crate::cell::tet::{Bary, TetCell};
 use crate::cell::{Cut, Part};
 use crate::field::Field;
 use crate::implicit::Implicit;
@@ -22,14 +22,14 @@ use crate::map::Tets;
 use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
-pub use level::{Amount, Spread};
-pub use surface::{Connectivity, TilingSurface, ZonePair, connectivity, stencil};
+pub use node_levels::{Amount, Spread};
+pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity};
 
 /// A cell of a tiling.
 #[derive(Clone)]
 pub struct Share {
     /// The cell.
-    pub stencil: Arc<Stencil>,
+    pub stencil: Arc<TetCell>,
     /// What its values are divided by, so that several cells have like values.
     pub scale: f64,
     /// Its weight at each node of the mesh; one everywhere if there is none.
@@ -76,7 +76,7 @@ const MOST: usize = 256;
 
 impl Tiling {
     /// A single cell over a mesh.
-    pub fn new(map: Arc<Tets>, stencil: Arc<Stencil>, part: Part, level: Level) -> Tiling {
+    pub fn new(map: Arc<Tets>, stencil: Arc<TetCell>, part: Part, level: Level) -> Tiling {
         let cell = Share { stencil, scale: 1.0, weights: None };
         Tiling::of(map, vec![cell], part, level)
     }
@@ -93,7 +93,7 @@ impl Tiling {
         let corners = cells[0].stencil.corners();
         let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
         // All tetrahedra of cells are regular: with edges of another length the Jacobian is that much larger.
-        let size = |s: &Stencil| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
+        let size = |s: &TetCell| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
         let longest = cells.iter().map(|c| size(&c.stencil)).fold(0.0, f64::max);
         let more = longest / size(&cells[0].stencil);
         let of = |t: usize| {

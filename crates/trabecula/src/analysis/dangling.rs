@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::depth::depths;
+use super::grid_depth::depths;
 use crate::field::{Block, Field};
 use crate::solid::Solid;
 use geometry::fault::{Fault, number};

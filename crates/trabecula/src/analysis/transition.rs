@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::depth::depths;
+use super::grid_depth::depths;
 use crate::blend::Blend;
 use crate::field::Field;
 use crate::solid::Solid;

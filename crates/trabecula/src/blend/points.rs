@@ -2,7 +2,7 @@
 
 use super::ends::{EndQuantiles, HIGH, LOW};
 use super::evaluated::{Evaluated, zeros};
-use super::offset::Position;
+use super::level_offset::Position;
 use super::share_grid::Simplex;
 use super::sum::Blend;
 use super::window_cache::WindowCache;

@@ -8,12 +8,12 @@
 use std::sync::OnceLock;
 
 use super::Part;
-use super::connect::connected;
 use super::curvature;
 use super::nearest::Search;
+use super::periodic_components::connected;
+use super::periodic_spline::Spline;
 use super::quantile::Quantile;
 use super::series::Series;
-use super::spline::Spline;
 use super::thickness::least;
 use geometry::math::{Interval, Mat3, Vec3, apply, inverse, norm, transpose};
 

@@ -5,14 +5,14 @@
 //! the vertices. So its traces on the four faces are one function with the full symmetry of the face, and f is
 //! continuous across the faces of any conforming mesh, for any vertex order, tetrahedron edge and element shape.
 
-mod connect;
+mod component_counts;
 mod fraction;
-mod nodes;
-mod ready;
+mod subdivision;
+mod tet_catalogue;
 
 pub(crate) use fraction::share_below;
-pub use nodes::{Grid, Nodes};
-pub use ready::{Ready, ready, ready_cells};
+pub use subdivision::{Nodes, Subdivision};
+pub use tet_catalogue::{NamedTetCell, named_tet_cell, tet_catalogue};
 
 use std::sync::OnceLock;
 
@@ -27,12 +27,12 @@ pub type Bary = [f64; 4];
 const LARGEST: f64 = 8.0;
 
 /// A tetrahedral cell: f in barycentric coordinates, with phase Σ λ_i p_i.
-pub struct Stencil {
+pub struct TetCell {
     series: Series,
     /// Phases p_1 … p_4 of the vertices, turns.
     corners: [Vec3; 4],
     volume: OnceLock<fraction::Table>,
-    connect: [OnceLock<connect::Pieces>; 3],
+    connect: [OnceLock<component_counts::ComponentCounts>; 3],
 }
 
 /// Numbers of connected components of a tetrahedral cell.
@@ -44,13 +44,13 @@ pub struct Count {
     pub ports: usize,
 }
 
-impl Stencil {
+impl TetCell {
     /// The regular tetrahedron of edge `edge` (in edges of the cubic cell) about `site` (turns) in a cubic cell: equation
     /// 10 of the paper, or its dual, equation 11, with m = edge √2/4.
     ///
     /// # Errors
     /// An edge that is not positive or above 8; a series that has not the symmetry of the tetrahedron about the site.
-    pub fn new(series: Series, site: Vec3, edge: f64, dual: bool) -> Result<Stencil, Fault> {
+    pub fn new(series: Series, site: Vec3, edge: f64, dual: bool) -> Result<TetCell, Fault> {
         if !(edge > 0.0 && edge <= LARGEST) {
             let message = format!(
                 "the edge of the tetrahedron is {} cells; it must be above 0 and at most {LARGEST}",
@@ -63,7 +63,7 @@ impl Stencil {
         }
         let m = if dual { -1.0 } else { 1.0 } * edge * 2f64.sqrt() / 4.0;
         let ends = [[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]];
-        let stencil = Stencil {
+        let stencil = TetCell {
             series,
             corners: ends.map(|e| add(site, scale(e, m))),
             volume: OnceLock::new(),
@@ -86,8 +86,8 @@ impl Stencil {
     ///
     /// # Errors
     /// As [`Series::about`].
-    pub fn about(&self, level: f64) -> Result<Stencil, Fault> {
-        Ok(Stencil {
+    pub fn about(&self, level: f64) -> Result<TetCell, Fault> {
+        Ok(TetCell {
             series: self.series.about(level)?,
             corners: self.corners,
             volume: OnceLock::new(),
@@ -172,8 +172,8 @@ impl Stencil {
         fraction::of_face(self, part, iso)
     }
 
-    fn pieces(&self, part: Part) -> &connect::Pieces {
-        self.connect[part as usize].get_or_init(|| connect::Pieces::new(self, part))
+    fn pieces(&self, part: Part) -> &component_counts::ComponentCounts {
+        self.connect[part as usize].get_or_init(|| component_counts::ComponentCounts::new(self, part))
     }
 
     /// The intervals of the level in which the solid is connected and reaches all four faces: there the lattice is

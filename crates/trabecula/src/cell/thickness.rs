@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::Part;
-use super::connect::{Function, critical, sample};
+use super::periodic_components::{Function, critical, sample};
 use geometry::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, sub, transpose, unit};
 
 /// Samples of the mid-surface along each axis of the torus.

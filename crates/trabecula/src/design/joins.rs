@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Warning, tiling::Zoned};
 use crate::cell::Part;
-use crate::cell::tet::{Bary, Stencil};
+use crate::cell::tet::{Bary, TetCell};
 use crate::report::ZoneJoin;
 use crate::tiling::{self, Connectivity, Tiling, ZonePair};
 
@@ -30,7 +30,7 @@ pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joi
 }
 
 /// The share of a face that is solid in both of two cells at the same fraction, by points evenly on it.
-fn common(a: &Stencil, b: &Stencil, part: Part, fraction: f64) -> Option<f64> {
+fn common(a: &TetCell, b: &TetCell, part: Part, fraction: f64) -> Option<f64> {
     let n = STEPS as f64;
     // The middles of small triangles that point one way, and the others.
     let at = |i: usize, j: usize, third: f64| -> Bary {
@@ -42,7 +42,7 @@ fn common(a: &Stencil, b: &Stencil, part: Part, fraction: f64) -> Option<f64> {
         points.extend((0..STEPS - i).map(|j| at(i, j, 1.0 / 3.0)));
         points.extend((0..STEPS - i - 1).map(|j| at(i, j, 2.0 / 3.0)));
     }
-    let solid = |s: &Stencil| -> Vec<bool> {
+    let solid = |s: &TetCell| -> Vec<bool> {
         let t = s.iso(part, fraction);
         let inside = |f: f64| match part {
             Part::Lower => f < t,

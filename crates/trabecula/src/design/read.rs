@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Design;
 use super::data::*;
-use crate::cell::tet::ready_cells;
+use crate::cell::tet::tet_catalogue;
 use crate::cell::{catalogue, named};
 use crate::kind::DesignError;
 use crate::kind::{At, Kind, Node, Table};
@@ -283,7 +283,7 @@ fn cell(at: &At) -> Read<CellSpec> {
 
 /// The name of a ready tetrahedral cell. Of a periodic cell that can be none it says why.
 fn tet_name(at: &At) -> Read<&'static str> {
-    let names: Vec<(&str, &'static str)> = ready_cells().iter().map(|n| (n.name, n.name)).collect();
+    let names: Vec<(&str, &'static str)> = tet_catalogue().iter().map(|n| (n.name, n.name)).collect();
     at.word("tetrahedral cell", &names).map_err(|e| {
         let periodic = at.text("").ok().and_then(named);
         let group = periodic.and_then(|n| Group::named(n.number()).ok());

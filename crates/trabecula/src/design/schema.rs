@@ -5,7 +5,7 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 use super::Design;
 use super::bridge;
 use crate::cell::catalogue;
-use crate::cell::tet::ready_cells;
+use crate::cell::tet::tet_catalogue;
 
 /// The JSON Schema of a design (draft 2020-12), as text.
 pub fn schema() -> String {
@@ -21,7 +21,7 @@ pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
 
 /// The names of the ready tetrahedral cells.
 pub(super) fn tet_cell_name(_: &mut SchemaGenerator) -> Schema {
-    let names: Vec<&str> = ready_cells().iter().map(|n| n.name).collect();
+    let names: Vec<&str> = tet_catalogue().iter().map(|n| n.name).collect();
     json_schema!({ "type": "string", "enum": names })
 }
 

@@ -12,7 +12,7 @@ use super::report::Varied;
 use super::tets::{self, TetReport};
 use super::warn::{amount_key, gaps};
 use super::{Design, Loader, Warning, sample};
-use crate::cell::tet::{Stencil, ready};
+use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::cell::{Part, Series, named};
 use crate::grade::Grade;
 use crate::kind::DesignError;
@@ -138,11 +138,11 @@ pub(super) fn domain<'a>(
 }
 
 /// The cell that a table describes.
-pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignError> {
+pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<TetCell, DesignError> {
     let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
     if let Some(name) = &spec.name {
-        let cell = ready(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
-        return cell.stencil().map_err(|f| wrong("", f));
+        let cell = named_tet_cell(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
+        return cell.cell().map_err(|f| wrong("", f));
     }
     let group = Group::named(spec.group.as_deref().unwrap_or_default());
     let group = group.map_err(|f| wrong(".group", f))?;
@@ -180,7 +180,7 @@ pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<Stencil, DesignE
             site
         }
     };
-    Stencil::new(series, site, spec.edge.unwrap_or(1.0), spec.dual).map_err(|f| wrong("", f))
+    TetCell::new(series, site, spec.edge.unwrap_or(1.0), spec.dual).map_err(|f| wrong("", f))
 }
 
 /// A lattice over a mesh.
@@ -193,7 +193,7 @@ pub(super) struct Made {
 }
 
 /// The cell of each zone.
-pub(super) type Zoned = BTreeMap<u32, Arc<Stencil>>;
+pub(super) type Zoned = BTreeMap<u32, Arc<TetCell>>;
 
 /// The lattice.
 pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
@@ -308,7 +308,7 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
 }
 
 /// The cell about another mid-surface.
-fn about(stencil: Stencil, mid: f64, part: Part, path: &str) -> Result<Stencil, DesignError> {
+fn about(stencil: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, DesignError> {
     if part != Part::Sheet {
         return Err(DesignError::new(path, "mid goes with part = \"sheet\""));
     }
@@ -395,7 +395,7 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
 }
 
 /// Warns of fractions at which a cell falls apart.
-fn apart(stencil: &Stencil, part: Part, [min, max]: [f64; 2], path: &str, warnings: &mut Vec<Warning>) {
+fn apart(stencil: &TetCell, part: Part, [min, max]: [f64; 2], path: &str, warnings: &mut Vec<Warning>) {
     let fraction = Varied { min, max };
     let whole = stencil.connected_fraction(part);
     if !gaps([min, max], &whole).is_empty() {

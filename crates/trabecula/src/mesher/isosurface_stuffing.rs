@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::bcc_grid::Grid;
 use crate::field::Field;
 use geometry::math::Vec3;
 use geometry::tetmesh::{EDGES, TetMesh};

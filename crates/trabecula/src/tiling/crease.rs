@@ -2,7 +2,7 @@
 
 use super::Tiling;
 use crate::cell::Part;
-use crate::cell::tet::{Bary, Grid};
+use crate::cell::tet::{Bary, Subdivision};
 use crate::map::tets::NONE;
 use geometry::math::{Vec3, add, dot, norm, scale};
 
@@ -76,7 +76,7 @@ impl Tiling {
         let at: Vec<Bary> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
         let v = stencil.values(&at);
         let mut found: Vec<Bary> = Vec::new();
-        Grid { n }.each_triangle(|c, up| {
+        Subdivision { n }.each_triangle(|c, up| {
             let c = c.map(|[a, b]| a * (a + 1) / 2 + b);
             // Triangles of one kind have every edge once.
             for (a, b) in [(0, 1), (1, 2), (0, 2)].into_iter().filter(|_| up) {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{Level, Share, Tiling};
 use crate::cell::Part;
-use crate::cell::tet::{Grid, Nodes, share_below};
+use crate::cell::tet::{Nodes, Subdivision, share_below};
 use crate::map::Tets;
 
 /// Steps along the edge of the tetrahedron, coarse and fine.
@@ -38,9 +38,9 @@ struct Size {
 
 impl Size {
     fn new(cells: &[Share], n: usize) -> Size {
-        let grid = Grid { n };
+        let grid = Subdivision { n };
         let mut tets = Vec::with_capacity(n.pow(3));
-        grid.each_tet(|at, _| tets.push(at.map(|[i, j, k]| Grid::index(i, j, k) as u32)));
+        grid.each_tet(|at, _| tets.push(at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32)));
         let values = |c: &Share| {
             let values = Nodes::new(&c.stencil, grid).values;
             values.into_iter().map(|v| v / c.scale).collect()

@@ -1,6 +1,6 @@
 //! Direct surface extraction from a tiling: every tetrahedron of the mesh is cut by itself, without a grid.
 //!
-//! Every tetrahedron is divided into the same small ones, and `piece` finds the surface in it. Where the level and the cell
+//! Every tetrahedron is divided into the same small ones, and `tet_surface` has the surface in it. Where the level and the cell
 //! are the same everywhere, that is done once and mapped to all tetrahedra.
 //!
 //! *Closed, oriented, manifold, embedded.* A tetrahedron takes its corners in the order of the mesh's nodes. On a common face
@@ -13,10 +13,10 @@
 
 mod component_links;
 mod connectivity;
-mod piece;
-mod root;
+mod cubic_root;
 mod shared_vertices;
-mod template;
+mod small_simplices;
+mod tet_surface;
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -24,7 +24,7 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use super::{Level, Tiling};
-use crate::cell::tet::{Grid, Nodes, Ready};
+use crate::cell::tet::{NamedTetCell, Nodes, Subdivision};
 use crate::map::Tets;
 use crate::map::tets::NONE;
 use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty};
@@ -36,9 +36,9 @@ use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::tetmesh::TetMesh;
-use piece::{Core, Levels, MARGIN, Piece, Scratch};
 use shared_vertices::SharedVertices;
-use template::Template;
+use small_simplices::Template;
+use tet_surface::{Core, Levels, MARGIN, Scratch, TetSurface};
 
 /// Tetrahedra that a thread takes at once.
 const CHUNK: usize = 128;
@@ -51,31 +51,31 @@ struct Work<'a> {
     template: Template,
     /// For each cell, its values at nodes, divided by its scale, and its slopes along edges.
     cells: Vec<(Nodes, Vec<f64>, Vec<[f64; 2]>)>,
-    /// The pieces for each set of capped faces, where all are the same.
-    same: [OnceLock<Piece>; 16],
+    /// The surface for each set of capped faces, where all tetrahedra have the same.
+    same: [OnceLock<TetSurface>; 16],
     middle: Vec3,
 }
 
-/// A piece of one tetrahedron.
-enum Of<'a> {
-    Same(&'a Piece),
-    Own(Box<Piece>),
+/// The surface in one tetrahedron: its own, or one shared by all with the same capped faces.
+enum TetSurfaceRef<'a> {
+    Shared(&'a TetSurface),
+    Own(Box<TetSurface>),
 }
 
-impl std::ops::Deref for Of<'_> {
-    type Target = Piece;
+impl std::ops::Deref for TetSurfaceRef<'_> {
+    type Target = TetSurface;
 
-    fn deref(&self) -> &Piece {
+    fn deref(&self) -> &TetSurface {
         match self {
-            Of::Same(p) => p,
-            Of::Own(p) => p,
+            TetSurfaceRef::Shared(p) => p,
+            TetSurfaceRef::Own(p) => p,
         }
     }
 }
 
 /// The surface in a range of tetrahedra.
 struct Chunk<'a> {
-    pieces: Vec<Of<'a>>,
+    surfaces: Vec<TetSurfaceRef<'a>>,
     totals: Vec<Totals>,
     /// Binary STL records if requested, otherwise the positions of the vertices.
     records: Vec<u8>,
@@ -124,7 +124,7 @@ impl<'a> Work<'a> {
 
     /// With `n` steps along the edge of a tetrahedron.
     fn in_steps(tiling: &'a Tiling, n: usize) -> Result<Work<'a>, Fault> {
-        let grid = Grid { n };
+        let grid = Subdivision { n };
         component_links::manifold(&tiling.map)?;
         let template = Template::new(grid);
         let cells = tiling.cells.iter().map(|c| {
@@ -153,15 +153,15 @@ impl<'a> Work<'a> {
         (0..4).fold(0, |m, i| m | u8::from(across[i] == NONE) << i)
     }
 
-    fn piece(&self, t: usize, scratch: &mut Scratch) -> Of<'_> {
+    fn piece(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
         let mask = self.mask(t);
         let (nodes, values, slopes) = &self.cells[0];
         let cut = |core: &Core, scratch: &mut Scratch| {
-            Piece::new(nodes, &self.template, core, self.tiling.part, mask, scratch)
+            TetSurface::new(nodes, &self.template, core, self.tiling.part, mask, scratch)
         };
         if let (Level::Same(level), false) = (&self.tiling.level, self.tiling.varies()) {
             let levels = Levels::Same(*level);
-            return Of::Same(self.same[mask as usize].get_or_init(|| {
+            return TetSurfaceRef::Shared(self.same[mask as usize].get_or_init(|| {
                 let core = Core { values, slopes, levels };
                 cut(&core, &mut Scratch::default())
             }));
@@ -183,7 +183,7 @@ impl<'a> Work<'a> {
         let mixed = self.tiling.cells.iter().any(|c| c.weights.is_some());
         if !mixed {
             let core = Core { values, slopes, levels };
-            return Of::Own(Box::new(cut(&core, scratch)));
+            return TetSurfaceRef::Own(Box::new(cut(&core, scratch)));
         }
         let mut sum = vec![0.0; values.len()];
         let mut turns = vec![[0.0; 2]; slopes.len()];
@@ -203,13 +203,13 @@ impl<'a> Work<'a> {
             }
         }
         let core = Core { values: &sum, slopes: &turns, levels };
-        Of::Own(Box::new(cut(&core, scratch)))
+        TetSurfaceRef::Own(Box::new(cut(&core, scratch)))
     }
 
     /// Cuts a range of tetrahedra and sums up the totals of their surface components.
     fn chunk(&self, range: Range<usize>, scratch: &mut Scratch, stl: bool) -> Chunk<'_> {
         let mut out = Chunk {
-            pieces: Vec::with_capacity(range.len()),
+            surfaces: Vec::with_capacity(range.len()),
             totals: Vec::new(),
             records: Vec::new(),
             positions: Vec::new(),
@@ -219,14 +219,14 @@ impl<'a> Work<'a> {
             let piece = self.piece(t, scratch);
             let corners = self.tiling.map.corners(t);
             places.clear();
-            places.extend(piece.places.iter().map(|l| {
+            places.extend(piece.vertices.iter().map(|l| {
                 let ab = add(scale(corners[0], l[0]), scale(corners[1], l[1]));
                 add(add(ab, scale(corners[2], l[2])), scale(corners[3], l[3]))
             }));
             let first = out.totals.len();
-            out.totals.resize(first + piece.bounds.len(), Totals::ZERO);
+            out.totals.resize(first + piece.solid_of.len(), Totals::ZERO);
             for (v, p) in places.iter().enumerate() {
-                let total = &mut out.totals[first + piece.body[v] as usize];
+                let total = &mut out.totals[first + piece.component[v] as usize];
                 total.bounds = total.bounds.with(*p);
             }
             if stl {
@@ -234,7 +234,7 @@ impl<'a> Work<'a> {
             }
             let flipped = self.tiling.map.flipped(t);
             let mut next = piece.triangles.iter();
-            for (component, count) in piece.bodies.iter().enumerate() {
+            for (component, count) in piece.triangle_counts.iter().enumerate() {
                 let total = &mut out.totals[first + component];
                 for (v, cap) in next.by_ref().take(*count as usize) {
                     let [a, b, c] = turned(*v, flipped).map(|v| places[v as usize]);
@@ -251,7 +251,7 @@ impl<'a> Work<'a> {
             if !stl {
                 out.positions.extend_from_slice(&places);
             }
-            out.pieces.push(piece);
+            out.surfaces.push(piece);
         }
         out
     }
@@ -312,8 +312,8 @@ impl SurfaceMaker for TilingSurface<'_> {
             (SurfaceMesh::default(), ComponentLinks::default(), SharedVertices::default());
         work.each(progress, false, |start, chunk| {
             let (mut totals, mut positions) = (&chunk.totals[..], &chunk.positions[..]);
-            for (t, piece) in (start..).zip(&chunk.pieces) {
-                let (mine, rest) = positions.split_at(piece.places.len());
+            for (t, piece) in (start..).zip(&chunk.surfaces) {
+                let (mine, rest) = positions.split_at(piece.vertices.len());
                 positions = rest;
                 let ids = self.0.map.tet(t);
                 let numbers = shared.numbers(ids, piece, mine, &mut out.mesh.vertices)?;
@@ -322,7 +322,7 @@ impl SurfaceMaker for TilingSurface<'_> {
                     out.mesh.triangles.push(turned(*v, flipped).map(|v| numbers[v as usize]));
                     out.cut.push(*cap);
                 }
-                let (of, rest) = totals.split_at(piece.bounds.len());
+                let (of, rest) = totals.split_at(piece.solid_of.len());
                 totals = rest;
                 links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
             }
@@ -344,8 +344,8 @@ impl SurfaceMaker for TilingSurface<'_> {
             triangles += (chunk.records.len() / stl::RECORD) as u64;
             surface_maker::check_count(triangles)?;
             let mut totals = &chunk.totals[..];
-            for (t, piece) in (start..).zip(&chunk.pieces) {
-                let (of, rest) = totals.split_at(piece.bounds.len());
+            for (t, piece) in (start..).zip(&chunk.surfaces) {
+                let (of, rest) = totals.split_at(piece.solid_of.len());
                 totals = rest;
                 links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
             }
@@ -381,13 +381,13 @@ impl SurfaceMaker for TilingSurface<'_> {
     }
 }
 
-/// The surface of a ready tetrahedral cell at its own fraction, in a regular tetrahedron of edge 1 mm divided into `steps`
+/// The surface of a named tetrahedral cell at its own fraction, in a regular tetrahedron of edge 1 mm divided into `steps`
 /// steps.
 ///
 /// # Errors
 /// Steps below 4 or above 64.
-pub fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
-    let stencil = ready.stencil().map_err(Stopped::Refused)?;
+pub fn cell_surface(named: &NamedTetCell, steps: usize, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
+    let cell = named.cell().map_err(Stopped::Refused)?;
     let h = 0.5f64.sqrt() / 2.0;
     let mesh = TetMesh {
         nodes: vec![[h, -h, -h], [-h, h, -h], [-h, -h, h], [h, h, h]],
@@ -395,7 +395,7 @@ pub fn stencil(ready: &Ready, steps: usize, progress: &dyn Progress) -> Result<S
         zones: Vec::new(),
     };
     let map = Tets::new(&mesh, 0.0).map_err(Stopped::Refused)?;
-    let level = Level::Same(stencil.iso(ready.part, ready.fraction));
-    let tiling = Tiling::new(Arc::new(map), Arc::new(stencil), ready.part, level);
+    let level = Level::Same(cell.iso(named.part, named.fraction));
+    let tiling = Tiling::new(Arc::new(map), Arc::new(cell), named.part, level);
     Ok(TilingSurface(&tiling).mesh(&Options::new(1.0 / steps as f64), progress)?.surface)
 }

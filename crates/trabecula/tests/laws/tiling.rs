@@ -12,7 +12,7 @@ use geometry::repair::Repair;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::symmetry::{Group, Side};
 use geometry::tetmesh::TetMesh;
-use trabecula::cell::tet::{Stencil, ready, ready_cells};
+use trabecula::cell::tet::{TetCell, named_tet_cell, tet_catalogue};
 use trabecula::cell::{Part, Series, Term};
 use trabecula::extract::GridSurface;
 use trabecula::field::Field;
@@ -73,27 +73,27 @@ pub fn made(tiling: Tiling, steps: f64, explicit: bool) -> (SurfaceMesh, Compone
     meshed(&GridSurface(&solid), edge, Islands::Keep).expect("surface")
 }
 
-pub fn cell(name: &str) -> (Arc<Stencil>, Part, f64) {
-    let r = ready(name).expect(name);
-    let s = r.stencil().expect(name);
+pub fn cell(name: &str) -> (Arc<TetCell>, Part, f64) {
+    let r = named_tet_cell(name).expect(name);
+    let s = r.cell().expect(name);
     let t = s.iso(r.part, r.fraction);
     (Arc::new(s), r.part, t)
 }
 
 /// The cell of one real wave of a group.
-fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<Stencil> {
+fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<TetCell> {
     let waves = Group::named(group).expect(group).orbit(hkl, Side::Re).expect(group);
     let terms = waves.into_iter().map(|(hkl, c, s)| Term { hkl, amplitude: c.hypot(s), phase: (-s).atan2(c) / TAU });
     let series = Series::new(terms.collect()).expect(group);
-    let stencil = Stencil::new(series, [site; 3], edge * 2f64.sqrt(), dual);
+    let stencil = TetCell::new(series, [site; 3], edge * 2f64.sqrt(), dual);
     Arc::new(stencil.expect(group))
 }
 
 #[test]
-fn ready_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
+fn named_cells_are_one_piece_on_any_mesh_and_keep_every_guarantee() {
     let mut some = Random(1);
     let mesh = shaken(2, 0.15, 10.0, &mut some);
-    for r in ready_cells() {
+    for r in tet_catalogue() {
         let (s, part, t) = cell(r.name);
         let tiling = Tiling::new(map(&mesh), s, part, Level::Same(t));
         let (surface, told) = made(tiling, 16.0, true);
@@ -319,7 +319,7 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
 fn connectivity_is_predicted_without_a_surface() {
     let mut some = Random(13);
     let mesh = shaken(3, 0.1, 6.0, &mut some);
-    let lower: Vec<&str> = ready_cells().iter().filter(|r| r.part == Part::Lower).map(|r| r.name).collect();
+    let lower: Vec<&str> = tet_catalogue().iter().filter(|r| r.part == Part::Lower).map(|r| r.name).collect();
     let drawn = (0..cases(2)).map(|_| {
         let mut any = || lower[some.below(lower.len())];
         ([any(), any()], some.between(0.15, 0.5), None)

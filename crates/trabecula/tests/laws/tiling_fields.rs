@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::common::{Random, check};
 use super::tiling::{cell, made, map, shaken};
 use geometry::math::{Aabb, dot, norm, sub};
-use trabecula::cell::tet::{Grid, Nodes, ready_cells};
+use trabecula::cell::tet::{Nodes, Subdivision, tet_catalogue};
 use trabecula::field::Field;
 use trabecula::implicit::Implicit;
 use trabecula::map::Tets;
@@ -16,8 +16,8 @@ fn fields_are_continuous_for_any_numbering() {
     let mut some = Random(5);
     let mesh = shaken(2, 0.15, 3.0, &mut some);
     let map = map(&mesh);
-    for r in ready_cells() {
-        let s = r.stencil().expect(r.name);
+    for r in tet_catalogue() {
+        let s = r.cell().expect(r.name);
         for t in 0..map.len() {
             for (face, other) in map.across(t).into_iter().enumerate() {
                 if (other as usize) >= map.len() {
@@ -37,7 +37,7 @@ fn fields_are_continuous_for_any_numbering() {
             }
         }
         // The trace on a face has the face's symmetry, and all four are one: to the last bit.
-        let nodes = Nodes::new(&s, Grid { n: 6 });
+        let nodes = Nodes::new(&s, Subdivision { n: 6 });
         let value = |k: [u16; 4]| {
             let i = nodes.whole.iter().position(|w| *w == k).expect("a node");
             nodes.values[i]

@@ -1,7 +1,7 @@
 //! Solid fraction of a tetrahedral cell and its inverse.
 
-use super::nodes::{Grid, Nodes};
-use super::{Part, Stencil};
+use super::subdivision::{Nodes, Subdivision};
+use super::{Part, TetCell};
 use geometry::math::Interval;
 
 /// Steps along the edge of the tetrahedron, coarse and fine: their two fractions give one of fourth order (Richardson).
@@ -65,7 +65,7 @@ fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
     // What a small tetrahedron adds between its least and its greatest value, and that it is full beyond.
     let (mut part, mut full) = (vec![0.0; LEVELS + 1], vec![0u32; LEVELS + 2]);
     nodes.grid.each_tet(|at, _| {
-        let v = ascending(at.map(|[i, j, k]| nodes.values[Grid::index(i, j, k)]));
+        let v = ascending(at.map(|[i, j, k]| nodes.values[Subdivision::index(i, j, k)]));
         let place = |t: f64| ((t - range.lo) / step).clamp(0.0, LEVELS as f64);
         let (first, last) = (place(v[0]).floor() as usize, place(v[3]).ceil() as usize);
         for (l, p) in part.iter_mut().enumerate().take(last).skip(first) {
@@ -83,8 +83,8 @@ fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
 }
 
 impl Table {
-    pub fn new(stencil: &Stencil) -> Table {
-        let nodes = STEPS.map(|n| Nodes::new(stencil, Grid { n }));
+    pub fn new(stencil: &TetCell) -> Table {
+        let nodes = STEPS.map(|n| Nodes::new(stencil, Subdivision { n }));
         let fine = &nodes[1].values;
         let (lo, hi) = fine.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
         let range = Interval::new(lo, hi);
@@ -150,7 +150,7 @@ impl Table {
 }
 
 /// The solid share of a face.
-pub(super) fn of_face(stencil: &Stencil, part: Part, iso: f64) -> f64 {
+pub(super) fn of_face(stencil: &TetCell, part: Part, iso: f64) -> f64 {
     let below = |t: f64| {
         let [coarse, fine] = FACE.map(|n| {
             let place = |a: usize, b: usize| {
@@ -160,7 +160,7 @@ pub(super) fn of_face(stencil: &Stencil, part: Part, iso: f64) -> f64 {
             let at: Vec<_> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
             let v = stencil.values(&at);
             let mut sum = 0.0;
-            Grid { n }.each_triangle(|t3, _| {
+            Subdivision { n }.each_triangle(|t3, _| {
                 let of = t3.map(|[a, b]| v[a * (a + 1) / 2 + b]);
                 sum += below_in_triangle(ascending(of), t);
             });

@@ -154,11 +154,11 @@ pub(crate) const KNOWN: [Known; 17] = [
     ("X4", "227:2", &[([1, 1, 1], Re, 1.0)], (0.125, 0.75, true), Lower, -2.2, (5, 3, 0.16016, 0.11780), None),
 ];
 
-pub(crate) fn known(k: &Known) -> Stencil {
+pub(crate) fn known(k: &Known) -> TetCell {
     let group = Group::named(k.1).expect(k.0);
-    let series = ready::series(&group, k.2).expect(k.0);
+    let series = tet_catalogue::series(&group, k.2).expect(k.0);
     let (site, edge, dual) = k.3;
-    Stencil::new(series, [site; 3], edge * 2f64.sqrt(), dual).expect(k.0)
+    TetCell::new(series, [site; 3], edge * 2f64.sqrt(), dual).expect(k.0)
 }
 
 #[test]
@@ -205,12 +205,12 @@ fn levels_invert_fractions() {
 #[test]
 fn values_are_the_same_in_all_bits_for_any_order_of_corners() {
     let s = known(&KNOWN[5]);
-    let nodes = Nodes::new(&s, Grid { n: 7 });
-    let find = |k: nodes::Whole| nodes.whole.iter().position(|w| *w == k).expect("a node");
+    let nodes = Nodes::new(&s, Subdivision { n: 7 });
+    let find = |k: subdivision::Whole| nodes.whole.iter().position(|w| *w == k).expect("a node");
     let scale = s.series().amplitude();
     for (a, ka) in nodes.whole.iter().enumerate() {
         for p in [[1, 0, 2, 3], [3, 1, 0, 2], [2, 3, 1, 0]] {
-            let turned = |k: &nodes::Whole| find(p.map(|i| k[i]));
+            let turned = |k: &subdivision::Whole| find(p.map(|i| k[i]));
             assert_eq!(nodes.values[a], nodes.values[turned(ka)]);
             for kb in nodes.whole.iter().step_by(5) {
                 let (b, found) = (find(*kb), nodes.slope(a, find(*kb)));
@@ -229,8 +229,8 @@ fn values_are_the_same_in_all_bits_for_any_order_of_corners() {
 
 #[test]
 fn what_has_not_the_symmetry_is_refused() {
-    let p = ready("primitive").expect("listed").stencil().expect("valid");
-    let wrong = |site, edge| Stencil::new(p.series().clone(), site, edge, false).err().map(|f| f.at);
+    let p = named_tet_cell("primitive").expect("listed").cell().expect("valid");
+    let wrong = |site, edge| TetCell::new(p.series().clone(), site, edge, false).err().map(|f| f.at);
     // 221 (100) about (1/4, 1/4, 1/4): the known counterexample.
     assert_eq!(wrong([0.25; 3], 1.0).as_deref(), Some("site"));
     assert_eq!(wrong([0.5; 3], 1.3), None, "any edge will do");

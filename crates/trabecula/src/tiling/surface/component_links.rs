@@ -4,8 +4,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::piece::{NONE as NOBODY, Piece, Run};
-use super::template::PAIRS;
+use super::small_simplices::PAIRS;
+use super::tet_surface::{NONE as NOBODY, Run, TetSurface};
 use crate::map::Tets;
 use crate::map::tets::NONE;
 use crate::surface_maker::{ComponentGraph, Totals};
@@ -19,7 +19,7 @@ pub(super) struct ComponentLinks {
     /// Runs on faces, by the tetrahedron and the corner on their other side.
     faces: HashMap<(u32, u8), Vec<Run>>,
     /// Runs of caps on edges of the boundary, by their nodes.
-    rims: HashMap<[u32; 2], Vec<Run>>,
+    boundary_edges: HashMap<[u32; 2], Vec<Run>>,
     /// Edges and nodes whose vertices are counted.
     edges: HashSet<[u32; 2]>,
     nodes: HashSet<u32>,
@@ -27,12 +27,12 @@ pub(super) struct ComponentLinks {
 
 impl ComponentLinks {
     /// Adds the next tetrahedron with the totals of its surface components.
-    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &Piece, totals: &[Totals]) -> Result<(), Fault> {
-        let components = piece.bounds.len();
+    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &TetSurface, totals: &[Totals]) -> Result<(), Fault> {
+        let components = piece.solid_of.len();
         let base = self.graph.add(totals, piece.solids as usize)? as usize;
         let surface = |s: u32| if s == NOBODY { s } else { base as u32 + s };
         let inner = |s: u32| (base + components) as u32 + s;
-        for (b, solid) in piece.bounds.iter().enumerate() {
+        for (b, solid) in piece.solid_of.iter().enumerate() {
             unite(&mut self.graph.solid, (base + b) as u32, inner(*solid));
         }
         let named = |runs: &[Run]| -> Vec<Run> {
@@ -62,13 +62,13 @@ impl ComponentLinks {
                 0 => {}
                 // The edge's other face on the boundary is another tetrahedron's.
                 1 => {
-                    let runs = named(&piece.rims[e]);
+                    let runs = named(&piece.boundary_edges[e]);
                     let key = [ids[*a], ids[*b]];
-                    match self.rims.remove(&key) {
+                    match self.boundary_edges.remove(&key) {
                         Some(theirs) => self.join(&runs, &theirs),
                         None => {
                             caps[e] = true;
-                            self.rims.insert(key, runs);
+                            self.boundary_edges.insert(key, runs);
                         }
                     }
                 }
@@ -92,13 +92,13 @@ impl ComponentLinks {
                     if corner {
                         *counts[usize::from(*zero)].get_or_insert_with(|| self.edges.insert([ids[a], ids[b]]))
                     } else {
-                        caps[super::template::pair(a, b)]
+                        caps[super::small_simplices::pair(a, b)]
                     }
                 }
                 _ => (0..4).find(on).is_some_and(|i| self.nodes.insert(ids[i])),
             };
             if mine {
-                self.graph.totals[base + piece.body[v] as usize].vertices += 1;
+                self.graph.totals[base + piece.component[v] as usize].vertices += 1;
             }
         }
         Ok(())

@@ -9,8 +9,8 @@ use std::collections::{BTreeMap, HashMap};
 use rayon::prelude::*;
 
 use super::component_links::ComponentLinks;
-use super::piece::{Piece, Scratch};
-use super::{Of, Work};
+use super::tet_surface::{Scratch, TetSurface};
+use super::{TetSurfaceRef, Work};
 use crate::map::tets::NONE;
 use crate::surface_maker::Totals;
 use crate::tiling::{Level, Tiling};
@@ -61,20 +61,20 @@ pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
     }
     let piece = |scratch: &mut Scratch, t: &usize| {
         let made = match work.piece(*t, scratch) {
-            Of::Own(piece) => *piece,
-            Of::Same(piece) => piece.clone(),
+            TetSurfaceRef::Own(piece) => *piece,
+            TetSurfaceRef::Shared(piece) => piece.clone(),
         };
         // Without positions.
-        Piece { places: Vec::new(), triangles: Vec::new(), ..made }
+        TetSurface { vertices: Vec::new(), triangles: Vec::new(), ..made }
     };
-    let pieces: Vec<Piece> = firsts.par_iter().map_init(Scratch::default, piece).collect();
+    let pieces: Vec<TetSurface> = firsts.par_iter().map_init(Scratch::default, piece).collect();
     let mut links = ComponentLinks::default();
     // For each piece of solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
     for (t, kind) in kinds.iter().enumerate() {
         let piece = &pieces[*kind];
-        let first = links.next(piece.bounds.len());
-        let totals = vec![Totals::ZERO; piece.bounds.len()];
+        let first = links.next(piece.solid_of.len());
+        let totals = vec![Totals::ZERO; piece.solid_of.len()];
         links.add(map, t, work.mask(t), piece, &totals).ok()?;
         for s in 0..piece.solids {
             of.push(t);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::piece::Piece;
+use super::tet_surface::TetSurface;
 use crate::map::tets::NONE;
 use geometry::fault::Fault;
 use geometry::math::Vec3;
@@ -19,11 +19,11 @@ pub(super) struct SharedVertices {
 }
 
 impl SharedVertices {
-    /// The number of each vertex of a piece; new vertices are added to the mesh.
+    /// The number of each vertex of a surface; new vertices are added to the mesh.
     pub fn numbers(
         &mut self,
         ids: [u32; 4],
-        piece: &Piece,
+        surface: &TetSurface,
         places: &[Vec3],
         vertices: &mut Vec<Vec3>,
     ) -> Result<Vec<u32>, Stopped> {
@@ -32,8 +32,8 @@ impl SharedVertices {
             return Err(Stopped::Refused(Fault::new("edge", message)));
         }
         let mut counts = [[0u32; 16]; 2];
-        for (v, zero) in piece.zero.iter().enumerate() {
-            counts[usize::from(v >= piece.crossings)][usize::from(*zero)] += 1;
+        for (v, zero) in surface.zero.iter().enumerate() {
+            counts[usize::from(v >= surface.crossings)][usize::from(*zero)] += 1;
         }
         // For every simplex, where its vertices begin and whether they are new.
         let mut next = [[(0, false); 16]; 2];
@@ -60,7 +60,7 @@ impl SharedVertices {
             }
         }
         let name = |(v, (place, zero)): (usize, (&Vec3, &u8))| {
-            let next = &mut next[usize::from(v >= piece.crossings)][usize::from(*zero)];
+            let next = &mut next[usize::from(v >= surface.crossings)][usize::from(*zero)];
             let name = next.0;
             if next.1 {
                 vertices[name as usize] = *place;
@@ -68,7 +68,7 @@ impl SharedVertices {
             next.0 += 1;
             name
         };
-        let all = places.iter().zip(&piece.zero).enumerate();
+        let all = places.iter().zip(&surface.zero).enumerate();
         Ok(all.map(name).collect())
     }
 }

@@ -1,11 +1,15 @@
-//! Where the periodic solid is one piece in R³.
+//! Connected components of a periodic solid: the levels at which it is connected in R³.
 //!
-//! The function is sampled on a grid of the torus cut into tetrahedra along the diagonals (Freudenthal), on which
-//! the linear interpolant's solid has the pieces and loops of the graph of its nodes. As solid grows node by node, a
-//! forest keeps the pieces and, for each, the lattice translations that its closed paths realise: the solid is one
-//! piece in R³ when there is one piece on the torus and its translations are all of Z³. Pieces appear and join at
-//! critical values of the function, so each such event is moved to the adjacent critical point, and the few events
-//! that matter are played again at their exact levels.
+//! The function is sampled on a grid of the torus R³/Z³, divided into tetrahedra along the diagonals (Freudenthal). The solid of its
+//! linear interpolant is homotopy equivalent to the subcomplex of its solid nodes, so its components and cycles are those of a
+//! *periodic graph* (a quotient graph on the torus whose edges are labelled with the lattice translations that they cross).
+//! Nodes are added in the order of their levels, and a *union-find with offsets* (`offset_forest`) keeps the components on the
+//! torus. Each has the *sublattice of translations* of Z³ that its closed paths generate (`sublattice`): a component on the torus
+//! lifts to as many components in R³ as that sublattice has cosets. So the solid is connected in R³ if it has one component on
+//! the torus whose sublattice is all of Z³ (rank 3, index 1).
+//!
+//! Components appear at minima and merge, or gain a translation, at saddles. Each such event is moved to the adjacent critical
+//! point of the function (`critical`), and the events are replayed at these levels.
 
 use super::Part;
 use rayon::prelude::*;
@@ -13,29 +17,29 @@ use rayon::prelude::*;
 use geometry::math::{Vec3, add, scale, sub, unit};
 
 mod critical;
-mod forest;
-mod grid;
+mod offset_forest;
 mod sublattice;
+mod torus_grid;
 
 pub(super) use critical::{Critical, Function, critical, sample};
-use forest::{Forest, Joined};
-use grid::{AROUND, DIRECTIONS, Grid, groups};
+use offset_forest::{Forest, Joined};
 use sublattice::{Int3, Sublattice};
+use torus_grid::{AROUND, DIRECTIONS, Grid, groups};
 
 /// The steps along the axes.
 const STEPS: [Int3; 3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
-/// A piece as it appears.
+/// A component as it appears.
 struct Birth {
     node: u32,
     level: f64,
     /// Whether the level is that of a critical point, not of a sample.
     exact: bool,
-    /// Loops that the piece had from the first.
-    loops: Sublattice,
+    /// Translations of its closed paths when it appears.
+    translations: Sublattice,
 }
 
-/// Two pieces that join, or one that meets its translate.
+/// Two components that merge, or one whose sublattice of translations grows.
 struct Event {
     pieces: [u32; 2],
     shift: Int3,
@@ -44,7 +48,7 @@ struct Event {
 }
 
 /// The intervals of the level, as amounts of solid grow, in which the periodic solid of this part of the cell function
-/// `f` (values and gradients per turn at phases) is one piece in R³: [from, to] in iso (for `Upper` from ≥ to). The last
+/// `f` (values and gradients per turn at phases) is connected in R³: [from, to] in iso (for `Upper` from ≥ to). The last
 /// one runs to the level at which all is solid.
 ///
 /// Levels are exact (to about 1e-9) where the critical points are found by Newton's method, else good to the sampling.
@@ -62,7 +66,7 @@ pub fn connected(f: Function, part: Part) -> Vec<[f64; 2]> {
     intervals
 }
 
-/// The saddles by which pieces that were separate in R³ join, a piece and its own lattice translate included: (phase
+/// The saddles at which components that are separate in R³ join, a component and its own lattice translate included: (phase
 /// in turns, level of f). A line on which f is extreme (a strut that shrinks to a line) is given by points along it.
 /// Empty for sheets.
 pub fn necks(f: Function, part: Part) -> Vec<(Vec3, f64)> {
@@ -140,7 +144,7 @@ impl Sweep<'_> {
         })
     }
 
-    /// Grows the solid and notes what happens to its pieces.
+    /// Adds the nodes in order and lists the events of the components.
     fn events(&self) -> (Vec<Birth>, Vec<Event>) {
         let (n, sheet) = (self.amounts.len(), self.part == Part::Sheet);
         // Elements: nodes, then for a sheet the edges that the surface f = 0 crosses.
@@ -170,7 +174,7 @@ impl Sweep<'_> {
                     node,
                     level: level.unwrap_or(self.amounts[node as usize]),
                     exact: level.is_some(),
-                    loops: Sublattice::default(),
+                    translations: Sublattice::default(),
                 });
             }
             for &(element, towards, wrap) in &nears {
@@ -188,7 +192,7 @@ impl Sweep<'_> {
         (births, events)
     }
 
-    /// Puts in the surface f = 0: crossed edges, joined through the triangles they share.
+    /// Adds the surface f = 0: the grid edges that it crosses, joined through the triangles they share.
     fn surface(&self, forest: &mut Forest, births: &mut Vec<Birth>) {
         let n = self.amounts.len() as u32;
         let negative = |i: u32| self.grid.values[i as usize] < 0.0;
@@ -221,8 +225,8 @@ impl Sweep<'_> {
             }
         }
         for edge in crossed {
-            if forest.leads(edge) {
-                births.push(Birth { node: edge, level: 0.0, exact: true, loops: forest.loops(edge) });
+            if forest.is_eldest(edge) {
+                births.push(Birth { node: edge, level: 0.0, exact: true, translations: forest.translations(edge) });
             }
         }
     }
@@ -304,7 +308,7 @@ impl Sweep<'_> {
     }
 }
 
-/// The neighbours that are in the forest, one of each group that is joined already.
+/// The neighbours that are in the forest, one of each group that is connected already.
 fn present(forest: &Forest, near: &[(u32, Int3); 14]) -> impl Iterator<Item = (u32, Int3)> + use<> {
     let bits = (0..14).fold(0, |bits, k| bits | u16::from(forest.has(near[k].0)) << k);
     let near = *near;
@@ -323,9 +327,9 @@ fn distinct(points: Vec<Critical>, apart: f64) -> Vec<Critical> {
     kept
 }
 
-/// Plays the events at their refined levels; the intervals in which one piece winds round the torus every way.
+/// Plays the events at their refined levels; the intervals in which there is one component, with all translations of Z³.
 ///
-/// Pieces that join others again within the error of sampling, or exactly where they appear, are noise.
+/// Components that merge with others within the error of sampling after they appear, or at the same level, are noise.
 fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, range: f64) -> Vec<[f64; 2]> {
     let index = |node: u32| births.iter().position(|b| b.node == node);
     let mut order: Vec<usize> = (0..births.len()).collect();
@@ -333,7 +337,7 @@ fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, ran
     let mut forest = Forest::new(births.len());
     for &i in &order {
         forest.insert(i as u32);
-        forest.wind(i as u32, &births[i].loops);
+        forest.add_translations(i as u32, &births[i].translations);
     }
     let Some(&eldest) = order.first() else {
         return Vec::new();
@@ -349,7 +353,7 @@ fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, ran
     events.sort_by(|a, b| a.level.total_cmp(&b.level));
     // Spans in which a second piece lives.
     let mut spans = Vec::new();
-    let mut whole = forest.loops(eldest as u32).is_full().then_some(births[eldest].level);
+    let mut whole = forest.translations(eldest as u32).is_full().then_some(births[eldest].level);
     for e in &events {
         let (Some(a), Some(b)) = (index(e.pieces[0]), index(e.pieces[1])) else {
             continue;
@@ -361,7 +365,7 @@ fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, ran
                 spans.push([born.level, e.level]);
             }
         }
-        if whole.is_none() && forest.loops(eldest as u32).is_full() {
+        if whole.is_none() && forest.translations(eldest as u32).is_full() {
             whole = Some(e.level);
         }
     }

@@ -1,4 +1,4 @@
-//! A grid of the torus, cut into tetrahedra along the diagonals.
+//! A grid of the torus, divided into tetrahedra along the diagonals (Freudenthal).
 
 use rayon::prelude::*;
 
@@ -36,8 +36,8 @@ const LINK: [u16; 14] = {
     link
 };
 
-/// Of neighbours (bits), one of each group that hangs together without the node: joining the node to these joins it to
-/// all, for a triangle holds no loop.
+/// Of neighbours (bits), one of each connected component of the graph among them without the node. Joining the node to these
+/// joins it to all; a closed path through a triangle has no translation.
 pub(super) fn groups(mut present: u16) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         if present == 0 {

@@ -1,4 +1,8 @@
-//! Union-find on the torus that also knows how the pieces wind around it.
+//! Union-find with offsets: connected components of a periodic graph, and the lattice translations of their closed paths.
+//!
+//! Each element stores the period in which it stands relative to its parent; path halving adds these offsets. An edge between two
+//! elements of one tree closes a path whose translation is the edge's period plus the difference of their offsets: it is added to
+//! the component's sublattice. A component keeps the index of its eldest element (the elder rule of persistent homology).
 
 use super::sublattice::{Int3, Sublattice};
 
@@ -12,36 +16,36 @@ fn minus(a: Int3, b: Int3) -> Int3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// What joining two elements changed.
+/// The effect of an edge between two elements.
 pub(super) enum Joined {
-    /// They were one piece in R³ already.
+    /// They were connected in R³ already.
     Same,
-    /// A piece met a translate of itself, which none of its loops had reached.
+    /// A component became connected with a translate of itself that was none of its translations.
     Loop {
-        /// The element by which the piece is known.
+        /// Its eldest element.
         piece: u32,
         /// The translation (periods).
         shift: Int3,
     },
-    /// Two pieces became one.
+    /// Two components became one.
     Merged {
-        /// The elements by which the pieces were known, the elder first; it names the union.
+        /// Their eldest elements, the elder first, which stays that of the union.
         pieces: [u32; 2],
-        /// The period in which the second stands, seen from the first.
+        /// The period of the second relative to the first.
         shift: Int3,
     },
 }
 
-/// A forest over elements of the torus. Each piece carries the translations realised by its closed loops.
+/// Trees over elements of the torus. Each component has the sublattice of translations of its closed paths.
 pub(super) struct Forest {
     parent: Vec<u32>,
-    /// The period in which the element stands, seen from its parent.
+    /// The period of each element relative to its parent.
     shift: Vec<Int3>,
-    /// When an element joined; an element counts as present from then on.
+    /// When each element was added, or `ABSENT`.
     rank: Vec<u32>,
-    /// For roots: the elder element of the piece, and the loops.
+    /// For roots: the eldest element of the component, and its translations.
     elder: Vec<u32>,
-    loops: Vec<Sublattice>,
+    translations: Vec<Sublattice>,
     clock: u32,
 }
 
@@ -55,12 +59,12 @@ impl Forest {
             shift: vec![[0; 3]; n],
             rank: vec![ABSENT; n],
             elder: (0..n as u32).collect(),
-            loops: vec![Sublattice::default(); n],
+            translations: vec![Sublattice::default(); n],
             clock: 0,
         }
     }
 
-    /// Makes an element present, as a piece of its own.
+    /// Adds an element, as a component of its own.
     pub(super) fn insert(&mut self, i: u32) {
         self.rank[i as usize] = self.clock;
         self.clock += 1;
@@ -71,25 +75,25 @@ impl Forest {
         self.rank[i as usize] != ABSENT
     }
 
-    /// Whether the element is the elder of its piece.
-    pub(super) fn leads(&mut self, i: u32) -> bool {
+    /// Whether the element is the eldest of its component.
+    pub(super) fn is_eldest(&mut self, i: u32) -> bool {
         let root = self.find(i).0;
         self.elder[root as usize] == i
     }
 
-    /// The loops of the piece of an element.
-    pub(super) fn loops(&mut self, i: u32) -> Sublattice {
+    /// The translations of the component of an element.
+    pub(super) fn translations(&mut self, i: u32) -> Sublattice {
         let root = self.find(i).0;
-        self.loops[root as usize]
+        self.translations[root as usize]
     }
 
-    /// Adds loops to the piece of an element.
-    pub(super) fn wind(&mut self, i: u32, loops: &Sublattice) {
+    /// Adds translations to the component of an element.
+    pub(super) fn add_translations(&mut self, i: u32, translations: &Sublattice) {
         let root = self.find(i).0;
-        self.loops[root as usize].absorb(loops);
+        self.translations[root as usize].absorb(translations);
     }
 
-    /// The root of an element and the period in which the element stands, seen from the root; halves the path.
+    /// The root of an element, and the element's period relative to it; halves the path.
     fn find(&mut self, mut i: u32) -> (u32, Int3) {
         let mut total = [0; 3];
         loop {
@@ -105,19 +109,19 @@ impl Forest {
         }
     }
 
-    /// Whether `a`, and `b` moved by `wrap` periods, are one piece in R³.
+    /// Whether `a`, and `b` moved by `wrap` periods, are connected in R³.
     pub(super) fn together(&mut self, a: u32, b: u32, wrap: Int3) -> bool {
         let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
-        ra == rb && self.loops[ra as usize].contains(minus(plus(ga, wrap), gb))
+        ra == rb && self.translations[ra as usize].contains(minus(plus(ga, wrap), gb))
     }
 
     /// Joins `a` with `b` moved by `wrap` periods.
     pub(super) fn join(&mut self, a: u32, b: u32, wrap: Int3) -> Joined {
         let ((ra, ga), (rb, gb)) = (self.find(a), self.find(b));
-        // Where the root of b stands, seen from the root of a.
+        // The period of the root of b relative to the root of a.
         let gap = minus(plus(ga, wrap), gb);
         if ra == rb {
-            let grew = self.loops[ra as usize].insert(gap);
+            let grew = self.translations[ra as usize].insert(gap);
             let piece = self.elder[ra as usize];
             return if grew { Joined::Loop { piece, shift: gap } } else { Joined::Same };
         }
@@ -129,8 +133,8 @@ impl Forest {
         } else {
             (rb, ra, back(gap), [eb, ea], back(shift))
         };
-        let loops = self.loops[lose as usize];
-        self.loops[keep as usize].absorb(&loops);
+        let translations = self.translations[lose as usize];
+        self.translations[keep as usize].absorb(&translations);
         self.parent[lose as usize] = keep;
         self.shift[lose as usize] = gap;
         Joined::Merged { pieces, shift }

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use serde_json::{Map, Value as Json, json};
 
 use super::super::{Part, Series, Term};
-use super::Stencil;
+use super::TetCell;
 use geometry::fault::Fault;
 use geometry::math::scale;
 use geometry::symmetry::{Group, Side};
@@ -18,7 +18,7 @@ use Side::{Im, Re};
 
 /// A predefined tetrahedral cell.
 #[derive(Clone, Copy, Debug)]
-pub struct Ready {
+pub struct NamedTetCell {
     /// Name in designs.
     pub name: &'static str,
     /// Description of its appearance.
@@ -39,8 +39,8 @@ pub struct Ready {
     pub fraction: f64,
 }
 
-static READY: [Ready; 20] = [
-    Ready {
+static CATALOGUE: [NamedTetCell; 20] = [
+    NamedTetCell {
         name: "primitive",
         title: "ball with a port on each face, of the P surface",
         group: "221",
@@ -51,7 +51,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.48,
     },
-    Ready {
+    NamedTetCell {
         name: "primitive_sheet",
         title: "the P surface's walls: a window to each face",
         group: "221",
@@ -62,7 +62,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.44,
     },
-    Ready {
+    NamedTetCell {
         name: "neovius_sheet",
         title: "the Neovius surface's walls",
         group: "221",
@@ -73,7 +73,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "diamond",
         title: "node with four arms, of the D surface",
         group: "227:2",
@@ -84,7 +84,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "diamond_sheet",
         title: "the D surface's walls: a tube to each face",
         group: "227:2",
@@ -95,7 +95,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.22,
     },
-    Ready {
+    NamedTetCell {
         name: "diamond_triple",
         title: "four arms to the corners, each cut by three faces, of the D surface",
         group: "227:2",
@@ -106,7 +106,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "diamond_cage",
         title: "four thick arms into the corners, of the D surface",
         group: "227:2",
@@ -117,7 +117,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.44,
     },
-    Ready {
+    NamedTetCell {
         name: "iwp",
         title: "arms into the corners and thinner ones to the faces, of the I-WP surface",
         group: "229",
@@ -128,7 +128,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.33,
     },
-    Ready {
+    NamedTetCell {
         name: "i43m",
         title: "node with four arms",
         group: "217",
@@ -139,7 +139,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.29,
     },
-    Ready {
+    NamedTetCell {
         name: "i43m_sheet",
         title: "walls with many windows",
         group: "217",
@@ -150,7 +150,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "p43m",
         title: "node with four arms",
         group: "215",
@@ -161,7 +161,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.22,
     },
-    Ready {
+    NamedTetCell {
         name: "p43m_sheet",
         title: "walls that leave the corners",
         group: "215",
@@ -172,7 +172,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "f43m",
         title: "node with four arms",
         group: "216",
@@ -183,7 +183,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.2,
     },
-    Ready {
+    NamedTetCell {
         name: "f43m_sheet",
         title: "walls: a tube to each face",
         group: "216",
@@ -194,7 +194,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "pn3m",
         title: "four thin arms into the corners",
         group: "224:2",
@@ -205,7 +205,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.3,
     },
-    Ready {
+    NamedTetCell {
         name: "pn3m_dual",
         title: "ball with a port on each face",
         group: "224:2",
@@ -216,7 +216,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.34,
     },
-    Ready {
+    NamedTetCell {
         name: "pn3m_sheet",
         title: "walls with a window to each face",
         group: "224:2",
@@ -227,7 +227,7 @@ static READY: [Ready; 20] = [
         part: Part::Sheet,
         fraction: 0.25,
     },
-    Ready {
+    NamedTetCell {
         name: "frd",
         title: "node with four arms, of the F-RD surface",
         group: "225",
@@ -238,7 +238,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.22,
     },
-    Ready {
+    NamedTetCell {
         name: "fm3m",
         title: "frame along the edges, open in the middle of the cell",
         group: "225",
@@ -249,7 +249,7 @@ static READY: [Ready; 20] = [
         part: Part::Lower,
         fraction: 0.17,
     },
-    Ready {
+    NamedTetCell {
         name: "fm3m_sheet",
         title: "three planes through the middle",
         group: "225",
@@ -263,13 +263,13 @@ static READY: [Ready; 20] = [
 ];
 
 /// All predefined cells.
-pub fn ready_cells() -> &'static [Ready] {
-    &READY
+pub fn tet_catalogue() -> &'static [NamedTetCell] {
+    &CATALOGUE
 }
 
 /// The predefined cell of this name.
-pub fn ready(name: &str) -> Option<&'static Ready> {
-    READY.iter().find(|r| r.name == name)
+pub fn named_tet_cell(name: &str) -> Option<&'static NamedTetCell> {
+    CATALOGUE.iter().find(|r| r.name == name)
 }
 
 /// The sum of waves over a group, each divided by its largest Fourier coefficient before its amplitude is applied.
@@ -289,13 +289,13 @@ pub(crate) fn series(group: &Group, terms: &[([i32; 3], Side, f64)]) -> Result<S
     Series::new(all)
 }
 
-impl Ready {
+impl NamedTetCell {
     /// Its definition and figures, computed from the series.
     ///
     /// # Errors
     /// None for those that are listed.
     pub fn facts(&self) -> Result<Json, Fault> {
-        let stencil = self.stencil()?;
+        let cell = self.cell()?;
         let terms = self.terms.iter().map(|(hkl, side, amplitude)| {
             let part = match side {
                 Re => "re",
@@ -306,9 +306,9 @@ impl Ready {
         let parts = [("sheet", Part::Sheet), ("lower", Part::Lower), ("upper", Part::Upper)];
         let word = parts.iter().find(|p| p.1 == self.part).map_or("", |p| p.0);
         let whole: Map<String, Json> =
-            parts.iter().map(|(word, part)| (word.to_string(), json!(stencil.connected_fraction(*part)))).collect();
-        let iso = stencil.iso(self.part, self.fraction);
-        let range = stencil.range();
+            parts.iter().map(|(word, part)| (word.to_string(), json!(cell.connected_fraction(*part)))).collect();
+        let iso = cell.iso(self.part, self.fraction);
+        let range = cell.range();
         Ok(json!({
             "name": self.name,
             "title": self.title,
@@ -320,8 +320,8 @@ impl Ready {
             "part": word,
             "fraction": self.fraction,
             "iso": iso,
-            "ports": stencil.count(self.part, iso).ports,
-            "face_fraction": stencil.face_fraction(self.part, iso),
+            "ports": cell.count(self.part, iso).ports,
+            "face_fraction": cell.face_fraction(self.part, iso),
             "range": [range.lo, range.hi],
             "connected_fraction": whole,
         }))
@@ -336,10 +336,10 @@ impl Ready {
     ///
     /// # Errors
     /// None for those that are listed.
-    pub fn stencil(&self) -> Result<Stencil, Fault> {
+    pub fn cell(&self) -> Result<TetCell, Fault> {
         let group = Group::named(self.group)?;
         let site = scale([1.0; 3], self.site);
-        Stencil::new(series(&group, self.terms)?, site, self.edge(), self.dual)
+        TetCell::new(series(&group, self.terms)?, site, self.edge(), self.dual)
     }
 }
 
@@ -348,11 +348,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ready_cells_are_of_all_eight_groups_and_hold() {
+    fn named_cells_are_of_all_eight_groups_and_hold() {
         let mut groups = std::collections::BTreeSet::new();
         let mut kinds = [0; 2];
-        for r in ready_cells() {
-            let s = r.stencil().expect(r.name);
+        for r in tet_catalogue() {
+            let s = r.cell().expect(r.name);
             let whole = s.connected_fraction(r.part);
             let holds = |i: &[f64; 2]| i[0] + 0.02 < r.fraction && r.fraction < i[1] - 0.02;
             assert!(whole.iter().any(holds), "{}: {whole:?}", r.name);
@@ -360,7 +360,7 @@ mod tests {
             assert!(count.pieces == 1 && count.ports > 0, "{}: {count:?}", r.name);
             groups.insert(Group::named(r.group).expect(r.name).number);
             kinds[usize::from(r.part == Part::Sheet)] += 1;
-            assert_eq!(ready_cells().iter().filter(|o| o.name == r.name).count(), 1);
+            assert_eq!(tet_catalogue().iter().filter(|o| o.name == r.name).count(), 1);
         }
         let eight = [215, 216, 217, 221, 224, 225, 227, 229];
         assert!(groups.into_iter().flatten().eq(eight));

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{Level, Tiling};
 use crate::cell::Part;
-use crate::cell::tet::{Bary, Grid, Nodes, Stencil};
+use crate::cell::tet::{Bary, Nodes, Subdivision, TetCell};
 use crate::map::Tets;
 use geometry::math::{Vec3, add, norm, scale};
 
@@ -40,11 +40,11 @@ pub struct Spread {
 }
 
 /// Points of the mid-surface f = 0 and ∂f/∂λ there.
-fn middle(stencil: &Stencil) -> Vec<(Bary, Bary)> {
-    let nodes = Nodes::new(stencil, Grid { n: STEPS });
+fn middle(stencil: &TetCell) -> Vec<(Bary, Bary)> {
+    let nodes = Nodes::new(stencil, Subdivision { n: STEPS });
     let mut edges = Vec::new();
     nodes.grid.each_tet(|at, _| {
-        let i = at.map(|[i, j, k]| Grid::index(i, j, k));
+        let i = at.map(|[i, j, k]| Subdivision::index(i, j, k));
         for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
             edges.push([i[a], i[b]]);
         }
@@ -76,7 +76,7 @@ impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in each tetrahedron, and
     /// a node has the mean of the tetrahedra about it.
-    pub fn of(map: &Tets, stencil: &Stencil, part: Part, amount: Amount, values: Vec<f64>) -> Level {
+    pub fn of(map: &Tets, stencil: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
             Amount::Iso => v,

@@ -1,4 +1,4 @@
-//! Sublattices of Z³.
+//! Sublattices of Z³, by generators in Hermite normal form (up to the entries above the pivots).
 
 /// An integer vector.
 pub(super) type Int3 = [i32; 3];

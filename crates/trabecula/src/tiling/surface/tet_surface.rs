@@ -3,15 +3,15 @@
 //! The solid is where f − t < 0 (lower), > 0 (upper), or where both f − t < 0 and f + t > 0 (sheet). Each inequality cuts a
 //! small tetrahedron in a triangle or a quadrilateral whose corners lie strictly inside its edges.
 //!
-//! *Embedded.* The pieces of a small tetrahedron stay in it. The two sides of a sheet keep their order along every edge; a
+//! *Embedded.* The triangles of a small tetrahedron stay in it. The two sides of a sheet keep their order along every edge; a
 //! triangle of one then lies on one side of the plane of the other, or crosses it only beyond the diagonal that both
 //! quadrilaterals have, where the other is not. So sheets thinner than a step keep both their sides.
 //!
 //! *Fitting.* A corner depends on values and slopes at the ends of its edge alone, and these are the same in all bits
-//! whichever tetrahedron looks at them.
+//! from every tetrahedron that has the edge.
 
-use super::root::first_root;
-use super::template::{FACES, PAIRS, Template, Tile, pair};
+use super::cubic_root::first_root;
+use super::small_simplices::{FACES, PAIRS, Template, Tile, pair};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
 use geometry::union_find::{find, unite};
@@ -22,7 +22,7 @@ pub(super) const MARGIN: f64 = 0.01;
 /// No component.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A run of points that belong to a body of the surface (`NONE`: to none) and a piece of the solid.
+/// A run of consecutive points that belong to one component of the surface (`NONE`: to none) and one of the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Run {
     pub count: u32,
@@ -39,27 +39,27 @@ fn push(runs: &mut Vec<Run>, surface: u32, solid: u32) {
 
 /// A surface in a tetrahedron, with the caps of those faces that lie on the mesh's boundary.
 #[derive(Clone, Default)]
-pub(super) struct Piece {
+pub(super) struct TetSurface {
     /// Barycentric coordinates of the vertices: corners on edges in the order of the edges, then nodes of caps in theirs.
-    pub places: Vec<Bary>,
+    pub vertices: Vec<Bary>,
     /// The coordinates that are zero at each, a bit for each.
     pub zero: Vec<u8>,
     /// How many of them are corners on edges.
     pub crossings: usize,
-    /// Triangles for a positive tetrahedron, body by body, and whether each is a cap.
+    /// Triangles for a positive tetrahedron, component by component, and whether each is a cap.
     pub triangles: Vec<([u32; 3], bool)>,
-    /// The triangles of each body.
-    pub bodies: Vec<u32>,
-    /// The body of each vertex.
-    pub body: Vec<u32>,
-    /// Pieces of the solid.
+    /// Number of triangles of each component.
+    pub triangle_counts: Vec<u32>,
+    /// The component of each vertex.
+    pub component: Vec<u32>,
+    /// Number of components of the solid.
     pub solids: u32,
-    /// The piece of solid that each body bounds.
-    pub bounds: Vec<u32>,
+    /// The component of the solid that each component of the surface bounds.
+    pub solid_of: Vec<u32>,
     /// On each closed face, all corners, then all solid nodes.
     pub faces: [Vec<Run>; 4],
     /// On each closed edge, all vertices of caps.
-    pub rims: [Vec<Run>; 6],
+    pub boundary_edges: [Vec<Run>; 6],
 }
 
 /// What is to be cut: f and the level at the nodes, and the change of f along the edges by its slope at both ends.
@@ -104,7 +104,7 @@ fn sides(part: Part) -> &'static [Side] {
     }
 }
 
-/// What is used for one tetrahedron after another.
+/// Buffers, used for one tetrahedron after another.
 #[derive(Default)]
 pub(super) struct Scratch {
     /// The vertex on each edge for each side.
@@ -118,11 +118,18 @@ pub(super) struct Scratch {
     inner: Vec<u32>,
 }
 
-impl Piece {
+impl TetSurface {
     /// Cuts the tetrahedron; `mask` has a bit for each face that is to be capped.
-    pub fn new(nodes: &Nodes, template: &Template, core: &Core, part: Part, mask: u8, scratch: &mut Scratch) -> Piece {
+    pub fn new(
+        nodes: &Nodes,
+        template: &Template,
+        core: &Core,
+        part: Part,
+        mask: u8,
+        scratch: &mut Scratch,
+    ) -> TetSurface {
         let sides = sides(part);
-        let mut out = Piece::default();
+        let mut out = TetSurface::default();
         let count = template.zero.len();
         scratch.solid.clear();
         scratch.solid.resize(count, true);
@@ -151,8 +158,8 @@ impl Piece {
         }
         for n in 0..count {
             if scratch.node[n] == 0 && scratch.solid[n] {
-                scratch.node[n] = out.places.len() as u32;
-                out.places.push(nodes.grid.bary(nodes.whole[n]));
+                scratch.node[n] = out.vertices.len() as u32;
+                out.vertices.push(nodes.grid.bary(nodes.whole[n]));
                 out.zero.push(template.zero[n]);
             } else {
                 scratch.node[n] = NONE;
@@ -190,21 +197,21 @@ impl Piece {
                 last = Some(at);
                 let at = if up { at } else { 1.0 - at };
                 scratch.corner[e][s] = NONE - 1;
-                self.places.push([at; 4]);
+                self.vertices.push([at; 4]);
             }
-            // By side, so that names ascend the same way for everyone.
+            // By side, so that indices ascend alike in every tetrahedron.
             if both {
-                let n = self.places.len();
-                self.places.swap(n - 1, n - 2);
+                let n = self.vertices.len();
+                self.vertices.swap(n - 1, n - 2);
             }
-            let first = self.places.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
+            let first = self.vertices.len() - scratch.corner[e].iter().filter(|c| **c != NONE).count();
             let (ka, kb) = (nodes.whole[*a as usize], nodes.whole[*b as usize]);
             let zero = template.zero[*a as usize] & template.zero[*b as usize];
             let named = scratch.corner[e].iter_mut().filter(|c| **c != NONE);
             for (next, name) in named.enumerate() {
                 let v = first + next;
-                let at = self.places[v][0];
-                self.places[v] = core::array::from_fn(|i| {
+                let at = self.vertices[v][0];
+                self.vertices[v] = core::array::from_fn(|i| {
                     let (x, y) = (f64::from(ka[i]), f64::from(kb[i]));
                     (x + at * (y - x)) / n
                 });
@@ -212,12 +219,12 @@ impl Piece {
                 *name = v as u32;
             }
         }
-        self.crossings = self.places.len();
+        self.crossings = self.vertices.len();
     }
 
     /// The triangles in the small tetrahedra.
     fn cut(&mut self, template: &Template, sides: &[Side], scratch: &mut Scratch) {
-        let count = self.places.len() as u32;
+        let count = self.vertices.len() as u32;
         scratch.surface.clear();
         scratch.surface.extend(0..count);
         scratch.inner.clear();
@@ -292,9 +299,9 @@ impl Piece {
         }
     }
 
-    /// Numbers bodies and pieces, puts triangles in the order of bodies, and notes what lies on faces and boundary loops.
+    /// Numbers the components, sorts triangles by component, and lists the runs on faces and on edges of the boundary.
     fn sort(&mut self, template: &Template, mask: u8, scratch: &mut Scratch) {
-        let count = self.places.len();
+        let count = self.vertices.len();
         for (n, v) in scratch.node.iter().enumerate() {
             if *v != NONE {
                 unite(&mut scratch.inner, *v, (count + n) as u32);
@@ -311,28 +318,28 @@ impl Piece {
             number[root]
         };
         let mut named = vec![NONE; count];
-        self.body = vec![NONE; count];
+        self.component = vec![NONE; count];
         for v in 0..count {
             let root = find(&mut scratch.surface, v as u32) as usize;
             if named[root] == NONE {
-                named[root] = self.bounds.len() as u32;
-                self.bounds.push(solid_of(&mut scratch.inner, v));
+                named[root] = self.solid_of.len() as u32;
+                self.solid_of.push(solid_of(&mut scratch.inner, v));
             }
-            self.body[v] = named[root];
+            self.component[v] = named[root];
         }
-        self.bodies = vec![0; self.bounds.len()];
+        self.triangle_counts = vec![0; self.solid_of.len()];
         for (t, _) in &self.triangles {
-            self.bodies[self.body[t[0] as usize] as usize] += 1;
+            self.triangle_counts[self.component[t[0] as usize] as usize] += 1;
         }
-        if self.bodies.len() > 1 {
-            let body = &self.body;
-            self.triangles.sort_by_key(|(t, _)| body[t[0] as usize]);
+        if self.triangle_counts.len() > 1 {
+            let component = &self.component;
+            self.triangles.sort_by_key(|(t, _)| component[t[0] as usize]);
         }
         for v in 0..self.crossings {
-            let (body, solid) = (self.body[v], self.bounds[self.body[v] as usize]);
+            let (component, solid) = (self.component[v], self.solid_of[self.component[v] as usize]);
             for face in 0..4 {
                 if self.zero[v] >> face & 1 == 1 {
-                    push(&mut self.faces[face], body, solid);
+                    push(&mut self.faces[face], component, solid);
                 }
             }
         }
@@ -354,7 +361,7 @@ impl Piece {
             }
             for v in 0..count {
                 if self.zero[v] & off == off {
-                    push(&mut self.rims[e], self.body[v], self.bounds[self.body[v] as usize]);
+                    push(&mut self.boundary_edges[e], self.component[v], self.solid_of[self.component[v] as usize]);
                 }
             }
         }

@@ -4,11 +4,11 @@
 //! faces they leave the plain triangular grid, whatever the order of the corners. So two tetrahedra of a mesh that number
 //! their corners by the mesh's nodes have the same small triangles on a common face.
 
-use super::{Bary, Stencil};
+use super::{Bary, TetCell};
 
 /// Names of nodes and edges of a subdivision into n steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grid {
+pub struct Subdivision {
     /// Steps along an edge.
     pub n: usize,
 }
@@ -16,7 +16,7 @@ pub struct Grid {
 /// Whole barycentric coordinates; their sum is n.
 pub type Whole = [u16; 4];
 
-impl Grid {
+impl Subdivision {
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
         (self.n + 1) * (self.n + 2) * (self.n + 3) / 6
@@ -96,7 +96,7 @@ impl Grid {
 /// points that differ in the order of their coordinates.
 pub struct Nodes {
     /// The subdivision.
-    pub grid: Grid,
+    pub grid: Subdivision,
     /// Coordinates of the nodes.
     pub whole: Vec<Whole>,
     /// f at the nodes.
@@ -109,7 +109,7 @@ pub struct Nodes {
 
 impl Nodes {
     /// Evaluates f where coordinates descend, and copies it to the rest.
-    pub fn new(stencil: &Stencil, grid: Grid) -> Nodes {
+    pub fn new(stencil: &TetCell, grid: Subdivision) -> Nodes {
         let whole = grid.whole();
         let descends = |k: &Whole| k.windows(2).all(|p| p[0] >= p[1]);
         let main: Vec<usize> = (0..whole.len()).filter(|i| descends(&whole[*i])).collect();
@@ -121,7 +121,7 @@ impl Nodes {
             .map(|k| {
                 let mut k = *k;
                 k.sort_unstable_by(|a, b| b.cmp(a));
-                Grid::index(grid.n - usize::from(k[0]), usize::from(k[2] + k[3]), usize::from(k[3])) as u32
+                Subdivision::index(grid.n - usize::from(k[0]), usize::from(k[2] + k[3]), usize::from(k[3])) as u32
             })
             .collect();
         let (mut values, mut gradients) = (vec![0.0; whole.len()], vec![[0.0; 4]; whole.len()]);

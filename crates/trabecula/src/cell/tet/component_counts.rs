@@ -1,11 +1,11 @@
-//! Connected components of a tetrahedral cell and its traces, as functions of the level.
+//! Numbers of connected components of a tetrahedral cell and of its traces on the faces, as functions of the level.
 //!
 //! On a small simplex f is interpolated linearly and the solid is convex, hence connected. So components are those of a
 //! graph of small tetrahedra, adjacent where they have solid on a common small triangle; a simplex enters the graph at
 //! the minimum "depth" of f on it. All levels are swept at once by union-find, deepest first.
 
-use super::nodes::{Grid, Nodes};
-use super::{Count, Part, Stencil};
+use super::subdivision::{Nodes, Subdivision};
+use super::{Count, Part, TetCell};
 use geometry::union_find::unite;
 
 /// Steps along the edge of the tetrahedron.
@@ -13,7 +13,7 @@ const STEPS: usize = 48;
 
 /// Number of connected components as a function of the depth: lower f, upper −f, sheet |f|; solid is what lies below
 /// it.
-pub(super) struct Pieces {
+pub(super) struct ComponentCounts {
     upper: bool,
     /// Pairs of a depth and the number of components from there on, ascending.
     solid: Vec<(f64, usize)>,
@@ -22,7 +22,7 @@ pub(super) struct Pieces {
 }
 
 /// The minimum depth on a simplex.
-fn least(part: Part, values: &[f64]) -> f64 {
+fn least_depth(part: Part, values: &[f64]) -> f64 {
     let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     match part {
         Part::Lower => lo,
@@ -31,11 +31,11 @@ fn least(part: Part, values: &[f64]) -> f64 {
     }
 }
 
-/// A graph whose nodes and links appear at a depth.
+/// A filtration of a graph: each node and each edge appears at a depth.
 #[derive(Default)]
 struct Sweep {
     nodes: Vec<f64>,
-    links: Vec<(f64, u32, u32)>,
+    edges: Vec<(f64, u32, u32)>,
 }
 
 impl Sweep {
@@ -43,13 +43,13 @@ impl Sweep {
     fn counts(mut self, slack: f64) -> Vec<(f64, usize)> {
         let mut births = self.nodes.clone();
         births.sort_unstable_by(f64::total_cmp);
-        self.links.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        self.edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
         let mut out: Vec<(f64, usize)> = Vec::new();
-        let (mut born, mut joined, mut links) = (0, 0, self.links.iter().peekable());
+        let (mut born, mut joined, mut edges) = (0, 0, self.edges.iter().peekable());
         loop {
             let next = births.get(born).copied().unwrap_or(f64::INFINITY);
-            let next = links.peek().map_or(next, |l| next.min(l.0));
+            let next = edges.peek().map_or(next, |l| next.min(l.0));
             if next == f64::INFINITY {
                 return out;
             }
@@ -57,7 +57,7 @@ impl Sweep {
             while births.get(born).is_some_and(|d| *d <= next + slack) {
                 born += 1;
             }
-            while let Some((_, a, b)) = links.next_if(|l| l.0 <= next + slack) {
+            while let Some((_, a, b)) = edges.next_if(|l| l.0 <= next + slack) {
                 joined += usize::from(unite(&mut root, *a, *b));
             }
             if out.last().is_none_or(|o| o.1 != born - joined) {
@@ -73,23 +73,23 @@ fn at(counts: &[(f64, usize)], depth: f64) -> usize {
     if i == 0 { 0 } else { counts[i - 1].1 }
 }
 
-impl Pieces {
-    pub fn new(stencil: &Stencil, part: Part) -> Pieces {
-        let nodes = Nodes::new(stencil, Grid { n: STEPS });
+impl ComponentCounts {
+    pub fn new(stencil: &TetCell, part: Part) -> ComponentCounts {
+        let nodes = Nodes::new(stencil, Subdivision { n: STEPS });
         let v = |i: usize| nodes.values[i];
         let mut solid = Sweep::default();
         let mut open = std::collections::HashMap::new();
         nodes.grid.each_tet(|p, _| {
-            let corners = p.map(|[i, j, k]| Grid::index(i, j, k));
+            let corners = p.map(|[i, j, k]| Subdivision::index(i, j, k));
             let tet = solid.nodes.len() as u32;
-            solid.nodes.push(least(part, &corners.map(v)));
+            solid.nodes.push(least_depth(part, &corners.map(v)));
             for without in 0..4 {
                 let mut of = [0; 3];
                 let others = (0..4).filter(|i| *i != without).map(|i| corners[i]);
                 of.iter_mut().zip(others).for_each(|(o, c)| *o = c);
                 of.sort_unstable();
                 if let Some(other) = open.remove(&of) {
-                    solid.links.push((least(part, &of.map(v)), other, tet));
+                    solid.edges.push((least_depth(part, &of.map(v)), other, tet));
                 } else {
                     open.insert(of, tet);
                 }
@@ -99,13 +99,13 @@ impl Pieces {
         let mut trace = Sweep::default();
         let mut open = std::collections::HashMap::new();
         nodes.grid.each_triangle(|p, _| {
-            let corners = p.map(|[a, b]| Grid::index(a, b, 0));
+            let corners = p.map(|[a, b]| Subdivision::index(a, b, 0));
             let triangle = trace.nodes.len() as u32;
-            trace.nodes.push(least(part, &corners.map(v)));
+            trace.nodes.push(least_depth(part, &corners.map(v)));
             for (a, b) in [(0, 1), (1, 2), (0, 2)] {
                 let of = [corners[a], corners[b]];
                 if let Some(other) = open.remove(&of) {
-                    trace.links.push((least(part, &of.map(v)), other, triangle));
+                    trace.edges.push((least_depth(part, &of.map(v)), other, triangle));
                 } else {
                     open.insert(of, triangle);
                 }
@@ -133,7 +133,7 @@ impl Pieces {
                 whole.push([level(from), level(to)]);
             }
         }
-        Pieces { upper, solid, trace, whole }
+        ComponentCounts { upper, solid, trace, whole }
     }
 
     pub fn whole(&self) -> &[[f64; 2]] {

@@ -1,6 +1,6 @@
 //! The small simplices of a tetrahedron cut into n steps, listed once.
 
-use crate::cell::tet::Grid;
+use crate::cell::tet::Subdivision;
 
 /// A small tetrahedron: its nodes, its six edges (01, 02, 03, 12, 13, 23), and whether it is in positive order.
 pub(super) struct Small {
@@ -44,11 +44,11 @@ pub(super) fn pair(a: usize, b: usize) -> usize {
 }
 
 impl Template {
-    pub fn new(grid: Grid) -> Template {
+    pub fn new(grid: Subdivision) -> Template {
         let zero: Vec<u8> = grid.whole().iter().map(|k| (0..4).fold(0, |m, i| m | u8::from(k[i] == 0) << i)).collect();
         let mut raw = Vec::new();
         grid.each_tet(|at, even| {
-            raw.push((at.map(|[i, j, k]| Grid::index(i, j, k) as u32), even));
+            raw.push((at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32), even));
         });
         let mut edges: Vec<[u32; 2]> = raw.iter().flat_map(|(n, _)| PAIRS.map(|[a, b]| [n[a], n[b]])).collect();
         edges.sort_unstable();
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn small_simplices_make_up_the_tetrahedron() {
         for n in [1, 2, 5] {
-            let t = Template::new(Grid { n });
+            let t = Template::new(Subdivision { n });
             assert_eq!(t.tets.len(), n * n * n);
             assert!(t.faces.iter().all(|f| f.len() == n * n));
             // V − E + F − T = 1; 4 T = 2 F − (faces outside).
