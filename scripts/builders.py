@@ -9,7 +9,7 @@ import json
 import sys
 import textwrap
 
-from kinds import ROOT, SCHEMA, keys, limits, resolved, words
+from kinds import ROOT, SCHEMA, alternatives, keys, limits, resolved, words
 
 STAMP = "# Made by scripts/builders.py from schema/design.json; do not edit."
 
@@ -18,6 +18,8 @@ PATH = "str | os.PathLike[str]"
 #: Module: the definition whose kinds it builds, its docstring.
 FAMILIES = {
     "region": ("Region", "Regions: where the part may be. Lengths in mm."),
+    "grade": ("Grade", "Grades: numbers that vary in space, for a level's amount or a number of a phase map. Lengths in mm."),
+    "map": ("Map", "Maps: position (mm) to phase (turns)."),
 }
 
 
@@ -55,11 +57,42 @@ def sentence(name, schema, required):
 
 def arguments(table):
     """The keys of a table as arguments: name, schema, whether it is required, whether a keyword. Of alternatives none is."""
-    out, keyword, several = [], False, len(table.get("oneOf", [])) > 1
+    out, keyword, several = {}, {}, len(alternatives(table)) > 1
+    control = [list(part["properties"]) for part in alternatives(table)] == [["points"], ["path"]]
     for name, schema, required, number in keys(table):
-        keyword = keyword or schema.get("x-keyword", False)
-        out.append((name, schema, required and not (number and several), keyword))
-    return sorted(out, key=lambda k: (k[3], not k[2]))
+        if control and name == "path":
+            continue
+        keyword[number] = keyword.get(number, False) or schema.get("x-keyword", False)
+        if control and name == "points":
+            schema = CONTROL
+        out.setdefault(name, (name, schema, required and not (number and several and not control), keyword[number]))
+    return sorted(out.values(), key=lambda k: (k[3], not k[2]))
+
+
+#: Control points, here or in a file, as one argument.
+CONTROL = {
+    "x-type": "Points",
+    "description": "Points [x, y, z] in order, or the path of a table (csv) of them.",
+    "x-unit": "mm",
+}
+
+
+def converted(name, schema, required):
+    """The Python type of an argument, and the item of the table that it becomes."""
+    of = resolved(schema)
+    optional = "" if required else " | None = None"
+    kind = of.get("x-type")
+    if kind == "Points":
+        return f"Points{optional}", f"**control({name})"
+    if kind == "Stops":
+        return f"Stops{optional}", f"{name}=pairs({name})"
+    if "propertyNames" in of:
+        value = annotation(of["additionalProperties"])
+        return f"Mapping[int, {value}]{optional}", f"{name}=numbered({name})"
+    if name == "path":
+        form = "os.fspath(path)" if required else "None if path is None else os.fspath(path)"
+        return f"{PATH}{optional}", f"path={form}"
+    return f"{literal(schema)}{optional}", f"{name}={name}"
 
 
 def docstring(text, rows):
@@ -92,18 +125,24 @@ def builder(name, schema):
         rest = "*others: dict" if first else "*regions: dict"
         text = docstring(schema["description"], [])
         return [f"def {name}({''.join(first)}{rest}) -> dict:", *text, f'    return {{"{name}": {listed}}}']
+    if of.get("type") == "string":
+        text = docstring(schema["description"], [])
+        return [f"def {name}(text: str) -> dict:", *text, f'    return {{"{name}": text}}']
     signature, rows, given, starred = [], [], [], False
     for key, value, required, keyword in arguments(of):
         if keyword and not starred:
             signature.append("*")
             starred = True
-        kind, form = (PATH, "os.fspath({0})") if key == "path" and required else (literal(value), "{0}")
-        signature.append(f"{key}: {kind}" + ("" if required else " | None = None"))
+        kind, item = converted(key, value, required)
+        signature.append(f"{key}: {kind}")
         rows.append(sentence(key, value, required))
-        given.append(f"{key}={form.format(key)}")
+        given.append(item)
     head = wrapped(f"def {name}(", signature, ") -> dict:")
     text = docstring(schema["description"], rows)
-    return [*head, *text, *wrapped(f'return {{"{name}": settings(', given, ")}", "    ")]
+    call = f'    return {{"{name}": settings({", ".join(given)})}}'
+    if len(call) <= 128:
+        return [*head, *text, call]
+    return [*head, *text, *wrapped("given = settings(", given, ")", "    "), f'    return {{"{name}": given}}']
 
 
 def module(definition, text):
@@ -114,8 +153,12 @@ def module(definition, text):
         parts.append((name, builder(name, choice)))
     body = "\n".join(line for _, lines in parts for line in lines)
     lines = [STAMP, f'"""{text}"""', "", "from __future__ import annotations", ""]
-    lines += ["import os"] * ("os." in body) + ["from collections.abc import Sequence"]
-    lines += ["from typing import Literal"] * ("Literal" in body) + ["", "from .given import settings", ""]
+    used = ["import os"] * ("os." in body)
+    used.append("from collections.abc import " + ", ".join(n for n in ("Mapping", "Sequence") if f"{n}[" in body))
+    used += ["from typing import Literal"] * ("Literal[" in body)
+    helpers = ["Points", "Stops", "control", "numbered", "pairs", "settings"]
+    given = [n for n in helpers if (f": {n}" if n[0].isupper() else f"{n}(") in body]
+    lines += [*used, "", f"from .given import {', '.join(given)}", ""]
     lines += wrapped("__all__ = [", [f'"{name}"' for name in sorted(n for n, _ in parts)], "]")
     for _, function in parts:
         lines += ["", "", *function]

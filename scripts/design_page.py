@@ -4,7 +4,7 @@
 import json
 import sys
 
-from kinds import ROOT, SCHEMA, keys, limits, resolved, words
+from kinds import ROOT, SCHEMA, alternatives, keys, limits, resolved, words
 
 PAGE = ROOT / "docs" / "reference" / "design-file.md"
 MARK = "<!-- Below: made by scripts/design_page.py from schema/design.json; do not edit. -->\n"
@@ -53,8 +53,8 @@ def section(name, of):
     """A definition: its keys, its kinds, or its words."""
     lines = [f'<a id="{name.lower()}"></a>', "", f"### {name}", "", cell(of.get("description", "")).replace("\\|", "|"), ""]
     tables = [p for p in of.get("oneOf", []) if "properties" in p]
-    if "properties" in of or (tables and "type" in of):
-        several = len(tables) > 1
+    if "properties" in of or alternatives(of):
+        several = len(alternatives(of)) > 1
         if several:
             lines += ["Of the keys with a number, those of one number are given.", ""]
         lines += ["| key | is | unit, range | needed or default | |", "|---|---|---|---|---|"]

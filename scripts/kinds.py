@@ -26,14 +26,20 @@ def limits(schema):
     of = resolved(schema)
     while of.get("type") == "array":
         of = resolved(of["items"])
-    if "anyOf" in of:
+    while "anyOf" in of:
         of = resolved(of["anyOf"][0])
     names = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
     return " ".join(f"{word} {of[key]:g}" for key, word in names.items() if key in of)
 
 
+def alternatives(table):
+    """The sets of keys of which one is given."""
+    parts = table.get("oneOf", []) + table.get("anyOf", []) if table.get("type") == "object" else []
+    return [part for part in parts if "properties" in part]
+
+
 def keys(table):
     """The keys of a table and of its alternatives: name, schema, whether it must be given, number of the alternative."""
-    for number, part in enumerate([table, *table.get("oneOf", [])]):
+    for number, part in enumerate([table, *alternatives(table)]):
         for name, schema in part.get("properties", {}).items():
             yield name, schema, name in part.get("required", []), number

@@ -386,7 +386,7 @@ MESH = SOLID.mesh(edge=0.25)
         (lambda: lt.Design(lt.region.box([1e300] * 3), cube().lattice).build(), "reaches to 5e299 mm"),
         (lambda: lt.Design(lt.region.box([8, 8, 8], center=[1e30, 0, 0]), cube().lattice).build(), "1e30 to 1e30 mm"),
         (lambda: cube(cell="\udcff").build(), "unknown cell"),
-        (lambda: cube(cell=lt.cell.series([lt.cell.term([float("inf"), 0, 0])])).build(), "whole numbers"),
+        (lambda: cube(cell=lt.cell.series([lt.cell.term([float("inf"), 0, 0])])).build(), "a whole number"),
         (lambda: cube(cell=lt.cell.series([lt.cell.term("abc")])).build(), "whole numbers"),
         (lambda: cube(level=lt.level.fraction(lt.grade.linear([0, 0, 1], [1, 2]))).build(), "stops"),
         (lambda: MESH.within(3), "within takes a Solid, a region or a path, found 3"),

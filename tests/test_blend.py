@@ -136,7 +136,7 @@ def test_grades_of_boundaries(tmp_path):
     [
         (('between = ["a", "b"]', 'between = ["a", "bb"]'), "blend.between[1]", ["bb", '"b"']),
         (('between = ["a", "b"]', 'between = ["a", "a"]'), "blend.between[1]", ["twice"]),
-        (('between = ["a", "b"]', 'between = ["a"]'), "blend.between", ["two", "1 name"]),
+        (('between = ["a", "b"]', 'between = ["a"]'), "blend.between", ["two", "1 value"]),
         (("weight = {", "wieght = {"), "blend.wieght", ["weight"]),
         (("[blend]", '[blend]\nby = "volume"'), "blend.by", ["fraction", "value"]),
         (("fraction = 0.30 }\nmap", 'fraction = 0.30, of = "part" }\nmap'), "lattice.a.level.of", ["blend"]),
@@ -155,10 +155,10 @@ def test_slips_are_told_where_they_are(tmp_path, change, path, words):
     [
         # all zero beyond x = 0
         ("of = { a = { formula = 'max(-x, 0)' }, b = 0 }", "blend.of", ["all weights are 0 at", "mm"]),
-        ("of = { a = 1 }", "blend.of", ["at least two"]),
+        ("of = { a = 1 }", "blend.of", ["at least 2"]),
         ("of = { a = 1, c = 1 }", "blend.of.c", ["c", "lattice"]),
         ("between = ['a', 'b']", "blend", ["weight"]),
-        ("between = ['a', 'b']\nweight = 0.5\nof = { a = 1, b = 1 }", "blend.of", ["both"]),
+        ("between = ['a', 'b']\nweight = 0.5\nof = { a = 1, b = 1 }", "blend.of", ["between and of at once"]),
         (
             "between = ['a', 'b']\nweight = { rbf = { points = [[0, 0, 0], [3, 0, 0], [0, 0, 0]] } }",
             "blend.weight.rbf.points",

@@ -6,6 +6,7 @@ from conftest import CUBE
 
 LEVEL = "lattice.core.level"
 MAP = "lattice.core.map.affine"
+SHELL = "cell = 'gyroid'\npart = 'sheet'\nmap.affine.wavelength = 4\nlevel.iso = 0.3"
 
 # (line of the good design, what stands there instead, path, parts of the message)
 CASES = [
@@ -33,10 +34,10 @@ CASES = [
         ["map.phase takes a wavelength and an orientation that vary"],
     ),
     # amounts
-    ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["iso and fraction at once", "exactly one"]),
+    ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["fraction and iso at once", "exactly one"]),
     ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of iso, fraction, porosity"]),
     ("fraction = 0.3", "porosity = 0", f"{LEVEL}.porosity", ["porosity is 0", "greater than 0 and less than 1"]),
-    ("fraction = 0.3", "porosity = 1", f"{LEVEL}.porosity", ["porosity is 1", "nothing would be solid"]),
+    ("fraction = 0.3", "porosity = 1", f"{LEVEL}.porosity", ["porosity is 1", "less than 1"]),
     ("fraction = 0.3", "porosity = 1.2", f"{LEVEL}.porosity", ["porosity is 1.2"]),
     ("fraction = 0.3", "porosity = -1", f"{LEVEL}.porosity", ["porosity is -1"]),
     ("fraction = 0.3", "porosity = nan", f"{LEVEL}.porosity", ["porosity is NaN"]),
@@ -51,7 +52,7 @@ CASES = [
     ("fraction = 0.3", "thickness = nan", f"{LEVEL}.thickness", ["thickness is NaN", "greater than 0"]),
     ("fraction = 0.3", "thickness = 5", f"{LEVEL}.thickness", ["at most the wavelength, 4 mm"]),
     ("fraction = 0.3", "thickness = 3", f"{LEVEL}.thickness", ["solid everywhere", "half the thickness is 1.5"]),
-    ("fraction = 0.3", "thickness = 1\nfraction = 0.3", LEVEL, ["fraction and thickness at once", "exactly one"]),
+    ("fraction = 0.3", "thickness = 1\nfraction = 0.3", LEVEL, ["thickness and fraction at once", "exactly one"]),
     ("fraction = 0.3", 'thickness = 1\nof = "part"', f"{LEVEL}.of", ["fraction or porosity", "found thickness"]),
     (
         "fraction = 0.3",
@@ -147,7 +148,7 @@ CASES = [
         'cell = "gyroid"',
         "cell.series = { terms = [{ hkl = [1, 0.5, 0] }] }",
         "lattice.core.cell.series.terms[0].hkl",
-        ["whole numbers"],
+        ["a whole number"],
     ),
     # regions
     ("size = [8, 8, 8]", "size = [8, 8]", "region.box.size", ["three numbers", "2 values"]),
@@ -183,9 +184,14 @@ CASES = [
         ["empty"],
     ),
     # more than there can be
-    ("[lattice.core.level]", "[blend]\nbetween = ['core', 'b']\n[lattice.core.level]", "blend.between[1]", ["b", "core"]),
-    ('units = "mm"', "beams.a.radius = 1", "beams.a", ["no graph given"]),
-    ("fraction = 0.3", "fraction = 0.3\n[lattice.rim]\ncell = 'gyroid'", "lattice.rim", ["blend", "between"]),
+    (
+        "[lattice.core.level]",
+        "[blend]\nbetween = ['core', 'b']\nweight = 0.5\n[lattice.core.level]",
+        "blend.between[1]",
+        ["b", "core"],
+    ),
+    ('units = "mm"', "beams.a.radius = 1", "beams.a", ['"cell" is missing']),
+    ("fraction = 0.3", f"fraction = 0.3\n[lattice.shell]\n{SHELL}", "lattice.shell", ["blend", "between"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]
 

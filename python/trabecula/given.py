@@ -4,13 +4,34 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
-__all__ = ["copied", "number", "plain", "positive", "settings", "three", "whole"]
+__all__ = [
+    "Points",
+    "Stops",
+    "control",
+    "copied",
+    "number",
+    "numbered",
+    "pairs",
+    "plain",
+    "positive",
+    "settings",
+    "three",
+    "whole",
+]
+
+#: Positions and the values taken there: {position: value}, or pairs.
+Stops = Mapping[float, float] | Iterable[Sequence[float]]
+
+#: Points [x, y, z], or the path of a table of them.
+Points = Iterable[Sequence[float]] | str | os.PathLike[str]
+
 
 #: How deep a design may nest; the core has the same limit.
 DEPTH = 64
@@ -80,3 +101,22 @@ def copied(data: Any, depth: int = 0) -> Any:
     if isinstance(data, Mapping):
         return {k: copied(v, depth + 1) for k, v in data.items()}
     return [copied(v, depth + 1) for v in data] if isinstance(data, list) else data
+
+
+def pairs(given: Stops | None) -> list | None:
+    """Stops as a list of pairs, positions rising if they are keys."""
+    if given is None:
+        return None
+    return copied(sorted(given.items()) if isinstance(given, Mapping) else given if hasattr(given, "tolist") else list(given))
+
+
+def control(points: Points) -> dict:
+    """Control points under the key that they have: points, or the path of a table."""
+    if isinstance(points, (str, os.PathLike)):
+        return {"path": os.fspath(points)}
+    return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
+
+
+def numbered(given: Mapping[int, Any] | None) -> dict | None:
+    """A table whose keys are whole numbers."""
+    return None if given is None else {str(number): value for number, value in given.items()}

@@ -1,24 +1,41 @@
-"""Grades: numbers that vary in space, accepted where a level's amount or a number of a phase map stands."""
+# Made by scripts/builders.py from schema/design.json; do not edit.
+"""Grades: numbers that vary in space, for a level's amount or a number of a phase map. Lengths in mm."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import os
+from collections.abc import Sequence
 
-from .given import copied, plain, settings
+from .given import Points, Stops, control, pairs, settings
 
 __all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid"]
 
-Stops = Mapping[float, float] | Iterable[Sequence[float]]
-
 
 def linear(along: Sequence[float], stops: Stops) -> dict:
-    """Piecewise linear in s = along · x, constant beyond the ends; ``stops`` is {s: value} or [(s, value), ...]."""
-    return {"linear": {"along": plain(along), "stops": copied(_stops(stops))}}
+    """Along a direction: piecewise linear in s = along · x, constant beyond the ends.
+
+    along: The direction [x, y, z]; s is measured in multiples of its length.
+    stops: Pairs [s, value], s rising.
+    """
+    return {"linear": settings(along=along, stops=pairs(stops))}
 
 
 def depth(stops: Stops) -> dict:
-    """Piecewise linear in the depth (mm) below the region's surface; ``stops`` is {depth: value} or pairs."""
-    return {"depth": {"stops": copied(_stops(stops))}}
+    """By depth below the region's surface: piecewise linear, constant beyond the ends.
+
+    stops: Pairs [depth in mm, value], depth rising.
+    """
+    return {"depth": settings(stops=pairs(stops))}
+
+
+def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+    """By the distance from a point or a line: piecewise linear, constant beyond the ends.
+
+    stops: Pairs [distance in mm, value], distance rising.
+    center: The point, or a point on the line. [mm, default [0.0, 0.0, 0.0]]
+    axis: Direction of the line; without it, distances are from the point. [optional]
+    """
+    return {"radial": settings(stops=pairs(stops), center=center, axis=axis)}
 
 
 def formula(text: str) -> dict:
@@ -26,86 +43,98 @@ def formula(text: str) -> dict:
     return {"formula": text}
 
 
-def radial(stops: Stops, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
-    """Piecewise linear in the distance (mm) from a point, or from the line through it along ``axis``; constant beyond."""
-    given = settings(center=center, axis=axis)
-    return {"radial": {**given, "stops": copied(_stops(stops))}}
-
-
 def grid(
-    path: str,
+    path: str | os.PathLike[str],
     origin: Sequence[float] | None = None,
     step: float | Sequence[float] | None = None,
     array: str | None = None,
     remap: Stops | None = None,
 ) -> dict:
-    """Numbers on a grid from a file: npy (with the ``origin`` of the first number and the ``step``, mm), vti, vtk; or from
-    grey pictures one above the other, png or tif ("scan/*.png", with ``origin`` and ``step``).
+    """Numbers on a grid, from a file; linear between them.
 
-    ``remap`` says what they stand for: {number: value} or pairs, linear between. A ``path`` is relative to the design's
-    folder.
+    path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
+        tif), where a * in the last part stands for anything: "scan/*.png". Columns run along x, rows along y, pictures
+        along z.
+    origin: Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it. [mm,
+        optional]
+    step: Distance between numbers, one or three. VTI and VTK files contain it. [mm, optional]
+    array: Name of the array, where a file has several. [optional]
+    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"grid": settings(path=path, origin=origin, step=step, array=array, remap=_remap(remap))}
+    return {"grid": settings(path=os.fspath(path), origin=origin, step=step, array=array, remap=pairs(remap))}
 
 
-def points(path: str, neighbours: int | None = None, remap: Stops | None = None) -> dict:
-    """Numbers at scattered points from a table (csv) of x, y, z (mm), value: the mean of the nearest ``neighbours``."""
-    return {"points": settings(path=path, neighbours=neighbours, remap=_remap(remap))}
+def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: Stops | None = None) -> dict:
+    """Numbers at scattered points, from a file: the mean of the nearest, weighted by one over the square of the
+    distance.
+
+    path: Path of a table (csv) of x, y, z (mm), value, relative to the design file.
+    neighbours: Number of nearest points that count. [from 1 to 64, default 8]
+    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
+    """
+    return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
 
 
-def field(path: str, array: str, component: int | None = None, remap: Stops | None = None) -> dict:
-    """An array of points or cells of a result on a mesh (vtu, vtk) or a grid (vti, vtk)."""
-    return {"field": settings(path=path, array=array, component=component, remap=_remap(remap))}
+def field(path: str | os.PathLike[str], array: str, component: int | None = None, remap: Stops | None = None) -> dict:
+    """An array of a result on a mesh of volume elements, from a file.
+
+    path: Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
+    array: Name of the array, of points or cells.
+    component: Which of its components, from 0, where it has several. [optional]
+    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
+    """
+    return {"field": settings(path=os.fspath(path), array=array, component=component, remap=pairs(remap))}
 
 
-def sigmoid(of: float | dict, width: float, at: float = 0.0) -> dict:
-    """A smooth step (the logistic function, with ends) from 0 to 1 as the grade ``of`` rises through ``at``, over ``width`` in
-    its unit; a negative width falls."""
-    return {"sigmoid": {"of": of, "width": width} | ({"at": at} if at else {})}
+def sigmoid(of: float | dict, width: float, at: float | None = None) -> dict:
+    """A smooth step from 0 to 1 of another number: the logistic function, with ends.
+
+    of: The number that it is a step of.
+    width: From where it is 0 to where it is 1, in the unit of the number; a negative width falls.
+    at: Where it is one half. [default 0.0]
+    """
+    return {"sigmoid": settings(of=of, width=width, at=at)}
 
 
 def region(of: dict, width: float) -> dict:
-    """1 inside a region (from the builders of ``trabecula.region``) and 0 outside, with a smooth step of ``width`` mm."""
-    return {"region": {"of": of, "width": width}}
+    """1 inside a region and 0 outside, with a smooth step at its surface.
+
+    of: The region.
+    width: Width of the step, half of it on either side of the surface. [mm, above 0]
+    """
+    return {"region": settings(of=of, width=width)}
 
 
 def distance(
-    points: Iterable[Sequence[float]] | str,
-    closed: bool = False,
+    points: Points,
+    closed: bool | None = None,
     axis: Sequence[float] | None = None,
     sharpness: float | None = None,
 ) -> dict:
-    """Distance (mm) to a line through control points: [x, y, z] in order, or the path of a table (csv) of them.
+    """Distance to a chain of straight segments through control points.
 
-    With an ``axis`` all is seen along it, and inside a ``closed`` line distances are negative. ``sharpness`` (at least 10)
-    asks for the smooth form instead of the exact one.
+    points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]
+    closed: Whether the last is joined to the first. [default false]
+    axis: Direction of projection: the distance is that from a wall through the line along it. Inside a closed line it
+        is negative. [optional]
+    sharpness: The smooth form instead of the exact distance: off by at most 0.2785/sharpness of the longest segment,
+        without a sign. [from 10, optional]
     """
-    given = settings(axis=axis, sharpness=sharpness) | ({"closed": True} if closed else {})
-    return {"distance": _control(points) | given}
+    return {"distance": settings(**control(points), closed=closed, axis=axis, sharpness=sharpness)}
 
 
 def rbf(
-    points: Iterable[Sequence[float]] | str,
+    points: Points,
     values: Sequence[float] | None = None,
     delta: float | None = None,
     axis: Sequence[float] | None = None,
 ) -> dict:
-    """Gaussian radial basis functions that take ``values`` (1 unless given) at control points; ``delta`` (mm) is their width.
+    """Gaussian radial basis functions through control points: the sum of β exp(−r²/δ²).
 
-    ``points`` are [x, y, z] or the path of a table (csv) of x, y, z, or x, y, z, value.
+    points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]
+    values: The values taken at the points: 1 at all unless given here or as a fourth column of the file. [optional]
+    delta: δ; one and a half times the mean distance of a point from its nearest neighbour unless given. [mm, above 0,
+        optional]
+    axis: Direction of projection, so that a point stands for a line. [optional]
     """
-    return {"rbf": _control(points) | settings(values=values, delta=delta, axis=axis)}
-
-
-def _control(points: Iterable[Sequence[float]] | str) -> dict:
-    if isinstance(points, str) or hasattr(points, "__fspath__"):
-        return {"path": points}
-    return {"points": copied(points if hasattr(points, "tolist") else [list(p) for p in points])}
-
-
-def _remap(remap: Stops | None) -> list | None:
-    return None if remap is None else copied(_stops(remap))
-
-
-def _stops(stops: Stops) -> list:
-    return sorted(stops.items()) if isinstance(stops, Mapping) else stops if hasattr(stops, "tolist") else list(stops)
+    return {"rbf": settings(**control(points), values=values, delta=delta, axis=axis)}

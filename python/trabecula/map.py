@@ -1,10 +1,13 @@
+# Made by scripts/builders.py from schema/design.json; do not edit.
 """Maps: position (mm) to phase (turns)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
-from .given import settings
+from .given import Points, control, numbered, settings
 
 __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
@@ -13,12 +16,14 @@ def affine(
     wavelength: float | Sequence[float],
     rotate: Sequence[float] | None = None,
     offset: Sequence[float] | None = None,
-    skew: dict[str, float] | None = None,
+    skew: dict | None = None,
 ) -> dict:
     """A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
 
-    ``wavelength`` is the cell's edge in mm, one or three; ``rotate`` the angles about x, y, z in degrees (z is turned
-    first); ``offset`` moves the lattice (mm); ``skew`` names shears in degrees: ``{"xz": 20}`` moves x by tan 20° · z.
+    wavelength: Cell edge, one number or three. [mm, above 0]
+    rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
+    offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
+    skew: Shears. [default {}]
     """
     return {"affine": settings(wavelength=wavelength, rotate=rotate, offset=offset, skew=skew)}
 
@@ -28,9 +33,11 @@ def spartan(
     rotate: Sequence[float] | None = None,
     offset: Sequence[float] | None = None,
 ) -> dict:
-    """The SPARTAN note's reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
+    """The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
 
-    With unequal wavelengths this shears the lattice in space; ``affine`` turns it rigidly.
+    wavelength: Wavelength, one number or three. [mm, above 0]
+    rotate: Angles about x, y, z. [degrees, default [0.0, 0.0, 0.0]]
+    offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     """
     return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}
 
@@ -39,43 +46,55 @@ def phase(
     wavelength: float | dict | Sequence[float | dict],
     rotate: Sequence[float | dict] | None = None,
     *,
-    rotate_x: float | dict | None = None,
-    rotate_y: float | dict | None = None,
-    rotate_z: float | dict | None = None,
-    direction: Sequence[float | dict] | None = None,
-    frame: dict | None = None,
-    stress: Sequence[float | dict] | dict | None = None,
-    weight: dict | None = None,
+    weight: float | dict | None = None,
     angle_weight: float | None = None,
     offset: Sequence[float] | None = None,
     step: float | None = None,
-    domain: str | None = None,
+    domain: Literal["region", "box"] | None = None,
     folds: bool | None = None,
+    rotate_x: float | dict | None = None,
+    rotate_y: float | dict | None = None,
+    rotate_z: float | dict | None = None,
+    direction: Sequence[float | dict] | dict | None = None,
+    frame: dict | None = None,
+    stress: Sequence[float | dict] | dict | None = None,
 ) -> dict:
-    """Cells that turn and stretch as asked for without tearing: phases with ∇Φᵢ = R eᵢ / λᵢ in least squares.
+    """Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares. At most one
+    of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 
-    Every number may be a grade. Cells are turned by ``rotate`` (three angles in degrees; or ``rotate_x``, ``rotate_y``,
-    ``rotate_z``), ``direction`` (a vector for the cell's z axis), ``frame`` (``{"x": …, "z": …}``) or ``stress`` (the
-    components 11, 22, 33, 23, 13, 12 of a tensor whose principal directions the axes take). ``weight`` says how much it
-    matters where: what no map can follow is left to where it is small. ``angle_weight`` is what an error of angle counts for
-    the same error of spacing: above 1 cells are nearer to their directions, below 1 to their sizes. ``step`` is the spacing
-    in mm of the grid that is solved on; ``domain`` is "region" or "box"; ``folds=True`` allows cells to turn inside out.
+    wavelength: Cell edge, one number or three; each may vary. [mm, above 0]
+    rotate: Angles about x, y, z: z is turned first, then y, then x. Each may vary. [degrees, optional]
+    weight: Weight of the cell's shape here, compared with other positions (0 or more): where no map can follow
+        everything, the error goes where this is small. [optional]
+    angle_weight: Weight of an error of angle against the same error of spacing: where no map can follow both, above 1
+        cells are nearer to their directions, below 1 to their sizes. [from 0.001 to 1000, default 1.0]
+    offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
+    step: Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given. [mm, above
+        0, optional]
+    domain: What counts when the phases are solved. [default "region"]
+    folds: Whether the map may fold, where cells turn inside out. [default false]
+    rotate_x: The angle about x alone, in addition to or in place of `rotate_y` and `rotate_z`. [degrees, optional]
+    rotate_y: The angle about y alone. [degrees, optional]
+    rotate_z: The angle about z alone. [degrees, optional]
+    direction: Direction of the cell's z axis; its sign and length do not matter. [optional]
+    frame: The directions of the cell's x and z axes. [optional]
+    stress: A stress tensor whose principal directions the cell's axes take. [optional]
     """
     given = settings(
         wavelength=wavelength,
         rotate=rotate,
-        rotate_x=rotate_x,
-        rotate_y=rotate_y,
-        rotate_z=rotate_z,
-        direction=direction,
-        frame=frame,
-        stress=stress,
         weight=weight,
         angle_weight=angle_weight,
         offset=offset,
         step=step,
         domain=domain,
         folds=folds,
+        rotate_x=rotate_x,
+        rotate_y=rotate_y,
+        rotate_z=rotate_z,
+        direction=direction,
+        frame=frame,
+        stress=stress,
     )
     return {"phase": given}
 
@@ -86,63 +105,84 @@ def cylinder(
     center: Sequence[float] | None = None,
     axis: Sequence[float] | None = None,
 ) -> dict:
-    """Cells round an axis, ``around`` of them, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
+    """Wrapped round an axis, a whole number of cells, so that the lattice closes: u = (r/λ, around · θ/2π, z/λ).
 
-    ``wavelength`` is the cell's edge in mm along the radius and along the axis, one or two.
+    wavelength: Cell edge along the radius and along the axis, one number or two. [mm, above 0]
+    around: Number of cells around. [from 1 to 1e+06]
+    center: A point on the axis. [mm, default [0.0, 0.0, 0.0]]
+    axis: Direction of the axis. [default [0.0, 0.0, 1.0]]
     """
     return {"cylinder": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
 
 
-def sphere(
-    wavelength: float,
-    around: int,
-    center: Sequence[float] | None = None,
-    axis: Sequence[float] | None = None,
-) -> dict:
-    """Shells of cells about a centre, ``around`` (even) of them round the equator and half as many from pole to pole."""
+def sphere(wavelength: float, around: int, center: Sequence[float] | None = None, axis: Sequence[float] | None = None) -> dict:
+    """Wrapped about a centre in shells, a whole number of cells round the equator and half as many from pole to pole.
+
+    wavelength: Cell edge along the radius. [mm, above 0]
+    around: Number of cells round the equator, even. [from 2 to 1e+06]
+    center: The centre. [mm, default [0.0, 0.0, 0.0]]
+    axis: Direction from pole to pole. [default [0.0, 0.0, 1.0]]
+    """
     return {"sphere": settings(wavelength=wavelength, around=around, center=center, axis=axis)}
 
 
 def sweep(
     wavelength: float | Sequence[float],
-    points: Sequence[Sequence[float]] | str,
+    points: Points,
     closed: bool | None = None,
     normal: Sequence[float] | None = None,
 ) -> dict:
-    """Cells along a line, in a frame that does not rotate about it: u = (a/λ₁, b/λ₂, s/λ₃), a and b across it, s along it.
+    """Along a line, in a frame that does not rotate about it: a cubic spline through control points, straight on beyond
+    the ends of an open one; u = (a/λ₁, b/λ₂, s/λ₃), a and b across it, s along it.
 
-    ``points`` are control points (mm) of a cubic spline, or the path of a table of them (csv); ``closed=True`` joins the last
-    with the first, with a whole number of cells around. ``normal`` is where the first edge points at the start. A region in
-    which the lattice would fold or tear is refused.
+    wavelength: Cell edge, one number or three: two across the line and one along it. Along a closed line it is made to
+        fit. [mm, above 0]
+    points: Points [x, y, z] in order, or the path of a table (csv) of them. [mm]
+    closed: Whether the last point is followed by the first. [default false]
+    normal: Direction of the cell's x axis at the start, up to its component along the line; chosen if not given.
+        [optional]
     """
-    line = {"path": points} if isinstance(points, str) else {"points": [list(p) for p in points]}
-    return {"sweep": settings(wavelength=wavelength, **line, closed=closed, normal=normal)}
+    return {"sweep": settings(wavelength=wavelength, **control(points), closed=closed, normal=normal)}
 
 
 def tets(
     size: float | dict | None = None,
-    mesher: str | None = None,
+    mesher: Literal["background", "ftetwild"] | None = None,
     limit: float | None = None,
     *,
-    zones: dict[int, dict] | None = None,
-    path: str | None = None,
-    unit: str | None = None,
-    split: bool | None = None,
+    zones: Mapping[int, dict] | None = None,
     overlap: float | None = None,
-    method: str | None = None,
+    method: Literal["explicit", "implicit"] | None = None,
+    path: str | os.PathLike[str] | None = None,
+    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
+    split: bool | None = None,
 ) -> dict:
-    """A cell in each tetrahedron of a mesh of the region, made or read.
+    """Piecewise affine over a tetrahedral mesh of the region, made or from a file: a cell in each tetrahedron.
 
-    Made: ``size`` is the edge (mm, a number or a grade) of a regular tetrahedron of the volume they are to have, ``mesher``
-    is "background" (ours, takes any region) or "ftetwild" (in the extra ``tets``, takes soups), ``limit`` the seconds that
-    the latter may take, ``zones`` regions by number: a tetrahedron is of the first that has its middle, else of zone 0, and
-    ``cell.tet(zones=…)`` names a cell for each. Read: ``path`` (vtu, vtk; with the extra ``fe`` msh, inp, med, mesh …),
-    ``unit`` of its coordinates, ``split=True`` to have hexahedra, wedges and pyramids cut into tetrahedra.
-
-    ``overlap`` smooths the creases at the faces of tetrahedra, from 0 (creases) to 0.2. ``method`` is "explicit", in each
-    tetrahedron apart, which is fast and needs no grid, or "implicit", on a grid like other lattices.
+    size: Edge of a regular tetrahedron of the volume that tetrahedra are to have, a number or a grade. [mm, above 0,
+        optional]
+    mesher: The program that makes it. [default "background"]
+    limit: Time that another mesher than the background one may take. [s, above 0, default 600.0]
+    zones: Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius
+        = 5 } } }`; the first of several counts, and all others are of zone 0. [default {}]
+    overlap: Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach
+        beyond themselves and are mixed with their neighbours, from 0 (creases) to 0.2. [from 0 to 0.2, default 0.0]
+    method: How the surface is made. [default "explicit"]
+    path: Path of the file, relative to the design file: vtu, vtk; with the extra "fe" of the Python package also msh,
+        inp, med, mesh and others. [optional]
+    unit: Unit of the file's coordinates (mm unless given). [optional]
+    split: Whether hexahedra, wedges and pyramids are cut into tetrahedra that fit face to face; refused otherwise.
+        [default false]
     """
-    given = settings(size=size, mesher=mesher, limit=limit, path=path, unit=unit, split=split, overlap=overlap, method=method)
-    if zones is not None:
-        given["zones"] = {str(zone): region for zone, region in zones.items()}
+    given = settings(
+        size=size,
+        mesher=mesher,
+        limit=limit,
+        zones=numbered(zones),
+        overlap=overlap,
+        method=method,
+        path=None if path is None else os.fspath(path),
+        unit=unit,
+        split=split,
+    )
     return {"tets": given}

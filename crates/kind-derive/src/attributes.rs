@@ -11,6 +11,7 @@ pub struct Outer {
     pub noun: Option<String>,
     pub doc: String,
     pub check: Option<Path>,
+    pub before: Option<Path>,
     pub family: Option<Path>,
     pub untagged: bool,
     pub alternatives: bool,
@@ -27,6 +28,8 @@ impl Outer {
                 out.noun = Some(meta.value()?.parse::<LitStr>()?.value());
             } else if meta.path.is_ident("check") {
                 out.check = Some(meta.value()?.parse()?);
+            } else if meta.path.is_ident("before") {
+                out.before = Some(meta.value()?.parse()?);
             } else if meta.path.is_ident("family") {
                 out.family = Some(meta.value()?.parse()?);
             } else if meta.path.is_ident("untagged") {
@@ -65,6 +68,8 @@ pub struct Inner {
     pub absent: Absent,
     pub flatten: bool,
     pub skip: bool,
+    pub inherit: bool,
+    pub always: bool,
     pub keyword: bool,
     pub hints: Vec<String>,
 }
@@ -80,6 +85,8 @@ impl Inner {
             absent: Absent::Required,
             flatten: false,
             skip: false,
+            inherit: false,
+            always: false,
             keyword: false,
             hints: Vec::new(),
         };
@@ -105,6 +112,10 @@ impl Inner {
                 out.flatten = true;
             } else if meta.path.is_ident("skip") {
                 out.skip = true;
+            } else if meta.path.is_ident("inherit") {
+                out.inherit = true;
+            } else if meta.path.is_ident("always") {
+                out.always = true;
             } else if meta.path.is_ident("keyword") {
                 out.keyword = true;
             } else if meta.path.is_ident("hints") {

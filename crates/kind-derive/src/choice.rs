@@ -22,7 +22,8 @@ fn boxed(ty: &Type) -> bool {
 /// A table named by its kind, or a word.
 pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<TokenStream> {
     let (mut choices, mut reads, mut writes, mut checks) = (vec![], vec![], vec![], vec![]);
-    let (mut schemas, mut keys, mut members, mut from) = (vec![], vec![], vec![], vec![]);
+    let (mut schemas, mut parts, mut keys) = (vec![], vec![], vec![]);
+    let (mut members, mut from) = (vec![], vec![]);
     for variant in &data.variants {
         let (v, inner) = (&variant.ident, Inner::of(&variant.attrs)?);
         let name = inner.key.clone().unwrap_or_else(|| v.to_string().to_lowercase());
@@ -48,6 +49,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
         };
         checks.push(quote! { #ident::#v(of) => Kind::check(of, #limits).map_err(|f| f.under(#name)) });
         schemas.push(quote! { choices.push(named_schema::<#ty>(#key, defs)); });
+        parts.push(quote! { choices.push(named_part::<#ty>(#key, defs)); });
         keys.push(quote! { #ident::#v(_) => #name });
         members.push(if boxed(ty) {
             quote! { #ident::#v(of) => &**of }
@@ -57,22 +59,25 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
     }
     let (name, doc) = (&outer.name, &outer.doc);
     let noun = outer.noun.clone().unwrap_or_else(|| ident.to_string().to_lowercase());
-    let check = outer.check.iter();
+    let (check, before) = (outer.check.iter(), outer.before.iter());
     let family = outer.family.iter().map(|family| {
         quote! {
-            impl #ident {
-                /// The key of the kind.
-                pub fn key(&self) -> &'static str {
-                    match self { #(#keys),* }
-                }
-                /// The kind, as one of its family.
-                pub(crate) fn family(&self) -> &dyn #family {
-                    match self { #(#members),* }
-                }
+            /// The kind, as one of its family.
+            pub(crate) fn family(&self) -> &dyn #family {
+                match self { #(#members),* }
             }
         }
     });
-    let family = quote! { #(#family)* };
+    let family = quote! {
+        #[allow(dead_code)]
+        impl #ident {
+            /// The key of the kind.
+            pub fn key(&self) -> &'static str {
+                match self { #(#keys),* }
+            }
+            #(#family)*
+        }
+    };
     let table = if from.is_empty() {
         quote! {}
     } else {
@@ -92,7 +97,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
                 }
                 fn open(defs: &mut Defs, out: &mut Open) {
                     let mut choices = Vec::new();
-                    #(#schemas)*
+                    #(#parts)*
                     out.choices(choices);
                 }
             }
@@ -111,6 +116,7 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
                 fits_choice(node, CHOICES)
             }
             fn read(at: &At) -> Result<Self, DesignError> {
+                #(#before(at)?;)*
                 let (key, at) = at.choice(#noun, CHOICES)?;
                 match key { #(#reads,)* _ => Err(at.unknown_kind(#noun, CHOICES)) }
             }
@@ -139,17 +145,22 @@ pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<To
     let types = data.variants.iter().map(one).collect::<syn::Result<Vec<_>>>()?;
     let docs = data.variants.iter().map(|v| Ok(Inner::of(&v.attrs)?.doc)).collect::<syn::Result<Vec<_>>>()?;
     let doc = &outer.doc;
-    let check = outer.check.iter();
+    let (check, before) = (outer.check.iter(), outer.before.iter());
+    let expected = match &outer.noun {
+        Some(noun) => quote! { #noun.into() },
+        None => quote! { [#(<#types as Kind>::expected()),*].join(" or ") },
+    };
     Ok(quote! {
         impl Kind for #ident {
             const DOC: &'static str = #doc;
             fn expected() -> String {
-                [#(<#types as Kind>::expected()),*].join(" or ")
+                #expected
             }
             fn fits(node: &Node) -> u8 {
                 0 #(.max(<#types as Kind>::fits(node)))*
             }
             fn read(at: &At) -> Result<Self, DesignError> {
+                #(#before(at)?;)*
                 let best = Self::fits(at.node);
                 #(if best > 0 && <#types as Kind>::fits(at.node) == best {
                     return Kind::read(at).map(#ident::#names);

@@ -9,17 +9,20 @@
 //! | where | attribute | meaning |
 //! |---|---|---|
 //! | type | `name = "…"` | name in the schema; that of the type unless given |
-//! | type | `noun = "…"` | noun in messages; the first sentence of the doc comment unless given, of an enum its name |
+//! | type | `noun = "…"` | noun in messages; the first sentence of the doc comment unless given, of an enum its name; of an untagged enum all that is expected |
+//! | type | `before = function` | `fn(&At) -> Result<(), DesignError>`: refuses a value before it is read, to explain common mistakes |
 //! | type | `check = function` | `fn(&Self, &Key) -> Result<(), Fault>`: what fields must keep together, checked after each |
 //! | enum | `untagged`, `alternatives` | see above |
 //! | enum | `inherit` | limits of the place where it stands hold for its numbers, instead of the variant's |
-//! | enum | `family = Trait` | gives `key(&self) -> &'static str` and `family(&self) -> &dyn Trait` |
+//! | enum | `family = Trait` | gives `family(&self) -> &dyn Trait`; every such enum has `key(&self) -> &'static str` |
 //! | field | `unit = "mm"` | unit |
 //! | field | `above`, `below`, `min`, `max` | limits of each number, exclusive and inclusive |
 //! | field | `least = n` | least number of items of a list or map |
 //! | field | `default = EXPR`, `default` | the value if absent; without it a key is required, unless it is an `Option` |
+//! | field | `always` | written even if it has its default |
 //! | field | `flatten` | the keys of that type stand in this table |
 //! | field | `skip` | not part of the data: `Default::default()` when read |
+//! | field | `inherit` | limits of the place where the table stands hold for it, instead of its own |
 //! | field | `keyword` | this and later keys are keyword arguments in Python |
 //! | field, variant | `rename = "…"` | its key; that of the field, of a variant its name in lower case, unless given |
 //! | field, variant | `hints("…", …)` | words that others use for it |

@@ -68,9 +68,10 @@ impl Parts {
             (Absent::Default(default), None) => {
                 self.reads
                     .push(quote! { #ident: match fields.maybe::<#ty>(#name)? { Some(v) => v, None => #default } });
+                let always = inner.always;
                 self.puts.push(quote! {
                     let default: #ty = #default;
-                    if self.#ident != default { out.push((#name.into(), None, Kind::write(&self.#ident))); }
+                    if #always || self.#ident != default { out.push((#name.into(), None, Kind::write(&self.#ident))); }
                 });
                 self.schemas.push(quote! {
                     let default: #ty = #default;
@@ -78,7 +79,9 @@ impl Parts {
                 });
             }
         }
-        if of.is_none() {
+        if inner.inherit {
+            self.checks.push(quote! { Kind::check(&self.#ident, key).map_err(|f| f.under(#name))?; });
+        } else if of.is_none() {
             self.checks.push(quote! { Kind::check(&self.#ident, &#key).map_err(|f| f.under(#name))?; });
         }
         Ok(())
@@ -88,7 +91,7 @@ impl Parts {
 /// `Kind` for a table: all but its keys and `checks`, which check the ranges of its values.
 pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> TokenStream {
     let (name, doc, noun) = (&outer.name, &outer.doc, outer.phrase());
-    let check = outer.check.iter();
+    let (check, before) = (outer.check.iter(), outer.before.iter());
     quote! {
         impl Kind for #ident {
             const DOC: &'static str = #doc;
@@ -99,6 +102,7 @@ pub fn kind_of_table(ident: &Ident, outer: &Outer, checks: &TokenStream) -> Toke
                 u8::from(matches!(node.value, Value::Table(_)))
             }
             fn read(at: &At) -> Result<Self, DesignError> {
+                #(#before(at)?;)*
                 Self::from_fields(&at.table(&Self::expected(), Self::keys())?)
             }
             fn write(&self) -> Node {
@@ -152,7 +156,7 @@ pub fn transparent(ident: &Ident, outer: &Outer, field: &Field) -> syn::Result<T
     let (ty, inner) = (&field.ty, Inner::of(&field.attrs)?);
     let least = inner.least.iter().collect::<Vec<_>>();
     let (name, doc) = (&outer.name, &outer.doc);
-    let check = outer.check.iter();
+    let (check, before) = (outer.check.iter(), outer.before.iter());
     Ok(quote! {
         impl Kind for #ident {
             const DOC: &'static str = #doc;
@@ -163,6 +167,7 @@ pub fn transparent(ident: &Ident, outer: &Outer, field: &Field) -> syn::Result<T
                 <#ty as Kind>::fits(node)
             }
             fn read(at: &At) -> Result<Self, DesignError> {
+                #(#before(at)?;)*
                 let of = <#ty as Kind>::read(at)?;
                 #(at.at_least(of.len(), #least)?;)*
                 Ok(#ident(of))

@@ -5,10 +5,8 @@
 
 mod beams;
 mod blend;
-mod bridge;
 mod build;
 mod cell;
-mod control;
 mod data;
 mod grade;
 mod joins;
@@ -16,7 +14,6 @@ mod level;
 mod map;
 mod pattern;
 mod place;
-mod read;
 mod region;
 mod report;
 mod sample;
@@ -32,13 +29,12 @@ mod warn;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
 use crate::extract::GridSurface;
+use crate::kind::{At, Kind};
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::report::{DesignReport, TransitionReport};
@@ -51,7 +47,6 @@ use geometry::formats::Elements;
 use geometry::mesh::Mesh;
 use geometry::repair::Repaired;
 use geometry::tetmesh::TetMesh;
-use read::RegionIn;
 
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use blend::Blended;
@@ -61,43 +56,38 @@ pub use schema::schema;
 pub use tets::{TetReport, Tets};
 
 /// A lattice part, as data.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("anyOf" = [{ "required": ["lattice"] }, { "required": ["beams"] }]))]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a design", before = data::version)]
 pub struct Design {
-    /// Version of this format; 1.
-    #[schemars(range(min = 1, max = 1))]
+    /// Version of this format; write schema = 1.
+    #[kind(min = 1.0, max = 1.0)]
     pub schema: u32,
-    /// Unit of length.
-    #[serde(default)]
+    /// Unit of length; a mesh file may have its own.
+    #[kind(default, always)]
     pub units: Units,
-    /// Where the part may be.
+    /// Where the part may be, such as [region.box] with size = [20, 20, 20].
     pub region: RegionKind,
     /// What fills the region: lattices under names of your own. Several need a blend.
-    #[serde(default, skip_serializing_if = "Lattices::is_empty")]
-    #[schemars(extend("minProperties" = 1))]
+    #[kind(default)]
     pub lattice: Lattices,
     /// Graphs of beams, under names of your own: instead of a lattice, or blended with others.
-    #[serde(default, skip_serializing_if = "BeamsSpecs::is_empty")]
-    #[schemars(extend("minProperties" = 1))]
+    #[kind(default)]
     pub beams: BeamsSpecs,
     /// Which lattice is where, if there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blend: Option<BlendSpec>,
     /// What closes the region's surface.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinSpec>,
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
-    #[serde(default, skip_serializing_if = "Keeps::is_empty")]
+    #[kind(default)]
     pub keep: Keeps,
     /// Where each key stands in the file it was read from.
-    #[serde(skip)]
+    #[kind(skip)]
     pub lines: Lines,
 }
 
 /// The unit of length of a design.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "unit of length of a design")]
 pub enum Units {
     /// Millimetre.
     #[default]
@@ -145,7 +135,7 @@ pub struct Tiled {
     /// The lattice.
     pub tiling: Arc<Tiling>,
     /// The cell of each zone, where zones have cells of their own.
-    pub zones: BTreeMap<String, String>,
+    pub zones: BTreeMap<u32, String>,
     /// What is known of the mesh.
     pub mesh: TetReport,
     /// Whether its surface is made without a grid.
@@ -183,10 +173,10 @@ impl Design {
             units: Units::Mm,
             region,
             lattice,
-            beams: BeamsSpecs::new(),
+            beams: BeamsSpecs::default(),
             blend: None,
             skin: None,
-            keep: Keeps::new(),
+            keep: Keeps::default(),
             lines: Lines::default(),
         }
     }
@@ -199,44 +189,95 @@ impl Design {
     /// assert_eq!((e.line, e.path.as_str(), e.nearest.as_deref()), (Some(2), "regoin", Some("region")));
     /// ```
     pub fn from_toml(text: &str) -> Result<Design, DesignError> {
-        read::design(&Node::from_toml(text)?)
+        Design::from_node(&Node::from_toml(text)?)
     }
 
     /// Reads a design from JSON.
     pub fn from_json(text: &str) -> Result<Design, DesignError> {
-        read::design(&Node::from_json(text)?)
+        Design::from_node(&Node::from_json(text)?)
     }
 
     /// Reads a design from a tree.
     pub fn from_node(node: &Node) -> Result<Design, DesignError> {
-        read::design(node)
+        let lines = node.lines();
+        let design = Design { lines, ..Design::read(&At::root(node))? };
+        design.check_names().map_err(|e| design.located(e))?;
+        Ok(design)
+    }
+
+    /// The error with its line, if its path stands in the file.
+    fn located(&self, mut e: DesignError) -> DesignError {
+        e.line = e.line.or_else(|| self.lines.line(&e.path));
+        e
+    }
+
+    /// Refuses names that are missing, given twice, or of no lattice.
+    fn check_names(&self) -> Result<(), DesignError> {
+        let missing = "say what fills the region, such as [lattice.core] with cell = \"gyroid\", or [beams.core] with cell = \"octet\"";
+        if self.lattice.is_empty() && self.beams.0.is_empty() {
+            return Err(DesignError::new("lattice", missing));
+        }
+        if let Some(name) = self.beams.0.keys().find(|name| self.lattice.contains_key(*name)) {
+            let message = format!("\"{name}\" names a lattice already; give the beams another name");
+            return Err(DesignError::new("beams", message));
+        }
+        let tables = self.lattice.keys().map(|n| ("lattice", n)).chain(self.beams.0.keys().map(|n| ("beams", n)));
+        let mut tables: Vec<(&str, &String)> = tables.collect();
+        tables.sort_by_key(|(table, name)| self.lines.line(&format!("{table}.{name}")));
+        let names: Vec<&str> = tables.iter().map(|t| t.1.as_str()).collect();
+        let Some(blend) = &self.blend else {
+            let [(_, a), (table, b), ..] = &tables[..] else { return Ok(()) };
+            let message = format!(
+                "several lattices ({a}, {b}) need a blend to say where each is, such as [blend] with between = [\"{a}\", \"{b}\"] \
+                 and a weight"
+            );
+            return Err(DesignError::new(format!("{table}.{b}"), message));
+        };
+        match blend.named().into_iter().find(|(_, name)| !names.contains(name)) {
+            Some((path, name)) => Err(DesignError::unknown(&path, "lattice", name, &names)),
+            None => Ok(()),
+        }
     }
 
     /// The design as TOML.
     pub fn to_toml(&self) -> Result<String, DesignError> {
-        toml::to_string(self).map_err(|e| DesignError::new("", format!("cannot be written as TOML: {e}")))
+        toml::to_string(&self.write()).map_err(|e| DesignError::new("", format!("cannot be written as TOML: {e}")))
     }
 
     /// The design as JSON.
     pub fn to_json(&self) -> Json {
-        serde_json::to_value(self).unwrap_or(Json::Null)
+        serde_json::to_value(self.write()).unwrap_or(Json::Null)
     }
 
     /// Builds the solid. Numbers are checked here: finite, in range, possible in the region.
     pub fn build(&self, loader: &dyn Loader) -> Result<Built, DesignError> {
-        build::design(self, loader).map_err(|mut e| {
-            e.line = e.line.or_else(|| self.lines.line(&e.path));
-            e
-        })
+        build::design(self, loader).map_err(|e| self.located(e))
     }
+}
+
+/// A file of a region alone.
+#[derive(Kind)]
+#[kind(noun = "a region file", before = data::version)]
+struct RegionFile {
+    /// Version of this format.
+    #[kind(rename = "schema")]
+    _schema: Option<u32>,
+    /// Unit of length.
+    #[kind(rename = "units", default)]
+    _units: Units,
+    /// Where the part may be, such as [region.box] with size = [20, 20, 20].
+    region: RegionKind,
 }
 
 /// The region of a design, or of a tree with the key `region` alone. The region of a lattice over tetrahedra is what these fill.
 pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
-    let found = match read::region_in(node)? {
-        RegionIn::Design(design) => build::space(&design, loader),
-        RegionIn::Alone(spec) => region::region(&spec, "region", loader, &mut crate::region::Notes::default()),
+    let entries = At::root(node).entries("a design or a region")?;
+    let found = if entries.iter().any(|(key, _)| ["lattice", "beams"].contains(key)) {
+        build::space(&Design::from_node(node)?, loader)
+    } else {
+        let alone = RegionFile::read(&At::root(node))?;
+        region::region(&alone.region, "region", loader, &mut crate::region::Notes::default())
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));
@@ -246,7 +287,9 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 
 /// The cell that a tree describes, as under the key `cell` of a lattice.
 pub fn cell(node: &Node) -> Result<Cell, DesignError> {
-    Ok(cell::cell(&read::cell_in(node)?, "cell", &NoFiles)?.1)
+    let spec = CellSpec::read(&At::alone(node, "cell"))?;
+    spec.valid().map_err(|f| DesignError::fault("cell", f))?;
+    Ok(cell::cell(&spec, "cell", &NoFiles)?.1)
 }
 
 impl Built {

@@ -11,11 +11,11 @@ mod node;
 mod schema;
 mod values;
 
-pub(crate) use at::{At, Fields, GRADES};
+pub(crate) use at::{At, Fields};
 pub use error::{DesignError, Warning};
 pub use kind_derive::Kind;
 pub use node::{Lines, Node, Value};
-pub(crate) use schema::{Defs, Open, any_schema, choice_schema, named_schema, word_schema};
+pub(crate) use schema::{Defs, Open, any_schema, choice_schema, named_part, named_schema, word_schema};
 pub use values::{OneOrThree, OneOrTwo, Unit};
 
 pub use geometry::fault::Fault;
@@ -134,6 +134,11 @@ impl Key {
 
     /// Refuses a number that is not finite or outside the limits.
     pub fn admit(&self, v: f64) -> Result<(), Fault> {
+        self.admit_at(v, "")
+    }
+
+    /// The same of a number at a `position`, such as " at position 3".
+    pub fn admit_at(&self, v: f64, position: &str) -> Result<(), Fault> {
         let inside = v > self.above && v < self.below && v >= self.min && v <= self.max;
         if v.is_finite() && inside {
             return Ok(());
@@ -142,7 +147,11 @@ impl Key {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         let finite = if v.is_finite() { None } else { Some("finite".to_string()) };
         let allowed = finite.into_iter().chain(self.allowed()).collect::<Vec<_>>().join(" and ");
-        Err(Fault::new("", format!("{name} is {}{unit}; it must be {allowed}", number(v))).found(number(v)))
+        let share = (self.above, self.below) == (0.0, 1.0) && v > 1.0 && v <= 100.0;
+        let hint =
+            if share { format!(" (for {} per cent write {})", number(v), number(v / 100.0)) } else { String::new() };
+        let message = format!("{name} is {}{unit}{position}; it must be {allowed}{hint}", number(v));
+        Err(Fault::new("", message).found(number(v)))
     }
 }
 

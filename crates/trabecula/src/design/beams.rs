@@ -24,26 +24,32 @@ use geometry::math::{Vec3, norm};
 pub(super) use told::{held, inside, lone, report, share};
 use told::{tell_cleaned, warn};
 pub(super) use wire::given;
-use wire::{check_beams, check_left, greatest, mean_length, merging, radii, tables, thickest};
+use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
 
+/// Nodes within this share of the mean length of struts are one.
+const ONE: f64 = 1e-6;
 /// Ends of beams within this share of the region's size of its surface lie on it.
 const ON: f64 = 1e-9;
 
 /// The beams of a design, filling the region.
 pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>) -> Result<Beams, DesignError> {
-    if let Some(pattern) = &spec.pattern {
-        return pattern::laid(spec, pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
+    if let GraphSpec::Pattern(of) = &spec.graph {
+        return pattern::laid(spec, &of.pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&place.path, f);
     let radii = radii(spec, place)?;
     let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &radii, place, warnings)?;
-    let mut cleaned = wire.clean(merging(spec, mean_length(&wire), place)?, &mut own);
-    let source = if spec.cell.is_some() { "map" } else { "struts" };
-    check_left(&wire, source, place)?;
-    if spec.cell.is_none() {
+    let trimming = spec.graph.trimming();
+    let mut cleaned = wire.clean(trimming.merge.unwrap_or_else(|| ONE * mean_length(&wire)), &mut own);
+    let cell = match &spec.graph {
+        GraphSpec::Cell(of) => graph::named(&of.cell.0),
+        _ => None,
+    };
+    check_left(&wire, if cell.is_some() { "map" } else { "struts" }, place)?;
+    if cell.is_none() {
         tell_cleaned(&cleaned, &place.path, warnings);
     }
-    let trim = match spec.trim {
+    let trim = match trimming.trim {
         TrimSpec::Cut => Trim::Cut,
         TrimSpec::Drop => Trim::Drop,
         TrimSpec::Snap => Trim::Snap,
@@ -53,7 +59,7 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
     let trimmed = trim.apply(&mut wire, &|p, out| space.values(p, out), reach, slack, &mut own);
     check_left(&wire, "trim", place)?;
     let held = |p: Vec3| space.value(p) >= -slack;
-    if spec.dangling == DanglingSpec::Drop {
+    if trimming.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", place)?;
     }
@@ -76,7 +82,7 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
         collisions,
         report: wire.report(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
-        cell: spec.cell.as_deref().and_then(graph::named).map(|u| u.name),
+        cell: cell.map(|u| u.name),
         graph,
         quadors: Arc::new(quadors),
         wavelength,
@@ -159,16 +165,17 @@ fn frame(
         FilletSpec::None => thick,
         _ => thick.max(0.5 * longest),
     };
-    let (Some(name), Some(map)) = (&spec.cell, &spec.map) else {
-        let (wire, own) = tables(spec, place)?;
-        let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
-        let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
-        return Ok(Frame { wavelength: mean_length(&wire), reach: reach(longest).max(largest), wire, own });
+    let (cell, map) = match &spec.graph {
+        GraphSpec::Cell(of) => (&of.cell.0, &of.map),
+        GraphSpec::Nodes(of) => {
+            let (wire, own) = tables(of, spec, place)?;
+            let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
+            let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
+            return Ok(Frame { wavelength: mean_length(&wire), reach: reach(longest).max(largest), wire, own });
+        }
+        GraphSpec::Pattern(_) => return Err(DesignError::new(&place.path, "a pattern is no frame")),
     };
-    let unit = graph::named(name).ok_or_else(|| {
-        let names: Vec<&str> = graph::catalogue().iter().map(|u| u.name).collect();
-        DesignError::unknown(&below("cell"), "cell of beams", name, &names)
-    })?;
+    let unit = graph::named(cell).ok_or_else(|| DesignError::new(below("cell"), "no such cell"))?;
     let net = unit.graph().map_err(|f| DesignError::fault(&place.path, f))?;
     let at = Place { path: below("map"), ..*place };
     let made = map::map(map, &at)?;

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use super::Warning;
-use super::control;
 use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
-use super::grade::{Allowed, grade};
+use super::grade::Asked;
 use super::place::Place;
 use super::sample;
 use crate::blend::{Blend, By, Constituent, Weights};
-use crate::kind::DesignError;
+use crate::kind::{DesignError, Key};
 use geometry::fault::number;
 use geometry::math::{Vec3, add, norm, scale, sub};
 
@@ -19,6 +18,16 @@ impl BlendSpec {
         match &self.lattices {
             BlendKind::Between(b) => b.between.iter().map(String::as_str).collect(),
             BlendKind::Of(of) => of.of.keys().map(String::as_str).collect(),
+        }
+    }
+
+    /// The paths at which lattices are named, and their names.
+    pub(super) fn named(&self) -> Vec<(String, &str)> {
+        match &self.lattices {
+            BlendKind::Between(b) => {
+                b.between.iter().enumerate().map(|(i, n)| (format!("blend.between[{i}]"), n.as_str())).collect()
+            }
+            BlendKind::Of(of) => of.of.keys().map(|n| (format!("blend.of.{n}"), n.as_str())).collect(),
         }
     }
 
@@ -71,7 +80,7 @@ fn functions(spec: &GradeSpec, path: &str, place: &Place, out: &mut Vec<Function
         GradeSpec::Kind(GradeKind::Sigmoid(s)) => functions(&s.of, &format!("{path}.sigmoid.of"), place, out),
         GradeSpec::Kind(GradeKind::Rbf(r)) => {
             let path = format!("{path}.rbf");
-            let made = control::rbf(r, &path, place)?;
+            let made = r.functions(&path, place)?;
             let (points, delta, condition) = (made.len(), made.delta(), made.condition());
             out.push(Functions { path, points, delta, condition });
             Ok(())
@@ -102,7 +111,7 @@ pub(super) fn blend(
     for (path, spec) in spec.weights() {
         functions(spec, &path, place, &mut rbf)?;
         let here = Place { path: path.clone(), ..*place };
-        grades.push(grade(spec, &path, &here, Allowed::Finite, false)?);
+        grades.push(spec.build(&Asked::new(path, &here, Key::NONE))?);
     }
     let weights = match (&spec.lattices, grades.pop()) {
         (BlendKind::Between(_), Some(weight)) => Weights::between(weight),

@@ -11,7 +11,7 @@ use super::{
 use crate::blend::Constituent;
 use crate::cell::Part;
 use crate::implicit::Implicit;
-use crate::kind::DesignError;
+use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
 use crate::region::Region;
 use crate::solid::Solid;
@@ -33,6 +33,7 @@ impl From<PartSpec> for Part {
 
 /// The region that a design's solid is in.
 pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
+    d.valid().map_err(|f| DesignError::fault("", f))?;
     let mut notes = crate::region::Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
@@ -55,6 +56,7 @@ fn given(
 }
 
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
+    d.valid().map_err(|f| DesignError::fault("", f))?;
     let mut notes = crate::region::Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     let bounds = space.bounds();
@@ -139,7 +141,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         lattices.push((name.clone(), built));
     }
     let mut graphs = Vec::new();
-    for (name, spec) in &d.beams {
+    for (name, spec) in &d.beams.0 {
         let place = Place { path: format!("beams.{name}"), region: &space, points: &points, filled: &filled, loader };
         let made = beams::beams(spec, &place, &mut warnings)?;
         graphs.push((name.clone(), made));

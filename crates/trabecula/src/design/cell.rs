@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use super::data::*;
-use super::place::finite;
 use super::{Loader, samples};
 use crate::cell::{Cell, Series, Term, named};
 use crate::kind::DesignError;
@@ -19,11 +18,8 @@ pub(super) fn cell<'a>(
 ) -> Result<(Option<&'a str>, Cell), DesignError> {
     let (name, terms, at) = match spec {
         CellSpec::Name(name) => {
-            let known = named(name).ok_or_else(|| {
-                let names: Vec<&str> = crate::cell::catalogue().iter().map(|n| n.name).collect();
-                DesignError::unknown(path, "cell", name, &names)
-            })?;
-            (Some(name.as_str()), known.terms(), path.to_string())
+            let known = named(&name.0).ok_or_else(|| DesignError::new(path, "no such cell"))?;
+            (Some(name.0.as_str()), known.terms(), path.to_string())
         }
         CellSpec::Kind(CellKind::File(f)) => {
             return Ok((None, samples::cell(f, &format!("{path}.file"), loader)?));
@@ -34,13 +30,9 @@ pub(super) fn cell<'a>(
         }
         CellSpec::Kind(CellKind::Series(s)) => {
             let at = format!("{path}.series");
-            for (i, t) in s.terms.iter().enumerate() {
-                finite(&format!("{at}.terms[{i}].amplitude"), t.amplitude)?;
-                finite(&format!("{at}.terms[{i}].phase"), t.phase)?;
-            }
             let terms = match &s.group {
                 None => s.terms.iter().map(plain_term).collect(),
-                Some(symbol) => {
+                Some(GroupSpec(symbol)) => {
                     let wrong = |place: &str, f| DesignError::fault(&format!("{at}.{place}"), f);
                     let group = Group::named(symbol).map_err(|f| wrong("group", f))?;
                     let mut all = Vec::new();

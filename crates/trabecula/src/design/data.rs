@@ -2,12 +2,57 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use super::schema;
-pub use crate::kind::{OneOrThree, OneOrTwo, Unit};
+use crate::cell::tet::tet_catalogue;
+use crate::cell::{catalogue, named};
+use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
+pub use crate::kind::{OneOrThree, Unit};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
+use geometry::symmetry::Group;
+
+/// A word out of a catalogue: its type, noun, the catalogue's words, why a word of another catalogue is refused, and words that
+/// others use, each with the one to use here.
+macro_rules! name_of {
+    ($(#[$doc:meta])* $type:ident, $noun:literal, $names:expr, $refused:expr, [$($hint:expr),* $(,)?]) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $type(pub String);
+
+        impl Kind for $type {
+            fn expected() -> String {
+                format!("one of {}", $names.collect::<Vec<&str>>().join(", "))
+            }
+
+            fn fits(node: &Node) -> u8 {
+                String::fits(node)
+            }
+
+            fn read(at: &At) -> Result<Self, DesignError> {
+                let names: Vec<&'static str> = $names.collect();
+                let refused: fn(&str) -> Option<String> = $refused;
+                if let crate::kind::Value::Text(word) = &at.node.value
+                    && !names.contains(&word.as_str())
+                    && let Some(why) = refused(word)
+                {
+                    return Err(at.error(why));
+                }
+                at.word_of($noun, &names, &[$($hint),*]).map(|word| $type(word.into()))
+            }
+
+            fn write(&self) -> Node {
+                self.0.write()
+            }
+
+            fn check(&self, _: &Key) -> Result<(), Fault> {
+                Ok(())
+            }
+
+            fn schema(_: &Key, _: &mut Defs) -> Node {
+                let names: Vec<Node> = $names.map(Node::from).collect();
+                Node::table([("type", "string".into()), ("enum", names.into())])
+            }
+        }
+    };
+}
 
 mod beams;
 mod blend;
@@ -20,126 +65,105 @@ pub use grade::*;
 pub use map::*;
 
 /// A lattice: a cell seen through a map, cut by a part at a level.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Lattice", noun = "a lattice", before = deeper)]
 pub struct LatticeSpec {
-    /// The function on the torus.
+    /// The function on the torus, such as "gyroid".
     pub cell: CellSpec,
-    /// Which side of the level is solid.
+    /// Which side of the level is solid: sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t).
     pub part: PartSpec,
-    /// Position (mm) to phase (turns).
+    /// Position (mm) to phase (turns), such as map.affine with wavelength = 4.
     pub map: MapSpec,
-    /// How much is solid.
+    /// How much is solid: exactly one of iso, fraction, porosity, thickness.
     pub level: LevelSpec,
 }
 
-/// A cell: the name of a ready one, or a series.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+/// Keys that stand one level deeper, where beginners look for them: the key and its table.
+const DEEPER: [(&str, &str); 8] = [
+    ("iso", "level"),
+    ("fraction", "level"),
+    ("porosity", "level"),
+    ("thickness", "level"),
+    ("mid", "level"),
+    ("wavelength", "map.affine"),
+    ("rotate", "map.affine"),
+    ("offset", "map.affine"),
+];
+
+fn deeper(at: &At) -> Result<(), DesignError> {
+    for (key, entry) in at.entries("a lattice").unwrap_or_default() {
+        if let Some((_, table)) = DEEPER.iter().find(|d| d.0 == key) {
+            return Err(entry.error(format!("{key} goes under [{}.{table}]", at.path)));
+        }
+    }
+    Ok(())
+}
+
+/// A cell: the name of a ready one, or one of your own.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged)]
 pub enum CellSpec {
     /// A named surface.
-    Name(#[schemars(schema_with = "schema::cell_name")] String),
+    Name(CellName),
     /// Your own function.
     Kind(CellKind),
 }
 
+name_of! {
+    /// The name of a ready periodic surface.
+    CellName, "cell", catalogue().iter().map(|n| n.name), of_beams, []
+}
+
+/// Why a word is no surface, if it is another kind of cell.
+fn of_beams(word: &str) -> Option<String> {
+    let cell = ::beams::graph::named(word);
+    cell.map(|_| format!("{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\""))
+}
+
 /// A cell with settings.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Cell", noun = "cell")]
+#[allow(missing_docs)] // The comment of each type says what it is.
 pub enum CellKind {
-    /// A Fourier series.
     Series(SeriesSpec),
-    /// Numbers or a mesh in a file: the largest waves of their Fourier transform.
     File(FileCellSpec),
-    /// A tetrahedral cell, for a map over a tetrahedral mesh.
     Tet(TetCellSpec),
 }
 
-/// A tetrahedral cell: a ready one by its name, or what a regular tetrahedron cuts out of the series of a group.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TetCellSpec {
-    /// A ready cell; all else is then left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::tet_cell_name")]
-    pub name: Option<String>,
-    /// A space group with a point of full tetrahedral symmetry: 215, 216, 217, 221, 224, 225, 227 or 229, named as for a series.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::group")]
-    pub group: Option<String>,
-    /// The terms, each summed over the group.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub terms: Vec<TermSpec>,
-    /// The tetrahedron's barycentre, in turns: a point of full tetrahedral symmetry; the group's first unless given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub site: Option<[f64; 3]>,
-    /// The dual tetrahedron, turned upside down.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub dual: bool,
-    /// Edge of the tetrahedron, in edges of the cubic cell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub edge: Option<f64>,
-    /// Instead of all else: a ready cell for each zone of the mesh, by its number, such as `{ 1 = "diamond", 2 = "iwp" }`; in the
-    /// tetrahedra between zones they pass into each other.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub zones: BTreeMap<String, String>,
-}
-
-/// A cell from a file: numbers at the nodes of one period, without the repeated end, or a mesh of the solid in one cell.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FileCellSpec {
-    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, 3mf, ply, obj, off), whose bounds are the
-    /// cell and whose inside has the value 1, the outside 0.
-    pub path: String,
-    /// How many waves are kept.
-    #[serde(default = "waves", skip_serializing_if = "is_waves")]
-    pub terms: f64,
-}
-
-fn waves() -> f64 {
-    200.0
-}
-
-fn is_waves(v: &f64) -> bool {
-    *v == waves()
-}
-
 /// A Fourier series: the sum of its terms.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Series", noun = "a series")]
 pub struct SeriesSpec {
+    /// The terms, such as { hkl = [1, 0, 0] }.
+    pub terms: Vec<TermSpec>,
     /// A space group: then each term stands for the sum of its wave over the group, divided by that sum's largest Fourier
     /// coefficient. By number (227), Hermann–Mauguin symbol ("Fd-3m"), either with a setting ("227:1"; origin choice 2 unless
     /// given), or Hall symbol.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::group")]
-    pub group: Option<String>,
-    /// The terms.
-    pub terms: Vec<TermSpec>,
+    pub group: Option<GroupSpec>,
 }
 
 /// amplitude · cos 2π(h·u + phase), u in turns; or the sine. With a group: the same part of amplitude · e^{2πi phase} times
 /// the sum of e^{2πi h·u} over the group.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Term", noun = "a term")]
 pub struct TermSpec {
-    /// Whole numbers (h, k, l).
+    /// Three whole numbers [h, k, l].
+    #[kind(min = -1e6, max = 1e6)]
     pub hkl: [i32; 3],
     /// Amplitude.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[kind(default = 1.0)]
     pub amplitude: f64,
-    /// Phase in turns.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Phase.
+    #[kind(unit = "turns", default = 0.0)]
     pub phase: f64,
     /// The real part of e^{2πi(h·u + phase)} (a cosine) or its imaginary part (a sine).
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default)]
     pub component: Component,
 }
 
 /// Which part of e^{2πi(h·u + phase)} a term is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "component")]
 pub enum Component {
     /// The real part: a cosine.
     #[default]
@@ -148,53 +172,166 @@ pub enum Component {
     Im,
 }
 
+/// A space group's number or symbol.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroupSpec(pub String);
+
+impl Kind for GroupSpec {
+    fn expected() -> String {
+        "a space group such as 227, \"227:2\" or \"Fd-3m\"".into()
+    }
+
+    fn fits(node: &Node) -> u8 {
+        String::fits(node).max(f64::fits(node))
+    }
+
+    fn read(at: &At) -> Result<Self, DesignError> {
+        if !at.is_number() {
+            return Ok(GroupSpec(at.text(&Self::expected())?.to_string()));
+        }
+        match at.number()? {
+            n if n.fract() == 0.0 && n.abs() < 1e6 => Ok(GroupSpec(format!("{n}"))),
+            n => Err(at.error(format!("expected a space group, found {n}; they are numbered from 1 to 230"))),
+        }
+    }
+
+    fn write(&self) -> Node {
+        self.0.write()
+    }
+
+    fn check(&self, _: &Key) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn schema(_: &Key, _: &mut Defs) -> Node {
+        Node::table([("type", vec![Node::from("string"), Node::from("integer")].into())])
+    }
+}
+
+/// Numbers or a mesh in a file: the largest waves of their Fourier transform. Numbers stand at the nodes of one period, without
+/// the repeated end; a mesh is the solid in one cell.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "FileCell", noun = "a cell from a file")]
+pub struct FileCellSpec {
+    /// Path of the file, relative to the design file: npy, or a closed mesh (stl, 3mf, ply, obj, off), whose bounds are the
+    /// cell and whose inside has the value 1, the outside 0.
+    pub path: String,
+    /// Number of waves that are kept.
+    #[kind(default = 200, min = 1.0, max = 2000.0)]
+    pub terms: u32,
+}
+
+/// A tetrahedral cell, for a map over a tetrahedral mesh: a ready one by its name, or what a regular tetrahedron cuts out of
+/// the series of a group.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "TetCell", noun = "a tetrahedral cell", alternatives)]
+pub enum TetCellSpec {
+    /// A ready cell.
+    Ready(ReadyTetCell),
+    /// A ready cell for each zone of the mesh.
+    Zones(ZonedTetCells),
+    /// A series of your own.
+    Series(TetSeriesSpec),
+}
+
+/// A ready cell.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct ReadyTetCell {
+    /// A ready cell.
+    pub name: TetCellName,
+}
+
+/// A ready cell for each zone of the mesh.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct ZonedTetCells {
+    /// A ready cell for each zone of the mesh, by its number, such as `{ 1 = "diamond", 2 = "iwp" }`; in the tetrahedra between
+    /// zones they pass into each other.
+    #[kind(least = 1, keyword)]
+    pub zones: BTreeMap<u32, TetCellName>,
+}
+
+/// What a regular tetrahedron cuts out of the series of a group.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct TetSeriesSpec {
+    /// A space group with a point of full tetrahedral symmetry: 215, 216, 217, 221, 224, 225, 227 or 229, named as for a series.
+    pub group: GroupSpec,
+    /// The terms, each summed over the group.
+    pub terms: Vec<TermSpec>,
+    /// Edge of the tetrahedron, in edges of the cubic cell.
+    pub edge: f64,
+    /// The tetrahedron's barycentre: a point of full tetrahedral symmetry; the group's first unless given.
+    #[kind(unit = "turns")]
+    pub site: Option<[f64; 3]>,
+    /// The dual tetrahedron, turned upside down.
+    #[kind(default = false)]
+    pub dual: bool,
+}
+
+name_of! {
+    /// The name of a ready tetrahedral cell.
+    TetCellName, "tetrahedral cell", tet_catalogue().iter().map(|n| n.name), no_sites, []
+}
+
+/// Why a periodic cell is no tetrahedral one, if its group is the reason.
+fn no_sites(word: &str) -> Option<String> {
+    let group = Group::named(named(word)?.number()).ok()?;
+    let names = tet_catalogue().iter().map(|n| n.name).collect::<Vec<_>>().join(", ");
+    Some(format!("{}; use one of {names}", group.tetrahedral_sites().err()?.message))
+}
+
 /// Which side of the level is solid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
+#[kind(name = "Part", noun = "part")]
 pub enum PartSpec {
     /// |f| ≤ t.
+    #[kind(hints("wall", "shell", "surface", "double"))]
     Sheet,
     /// f ≤ t.
+    #[kind(hints("network", "skeletal", "skeleton", "strut", "solid", "below", "negative"))]
     Lower,
     /// f ≥ t.
+    #[kind(hints("above", "positive", "over"))]
     Upper,
 }
 
 /// How much is solid: exactly one amount.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Level", noun = "a level")]
 pub struct LevelSpec {
     /// The amount.
-    #[serde(flatten)]
+    #[kind(flatten)]
     pub amount: AmountSpec,
     /// What a fraction or porosity is of.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default)]
     pub of: Of,
     /// How a fraction or porosity becomes a level.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default)]
     pub fit: Fit,
     /// The sheet's mid-surface is f = mid: an off-centre sheet, |f − mid| ≤ t or the wall about it.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default = 0.0)]
     pub mid: f64,
 }
 
 /// An amount of solid.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "amount")]
 pub enum AmountSpec {
     /// The field value t; for a sheet the half-level.
     Iso(GradeSpec),
-    /// Solid volume fraction, between 0 and 1.
+    /// Solid volume fraction.
+    #[kind(above = 0.0, below = 1.0)]
     Fraction(GradeSpec),
-    /// One minus the solid volume fraction, between 0 and 1.
+    /// One minus the solid volume fraction.
+    #[kind(above = 0.0, below = 1.0)]
     Porosity(GradeSpec),
-    /// Thickness of a sheet's wall (mm): solid is what lies within half of it of the mid-surface.
+    /// Thickness of a sheet's wall: solid is what lies within half of it of the mid-surface.
+    #[kind(unit = "mm", above = 0.0)]
     Thickness(GradeSpec),
 }
 
 /// What a fraction is of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "word")]
 pub enum Of {
     /// Of the periodic cell.
     #[default]
@@ -204,8 +341,8 @@ pub enum Of {
 }
 
 /// How a fraction becomes a level.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "fit")]
 pub enum Fit {
     /// By the cell's own exact distribution.
     #[default]
@@ -214,26 +351,37 @@ pub enum Fit {
     Spartan,
 }
 
-/// Named lattices.
-pub type Lattices = BTreeMap<String, LatticeSpec>;
+/// Regions that are kept fully solid, by name.
+#[derive(Clone, Debug, Default, PartialEq, Kind)]
+#[kind(before = named_first)]
+pub struct Keeps(pub BTreeMap<String, RegionKind>);
 
-/// Named regions that are kept fully solid.
-pub type Keeps = BTreeMap<String, RegionKind>;
+/// Explains that a name comes before the kind of a region.
+fn named_first(at: &At) -> Result<(), DesignError> {
+    for (name, at) in at.entries("regions by name, such as [keep.boss.cylinder]")? {
+        if RegionKind::keys().iter().any(|k| k.name == name) && RegionKind::read(&at).is_err() {
+            let message = format!("a name comes first, such as [keep.boss.{name}]: {name} is a kind of region");
+            return Err(at.error(message));
+        }
+    }
+    Ok(())
+}
 
 /// A skin: the part of the region that is at most so far below its surface.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Skin", noun = "a skin")]
 pub struct SkinSpec {
-    /// How far (mm).
+    /// Depth below the region's surface to which it reaches.
+    #[kind(unit = "mm", above = 0.0)]
     pub thickness: GradeSpec,
-    /// Flat faces of the region that it leaves open.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Flat faces of the region that it leaves open: sides of its bounds such as "-z", or half-spaces.
+    #[kind(default)]
     pub open: Vec<OpenSpec>,
 }
 
 /// A flat face of the region that stays open.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(untagged)]
 pub enum OpenSpec {
     /// The one on a side of the region's bounds.
     Side(SideSpec),
@@ -242,62 +390,53 @@ pub enum OpenSpec {
 }
 
 /// A side of the region's bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Kind)]
+#[kind(name = "Side", noun = "side")]
 pub enum SideSpec {
     /// Least x.
-    #[serde(rename = "-x")]
+    #[kind(rename = "-x", hints("left", "xmin"))]
     LowX,
     /// Greatest x.
-    #[serde(rename = "+x")]
+    #[kind(rename = "+x", hints("right", "xmax"))]
     HighX,
     /// Least y.
-    #[serde(rename = "-y")]
+    #[kind(rename = "-y", hints("front", "ymin"))]
     LowY,
     /// Greatest y.
-    #[serde(rename = "+y")]
+    #[kind(rename = "+y", hints("back", "ymax"))]
     HighY,
     /// Least z: the bottom.
-    #[serde(rename = "-z")]
+    #[kind(rename = "-z", hints("bottom", "down", "zmin"))]
     LowZ,
     /// Greatest z: the top.
-    #[serde(rename = "+z")]
+    #[kind(rename = "+z", hints("top", "up", "zmax"))]
     HighZ,
 }
 
 impl SideSpec {
-    /// The words and what they mean.
-    pub const ALL: [(&'static str, SideSpec); 6] = [
-        ("-x", SideSpec::LowX),
-        ("+x", SideSpec::HighX),
-        ("-y", SideSpec::LowY),
-        ("+y", SideSpec::HighY),
-        ("-z", SideSpec::LowZ),
-        ("+z", SideSpec::HighZ),
-    ];
-
     /// Its axis, and whether it is the upper one.
     pub fn axis(self) -> (usize, bool) {
-        let i = Self::ALL.iter().position(|s| s.1 == self).unwrap_or(0);
-        (i / 2, i % 2 == 1)
+        match self {
+            SideSpec::LowX => (0, false),
+            SideSpec::HighX => (0, true),
+            SideSpec::LowY => (1, false),
+            SideSpec::HighY => (1, true),
+            SideSpec::LowZ => (2, false),
+            SideSpec::HighZ => (2, true),
+        }
     }
 }
 
-fn is_default<T: Default + PartialEq>(v: &T) -> bool {
-    *v == T::default()
-}
+/// Named lattices.
+pub type Lattices = BTreeMap<String, LatticeSpec>;
 
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(v: &f64) -> bool {
-    *v == 1.0
-}
-
-fn build_axis() -> [f64; 3] {
-    [0.0, 0.0, 1.0]
-}
-
-fn is_build_axis(v: &[f64; 3]) -> bool {
-    *v == build_axis()
+/// Explains that the format has another version.
+pub(super) fn version(at: &At) -> Result<(), DesignError> {
+    let entries = at.entries("a design")?;
+    match entries.iter().find(|e| e.0 == "schema") {
+        Some((_, at)) if at.number()? != 1.0 => {
+            Err(at.error(format!("this version reads schema 1, found {}", geometry::fault::number(at.number()?))))
+        }
+        _ => Ok(()),
+    }
 }

@@ -1,178 +1,257 @@
-//! Numbers that may vary: data to [`Grade`], values checked.
+//! Numbers that may vary: data to [`Grade`].
 
-use std::sync::Arc;
+use super::data::*;
+use super::place::Place;
+use super::{region, samples};
+use crate::field::Field;
+use crate::grade::{
+    Depth, Formula, Grade, Linear, Polyline, Radial, Rbf, Remapped, Samples, Sigmoid, Varying, region_step,
+};
+use crate::kind::{DesignError, Key, Table};
+use crate::region::Notes;
+use geometry::fault::{Fault, counted};
+use geometry::math::{Aabb, Interval, Vec3, scale};
 
-use super::data::{GradeKind, GradeSpec};
-use super::place::{Place, finite};
-use super::{control, samples};
-use crate::grade::{Depth, Formula, Grade, Linear, Radial, Varying};
-use crate::kind::DesignError;
-use geometry::fault::{Fault, number};
-use geometry::math::norm;
-
-/// What values an amount may take.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Allowed {
-    /// Any finite number.
-    Finite,
-    /// Greater than 0 and less than 1.
-    Share(&'static str),
-    /// Greater than 0 and at most the greatest wavelength (mm).
-    Length(&'static str, f64),
-    /// Greater than 0 (mm).
-    Positive(&'static str),
+/// A number that is asked for: where it stands, its limits, and whether `1 − value` is meant.
+pub(super) struct Asked<'a> {
+    pub path: String,
+    pub place: &'a Place<'a>,
+    pub key: Key,
+    pub complement: bool,
 }
 
-impl Allowed {
-    pub fn check(self, path: &str, v: f64, place: &str) -> Result<f64, DesignError> {
+/// The declaration of a key of a table.
+pub(super) fn key_of<T: Table>(name: &str) -> Key {
+    T::keys().into_iter().find(|k| k.name == name).unwrap_or(Key::NONE)
+}
+
+impl<'a> Asked<'a> {
+    /// A number at `path`, under a key of these limits.
+    pub fn new(path: impl Into<String>, place: &'a Place<'a>, key: Key) -> Self {
+        Asked { path: path.into(), place, key, complement: false }
+    }
+
+    fn below(&self, key: &str) -> Self {
+        Asked { path: format!("{}.{key}", self.path), ..*self }
+    }
+
+    fn turned(&self, v: f64) -> f64 {
+        if self.complement { 1.0 - v } else { v }
+    }
+
+    fn stops(&self, stops: &Stops) -> Vec<[f64; 2]> {
+        stops.0.iter().map(|&[at, v]| [at, self.turned(v)]).collect()
+    }
+
+    /// A grade whose values cannot be checked where they are declared: they are sampled in the region.
+    fn checked(&self, grade: Grade) -> Result<Grade, DesignError> {
+        self.check(&grade, |v, position| self.key.admit_at(v, position))?;
+        Ok(grade)
+    }
+
+    /// Any other function of position; values are sampled.
+    fn function<V: Varying + 'static>(&self, of: Result<V, Fault>) -> Result<Grade, DesignError> {
+        let of = of.map_err(|f| DesignError::fault(&self.path, f))?;
+        self.checked(if self.complement { Grade::from(Rest(of)) } else { Grade::from(of) })
+    }
+
+    /// A function of position whose stops were checked.
+    fn made<V: Varying + 'static>(&self, of: Result<V, Fault>) -> Result<Grade, DesignError> {
+        of.map(Grade::from).map_err(|f| DesignError::fault(&self.path, f))
+    }
+
+    /// Checks a number at the positions of the region where it is least and greatest, of some thousands.
+    pub fn check(&self, grade: &Grade, admit: impl Fn(f64, &str) -> Result<(), Fault>) -> Result<(), DesignError> {
+        let Place { region, points, .. } = *self.place;
+        let bounds = region.bounds();
+        let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
+        let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+        let mut distance = [0.0; 8];
+        region.values(&corners, &mut distance);
+        let in_corners = corners.iter().zip(distance).filter(|(_, d)| *d <= 1e-9).map(|(c, _)| *c);
+        let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
+        let mut values = vec![0.0; points.len()];
+        grade.values(&points, &mut values);
+        let order = |a: &usize, b: &usize| self.turned(values[*a]).total_cmp(&self.turned(values[*b]));
+        // Not a number comes first or last in this order.
+        let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
+        for i in ends.into_iter().flatten() {
+            let [x, y, z] = points[i];
+            admit(self.turned(values[i]), &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))
+                .map_err(|f| DesignError::fault(&self.path, f))?;
+        }
+        Ok(())
+    }
+}
+
+impl GradeSpec {
+    /// The grade; its constants and stops have been checked.
+    pub(super) fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
         match self {
-            Allowed::Finite => finite(path, v),
-            Allowed::Share(name) if !(v > 0.0 && v < 1.0) => {
-                let message = format!(
-                    "{name} is {}{place}; it must be greater than 0 and less than 1{}",
-                    number(v),
-                    hint(name, v)
-                );
-                Err(DesignError::new(path, message).found(number(v)))
-            }
-            Allowed::Length(name, most) if !(v > 0.0 && v <= most) => {
-                let message =
-                    format!("{name} is {v} mm{place}; it must be greater than 0 and at most the wavelength, {most} mm");
-                Err(DesignError::new(path, message).found(v.to_string()))
-            }
-            Allowed::Positive(name) if !(v > 0.0 && v.is_finite()) => {
-                let message = format!("{name} is {} mm{place}; it must be a finite number greater than 0", number(v));
-                Err(DesignError::new(path, message).found(number(v)))
-            }
-            Allowed::Share(_) | Allowed::Length(..) | Allowed::Positive(_) => Ok(v),
+            GradeSpec::Constant(v) => Ok(Grade::Constant(asked.turned(*v))),
+            GradeSpec::Kind(kind) => kind.family().build(&asked.below(kind.key())),
         }
     }
 }
 
-fn hint(name: &str, v: f64) -> String {
-    match (name, v) {
-        ("fraction", 0.0) | ("porosity", 1.0) => " (nothing would be solid)".into(),
-        ("fraction", 1.0) | ("porosity", 0.0) => " (all would be solid)".into(),
-        (_, v) if v > 1.0 && v <= 100.0 => {
-            format!(" (for {} per cent write {})", number(v), number(v / 100.0))
-        }
-        _ => String::new(),
+/// A kind of grade, as it is declared.
+pub(super) trait BuildGrade {
+    /// The grade. `asked.path` is that of the kind's table.
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError>;
+}
+
+impl BuildGrade for LinearSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        asked.made(Linear::new(self.along, asked.stops(&self.stops)))
     }
 }
 
-/// The grade of a kind; a fault of its constructor stands below `path`.
-fn made<G: Varying + 'static>(path: &str, made: Result<G, Fault>) -> Result<Grade, DesignError> {
-    made.map(Grade::from).map_err(|f| DesignError::fault(path, f))
+impl BuildGrade for DepthSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        asked.made(Depth::new(asked.place.region.clone(), asked.stops(&self.stops)))
+    }
 }
 
-/// The grade, with `1 − value` instead of the value if `complement`. Stops are checked here; a formula is checked
-/// where it is sampled.
-pub(super) fn grade(
-    spec: &GradeSpec,
-    path: &str,
-    place: &Place,
-    allowed: Allowed,
-    complement: bool,
-) -> Result<Grade, DesignError> {
-    let turn = |v: f64| if complement { 1.0 - v } else { v };
-    let kind = match spec {
-        GradeSpec::Constant(v) => return Ok(Grade::Constant(turn(allowed.check(path, *v, "")?))),
-        GradeSpec::Kind(kind) => kind,
-    };
-    let stops = |path: &str, stops: &[[f64; 2]]| {
+impl BuildGrade for RadialSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        asked.made(Radial::new(self.center, self.axis, asked.stops(&self.stops)))
+    }
+}
+
+impl BuildGrade for FormulaSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        let parse = |text: &str| {
+            let parsed = Formula::parse(text).map(Grade::from);
+            parsed.map_err(|f| DesignError::fault(&asked.path, f).found(&self.0))
+        };
+        let made = parse(&self.0)?;
+        let made = if asked.complement { parse(&format!("1 - ({})", self.0))? } else { made };
+        if asked.key.allowed().is_some() { asked.checked(made) } else { Ok(made) }
+    }
+}
+
+impl BuildGrade for GridSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        sampled(samples::grid(self, &asked.path, asked.place)?, &self.remap, asked)
+    }
+}
+
+impl BuildGrade for PointsSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        sampled(samples::points(self, &asked.path, asked.place)?, &self.remap, asked)
+    }
+}
+
+impl BuildGrade for FieldSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        sampled(samples::field(self, &asked.path, asked.place)?, &self.remap, asked)
+    }
+}
+
+/// The grade of samples.
+fn sampled(samples: Samples, remap: &Option<Stops>, asked: &Asked) -> Result<Grade, DesignError> {
+    let mut stops = remap.as_ref().map_or(Vec::new(), |s| s.0.clone());
+    if asked.complement {
         if stops.is_empty() {
-            return Err(DesignError::new(path, "no stops given; give at least one [position, value]"));
+            let r = samples.bound(&Aabb::ALL);
+            // One stop would do where all numbers are the same.
+            stops = vec![[r.lo, r.lo], [r.hi.max(r.lo + 1.0), r.hi.max(r.lo + 1.0)]];
         }
-        let mut out = Vec::with_capacity(stops.len());
-        let mut last = f64::NEG_INFINITY;
-        for (i, &[at, value]) in stops.iter().enumerate() {
-            let path = format!("{path}[{i}]");
-            finite(&path, at)?;
-            if at <= last {
-                let message =
-                    format!("positions must rise from stop to stop, found {} after {}", number(at), number(last));
-                return Err(DesignError::new(path, message).found(number(at)));
-            }
-            last = at;
-            out.push([at, turn(allowed.check(&path, value, &format!(" at position {}", number(at)))?)]);
-        }
-        Ok(out)
+        stops.iter_mut().for_each(|s| s[1] = 1.0 - s[1]);
+    }
+    let made = match stops.is_empty() {
+        true => Grade::from(samples),
+        false => Grade::from(Remapped::new(samples, stops).map_err(|f| DesignError::fault(&asked.path, f))?),
     };
-    match kind {
-        GradeKind::Linear(l) => {
-            let below = format!("{path}.linear.along");
-            for v in l.along {
-                finite(&below, v)?;
-            }
-            if l.along == [0.0; 3] {
-                return Err(DesignError::new(below, "the direction is zero; give one such as [0, 0, 1]"));
-            }
-            let stops = stops(&format!("{path}.linear.stops"), &l.stops)?;
-            made(path, Linear::new(l.along, stops))
+    asked.checked(made)
+}
+
+impl BuildGrade for SigmoidSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        let of = self.of.build(&Asked::new(format!("{}.of", asked.path), asked.place, Key::NONE))?;
+        asked.function(Sigmoid::new(of, self.at, self.width))
+    }
+}
+
+impl BuildGrade for WithinSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        let mut notes = Notes::default();
+        let region = region::region(&self.of, &format!("{}.of", asked.path), asked.place.loader, &mut notes)?;
+        asked.function(region_step(region, self.width))
+    }
+}
+
+impl BuildGrade for DistanceSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        let (points, _) = self.points.read(&asked.path, asked.place)?;
+        let line = Polyline::new(points, self.closed, self.axis, self.sharpness);
+        asked.function(Ok(line.map_err(|f| self.points.fault(&asked.path, f))?))
+    }
+}
+
+impl BuildGrade for RbfSpec {
+    fn build(&self, asked: &Asked) -> Result<Grade, DesignError> {
+        asked.function(Ok(self.functions(&asked.path, asked.place)?))
+    }
+}
+
+impl RbfSpec {
+    /// The functions.
+    pub(super) fn functions(&self, path: &str, place: &Place) -> Result<Rbf, DesignError> {
+        let (points, column) = self.points.read(path, place)?;
+        let ones = || vec![1.0; points.len()];
+        let values = self.values.clone().or(column).unwrap_or_else(ones);
+        if values.len() != points.len() {
+            let message =
+                format!("{} for {}; give one for each", counted(values.len(), "value"), counted(points.len(), "point"));
+            return Err(DesignError::new(format!("{path}.values"), message));
         }
-        GradeKind::Depth(d) => {
-            let stops = stops(&format!("{path}.depth.stops"), &d.stops)?;
-            made(path, Depth::new(place.region.clone(), stops))
+        Rbf::new(points, &values, self.delta, self.axis).map_err(|f| self.points.fault(path, f))
+    }
+}
+
+impl ControlSpec {
+    /// The control points, and their values if a file has a fourth column; `path` is that of the table with the key.
+    pub(super) fn read(&self, path: &str, place: &Place) -> Result<(Vec<Vec3>, Option<Vec<f64>>), DesignError> {
+        match self {
+            ControlSpec::Path(file) => samples::control(file, &format!("{path}.path"), place),
+            ControlSpec::Points(points) => Ok((points.clone(), None)),
         }
-        GradeKind::Radial(r) => {
-            let below = |key: &str| format!("{path}.radial.{key}");
-            for v in r.center {
-                finite(&below("center"), v)?;
-            }
-            if let Some(axis) = r.axis {
-                for v in axis {
-                    finite(&below("axis"), v)?;
-                }
-                if norm(axis) == 0.0 {
-                    let message = "the direction is zero; give one such as [0, 0, 1]";
-                    return Err(DesignError::new(below("axis"), message));
-                }
-            }
-            made(path, Radial::new(r.center, r.axis, stops(&below("stops"), &r.stops)?))
-        }
-        GradeKind::Grid(g) => {
-            let at = format!("{path}.grid");
-            let of = samples::grid(g, &at, place)?;
-            samples::grade(of, &g.remap, &at, place, allowed, complement)
-        }
-        GradeKind::Points(p) => {
-            let at = format!("{path}.points");
-            let of = samples::points(p, &at, place)?;
-            samples::grade(of, &p.remap, &at, place, allowed, complement)
-        }
-        GradeKind::Field(f) => {
-            let at = format!("{path}.field");
-            let of = samples::field(f, &at, place)?;
-            samples::grade(of, &f.remap, &at, place, allowed, complement)
-        }
-        GradeKind::Sigmoid(s) => {
-            let at = format!("{path}.sigmoid");
-            let of = Arc::new(control::sigmoid(s, &at, place)?);
-            control::checked(of, &at, place, allowed, complement)
-        }
-        GradeKind::Region(r) => {
-            let at = format!("{path}.region");
-            let of = Arc::new(control::within(r, &at, place)?);
-            control::checked(of, &at, place, allowed, complement)
-        }
-        GradeKind::Distance(d) => {
-            let at = format!("{path}.distance");
-            let of = Arc::new(control::distance(d, &at, place)?);
-            control::checked(of, &at, place, allowed, complement)
-        }
-        GradeKind::Rbf(r) => {
-            let at = format!("{path}.rbf");
-            let of = Arc::new(control::rbf(r, &at, place)?);
-            control::checked(of, &at, place, allowed, complement)
-        }
-        GradeKind::Formula(text) => {
-            let place = format!("{path}.formula");
-            let own = Formula::parse(text).map_err(|f| DesignError::fault(&place, f).found(text))?;
-            if !complement {
-                return Ok(Grade::from(own));
-            }
-            let turned = format!("1 - ({text})");
-            Formula::parse(&turned).map(Grade::from).map_err(|f| DesignError::fault(&place, f).found(text))
-        }
+    }
+
+    /// A fault of control points stands where they do.
+    pub(super) fn fault(&self, path: &str, f: Fault) -> DesignError {
+        let f = match self {
+            ControlSpec::Path(_) if f.at == "points" => Fault { at: "path".into(), ..f },
+            _ => f,
+        };
+        DesignError::fault(path, f)
+    }
+}
+
+/// One less a number.
+struct Rest<V>(V);
+
+impl<V: Varying> Varying for Rest<V> {
+    fn varies(&self) -> [bool; 3] {
+        self.0.varies()
+    }
+}
+
+impl<V: Varying> Field for Rest<V> {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+        out.iter_mut().for_each(|v| *v = 1.0 - *v);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v = 1.0 - *v);
+        gradients.iter_mut().for_each(|g| *g = scale(*g, -1.0));
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let r = self.0.bound(b);
+        Interval::new(1.0 - r.hi, 1.0 - r.lo)
     }
 }

@@ -57,11 +57,11 @@ fn common(a: &TetCell, b: &TetCell, part: Part, fraction: f64) -> Option<f64> {
 
 impl Joins {
     /// Warns of zones that do not join, or of a lattice in pieces although they do.
-    pub(super) fn warn(&self, names: &BTreeMap<String, String>, path: &str, warnings: &mut Vec<Warning>) {
+    pub(super) fn warn(&self, names: &BTreeMap<u32, String>, path: &str, warnings: &mut Vec<Warning>) {
         let mut say = |message: String| {
             warnings.push(Warning { path: path.to_string(), message });
         };
-        let name = |zone: u32| names.get(&zone.to_string()).map_or("", String::as_str);
+        let name = |zone: u32| names.get(&zone).map_or("", String::as_str);
         let apart = self.connectivity.pairs.iter().zip(&self.shares).filter(|(j, _)| !j.joined);
         let mut any = false;
         for (join, share) in apart {

@@ -1,8 +1,8 @@
 //! How much is solid: data to [`Level`].
 
-use super::data::{AmountSpec, Fit, GradeKind, GradeSpec, LevelSpec, Of, PartSpec};
-use super::grade::{Allowed, grade};
-use super::place::{Place, finite};
+use super::data::{AmountSpec, Fit, GradeSpec, LevelSpec, Of, PartSpec};
+use super::grade::{Asked, key_of};
+use super::place::Place;
 use super::sample;
 use crate::cell::{Cell, Part};
 use crate::field::Field;
@@ -10,7 +10,7 @@ use crate::grade::Grade;
 use crate::kind::DesignError;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
-use geometry::fault::number;
+use geometry::fault::{Fault, number};
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
@@ -61,16 +61,12 @@ pub(super) fn level(
     place: &Place,
 ) -> Result<Level, DesignError> {
     let path = |key: &str| format!("{}.{key}", place.path);
-    let (key, value, allowed) = match &spec.amount {
-        AmountSpec::Iso(v) => ("iso", v, Allowed::Finite),
-        AmountSpec::Fraction(v) => ("fraction", v, Allowed::Share("fraction")),
-        AmountSpec::Porosity(v) => ("porosity", v, Allowed::Share("porosity")),
-        AmountSpec::Thickness(v) => {
-            check_sheet(part, "thickness", &path("thickness"))?;
-            ("thickness", v, Allowed::Length("thickness", map.longest()))
-        }
-    };
-    let amount = grade(value, &path(key), place, allowed, key == "porosity")?;
+    let (key, value) = (spec.amount.key(), spec.amount.grade());
+    if key == "thickness" {
+        check_sheet(part, key, &path(key))?;
+    }
+    let asked = spec.amount.asked(path(key), place);
+    let amount = value.build(&asked)?;
     if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
@@ -82,12 +78,8 @@ pub(super) fn level(
     if key == "iso" {
         return Ok(Level::Iso(amount));
     }
-    if let GradeSpec::Kind(GradeKind::Formula(_)) = value {
-        let at = path(&format!("{key}.formula"));
-        let complement = key == "porosity";
-        check_varied(&amount, &at, allowed, complement, place)?;
-    }
     if key == "thickness" {
+        within_wavelength(&amount, &asked, map.longest())?;
         let range = cell.range();
         if range.lo >= 0.0 || range.hi <= 0.0 {
             let message = format!(
@@ -137,6 +129,35 @@ pub(super) fn level(
     }
 }
 
+impl AmountSpec {
+    /// The number.
+    pub(super) fn grade(&self) -> &GradeSpec {
+        let (AmountSpec::Iso(v) | AmountSpec::Fraction(v) | AmountSpec::Porosity(v) | AmountSpec::Thickness(v)) = self;
+        v
+    }
+
+    /// What it is asked for as; of a porosity the complement is meant.
+    pub(super) fn asked<'a>(&self, path: String, place: &'a Place<'a>) -> Asked<'a> {
+        Asked { complement: self.key() == "porosity", ..Asked::new(path, place, key_of::<AmountSpec>(self.key())) }
+    }
+}
+
+/// Refuses a wall thicker than the greatest wavelength, mm.
+pub(super) fn within_wavelength(thickness: &Grade, asked: &Asked, most: f64) -> Result<(), DesignError> {
+    asked.check(thickness, |v, position| {
+        if v <= most {
+            return Ok(());
+        }
+        let position = if thickness.constant().is_some() { "" } else { position };
+        let message = format!(
+            "thickness is {} mm{position}; it must be greater than 0 and at most the wavelength, {} mm",
+            number(v),
+            number(most)
+        );
+        Err(Fault::new("", message).found(number(v)))
+    })
+}
+
 /// Refuses a part that has no mid-surface.
 fn check_sheet(part: PartSpec, key: &str, path: &str) -> Result<(), DesignError> {
     let found = match part {
@@ -152,7 +173,7 @@ fn check_sheet(part: PartSpec, key: &str, path: &str) -> Result<(), DesignError>
 /// The cell of a lattice whose mid-surface is f = mid: the same series less a constant.
 pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str) -> Result<Cell, DesignError> {
     let path = format!("{path}.mid");
-    let mid = finite(&path, spec.mid)?;
+    let mid = spec.mid;
     if mid == 0.0 {
         return Ok(cell);
     }
@@ -167,35 +188,6 @@ pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str
     }
     let series = cell.series().about(mid);
     Ok(Cell::new(series.map_err(|f| DesignError::fault(&path, f))?))
-}
-
-/// Refuses a number that leaves what is allowed at any of some thousands of points in the region.
-pub(super) fn check_varied(
-    amount: &Grade,
-    path: &str,
-    allowed: Allowed,
-    complement: bool,
-    place: &Place,
-) -> Result<(), DesignError> {
-    let Place { region, points, .. } = *place;
-    let bounds = region.bounds();
-    let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
-    let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
-    let mut distance = [0.0; 8];
-    region.values(&corners, &mut distance);
-    let in_corners = corners.iter().zip(distance).filter(|(_, d)| *d <= 1e-9).map(|(c, _)| *c);
-    let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
-    let mut values = vec![0.0; points.len()];
-    amount.values(&points, &mut values);
-    let own = |v: f64| if complement { 1.0 - v } else { v };
-    let order = |a: &usize, b: &usize| own(values[*a]).total_cmp(&own(values[*b]));
-    // Not a number comes first or last in this order.
-    let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
-    for i in ends.into_iter().flatten() {
-        let [x, y, z] = points[i];
-        allowed.check(path, own(values[i]), &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
-    }
-    Ok(())
 }
 
 /// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::Warning;
 use super::data::*;
-use super::grade::{Allowed, grade};
-use super::place::{Place, finite};
-use super::{control, samples};
+use super::grade::{Asked, key_of};
+use super::place::Place;
+use super::samples;
 use crate::field::Field;
 use crate::grade::Grade;
-use crate::kind::DesignError;
-use crate::map::{Affine, Map, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
-use geometry::fault::number;
+use crate::kind::{DesignError, Key};
+use crate::map::{Affine, Map, Mapping, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
+use geometry::fault::Fault;
 use geometry::math::{dot, norm, scale, sub, unit};
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
@@ -19,91 +19,135 @@ const TURN: f64 = 45.0;
 /// The share of places and axes with spacings outside 1/1.5 to 1.5 above which it is warned of.
 const OUTSIDE: f64 = 0.05;
 
-/// The kind of map, as it is written.
-pub(super) fn kind(spec: &MapSpec) -> &'static str {
-    match spec {
-        MapSpec::Affine(_) => "affine",
-        MapSpec::Spartan(_) => "spartan",
-        MapSpec::Phase(_) => "phase",
-        MapSpec::Cylinder(_) => "cylinder",
-        MapSpec::Sphere(_) => "sphere",
-        MapSpec::Sweep(_) => "sweep",
-        MapSpec::Tets(_) => "tets",
-    }
+/// A kind of map, as it is declared.
+pub(super) trait BuildMap {
+    /// The map. `path` is that of the kind's table.
+    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError>;
 }
 
+/// The map at `place.path`.
 pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
-    let path = format!("{}.{}", place.path, kind(spec));
-    let (wavelength, rotate, offset) = match spec {
-        MapSpec::Affine(a) => (a.wavelength, a.rotate, a.offset),
-        MapSpec::Spartan(s) => (s.wavelength, s.rotate, s.offset),
-        MapSpec::Phase(p) => return phase(p, &path, place),
-        MapSpec::Tets(_) => {
-            let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
-                           face to face";
-            return Err(DesignError::new(path, message));
-        }
-        MapSpec::Cylinder(c) => {
-            let wavelength = match c.wavelength {
-                OneOrTwo::One(w) => [w; 2],
-                OneOrTwo::Two(two) => two,
-            };
-            let radii = radii(c.center, c.axis, place);
-            let map = Round::cylinder(c.center, c.axis, wavelength, c.around, radii);
-            return map.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f));
-        }
-        MapSpec::Sweep(s) => return sweep(s, &path, place),
-        MapSpec::Sphere(s) => {
-            let radii = radii(s.center, s.axis, place);
-            let map = Round::sphere(s.center, s.axis, s.wavelength, s.around, radii);
-            return map.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f));
-        }
-    };
-    let below = |key: &str| format!("{path}.{key}");
-    for (i, v) in wavelength.three().into_iter().enumerate() {
-        if !(v.is_finite() && v > 0.0) {
-            let at = match wavelength {
-                OneOrThree::One(_) => below("wavelength"),
-                OneOrThree::Three(_) => format!("{}[{i}]", below("wavelength")),
-            };
-            let message = format!("wavelength is {}; it must be a finite number of mm greater than 0", number(v));
-            return Err(DesignError::new(at, message).found(number(v)));
-        }
-    }
-    for (key, three) in [("rotate", rotate), ("offset", offset)] {
-        for v in three {
-            finite(&below(key), v)?;
-        }
-    }
-    let affine = match spec {
-        MapSpec::Affine(a) => {
-            let axis = |c: u8| usize::from(c - b'x');
-            let mut skew = Vec::new();
-            for (name, angle) in a.skew.named() {
-                let at = below(&format!("skew.{name}"));
-                finite(&at, angle)?;
-                if angle.abs() >= 89.0 {
-                    let message = format!("a shear of {} degrees; it must be between -89 and 89", number(angle));
-                    return Err(DesignError::new(at, message).found(number(angle)));
-                }
-                if angle != 0.0 {
-                    let n = name.as_bytes();
-                    skew.push((axis(n[0]), axis(n[1]), angle));
-                }
-            }
-            Affine::rigid(wavelength.three(), rotate, offset, &skew)
-        }
-        _ => Affine::spartan(wavelength.three(), rotate, offset),
-    };
-    affine.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(&path, f))
+    spec.family().build(&format!("{}.{}", place.path, spec.key()), place)
 }
 
-fn sweep(spec: &SweepSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
-    let (points, _) = control::control(&spec.points, path, place)?;
-    let line = Path { points, closed: spec.closed, wavelength: spec.wavelength.three(), normal: spec.normal };
-    Sweep::new(&line, &**place.region, place.points)
-        .map(|s| Arc::new(s) as Map)
-        .map_err(|f| control::wrong(&spec.points, path, f))
+fn shared(made: Result<impl Mapping + 'static, Fault>, path: &str) -> Result<Map, DesignError> {
+    made.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(path, f))
+}
+
+impl BuildMap for AffineSpec {
+    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+        let made = Affine::rigid(self.wavelength.three(), self.rotate, self.offset, &self.skew.shears());
+        shared(made, path)
+    }
+}
+
+impl BuildMap for SpartanSpec {
+    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+        let made = Affine::spartan(self.wavelength.three(), self.rotate, self.offset);
+        shared(made, path)
+    }
+}
+
+impl BuildMap for CylinderMapSpec {
+    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
+        let radii = radii(self.center, self.axis, place);
+        let made = Round::cylinder(self.center, self.axis, self.wavelength.two(), self.around.into(), radii);
+        shared(made, path)
+    }
+}
+
+impl BuildMap for SphereMapSpec {
+    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
+        let radii = radii(self.center, self.axis, place);
+        let made = Round::sphere(self.center, self.axis, self.wavelength, self.around.into(), radii);
+        shared(made, path)
+    }
+}
+
+impl BuildMap for SweepSpec {
+    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
+        let (points, _) = self.points.read(path, place)?;
+        let line = Path { points, closed: self.closed, wavelength: self.wavelength.three(), normal: self.normal };
+        let made = Sweep::new(&line, &**place.region, place.points);
+        made.map(|s| Arc::new(s) as Map).map_err(|f| self.points.fault(path, f))
+    }
+}
+
+impl BuildMap for TetsSpec {
+    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+        let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
+                       face to face";
+        Err(DesignError::new(path, message))
+    }
+}
+
+impl BuildMap for PhaseSpec {
+    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
+        let below = |key: &str| format!("{path}.{key}");
+        let any = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, Key::NONE));
+        let length = key_of::<PhaseSpec>("wavelength");
+        let length = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, length));
+        let wavelength = match &self.wavelength {
+            GradeOrThree::One(g) => {
+                let one = length(g, below("wavelength"))?;
+                [one.clone(), one.clone(), one]
+            }
+            GradeOrThree::Three(of) => each(of, &below("wavelength"), &length)?,
+        };
+        let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
+        let wanted = Wanted {
+            wavelength,
+            orientation: self.orientation.build(path, place)?,
+            weight: weight.transpose()?,
+            angle_weight: self.angle_weight,
+            offset: self.offset,
+        };
+        let region: &dyn Field = &**place.region;
+        let settings =
+            Settings { step: self.step, region: (self.domain == Domain::Region).then_some(region), folds: self.folds };
+        let made = Phase::solve(&place.region.bounds(), &wanted, &settings);
+        shared(made, path)
+    }
+}
+
+impl OrientationSpec {
+    fn build(&self, path: &str, place: &Place) -> Result<Orientation, DesignError> {
+        let below = |key: &str| format!("{path}.{key}");
+        let any = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, Key::NONE));
+        let angle = |of: &Option<GradeSpec>, key: &str| match of {
+            Some(of) => any(of, below(key)),
+            None => Ok(Grade::Constant(0.0)),
+        };
+        let vector = |of: &VectorSpec, key: &str| match of {
+            VectorSpec::Components(of) => each(of, &below(key), &any),
+            VectorSpec::Field(of) => {
+                samples::several(&of.field, &below(&format!("{key}.field")), place, |n| (n == 3).then_some([0, 1, 2]))
+            }
+        };
+        Ok(match self {
+            OrientationSpec::Axes(AxesSpec { rotate_x, rotate_y, rotate_z }) => Orientation::Angles([
+                angle(rotate_x, "rotate_x")?,
+                angle(rotate_y, "rotate_y")?,
+                angle(rotate_z, "rotate_z")?,
+            ]),
+            OrientationSpec::Rotate(of) => Orientation::Angles(each(&of.rotate, &below("rotate"), &any)?),
+            OrientationSpec::Direction(of) => Orientation::Direction(vector(&of.direction, "direction")?),
+            OrientationSpec::Frame(FrameAlone { frame }) => {
+                Orientation::Frame { x: vector(&frame.x, "frame.x")?, z: vector(&frame.z, "frame.z")? }
+            }
+            OrientationSpec::Stress(of) => Orientation::Stress(match &of.stress {
+                TensorSpec::Components(of) => each(of, &below("stress"), &any)?,
+                TensorSpec::Field(of) => {
+                    samples::several(&of.field, &below("stress.field"), place, |n| match (n, of.order) {
+                        (9, _) => Some([0, 4, 8, 5, 2, 1]),
+                        (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
+                        (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
+                        _ => None,
+                    })?
+                }
+            }),
+        })
+    }
 }
 
 /// Least, mean and greatest distance from an axis in the region.
@@ -118,74 +162,6 @@ fn radii(center: [f64; 3], axis: [f64; 3], place: &Place) -> [f64; 3] {
         (least, most, sum) = (least.min(r), most.max(r), sum + r);
     }
     [least, sum / place.points.len() as f64, most]
-}
-
-fn phase(spec: &PhaseSpec, path: &str, place: &Place) -> Result<Map, DesignError> {
-    let below = |key: &str| format!("{path}.{key}");
-    let vary = |spec: &GradeSpec, path: String, allowed| grade(spec, &path, place, allowed, false);
-    let any = |spec: &GradeSpec, path: String| vary(spec, path, Allowed::Finite);
-    let length = |spec: &GradeSpec, path: String| vary(spec, path, Allowed::Positive("wavelength"));
-    let wavelength = match &spec.wavelength {
-        GradeOrThree::One(g) => {
-            let one = length(g, below("wavelength"))?;
-            [one.clone(), one.clone(), one]
-        }
-        GradeOrThree::Three(of) => each(of, &below("wavelength"), &length)?,
-    };
-    let vector = |of: &VectorSpec, key: &str| match of {
-        VectorSpec::Components(of) => each(of, &below(key), &any),
-        VectorSpec::Field(of) => {
-            samples::several(&of.field, &below(&format!("{key}.field")), place, |n| (n == 3).then_some([0, 1, 2]))
-        }
-    };
-    let angles = |of: [Option<&GradeSpec>; 3]| {
-        let names = ["rotate_x", "rotate_y", "rotate_z"];
-        let mut out = [Grade::Constant(0.0), Grade::Constant(0.0), Grade::Constant(0.0)];
-        for ((o, g), name) in out.iter_mut().zip(of).zip(names) {
-            if let Some(g) = g {
-                *o = any(g, below(name))?;
-            }
-        }
-        Ok(out)
-    };
-    let orientation = if let Some(of) = &spec.rotate {
-        Orientation::Angles(each(of, &below("rotate"), &any)?)
-    } else if let Some(of) = &spec.direction {
-        Orientation::Direction(vector(of, "direction")?)
-    } else if let Some(of) = &spec.frame {
-        Orientation::Frame { x: vector(&of.x, "frame.x")?, z: vector(&of.z, "frame.z")? }
-    } else if let Some(of) = &spec.stress {
-        Orientation::Stress(match of {
-            TensorSpec::Components(of) => each(of, &below("stress"), &any)?,
-            TensorSpec::Field(of) => {
-                samples::several(&of.field, &below("stress.field"), place, |n| match (n, of.order) {
-                    (9, _) => Some([0, 4, 8, 5, 2, 1]),
-                    (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
-                    (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
-                    _ => None,
-                })?
-            }
-        })
-    } else {
-        Orientation::Angles(angles([spec.rotate_x.as_ref(), spec.rotate_y.as_ref(), spec.rotate_z.as_ref()])?)
-    };
-    for v in spec.offset {
-        finite(&below("offset"), v)?;
-    }
-    let weight = spec.weight.as_ref().map(|g| any(g, below("weight")));
-    let wanted = Wanted {
-        wavelength,
-        orientation,
-        weight: weight.transpose()?,
-        angle_weight: finite(&below("angle_weight"), spec.angle_weight)?,
-        offset: spec.offset,
-    };
-    let region: &dyn Field = &**place.region;
-    let settings =
-        Settings { step: spec.step, region: (spec.domain == Domain::Region).then_some(region), folds: spec.folds };
-    Phase::solve(&place.region.bounds(), &wanted, &settings)
-        .map(|p| Arc::new(p) as Map)
-        .map_err(|f| DesignError::fault(path, f))
 }
 
 /// The same for each, with its index in the path.
@@ -204,7 +180,7 @@ pub(super) fn warn(map: &Map, spec: &MapSpec, lattice: &str, warnings: &mut Vec<
     let Some(phase) = map.solved() else { return };
     let d = phase.distortion();
     let mut say = |message: String| {
-        warnings.push(Warning { path: format!("{lattice}.map.{}", kind(spec)), message });
+        warnings.push(Warning { path: format!("{lattice}.map.{}", spec.key()), message });
     };
     let at = |[x, y, z]: [f64; 3]| format!("({x:.3}, {y:.3}, {z:.3}) mm");
     if d.turn > TURN {

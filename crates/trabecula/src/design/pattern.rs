@@ -2,17 +2,13 @@
 
 use super::beams::{check_open, fillet, given, inside, share};
 use super::data::*;
-use super::grade::Allowed;
-use super::place::{Place, finite};
+use super::place::Place;
 use super::{Built, Warning};
 use crate::kind::DesignError;
 use crate::report::{BeamsReport, PatternReport};
 use ::beams::graph::{Hub, Profile};
 use ::beams::pattern::{Pattern, PatternField, Similarity, Strut};
 use geometry::fault::{counted, number};
-
-/// Most repeats of a step: every one is kept as a turn, a scale and a shift.
-const COUNT: f64 = 1e6;
 
 /// The pattern of a design, filling the region.
 pub(super) fn laid(
@@ -22,17 +18,13 @@ pub(super) fn laid(
     warnings: &mut Vec<Warning>,
 ) -> Result<PatternField, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
-    let single = |given: &Option<GradeSpec>, key: &'static str| match given {
-        None => Ok(None),
-        Some(GradeSpec::Constant(v)) => Allowed::Positive(key).check(&below(key), *v, "").map(Some),
-        Some(_) => {
-            let message = "in a pattern it is one number, at the first place; it scales with the repeats";
-            Err(DesignError::new(below(key), message))
-        }
+    let single = |given: &Option<GradeSpec>| match given {
+        Some(GradeSpec::Constant(v)) => Some(*v),
+        _ => None,
     };
-    let (radius, hub) = (single(&spec.radius, "radius")?, single(&spec.hub, "hub")?);
+    let (radius, hub) = (single(&spec.radius), single(&spec.hub));
     let at = below("pattern");
-    let nodes = given(&of.nodes, &format!("{at}.nodes"))?;
+    let nodes = given(&of.nodes);
     let mut hubs = Vec::new();
     for (i, center) in nodes.positions.iter().enumerate() {
         let own = nodes.radii.get(i).copied().filter(|r| !r.is_nan());
@@ -49,26 +41,15 @@ pub(super) fn laid(
         (None, Some(r)) => Profile::Mid(r),
         (Some(ProfileSpec::Cone), _) | (None, None) => Profile::Cone,
     };
-    let strut = |s: &[i32; 5]| Strut { ends: [s[0] as u32, s[1] as u32], offset: [s[2], s[3], s[4]], profile };
+    let strut = |PatternStrut(s): &PatternStrut| Strut {
+        ends: [s[0] as u32, s[1] as u32],
+        offset: [s[2], s[3], s[4]],
+        profile,
+    };
     let mut steps = [(Similarity::IDENTITY, 1); 3];
     for (i, (step, repeat)) in steps.iter_mut().zip(&of.repeat).enumerate() {
         let at = |key: &str| format!("{at}.repeat[{i}].{key}");
-        for (key, three) in [("rotate", repeat.rotate), ("about", repeat.about), ("by", repeat.by)] {
-            for v in three {
-                finite(&at(key), v)?;
-            }
-        }
-        if !(repeat.count >= 1.0 && repeat.count.fract() == 0.0 && repeat.count <= COUNT) {
-            let message =
-                format!("count is {}; it must be a whole number from 1 to {}", number(repeat.count), number(COUNT));
-            return Err(DesignError::new(at("count"), message).found(number(repeat.count)));
-        }
-        if !(repeat.scale >= 0.1 && repeat.scale <= 10.0) {
-            let message =
-                format!("scale is {}; from one repeat to the next it must be from 0.1 to 10", number(repeat.scale));
-            return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
-        }
-        let all = repeat.scale.powf(repeat.count - 1.0);
+        let all = repeat.scale.powf(f64::from(repeat.count) - 1.0);
         if !(1e-6..=1e6).contains(&all) {
             let message = format!(
                 "the last repeat is {} times as large as the first; it must be from 1e-6 to 1e6 times",
@@ -76,7 +57,7 @@ pub(super) fn laid(
             );
             return Err(DesignError::new(at("scale"), message).found(number(repeat.scale)));
         }
-        *step = (Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by), repeat.count as u32);
+        *step = (Similarity::new(repeat.scale, repeat.rotate, repeat.about, repeat.by), repeat.count);
     }
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;

@@ -206,8 +206,8 @@ fn tiled(it: &Tiled) -> LatticeReport {
     if !it.zones.is_empty() {
         // Cells of zones have no level in common, and between them no fraction that they were asked for.
         let zones = it.zones.iter().map(|(zone, cell)| {
-            let (count, volume, solid) = sums(zone.parse().ok());
-            (zone.clone(), ZoneReport { cell: cell.clone(), count, volume, solid_fraction: solid / volume })
+            let (count, volume, solid) = sums(Some(*zone));
+            (zone.to_string(), ZoneReport { cell: cell.clone(), count, volume, solid_fraction: solid / volume })
         });
         let tets = TilingReport {
             zones: Some(zones.collect()),

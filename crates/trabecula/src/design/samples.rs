@@ -5,17 +5,16 @@ mod grid;
 
 use super::Loader;
 use super::data::*;
-use super::grade::Allowed;
-use super::place::{Place, finite};
+use super::place::Place;
 use crate::cell::{Cell, Series};
 use crate::field::Field;
-use crate::grade::{Grade, Remapped, Samples};
+use crate::grade::Samples;
 use crate::kind::DesignError;
 use crate::region::{MeshRegion, Shape as _};
 pub(super) use field::{field, several};
-use geometry::fault::{Fault, counted, number};
+use geometry::fault::{Fault, counted};
 use geometry::formats;
-use geometry::math::{Aabb, Vec3};
+use geometry::math::Vec3;
 use geometry::repair::Repair;
 pub(super) use grid::grid;
 
@@ -30,10 +29,6 @@ const CELL: usize = 64;
 pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Result<Cell, DesignError> {
     let at = format!("{path}.path");
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
-    if !(spec.terms >= 1.0 && spec.terms <= 2000.0 && spec.terms.fract() == 0.0) {
-        let message = format!("terms is {}; it must be a whole number from 1 to 2000", number(spec.terms));
-        return Err(DesignError::new(format!("{path}.terms"), message));
-    }
     let file = loader.load(&spec.path).map_err(|m| DesignError::new(&at, m).found(&spec.path))?;
     let kind = extension(&spec.path);
     let (shape, values) = if kind == "npy" {
@@ -66,41 +61,6 @@ pub(super) fn cell(spec: &FileCellSpec, path: &str, loader: &dyn Loader) -> Resu
 
 fn extension(path: &str) -> String {
     path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase()
-}
-
-/// The grade of samples, checked against what is allowed in the region; `1 − value` if `complement`.
-pub(super) fn grade(
-    samples: Samples,
-    remap: &[[f64; 2]],
-    path: &str,
-    place: &Place,
-    allowed: Allowed,
-    complement: bool,
-) -> Result<Grade, DesignError> {
-    let mut stops: Vec<[f64; 2]> = Vec::new();
-    for (i, [v, w]) in remap.iter().enumerate() {
-        let at = format!("{path}.remap[{i}]");
-        finite(&at, *v)?;
-        finite(&at, *w)?;
-        if stops.last().is_some_and(|s| s[0] >= *v) {
-            return Err(DesignError::new(at, format!("numbers must rise from stop to stop, found {}", number(*v))));
-        }
-        stops.push([*v, *w]);
-    }
-    if complement {
-        if stops.is_empty() {
-            let r = samples.bound(&Aabb::ALL);
-            // One stop would do where all numbers are the same.
-            stops = vec![[r.lo, r.lo], [r.hi.max(r.lo + 1.0), r.hi.max(r.lo + 1.0)]];
-        }
-        stops.iter_mut().for_each(|s| s[1] = 1.0 - s[1]);
-    }
-    let grade = match stops.is_empty() {
-        true => Grade::from(samples),
-        false => Grade::from(Remapped::new(samples, stops).map_err(|f| DesignError::fault(path, f))?),
-    };
-    super::level::check_varied(&grade, path, allowed, complement, place)?;
-    Ok(grade)
 }
 
 /// The array of this name, or the only one.
@@ -141,10 +101,6 @@ pub(super) fn points(spec: &PointsSpec, path: &str, place: &Place) -> Result<Sam
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
     let (places, values): (Vec<Vec3>, Vec<f64>) = rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
-    if spec.neighbours < 1.0 || spec.neighbours.fract() != 0.0 || spec.neighbours > 64.0 {
-        let message = format!("neighbours is {}; it must be a whole number from 1 to 64", number(spec.neighbours));
-        return Err(DesignError::new(format!("{path}.neighbours"), message));
-    }
     Samples::scattered(&places, &values, spec.neighbours as usize, &place.region.bounds()).map_err(wrong)
 }
 

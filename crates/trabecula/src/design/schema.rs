@@ -1,46 +1,22 @@
-//! The JSON Schema of a design, generated from the data.
-
-use schemars::{Schema, SchemaGenerator, json_schema};
+//! The JSON Schema of a design, from its declarations.
 
 use super::Design;
-use super::bridge;
-use crate::cell::catalogue;
-use crate::cell::tet::tet_catalogue;
+use crate::kind::{Defs, Key, Kind, Node, Value};
 
 /// The JSON Schema of a design (draft 2020-12), as text.
 pub fn schema() -> String {
-    let mut v = schemars::schema_for!(Design).to_value();
-    v["title"] = "A Trabecula design".into();
-    serde_json::to_string_pretty(&bridge::ordered(bridge::node(&v))).unwrap_or_default() + "\n"
-}
-
-/// A space group's number or symbol.
-pub(super) fn group(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({ "type": ["string", "integer"] })
-}
-
-/// The names of the ready tetrahedral cells.
-pub(super) fn tet_cell_name(_: &mut SchemaGenerator) -> Schema {
-    let names: Vec<&str> = tet_catalogue().iter().map(|n| n.name).collect();
-    json_schema!({ "type": "string", "enum": names })
-}
-
-/// The struts of a pattern.
-pub(super) fn pattern_struts(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({
-        "type": "array",
-        "items": { "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 5 },
-    })
-}
-
-/// The names of the ready cells of beams.
-pub(super) fn beam_cell(_: &mut SchemaGenerator) -> Schema {
-    let names: Vec<&str> = beams::graph::catalogue().iter().map(|u| u.name).collect();
-    json_schema!({ "type": "string", "enum": names })
-}
-
-/// The names of the ready cells.
-pub(super) fn cell_name(_: &mut SchemaGenerator) -> Schema {
-    let names: Vec<&str> = catalogue().iter().map(|n| n.name).collect();
-    json_schema!({ "type": "string", "enum": names })
+    let mut defs = Defs::default();
+    Design::schema(&Key::NONE, &mut defs);
+    let Value::Table(all) = defs.into_node().value else { return String::new() };
+    let (design, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|d| d.0 == "Design");
+    let [(_, _, design)] = &design[..] else { return String::new() };
+    let needed = |key: &str| Node::table([("required", vec![Node::from(key)].into())]);
+    let schema = Node::table([
+        ("$schema", "https://json-schema.org/draft/2020-12/schema".into()),
+        ("title", "A Trabecula design".into()),
+    ]);
+    let schema = design.entries().fold(schema, |schema, (key, node)| schema.with(key, node.clone()));
+    let schema =
+        schema.with("anyOf", vec![needed("lattice"), needed("beams")].into()).with("$defs", Value::Table(rest).into());
+    serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
 }

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::data::{GradeKind, GradeSpec, OpenSpec, SkinSpec};
-use super::grade::{Allowed, grade};
-use super::level::check_varied;
+use super::data::{OpenSpec, SkinSpec};
+use super::grade::{Asked, key_of};
 use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Design, Loader, region, sample};
@@ -32,7 +31,7 @@ pub(super) fn filled(
         filled.push(body);
         thinnest = Some(least);
     }
-    for (name, spec) in &d.keep {
+    for (name, spec) in &d.keep.0 {
         let path = format!("keep.{name}");
         let zone = region::region(spec, &path, loader, notes)?;
         check_zone(&zone, space, points, &path)?;
@@ -70,12 +69,7 @@ fn is_open(filled: &[CsgSolid], space: &Region, points: &[Vec3]) -> bool {
 fn grown(spec: &SkinSpec, place: &Place) -> Result<(CsgSolid, f64), DesignError> {
     let Place { region: space, points, .. } = *place;
     let path = "skin.thickness";
-    let allowed = Allowed::Positive("thickness");
-    let thickness = grade(&spec.thickness, path, place, allowed, false)?;
-    if let GradeSpec::Kind(GradeKind::Formula(_)) = &spec.thickness {
-        let at = format!("{path}.formula");
-        check_varied(&thickness, &at, allowed, false, place)?;
-    }
+    let thickness = spec.thickness.build(&Asked::new(path, place, key_of::<SkinSpec>("thickness")))?;
     let bounds = space.bounds();
     let open = spec.open.iter().enumerate().map(|(i, o)| match o {
         OpenSpec::Plane(h) => region::halfspace(h, &format!("skin.open[{i}]")),

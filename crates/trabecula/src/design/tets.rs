@@ -3,10 +3,10 @@
 mod source;
 
 use super::data::*;
-use super::grade::{Allowed, grade};
+use super::grade::{Asked, key_of};
 use super::place::{LOOKS, Place};
-use super::{Loader, Node, Warning, read, region, sample};
-use crate::kind::DesignError;
+use super::{Design, Loader, Node, Warning, region, sample};
+use crate::kind::{At, DesignError, Key, Kind};
 use crate::mesher::{self, Fit, background};
 use crate::report::{FitReport, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
@@ -60,8 +60,9 @@ impl Tets {
     pub fn in_design(node: &Node, lattice: Option<&str>, loader: &dyn Loader) -> Result<Tets, DesignError> {
         let lines = node.lines();
         let make = || {
-            let (path, spec) = read::tets_in(node, lattice)?;
-            let region_spec = read::region_of(node)?;
+            let (path, spec) = declared(node, lattice)?;
+            spec.check(&Key::NONE).map_err(|f| DesignError::fault(&path, f))?;
+            let region_spec = region_of(node)?;
             let mut notes = crate::region::Notes::default();
             let space = match region::region(&region_spec, "region", loader, &mut notes) {
                 Ok(space) => space,
@@ -100,6 +101,41 @@ impl Tets {
     }
 }
 
+/// The region in a design whose other keys are left alone.
+fn region_of(node: &Node) -> Result<RegionKind, DesignError> {
+    match entry(&At::root(node), "region")? {
+        Some(at) => RegionKind::read(&at),
+        None => {
+            Err(DesignError::new("region", format!("\"region\" is missing: {}", key_of::<Design>("region").meaning())))
+        }
+    }
+}
+
+/// The entry of a table with other keys, which are left alone.
+fn entry<'a>(at: &At<'a>, key: &str) -> Result<Option<At<'a>>, DesignError> {
+    let entries = at.entries(&format!("a table with {key}"))?;
+    Ok(entries.into_iter().find(|(k, _)| *k == key).map(|e| e.1))
+}
+
+/// The tetrahedral mesh in a design, whose other keys are left alone, and the path of its table; the name of its lattice if
+/// it is to be that of one.
+fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), DesignError> {
+    let lattices = match entry(&At::root(node), "lattice")? {
+        Some(of) => of.entries("lattices by name, such as [lattice.core]")?,
+        None => Vec::new(),
+    };
+    for (_, at) in lattices.iter().filter(|(name, _)| lattice.is_none_or(|wanted| wanted == *name)) {
+        if let Some(map) = entry(at, "map")?
+            && let Some(tets) = entry(&map, "tets")?
+        {
+            return Ok((tets.path.clone(), TetsSpec::read(&tets)?));
+        }
+    }
+    let message =
+        "no lattice of the design has a tetrahedral mesh; give one, such as [lattice.core.map.tets] with size = 5";
+    Err(DesignError::new("lattice", message))
+}
+
 /// The tetrahedral mesh that `spec` asks for; `place.path` is that of its table.
 pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, place: &Place) -> Result<Tets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&place.path, f);
@@ -114,7 +150,7 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, place: &Place) -> Result
     let (mut mesh, fit, checked, mesher) = match spec {
         TetsSpec::Made(made) => {
             let below = |key: &str| format!("{}.{key}", place.path);
-            let size = grade(&made.size, &below("size"), place, Allowed::Positive("size"), false)?;
+            let size = made.size.build(&Asked::new(below("size"), place, key_of::<MadeTetsSpec>("size")))?;
             if made.mesher == MesherSpec::Background {
                 let (mesh, fit) = background(&**place.region, &bounds, &size, &inside).map_err(wrong)?;
                 (mesh, Some(fit), Checked::default(), "background".to_string())
@@ -165,10 +201,7 @@ fn zones(
     };
     let middles: Vec<Vec3> = mesh.tets.iter().map(middle).collect();
     let mut of: Vec<Option<u32>> = vec![None; middles.len()];
-    let numbered = made.zones.iter();
-    let mut numbered: Vec<(u32, &RegionKind)> = numbered.filter_map(|(n, r)| Some((n.parse().ok()?, r))).collect();
-    numbered.sort_by_key(|z| z.0);
-    for (zone, spec) in numbered {
+    for (&zone, spec) in &made.zones {
         let path = format!("{path}.zones.{zone}");
         let region = region::region(spec, &path, loader, notes)?;
         let mut values = vec![0.0; middles.len()];
@@ -229,7 +262,6 @@ pub(super) fn of_soup(
     let GradeSpec::Constant(size) = made.size else {
         return Err(why);
     };
-    let size = Allowed::Positive("size").check(&format!("{path}.size"), size, "")?;
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
     let mut notes = crate::region::Notes::default();
     mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
@@ -353,8 +385,8 @@ mod tests {
         };
         wrong("", "", Some(6), "\"size\" is missing");
         wrong("size = -1", ".size", Some(7), "size is -1 mm");
-        wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "found both");
-        wrong("size = 1\nsplit = true", ".split", Some(8), "there is no path");
+        wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "size and path at once");
+        wrong("size = 1\nsplit = true", ".split", Some(8), "size and split at once");
         wrong("size = 1\nmesher = \"ftetwlid\"", ".mesher", Some(8), "did you mean \"ftetwild\"?");
         wrong("size = 1\nmesher = \"ftetwild\"", ".mesher", Some(8), "not available here");
         wrong("size = 1\nmesh = 3", ".mesh", Some(8), "did you mean");

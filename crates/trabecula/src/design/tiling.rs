@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use super::cell::orbit_terms;
 use super::data::*;
-use super::grade::{Allowed, grade};
+use super::grade::Asked;
 use super::joins::{Joins, joins};
-use super::place::{LOOKS, Place, finite};
+use super::level::within_wavelength;
+use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::tets::{self, TetReport};
-use super::warn::{amount_key, gaps};
+use super::warn::gaps;
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::cell::{Part, Series, named};
@@ -19,13 +20,10 @@ use crate::kind::DesignError;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region};
 use crate::tiling::{Amount, Level, Share, Tiling};
-use geometry::fault::{Fault, number};
+use geometry::fault::Fault;
 use geometry::mesh::Mesh;
 use geometry::repair::Repair;
 use geometry::symmetry::Group;
-
-/// The most that tetrahedra may reach beyond themselves: beyond it a function is used where it has little to say.
-const OVERLAP: f64 = 0.2;
 
 /// A tetrahedral mesh that the part is made of, and the lattice in it.
 pub(super) struct Domain<'a> {
@@ -42,8 +40,11 @@ pub(super) struct Domain<'a> {
 
 impl Domain<'_> {
     /// The cell of each zone, where zones have cells of their own.
-    pub fn zones(&self) -> BTreeMap<String, String> {
-        self.cell.zones.clone()
+    pub fn zones(&self) -> BTreeMap<u32, String> {
+        match self.cell {
+            TetCellSpec::Zones(of) => of.zones.iter().map(|(zone, cell)| (*zone, cell.0.clone())).collect(),
+            _ => BTreeMap::new(),
+        }
     }
 }
 
@@ -88,7 +89,7 @@ pub(super) fn domain<'a>(
     let path = format!("lattice.{name}");
     let CellSpec::Kind(CellKind::Tet(cell)) = &spec.cell else {
         let why = match &spec.cell {
-            CellSpec::Name(name) => named(name).and_then(|n| Group::named(n.number()).ok()),
+            CellSpec::Name(name) => named(&name.0).and_then(|n| Group::named(n.number()).ok()),
             CellSpec::Kind(_) => None,
         };
         let why = why.and_then(|g| g.tetrahedral_sites().err());
@@ -104,7 +105,7 @@ pub(super) fn domain<'a>(
         return Err(DesignError::new(format!("lattice.{other}"), message));
     }
     let tables = others.map(|(n, _)| format!("lattice.{n}"));
-    let tables = tables.chain(d.beams.keys().map(|n| format!("beams.{n}")));
+    let tables = tables.chain(d.beams.0.keys().map(|n| format!("beams.{n}")));
     if let (None, Some(other)) = (&d.blend, tables.into_iter().next()) {
         let message = "a lattice over tetrahedra stands alone without a blend; keep one, or say where each is";
         return Err(DesignError::new(other, message));
@@ -114,11 +115,6 @@ pub(super) fn domain<'a>(
         TetsSpec::Made(m) => m.joined,
         TetsSpec::File(f) => f.joined,
     };
-    let overlap = finite(&format!("{path}.overlap"), joined.overlap)?;
-    if !(0.0..=OVERLAP).contains(&overlap) {
-        let message = format!("overlap is {}; it must be from 0 to {OVERLAP}", number(overlap));
-        return Err(DesignError::new(format!("{path}.overlap"), message).found(number(overlap)));
-    }
     let (made, filled) = match soup {
         Some(made) => (made, Some(space.clone())),
         None => {
@@ -129,7 +125,7 @@ pub(super) fn domain<'a>(
         }
     };
     warnings.extend(made.warnings);
-    let map = Tets::new(&made.mesh, overlap).map_err(|f| DesignError::fault(&path, f))?;
+    let map = Tets::new(&made.mesh, joined.overlap).map_err(|f| DesignError::fault(&path, f))?;
     let region = match filled {
         Some(region) => region,
         None => enclosed(map.boundary(), &path)?,
@@ -137,20 +133,19 @@ pub(super) fn domain<'a>(
     Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), report: made.report, region }))
 }
 
-/// The cell that a table describes.
-pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<TetCell, DesignError> {
+/// A ready cell.
+fn ready_cell(name: &TetCellName, path: &str) -> Result<TetCell, DesignError> {
+    let cell = named_tet_cell(&name.0).ok_or_else(|| DesignError::new(path, "no such cell"))?;
+    cell.cell().map_err(|f| DesignError::fault(path, f))
+}
+
+/// The cell that a series describes; `path` is that of its table.
+fn series_cell(spec: &TetSeriesSpec, path: &str) -> Result<TetCell, DesignError> {
     let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
-    if let Some(name) = &spec.name {
-        let cell = named_tet_cell(name).ok_or_else(|| DesignError::new(format!("{path}.name"), "no such cell"))?;
-        return cell.cell().map_err(|f| wrong("", f));
-    }
-    let group = Group::named(spec.group.as_deref().unwrap_or_default());
-    let group = group.map_err(|f| wrong(".group", f))?;
+    let group = Group::named(&spec.group.0).map_err(|f| wrong(".group", f))?;
     let sites = group.tetrahedral_sites().map_err(|f| wrong("", f))?;
     let mut all = Vec::new();
     for (i, t) in spec.terms.iter().enumerate() {
-        finite(&format!("{path}.terms[{i}].amplitude"), t.amplitude)?;
-        finite(&format!("{path}.terms[{i}].phase"), t.phase)?;
         let orbit = orbit_terms(&group, t);
         all.extend(orbit.map_err(|f| wrong(&format!(".terms[{i}]"), f))?);
     }
@@ -180,7 +175,7 @@ pub(super) fn stencil(spec: &TetCellSpec, path: &str) -> Result<TetCell, DesignE
             site
         }
     };
-    TetCell::new(series, site, spec.edge.unwrap_or(1.0), spec.dual).map_err(|f| wrong("", f))
+    TetCell::new(series, site, spec.edge, spec.dual).map_err(|f| wrong("", f))
 }
 
 /// A lattice over a mesh.
@@ -198,10 +193,12 @@ pub(super) type Zoned = BTreeMap<u32, Arc<TetCell>>;
 /// The lattice.
 pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
-    if !domain.cell.zones.is_empty() {
-        return zoned(domain, place, warnings);
-    }
-    let mut stencil = stencil(domain.cell, &below("cell.tet"))?;
+    let at = below("cell.tet");
+    let mut stencil = match domain.cell {
+        TetCellSpec::Zones(zones) => return zoned(domain, &zones.zones, place, warnings),
+        TetCellSpec::Ready(of) => ready_cell(&of.name, &at)?,
+        TetCellSpec::Series(of) => series_cell(of, &at)?,
+    };
     let part: Part = domain.spec.part.into();
     let spec = &domain.spec.level;
     let path = below("level");
@@ -211,28 +208,27 @@ pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning
             return Err(DesignError::new(format!("{path}.{option}"), message));
         }
     }
-    let mid = finite(&format!("{path}.mid"), spec.mid)?;
+    let mid = spec.mid;
     if mid != 0.0 {
         stencil = about(stencil, mid, part, &format!("{path}.mid"))?;
     }
-    let key = amount_key(domain.spec);
+    let key = spec.amount.key();
     let path = format!("{path}.{key}");
-    if key == "thickness" && part != Part::Sheet {
-        let message = "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
-        return Err(DesignError::new(path, message));
-    }
-    let (value, allowed, amount) = match &spec.amount {
-        AmountSpec::Iso(v) => (v, Allowed::Finite, Amount::Iso),
-        AmountSpec::Fraction(v) => (v, Allowed::Share("fraction"), Amount::Fraction),
-        AmountSpec::Porosity(v) => (v, Allowed::Share("porosity"), Amount::Fraction),
-        AmountSpec::Thickness(v) => {
-            let most = domain.map.mean_edge();
-            (v, Allowed::Length("thickness", most), Amount::Thickness)
+    let amount = match spec.amount {
+        AmountSpec::Iso(_) => Amount::Iso,
+        AmountSpec::Fraction(_) | AmountSpec::Porosity(_) => Amount::Fraction,
+        AmountSpec::Thickness(_) if part != Part::Sheet => {
+            let message = "thickness goes with part = \"sheet\": a network has no wall; give its fraction";
+            return Err(DesignError::new(path, message));
         }
+        AmountSpec::Thickness(_) => Amount::Thickness,
     };
-    let complement = key == "porosity";
-    let asked = grade(value, &path, place, allowed, complement)?;
-    let values = at_nodes(&asked, allowed, complement, &path, &domain.map)?;
+    let asked = spec.amount.asked(path.clone(), place);
+    let grade = spec.amount.grade().build(&asked)?;
+    if amount == Amount::Thickness {
+        within_wavelength(&grade, &asked, domain.map.mean_edge())?;
+    }
+    let values = at_nodes(&grade, &asked, &domain.map)?;
     if amount == Amount::Thickness && stencil.iso(Part::Sheet, 0.5) <= 0.0 {
         return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
     }
@@ -251,49 +247,47 @@ fn explicit(domain: &Domain, place: &Place) -> bool {
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
 /// zone, so that one passes into the other in the tetrahedra between.
-fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
+fn zoned(
+    domain: &Domain,
+    zones: &BTreeMap<u32, TetCellName>,
+    place: &Place,
+    warnings: &mut Vec<Warning>,
+) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let at = below("cell.tet.zones");
     let map = &domain.map;
     let part: Part = domain.spec.part.into();
-    let key = amount_key(domain.spec);
-    let path = below(&format!("level.{key}"));
-    let value = match &domain.spec.level.amount {
-        AmountSpec::Fraction(v) | AmountSpec::Porosity(v) => v,
-        _ => {
-            let message = "cells of different zones have no level in common; give their fraction";
-            return Err(DesignError::new(path, message));
-        }
+    let amount = &domain.spec.level.amount;
+    let path = below(&format!("level.{}", amount.key()));
+    let (AmountSpec::Fraction(value) | AmountSpec::Porosity(value)) = amount else {
+        let message = "cells of different zones have no level in common; give their fraction";
+        return Err(DesignError::new(path, message));
     };
     if domain.spec.level.mid != 0.0 {
         return Err(DesignError::new(below("level.mid"), "cells of zones are taken about f = 0"));
     }
     let found: BTreeSet<u32> = (0..map.len()).map(|t| map.zone(t)).collect();
-    let zones = &domain.cell.zones;
-    if let Some(zone) = found.iter().find(|z| !zones.contains_key(&z.to_string())) {
+    if let Some(zone) = found.iter().find(|z| !zones.contains_key(z)) {
         let message = format!("the mesh has a zone {zone}, which has no cell; give it one");
         return Err(DesignError::new(at, message));
     }
-    if let Some(zone) = zones.keys().find(|z| !found.iter().any(|f| f.to_string() == **z)) {
+    if let Some(zone) = zones.keys().find(|z| !found.contains(z)) {
         let listed: Vec<String> = found.iter().map(u32::to_string).collect();
         let message = format!("no tetrahedron of the mesh is of zone {zone}; its zones are {}", listed.join(", "));
         return Err(DesignError::new(format!("{at}.{zone}"), message));
     }
-    let complement = key == "porosity";
-    let allowed = Allowed::Share(key);
-    let asked = grade(value, &path, place, allowed, complement)?;
-    let values = at_nodes(&asked, allowed, complement, &path, map)?;
-    let names: BTreeSet<&String> = zones.values().collect();
+    let asked = amount.asked(path.clone(), place);
+    let values = at_nodes(&value.build(&asked)?, &asked, map)?;
+    let names: BTreeSet<&TetCellName> = zones.values().collect();
     let (lo, hi) = values.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let (mut cells, mut zoned) = (Vec::new(), Zoned::new());
     for name in names {
-        let spec = TetCellSpec { name: Some(name.clone()), ..TetCellSpec::default() };
-        let stencil = Arc::new(stencil(&spec, &at)?);
+        let stencil = Arc::new(ready_cell(name, &at)?);
         let range = stencil.range();
-        let of = found.iter().filter(|z| zones[&z.to_string()] == **name);
+        let of = found.iter().filter(|z| zones[z] == *name);
         zoned.extend(of.map(|z| (*z, stencil.clone())));
         apart(&stencil, part, [lo, hi], &path, warnings);
-        let weights = map.shares(|zone| zones[&zone.to_string()] == **name);
+        let weights = map.shares(|zone| zones[&zone] == *name);
         cells.push(Share { stencil, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
     }
     let level = Level::mixed(map, &cells, part, &values);
@@ -302,7 +296,7 @@ fn zoned(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<
     let joins = explicit.then(|| joins(&tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
     if let Some(joins) = &joins {
-        joins.warn(zones, &at, warnings);
+        joins.warn(&domain.zones(), &at, warnings);
     }
     Ok(Made { tiling: Arc::new(tiling), explicit, joins })
 }
@@ -324,22 +318,16 @@ fn about(stencil: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, 
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.
-fn at_nodes(
-    asked: &Grade,
-    allowed: Allowed,
-    complement: bool,
-    path: &str,
-    map: &Tets,
-) -> Result<Vec<f64>, DesignError> {
-    if let Some(v) = asked.constant() {
+fn at_nodes(grade: &Grade, asked: &Asked, map: &Tets) -> Result<Vec<f64>, DesignError> {
+    if let Some(v) = grade.constant() {
         return Ok(vec![v]);
     }
     let mut values = vec![0.0; map.nodes().len()];
-    asked.values(map.nodes(), &mut values);
-    for (v, p) in values.iter().zip(map.nodes()) {
-        let own = if complement { 1.0 - v } else { *v };
-        let [x, y, z] = p;
-        allowed.check(path, own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))?;
+    grade.values(map.nodes(), &mut values);
+    for (v, [x, y, z]) in values.iter().zip(map.nodes()) {
+        let own = if asked.complement { 1.0 - v } else { *v };
+        let admitted = asked.key.admit_at(own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"));
+        admitted.map_err(|f| DesignError::fault(&asked.path, f))?;
     }
     Ok(values)
 }

@@ -3,7 +3,7 @@
 use super::data::*;
 use super::place::{LOOKS, Place};
 use super::report::Varied;
-use super::{Warning, map, sample};
+use super::{Warning, sample};
 use crate::cell::Distance;
 use crate::field::Field;
 use crate::kind::DesignError;
@@ -16,21 +16,11 @@ const TRUNCATED: f64 = 0.25;
 /// Index of a series beyond which the grids on which a cell is analysed have less than four nodes on a wave.
 const FINEST: usize = 24;
 
-/// The key under which the amount stands.
-pub(super) fn amount_key(spec: &LatticeSpec) -> &'static str {
-    match spec.level.amount {
-        AmountSpec::Iso(_) => "iso",
-        AmountSpec::Fraction(_) => "fraction",
-        AmountSpec::Porosity(_) => "porosity",
-        AmountSpec::Thickness(_) => "thickness",
-    }
-}
-
 /// Refuses a lattice that leaves the region empty or solid everywhere.
 pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(), DesignError> {
     let mut values = vec![0.0; place.points.len()];
     lattice.values(place.points, &mut values);
-    let path = format!("{}.level.{}", place.path, amount_key(spec));
+    let path = format!("{}.level.{}", place.path, spec.level.amount.key());
     if values.iter().any(|v| v.is_nan()) {
         return Err(DesignError::new(path, "the level is not a number somewhere in the region"));
     }
@@ -116,7 +106,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             format!("the solid fraction is {fraction} over the region, and at {}", ranges(&broken))
         };
         let message = format!("{place} the periodic solid is not one piece in space; {limit}");
-        warnings.push(Warning { path: format!("{}.level.{}", path, amount_key(spec)), message });
+        warnings.push(Warning { path: format!("{}.level.{}", path, spec.level.amount.key()), message });
     }
     if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
         let message = format!(
@@ -142,7 +132,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
                 figure(2.0 * half.min),
                 figure(2.0 * error)
             );
-            warnings.push(Warning { path: format!("{}.level.{}", place.path, amount_key(spec)), message });
+            warnings.push(Warning { path: format!("{}.level.{}", place.path, spec.level.amount.key()), message });
         }
     }
     if let Some(limit) = lattice.folding() {
@@ -154,7 +144,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
                  mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
                 figure(limit)
             );
-            warnings.push(Warning { path: format!("{}.level.{}", place.path, amount_key(spec)), message });
+            warnings.push(Warning { path: format!("{}.level.{}", place.path, spec.level.amount.key()), message });
         }
     }
     let wavelength = lattice.map.wavelength();
@@ -166,7 +156,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             number(wavelength),
             number(least)
         );
-        let kind = map::kind(&spec.map);
+        let kind = spec.map.key();
         warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", place.path), message });
     }
 }

@@ -19,6 +19,11 @@ impl<'a> At<'a> {
         At { node, path: String::new(), line: None }
     }
 
+    /// A node that stands at `path` of a design, outside any file.
+    pub fn alone(node: &'a Node, path: &str) -> Self {
+        At { path: path.into(), ..At::root(node) }
+    }
+
     fn below(&self, key: &str) -> String {
         if self.path.is_empty() { key.to_string() } else { format!("{}.{key}", self.path) }
     }
@@ -36,11 +41,6 @@ impl<'a> At<'a> {
     pub fn expected(&self, what: &str) -> DesignError {
         let found = describe(self.node);
         self.error(format!("expected {what}, found {found}"))
-    }
-
-    fn unknown(&self, what: &str, word: &str, allowed: &[&str]) -> DesignError {
-        let line = self.line.or(self.node.line);
-        DesignError { line, ..DesignError::unknown(&self.path, what, word, allowed) }
     }
 
     /// The entries of a table with any keys.
@@ -129,36 +129,6 @@ impl<'a> At<'a> {
         Err(self.error(format!("{name} needs at least {}, found {found}", counted(least, "item"))))
     }
 
-    /// The entries of a table whose keys are all among `allowed`.
-    pub fn fields(&self, what: &str, allowed: &[&str]) -> Result<Fields<'a>, DesignError> {
-        let what = format!("{what} (a table with {})", allowed.join(", "));
-        let entries = self.entries(&what)?;
-        for (key, at) in &entries {
-            if !allowed.contains(key) {
-                return Err(at.unknown("key", key, allowed));
-            }
-        }
-        Ok(Fields { at: self.clone(), entries })
-    }
-
-    /// The one kind named by a table with one key.
-    pub fn kind(&self, what: &str, allowed: &[&str]) -> Result<(&'a str, At<'a>), DesignError> {
-        let entries = self.entries(&format!("a {what} as a table named by its kind: {}", allowed.join(", ")))?;
-        for (key, at) in &entries {
-            if !allowed.contains(key) {
-                return Err(at.unknown(what, key, allowed));
-            }
-        }
-        let mut entries = entries.into_iter();
-        match (entries.next(), entries.next()) {
-            (Some(one), None) => Ok(one),
-            (None, _) => Err(self.error(format!("a {what} is missing here; give one of {}", allowed.join(", ")))),
-            (Some(a), Some(b)) => {
-                Err(b.1.error(format!("two kinds of {what} at once, {} and {}; give exactly one", a.0, b.0)))
-            }
-        }
-    }
-
     pub fn text(&self, what: &str) -> Result<&'a str, DesignError> {
         match &self.node.value {
             Value::Text(s) => Ok(s),
@@ -166,46 +136,32 @@ impl<'a> At<'a> {
         }
     }
 
-    /// One of the words.
-    pub fn word<T: Copy>(&self, what: &str, words: &[(&str, T)]) -> Result<T, DesignError> {
-        self.word_or(what, words, &[])
-    }
-
-    /// One of the words; `meant` are words that others use, each with the one to use here.
-    pub fn word_or<T: Copy>(
+    /// One of `names`; `hints` are words that others use, each with the one to use here.
+    pub fn word_of(
         &self,
         what: &str,
-        words: &[(&str, T)],
-        meant: &[(&str, &'static str)],
-    ) -> Result<T, DesignError> {
-        let names: Vec<&str> = words.iter().map(|w| w.0).collect();
+        names: &[&'static str],
+        hints: &[(&str, &'static str)],
+    ) -> Result<&'static str, DesignError> {
         let word = self.text(&format!("one of {}", names.join(", ")))?;
-        if let Some(hit) = words.iter().find(|w| w.0 == word) {
-            return Ok(hit.1);
+        if let Some(known) = names.iter().find(|n| **n == word) {
+            return Ok(known);
         }
-        let near = nearest(word, meant.iter().map(|m| m.0));
-        let near = near.and_then(|n| meant.iter().find(|m| m.0 == n));
-        Err(match (near, nearest(word, names.iter().copied())) {
-            (Some((_, right)), None) => DesignError {
-                line: self.line.or(self.node.line),
-                ..DesignError::unknown_but(&self.path, what, word, &names, Some(*right))
-            },
-            _ => self.unknown(what, word, &names),
-        })
+        let meant = || {
+            let hint = nearest(word, hints.iter().map(|h| h.0))?;
+            hints.iter().find(|h| h.0 == hint).map(|h| h.1)
+        };
+        let near = nearest(word, names.iter().copied()).or_else(meant);
+        let line = self.line.or(self.node.line);
+        Err(DesignError { line, ..DesignError::unknown_but(&self.path, what, word, names, near) })
     }
 
     pub fn number(&self) -> Result<f64, DesignError> {
         match &self.node.value {
             Value::Number(v) => Ok(*v),
             Value::Whole(v) => Ok(*v as f64),
-            Value::Table(t) if t.first().is_some_and(|e| GRADES.contains(&e.0.as_str())) => {
-                let of_map = [".map.affine.", ".map.spartan."];
-                Err(self.error(match of_map.iter().any(|m| self.path.contains(m)) {
-                    true => {
-                        "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary"
-                    }
-                    false => "this number cannot vary in space; give one number",
-                }))
+            Value::Table(_) => {
+                Err(self.error(format!("expected one number, found {}; it cannot vary in space", describe(self.node))))
             }
             _ => Err(self.expected("a number")),
         }
@@ -246,15 +202,7 @@ impl<'a> At<'a> {
     pub fn is_number(&self) -> bool {
         matches!(self.node.value, Value::Number(_))
     }
-
-    pub fn is_text(&self) -> bool {
-        matches!(self.node.value, Value::Text(_))
-    }
 }
-
-/// The kinds of grade in this version.
-pub(crate) const GRADES: [&str; 11] =
-    ["linear", "depth", "radial", "formula", "grid", "points", "field", "sigmoid", "region", "distance", "rbf"];
 
 /// A table whose keys are known to be allowed.
 pub(crate) struct Fields<'a> {
@@ -270,15 +218,6 @@ impl<'a> Fields<'a> {
     pub fn need(&self, key: &str, meaning: &str) -> Result<&At<'a>, DesignError> {
         self.get(key)
             .ok_or_else(|| DesignError { found: None, ..self.at.error(format!("\"{key}\" is missing: {meaning}")) })
-    }
-
-    pub fn read<T>(
-        &self,
-        key: &str,
-        default: T,
-        read: impl FnOnce(&At<'a>) -> Result<T, DesignError>,
-    ) -> Result<T, DesignError> {
-        self.get(key).map_or(Ok(default), read)
     }
 }
 
@@ -316,7 +255,10 @@ impl<'a> Fields<'a> {
         let given = |set: &[Key]| self.entries.iter().find(|(name, _)| has(set, name) && !shared(name)).map(|e| e.0);
         let own = |set: &[Key]| set.iter().map(|k| k.name).filter(|n| !shared(n)).collect::<Vec<_>>().join(", ");
         let Some(first) = sets.iter().position(|s| given(s).is_some()) else {
-            // None is: the first required key is missing.
+            // None is: that of which no key is required, or else the first required key is missing.
+            if let Some(free) = sets.iter().position(|s| !s.iter().any(|k| k.required && !shared(k.name))) {
+                return Ok(free);
+            }
             let mut needed = sets.iter().flatten().filter(|k| k.required && self.get(k.name).is_none());
             return match needed.next() {
                 Some(key) => {

@@ -90,6 +90,12 @@ impl Node {
         Value::Table(entries.into_iter().map(|(key, node)| (key.to_string(), None, node)).collect()).into()
     }
 
+    /// The keys and values of a table; none of other nodes.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = (&str, &Node)> {
+        let entries = if let Value::Table(entries) = &self.value { entries.as_slice() } else { &[] };
+        entries.iter().map(|(key, _, node)| (key.as_str(), node))
+    }
+
     /// The same table with one more key, placed last; other nodes are left as they are.
     pub fn with(mut self, key: &str, node: Node) -> Node {
         if let Value::Table(entries) = &mut self.value {

@@ -74,7 +74,9 @@ impl Open {
             node = node.with("required", self.required.into());
         }
         if !self.choices.is_empty() {
-            node = node.with("oneOf", self.choices.into());
+            // An alternative without a required key is fulfilled whenever another is.
+            let free = self.choices.iter().any(|c| !c.entries().any(|e| e.0 == "required"));
+            node = node.with(if free { "anyOf" } else { "oneOf" }, self.choices.into());
         }
         node
     }
@@ -105,10 +107,16 @@ pub(crate) fn word_schema(key: &Key) -> Node {
 
 /// One table of a choice.
 pub(crate) fn named_schema<T: Kind>(key: Key, defs: &mut Defs) -> Node {
-    let mut open = Open::default();
-    open.property::<T>(Key { required: true, doc: "", ..key }, None, defs);
     let doc = if key.doc.is_empty() { T::DOC } else { key.doc };
-    open.node().described(doc).with("additionalProperties", false.into())
+    let part = named_part::<T>(Key { doc: "", ..key }, defs);
+    part.described(doc).with("additionalProperties", false.into())
+}
+
+/// One key of a choice, in a table with other keys.
+pub(crate) fn named_part<T: Kind>(key: Key, defs: &mut Defs) -> Node {
+    let mut open = Open::default();
+    open.property::<T>(Key { required: true, ..key }, None, defs);
+    open.node()
 }
 
 /// One of several kinds.

@@ -165,7 +165,7 @@ fn list_schema<T: Kind>(key: &Key, defs: &mut Defs) -> Node {
 
 impl<T: Kind> Kind for Vec<T> {
     fn expected() -> String {
-        "a list".into()
+        format!("a list, each {}", T::expected())
     }
 
     fn fits(node: &Node) -> u8 {
@@ -202,7 +202,8 @@ impl<T: Kind, const N: usize> Kind for [T; N] {
             ("a number", 3) => "three numbers [x, y, z]".into(),
             ("a number", _) => format!("{count} numbers"),
             ("a whole number", _) => format!("{count} whole numbers"),
-            (of, _) => format!("a list of {count}, each {of}"),
+            (of, _) if of.len() < 40 => format!("a list of {count}, each {of}"),
+            _ => format!("a list of {count}"),
         }
     }
 
@@ -237,9 +238,38 @@ impl<T: Kind, const N: usize> Kind for [T; N] {
     }
 }
 
-impl<T: Kind> Kind for BTreeMap<String, T> {
+/// The name of an entry: text, or a whole number.
+pub(crate) trait Name: Ord + Sized + ToString {
+    /// What a table of such names is.
+    const TABLE: &'static str;
+    /// A regular expression that all names match.
+    const PATTERN: Option<&'static str>;
+
+    /// The name, if it is one.
+    fn of(word: &str) -> Option<Self>;
+}
+
+impl Name for String {
+    const TABLE: &'static str = "a table of names";
+    const PATTERN: Option<&'static str> = None;
+
+    fn of(word: &str) -> Option<Self> {
+        Some(word.into())
+    }
+}
+
+impl Name for u32 {
+    const TABLE: &'static str = "a table of whole numbers";
+    const PATTERN: Option<&'static str> = Some("^(0|[1-9][0-9]*)$");
+
+    fn of(word: &str) -> Option<Self> {
+        word.parse::<u32>().ok().filter(|n| n.to_string() == word)
+    }
+}
+
+impl<N: Name, T: Kind> Kind for BTreeMap<N, T> {
     fn expected() -> String {
-        "a table of names".into()
+        N::TABLE.into()
     }
 
     fn fits(node: &Node) -> u8 {
@@ -247,21 +277,31 @@ impl<T: Kind> Kind for BTreeMap<String, T> {
     }
 
     fn read(at: &At) -> Result<Self, DesignError> {
-        let entries = at.entries(&Self::expected())?;
-        entries.iter().map(|(name, at)| Ok((name.to_string(), T::read(at)?))).collect()
+        let entry = |(name, at): (&str, At)| match N::of(name) {
+            Some(name) => Ok((name, T::read(&at)?)),
+            None => Err(at.error(format!("expected a whole number from 0, found \"{name}\""))),
+        };
+        at.entries(&Self::expected())?.into_iter().map(entry).collect()
     }
 
     fn write(&self) -> Node {
-        Value::Table(self.iter().map(|(name, of)| (name.clone(), None, of.write())).collect()).into()
+        Value::Table(self.iter().map(|(name, of)| (name.to_string(), None, of.write())).collect()).into()
     }
 
     fn check(&self, key: &Key) -> Result<(), Fault> {
-        self.iter().try_for_each(|(name, of)| of.check(key).map_err(|f| f.under(name)))
+        if self.len() < key.least {
+            let message = format!("at least {} needed, found {}", counted(key.least, "item"), self.len());
+            return Err(Fault::new("", message));
+        }
+        self.iter().try_for_each(|(name, of)| of.check(key).map_err(|f| f.under(&name.to_string())))
     }
 
     fn schema(key: &Key, defs: &mut Defs) -> Node {
         let of = T::schema(&Key { least: 0, ..*key }, defs);
-        let node = Node::table([("type", "object".into()), ("additionalProperties", of)]);
+        let mut node = Node::table([("type", "object".into()), ("additionalProperties", of)]);
+        if let Some(pattern) = N::PATTERN {
+            node = node.with("propertyNames", Node::table([("pattern", pattern.into())]));
+        }
         if key.least == 0 { node } else { node.with("minProperties", Value::Whole(key.least as i64).into()) }
     }
 }

@@ -3,9 +3,8 @@
 use rayon::prelude::*;
 
 use crate::design::data::*;
-use crate::design::grade::{Allowed, grade};
-use crate::design::level::check_varied;
-use crate::design::place::{Place, finite};
+use crate::design::grade::{Asked, key_of};
+use crate::design::place::Place;
 use crate::design::samples;
 use crate::grade::Grade;
 use crate::kind::DesignError;
@@ -14,8 +13,6 @@ use ::beams::quador::Pencil;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
 
-/// Nodes within this share of the mean length of struts are one.
-const ONE: f64 = 1e-6;
 /// Refuses beams that no quadric makes, with the place of the first and how many there are.
 pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> {
     let wrong: Vec<(usize, Fault)> = (graph.beams.par_iter().enumerate())
@@ -46,27 +43,16 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
 }
 
 pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii<Grade>, DesignError> {
-    let varied = |spec: &Option<GradeSpec>, key: &'static str| {
-        let Some(spec) = spec else { return Ok(None) };
-        let path = format!("{}.{key}", place.path);
-        let allowed = Allowed::Positive(key);
-        let made = grade(spec, &path, place, allowed, false)?;
-        if let GradeSpec::Kind(GradeKind::Formula(_)) = spec {
-            check_varied(&made, &format!("{path}.formula"), allowed, false, place)?;
-        }
-        Ok(Some(made))
+    let varied = |spec: &Option<GradeSpec>, key: &str| {
+        let asked = Asked::new(format!("{}.{key}", place.path), place, key_of::<BeamsSpec>(key));
+        spec.as_ref().map(|spec| spec.build(&asked)).transpose()
     };
-    let positive = |v: f64, kind: &str| {
-        let path = format!("{}.profile.{kind}", place.path);
-        Allowed::Positive(if kind == "waist" { "waist" } else { "lambda" }).check(&path, v, "")
-    };
-    let profile = match spec.profile {
-        None => None,
-        Some(ProfileSpec::Cone) => Some(Profile::Cone),
-        Some(ProfileSpec::Cylinder) => Some(Profile::Cylinder),
-        Some(ProfileSpec::Waist(v)) => Some(Profile::Waist(positive(v, "waist")?)),
-        Some(ProfileSpec::Lambda(v)) => Some(Profile::Lambda(positive(v, "lambda")?)),
-    };
+    let profile = spec.profile.map(|p| match p {
+        ProfileSpec::Cone => Profile::Cone,
+        ProfileSpec::Cylinder => Profile::Cylinder,
+        ProfileSpec::Waist(v) => Profile::Waist(v),
+        ProfileSpec::Lambda(v) => Profile::Lambda(v),
+    });
     Ok(Radii { radius: varied(&spec.radius, "radius")?, hub: varied(&spec.hub, "hub")?, profile })
 }
 
@@ -92,17 +78,6 @@ pub(super) fn mean_length(wire: &Wireframe) -> f64 {
     total / wire.struts.len().max(1) as f64
 }
 
-pub(super) fn merging(spec: &BeamsSpec, mean: f64, place: &Place) -> Result<f64, DesignError> {
-    match spec.merge {
-        None => Ok(ONE * mean),
-        Some(v) if v >= 0.0 && v.is_finite() => Ok(v),
-        Some(v) => {
-            let message = format!("merge is {} mm; it must be a finite number, 0 or more", number(v));
-            Err(DesignError::new(format!("{}.merge", place.path), message).found(number(v)))
-        }
-    }
-}
-
 /// Refuses a frame of which nothing is left.
 pub(super) fn check_left(wire: &Wireframe, key: &str, place: &Place) -> Result<(), DesignError> {
     if !wire.struts.is_empty() {
@@ -123,26 +98,25 @@ pub(super) fn check_left(wire: &Wireframe, key: &str, place: &Place) -> Result<(
 }
 
 /// Nodes and struts of the user's own.
-pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<f64>), DesignError> {
+pub(super) fn tables(graph: &NodeGraph, spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<f64>), DesignError> {
     let below = |key: &str| format!("{}.{key}", place.path);
     let read = |path: &str, key: &str| samples::bytes(path, &below(key), place);
     let wrong =
         |path: &str, key: &str, f: Fault| DesignError::new(below(key), format!("{path}: {}", f.message)).found(path);
-    let nodes = match &spec.nodes {
-        Some(NodesSpec::Path(path)) => {
+    let nodes = match &graph.nodes {
+        NodesSpec::Path(path) => {
             let text = read(path, "nodes")?;
             graph::nodes(&String::from_utf8_lossy(&text)).map_err(|f| wrong(path, "nodes", f))?
         }
-        Some(NodesSpec::Rows(rows)) => given(rows, &below("nodes"))?,
-        None => Nodes::default(),
+        NodesSpec::Rows(rows) => given(rows),
     };
-    let wire = match &spec.struts {
-        Some(StrutsSpec::Path(path)) => {
+    let wire = match &graph.struts {
+        StrutsSpec::Path(path) => {
             let text = read(path, "struts")?;
             let text = String::from_utf8_lossy(&text);
             graph::struts(&text, &nodes).map_err(|f| wrong(path, "struts", f))?
         }
-        Some(StrutsSpec::Rows(rows)) => {
+        StrutsSpec::Rows(Pairs(rows)) => {
             for (i, n) in rows.iter().enumerate().flat_map(|(i, r)| r.iter().map(move |n| (i, n))) {
                 if *n as usize >= nodes.positions.len() {
                     let message = format!(
@@ -155,7 +129,6 @@ pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<
             }
             Wireframe { nodes: nodes.positions.clone(), struts: rows.clone() }
         }
-        None => Wireframe::default(),
     };
     if spec.radius.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
         let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
@@ -165,26 +138,19 @@ pub(super) fn tables(spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<
 }
 
 /// Nodes that stand in the design.
-pub(in crate::design) fn given(rows: &[RowSpec], path: &str) -> Result<Nodes, DesignError> {
+pub(in crate::design) fn given(rows: &Rows) -> Nodes {
     let mut nodes = Nodes::default();
-    for (i, row) in rows.iter().enumerate() {
+    for (i, row) in rows.0.iter().enumerate() {
         let (at, radius) = match *row {
-            RowSpec::Place(p) => (p, None),
-            RowSpec::Ball([x, y, z, r]) => ([x, y, z], Some(r)),
+            RowSpec::Place(p) => (p, f64::NAN),
+            RowSpec::Ball([x, y, z, r]) => ([x, y, z], r),
         };
-        let path = format!("{path}[{i}]");
-        for v in at {
-            finite(&path, v)?;
-        }
-        if let Some(r) = radius {
-            Allowed::Positive("radius").check(&path, r, "")?;
-        }
         nodes.positions.push(at);
-        nodes.radii.push(radius.unwrap_or(f64::NAN));
+        nodes.radii.push(radius);
         nodes.names.insert(i.to_string(), i as u32);
     }
     if nodes.radii.iter().all(|r| r.is_nan()) {
         nodes.radii.clear();
     }
-    Ok(nodes)
+    nodes
 }

@@ -2,73 +2,148 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
-use serde::Serialize;
+use super::{GradeSpec, MapSpec};
+use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
 
-use super::{GradeSpec, MapSpec, is_default, is_one, one};
-use crate::design::schema;
+/// Graphs of beams, by name.
+#[derive(Clone, Debug, Default, PartialEq, Kind)]
+#[kind(before = named_first)]
+pub struct BeamsSpecs(pub BTreeMap<String, BeamsSpec>);
 
-/// Named graphs of beams.
-pub type BeamsSpecs = BTreeMap<String, BeamsSpec>;
+/// Explains that a name comes before the keys of beams.
+fn named_first(at: &At) -> Result<(), DesignError> {
+    let keys = BeamsSpec::keys();
+    match at.entries("beams by name, such as [beams.core]")?.iter().find(|e| keys.iter().any(|k| k.name == e.0)) {
+        Some((key, at)) => Err(at.error(format!("a name comes first, such as [beams.core] with {key}"))),
+        None => Ok(()),
+    }
+}
 
-/// A graph of beams: a unit cell on a map, or nodes and struts of your own.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// A graph of beams, filling the region.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Beams", noun = "beams", check = BeamsSpec::consistent)]
 pub struct BeamsSpec {
-    /// A ready unit cell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::beam_cell")]
-    pub cell: Option<String>,
-    /// Where the cells lie: nodes are carried, beams stay straight.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub map: Option<MapSpec>,
-    /// Nodes of your own, instead of a cell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nodes: Option<NodesSpec>,
-    /// The nodes that each beam joins.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub struts: Option<StrutsSpec>,
-    /// A program of repeats, instead of a cell or a graph.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pattern: Option<PatternSpec>,
-    /// Radius of a beam at mid length (mm), taken there. It may be left out where all hubs have radii.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The graph.
+    #[kind(flatten)]
+    pub graph: GraphSpec,
+    /// Radius of a beam at mid length, taken there. It may be left out where all hubs have radii.
+    #[kind(unit = "mm", above = 0.0)]
     pub radius: Option<GradeSpec>,
-    /// Radius of the balls in which beams meet (mm), taken at their centres; the largest radius of the beams that meet
-    /// there unless given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Radius of the balls in which beams meet, taken at their centres; the largest radius of the beams that meet there unless
+    /// given.
+    #[kind(unit = "mm", above = 0.0)]
     pub hub: Option<GradeSpec>,
     /// Which of the quadrics of revolution tangent to both balls a beam is; the one with the radius at mid length unless
     /// given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<ProfileSpec>,
-    /// How beams are rounded into one another.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Rounding of beams into one another.
+    #[kind(default)]
     pub fillet: FilletSpec,
+}
+
+impl BeamsSpec {
+    fn consistent(&self, _: &Key) -> Result<(), Fault> {
+        if let (GraphSpec::Cell(_), None, None) = (&self.graph, &self.radius, &self.hub) {
+            return Err(Fault::new("", "\"radius\" is missing: of a beam at mid length, mm"));
+        }
+        let GraphSpec::Pattern(_) = &self.graph else { return Ok(()) };
+        for (key, given) in [("radius", &self.radius), ("hub", &self.hub)] {
+            if let Some(GradeSpec::Kind(_)) = given {
+                return Err(Fault::new(
+                    key,
+                    "in a pattern it is one number, at the first repeat; it scales with the repeats",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where the beams of a graph come from.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a graph", alternatives)]
+pub enum GraphSpec {
+    /// A unit cell on a map.
+    Cell(CellGraph),
+    /// Nodes and struts.
+    Nodes(NodeGraph),
+    /// A program of repeats.
+    Pattern(PatternGraph),
+}
+
+impl GraphSpec {
+    /// Trimming, of a graph that is written out.
+    pub fn trimming(&self) -> Trimming {
+        match self {
+            GraphSpec::Cell(c) => c.trimming,
+            GraphSpec::Nodes(n) => n.trimming,
+            GraphSpec::Pattern(_) => Trimming::default(),
+        }
+    }
+}
+
+/// A unit cell on a map.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct CellGraph {
+    /// A ready unit cell, such as "octet".
+    pub cell: BeamCellName,
+    /// Position of the cells: nodes are mapped, beams stay straight.
+    pub map: MapSpec,
+    /// Trimming to the region.
+    #[kind(flatten)]
+    pub trimming: Trimming,
+}
+
+/// Nodes and struts.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct NodeGraph {
+    /// The nodes: rows of x, y, z (mm), or the path of a table (csv) of id, x, y, z.
+    pub nodes: NodesSpec,
+    /// The nodes that each beam joins: pairs of ids, or the path of a table (csv) of these.
+    pub struts: StrutsSpec,
+    /// Trimming to the region.
+    #[kind(flatten)]
+    pub trimming: Trimming,
+}
+
+/// A program of repeats.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct PatternGraph {
+    /// A program of repeats, which the region cuts.
+    pub pattern: PatternSpec,
+}
+
+/// What is done to beams at the region's surface and to nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Kind)]
+pub struct Trimming {
     /// What becomes of beams that leave the region.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default)]
     pub trim: TrimSpec,
     /// What becomes of beams with a free end inside the region.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[kind(default)]
     pub dangling: DanglingSpec,
-    /// Nodes so near to each other (mm) are one; a millionth of the mean beam's length unless given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Distance within which nodes are merged; a millionth of the mean beam's length unless given.
+    #[kind(unit = "mm", min = 0.0)]
     pub merge: Option<f64>,
 }
 
 /// Nodes in a file or in the design.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged, noun = "the path of a table, or rows of x, y, z in mm")]
 pub enum NodesSpec {
     /// Path of a table (csv) of id, x, y, z (mm) and perhaps a hub's radius (mm), relative to the design file.
     Path(String),
     /// Rows of x, y, z (mm) and perhaps a hub's radius (mm); their ids are 0, 1, 2 …
-    Rows(Vec<RowSpec>),
+    Rows(Rows),
 }
 
+/// Nodes: rows of x, y, z (mm) and perhaps a hub's radius (mm); their ids are 0, 1, 2 …
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct Rows(#[kind(least = 1)] pub Vec<RowSpec>);
+
 /// A node: x, y, z (mm) and perhaps a radius (mm).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(untagged, noun = "x, y, z and perhaps a radius, mm", check = RowSpec::positive)]
 pub enum RowSpec {
     /// x, y, z.
     Place([f64; 3]),
@@ -76,87 +151,169 @@ pub enum RowSpec {
     Ball([f64; 4]),
 }
 
+impl RowSpec {
+    fn positive(&self, _: &Key) -> Result<(), Fault> {
+        match self {
+            RowSpec::Ball([.., r]) => Key { name: "radius", unit: "mm", above: 0.0, ..Key::NONE }.admit(*r),
+            RowSpec::Place(_) => Ok(()),
+        }
+    }
+}
+
 /// Struts in a file or in the design.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged, noun = "the path of a table, or pairs of ids of nodes")]
 pub enum StrutsSpec {
     /// Path of a table (csv) of pairs of node ids, relative to the design file.
     Path(String),
     /// Pairs of node ids, whole numbers from 0.
-    Rows(Vec<[u32; 2]>),
+    Rows(Pairs),
 }
+
+/// Struts: pairs of node ids, whole numbers from 0.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct Pairs(#[kind(least = 1)] pub Vec<[u32; 2]>);
 
 /// A graph that is repeated by up to three steps: what is at [i, j, k] is the first step done i times, then the second j
 /// times, then the third k times. It is not written out, however often it is repeated.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Pattern", noun = "a pattern", check = PatternSpec::stepped)]
 pub struct PatternSpec {
     /// Rows of x, y, z (mm) and perhaps a hub's radius (mm), at [0, 0, 0]; their ids are 0, 1, 2 …
-    pub nodes: Vec<RowSpec>,
+    pub nodes: Rows,
     /// Rows of two ids and how many repeats on, along each step, the second node lies (0 unless given).
-    #[schemars(schema_with = "schema::pattern_struts")]
-    pub struts: Vec<[i32; 5]>,
-    /// One to three steps.
-    #[schemars(length(min = 1, max = 3))]
+    #[kind(least = 1)]
+    pub struts: Vec<PatternStrut>,
+    /// One to three steps, such as { count = 12, rotate = [0, 0, 30] }.
+    #[kind(least = 1)]
     pub repeat: Vec<RepeatSpec>,
 }
 
+impl PatternSpec {
+    fn stepped(&self, _: &Key) -> Result<(), Fault> {
+        match self.repeat.len() {
+            1..=3 => Ok(()),
+            n => Err(Fault::new("repeat", format!("expected one to three steps, found {n}"))),
+        }
+    }
+}
+
+/// A strut of a pattern: two ids and up to three repeats between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatternStrut(pub [i32; 5]);
+
+impl Kind for PatternStrut {
+    fn expected() -> String {
+        "two ids and up to three repeats, such as [0, 0, 1, 0, 0]".into()
+    }
+
+    fn fits(node: &Node) -> u8 {
+        Vec::<i32>::fits(node)
+    }
+
+    fn read(at: &At) -> Result<Self, DesignError> {
+        let items = at.list(&Self::expected())?;
+        if !(2..=5).contains(&items.len()) {
+            let found = geometry::fault::counted(items.len(), "value");
+            return Err(at.error(format!("expected {}, found {found}", Self::expected())));
+        }
+        let mut row = [0; 5];
+        for (i, (r, item)) in row.iter_mut().zip(&items).enumerate() {
+            *r = if i < 2 { u32::read(item)? as i32 } else { i32::read(item)? };
+        }
+        Ok(PatternStrut(row))
+    }
+
+    fn write(&self) -> Node {
+        self.0.write()
+    }
+
+    fn check(&self, _: &Key) -> Result<(), Fault> {
+        let most = Key { name: "id or repeat", min: -1e6, max: 1e6, ..Key::NONE };
+        self.0.check(&most)
+    }
+
+    fn schema(_: &Key, defs: &mut Defs) -> Node {
+        let count = |n| crate::kind::Value::Whole(n).into();
+        let list = Vec::<i32>::schema(&Key::NONE, defs);
+        list.with("minItems", count(2)).with("maxItems", count(5))
+    }
+}
+
 /// A step of a pattern: scaled and turned about a point, then moved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Repeat", noun = "a step")]
 pub struct RepeatSpec {
-    /// How often what is repeated is there, the original counted.
-    pub count: f64,
-    /// By how much each is moved from the last (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Number of repeats, the original counted.
+    #[kind(min = 1.0, max = 1e6)]
+    pub count: u32,
+    /// Displacement of each from the last.
+    #[kind(unit = "mm", default = [0.0; 3])]
     pub by: [f64; 3],
-    /// Angles about x, y, z (degrees): z is turned first, then y, then x.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Angles about x, y, z: z is turned first, then y, then x.
+    #[kind(unit = "degrees", default = [0.0; 3])]
     pub rotate: [f64; 3],
-    /// How many times as large each is as the last.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    /// Size of each in sizes of the last.
+    #[kind(min = 0.1, max = 10.0, default = 1.0)]
     pub scale: f64,
-    /// The point about which it is turned and scaled (mm).
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// The point about which it is turned and scaled.
+    #[kind(unit = "mm", default = [0.0; 3])]
     pub about: [f64; 3],
 }
 
 /// Which quadric a beam is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Profile", noun = "profile")]
 pub enum ProfileSpec {
     /// The cone: what covers both balls most tightly.
     Cone,
     /// The cylinder; hubs must be equal.
     Cylinder,
-    /// The hyperboloid whose thinnest place has this radius (mm).
+    /// The hyperboloid whose least radius is this.
+    #[kind(unit = "mm", above = 0.0)]
     Waist(f64),
     /// By the parameter of the pencil of quadrics: 1 for a cylinder or paraboloid, less for a barrel, more for a waist.
+    #[kind(above = 0.0)]
     Lambda(f64),
 }
 
-/// How beams are rounded into one another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+/// Rounding of beams into one another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Kind)]
+#[kind(name = "Fillet", noun = "fillet", before = unnamed)]
 pub enum FilletSpec {
-    /// Not: they meet in creases.
+    /// No fillets: beams meet in creases.
     #[default]
     None,
     /// The largest that each hub allows.
     Auto,
-    /// With this radius (mm) in the tightest place; where it cannot be had, with the largest that can, and a warning.
+    /// With this radius in the tightest crotch; where it does not fit, with the largest that does, and a warning.
+    #[kind(unit = "mm", above = 0.0)]
     Radius(f64),
-    /// By τ, from 0 up to 1, exclusive: nearly 1 is a small fillet.
+    /// By τ: nearly 1 is a small fillet.
+    #[kind(min = 0.0, below = 1.0)]
     Tau(f64),
-    /// By α, above 0 and up to ½: a larger one is a larger fillet; τ = (1 − 4α²)/(1 + 4α²).
+    /// By α: a larger one is a larger fillet; τ = (1 − 4α²)/(1 + 4α²).
+    #[kind(above = 0.0, max = 0.5)]
     Alpha(f64),
-    /// By β = 1/(4α), from ½ on: a larger one is a smaller fillet.
+    /// By β = 1/(4α): a larger one is a smaller fillet.
+    #[kind(min = 0.5)]
     Beta(f64),
 }
 
+/// Explains what a number alone lacks.
+fn unnamed(at: &At) -> Result<(), DesignError> {
+    match at.is_number() {
+        true => {
+            Err(at
+                .error("a number alone does not name its quantity; for a radius in mm write fillet = { radius = 0.5 }"))
+        }
+        false => Ok(()),
+    }
+}
+
 /// What becomes of beams that leave the region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(name = "Trim", noun = "trim")]
 pub enum TrimSpec {
     /// They are cut by the region's surface.
     #[default]
@@ -168,12 +325,40 @@ pub enum TrimSpec {
 }
 
 /// What becomes of beams with a free end inside the region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(name = "Dangling", noun = "word")]
 pub enum DanglingSpec {
     /// They stay, with a warning.
     #[default]
     Keep,
     /// They are left out, one after the other.
     Drop,
+}
+
+name_of! {
+    /// The name of a ready unit cell of beams.
+    BeamCellName, "cell of beams", beams::graph::catalogue().iter().map(|u| u.name), surface,
+    [
+        ("simple_cubic", "sc"),
+        ("cubic", "sc"),
+        ("grid", "sc"),
+        ("body_centred_cubic", "bcc"),
+        ("body_centered_cubic", "bcc"),
+        ("face_centred_cubic", "fcc"),
+        ("face_centered_cubic", "fcc"),
+        ("octet_truss", "octet"),
+        ("octahedron", "octahedra"),
+        ("cuboctahedron", "octahedra"),
+        ("truncated_octahedron", "kelvin"),
+        ("tetrakaidecahedron", "kelvin"),
+        ("fluorite", "rhombic_dodecahedron"),
+        ("dodecahedron", "rhombic_dodecahedron"),
+        ("auxetic", "re_entrant"),
+        ("honeycomb", "hexagonal_prism"),
+    ]
+}
+
+/// Why a word is no cell of beams, if it is another kind of cell.
+fn surface(word: &str) -> Option<String> {
+    crate::cell::named(word).map(|_| format!("{word} is a surface, not a cell of beams; write it as a lattice"))
 }

@@ -2,26 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use super::{GradeSpec, is_default};
+use super::GradeSpec;
+use crate::kind::{Fault, Key, Kind};
 
 /// Several lattices in one part: which of them is where.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Blend", noun = "a blend")]
 pub struct BlendSpec {
     /// The lattices and their weights.
-    #[serde(flatten)]
+    #[kind(flatten)]
     pub lattices: BlendKind,
-    /// What the blend keeps where it passes from one lattice to another.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// What the blend keeps between one lattice and another.
+    #[kind(default)]
     pub by: BySpec,
 }
 
 /// The lattices of a blend: two and one weight, or any number with a weight each.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a blend", alternatives)]
 pub enum BlendKind {
     /// Two.
     Between(BetweenSpec),
@@ -30,25 +28,36 @@ pub enum BlendKind {
 }
 
 /// Two lattices.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(check = BetweenSpec::different)]
 pub struct BetweenSpec {
-    /// Their names.
+    /// The names of two lattices.
     pub between: [String; 2],
-    /// How much the second counts, from 0 to 1; what is below or above counts as 0 or 1.
+    /// Weight of the second, from 0 to 1; what is below or above counts as 0 or 1.
     pub weight: GradeSpec,
 }
 
+impl BetweenSpec {
+    fn different(&self, _: &Key) -> Result<(), Fault> {
+        let [a, b] = &self.between;
+        match a == b {
+            true => Err(Fault::new("between[1]", format!("\"{b}\" is named twice; a blend is between two lattices"))),
+            false => Ok(()),
+        }
+    }
+}
+
 /// Any number of lattices.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Kind)]
 pub struct OfSpec {
-    /// How much each counts, by name; divided by their sum. What is below 0 counts as 0.
-    #[schemars(extend("minProperties" = 2))]
+    /// Weight of each lattice, by name; divided by their sum. What is below 0 counts as 0.
+    #[kind(least = 2)]
     pub of: BTreeMap<String, GradeSpec>,
 }
 
 /// What a blend keeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(name = "By", noun = "word")]
 pub enum BySpec {
     /// The solid fractions: each lattice's own where it is alone, their weighted mean between.
     #[default]

@@ -5,7 +5,7 @@ use crate::design::data::*;
 use crate::design::place::Place;
 use crate::grade::{Grade, Samples};
 use crate::kind::DesignError;
-use geometry::fault::{Fault, counted, number};
+use geometry::fault::{Fault, counted};
 use geometry::formats::{self, Shape};
 use geometry::math::Aabb;
 
@@ -21,10 +21,10 @@ pub(in crate::design) fn field(spec: &FieldSpec, path: &str, place: &Place) -> R
             &at,
             format!("the array \"{}\" has {n} components; give component, from 0 to {}", array.name, n - 1),
         )),
-        (Some(c), n) if c >= 0.0 && c < n as f64 && c.fract() == 0.0 => Ok(vec![c as usize]),
+        (Some(c), n) if (c as usize) < n => Ok(vec![c as usize]),
         (Some(c), n) => Err(DesignError::new(
             &at,
-            format!("component is {}; the array \"{}\" has components 0 to {}", number(c), array.name, n - 1),
+            format!("component is {}; the array \"{}\" has components 0 to {}", c, array.name, n - 1),
         )),
     })?;
     let one = made.into_iter().next();

@@ -6,7 +6,7 @@ use crate::design::place::Place;
 use crate::extract;
 use crate::kind::DesignError;
 use crate::solid::Solid;
-use geometry::fault::{Fault, number};
+use geometry::fault::Fault;
 use geometry::formats::{self, Elements, Shape};
 use geometry::math::scale;
 use geometry::mesh::Mesh;
@@ -50,10 +50,6 @@ pub(super) fn wild(
     path: &str,
     loader: &dyn Loader,
 ) -> Result<(TetMesh, Checked), DesignError> {
-    if !(made.limit > 0.0 && made.limit.is_finite()) {
-        let message = format!("limit is {} s; it must be a finite number greater than 0", number(made.limit));
-        return Err(DesignError::new(format!("{path}.limit"), message));
-    }
     loader
         .tetrahedra("ftetwild", surface, size, made.limit)
         .map_err(|m| DesignError::new(format!("{path}.mesher"), m).found("ftetwild"))?
