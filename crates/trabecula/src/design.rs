@@ -8,16 +8,12 @@ mod blend;
 mod build;
 mod cell;
 mod data;
-mod grade;
 mod joins;
 mod level;
 mod map;
 mod pattern;
-mod place;
-mod region;
 mod report;
 mod sample;
-mod samples;
 mod schema;
 mod skin;
 #[cfg(test)]
@@ -33,6 +29,7 @@ use serde_json::Value as Json;
 
 use crate::beam_surface::BeamSurface;
 use crate::cell::Cell;
+use crate::environment;
 use crate::extract::GridSurface;
 use crate::kind::{At, Kind};
 use crate::lattice::Lattice;
@@ -43,11 +40,9 @@ use crate::surface_maker::SurfaceMaker;
 use crate::tiling::{Tiling, TilingSurface};
 use crate::truss::Beams;
 use geometry::fault::Fault;
-use geometry::formats::Elements;
-use geometry::mesh::Mesh;
 use geometry::repair::Repaired;
-use geometry::tetmesh::TetMesh;
 
+pub use crate::environment::{Loader, NoFiles};
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use blend::Blended;
 pub use data::*;
@@ -92,40 +87,6 @@ pub enum Units {
     /// Millimetre.
     #[default]
     Mm,
-}
-
-/// Hands over the files that a design refers to.
-pub trait Loader {
-    /// The bytes of the file at `path`, or one sentence why not.
-    fn load(&self, path: &str) -> Result<Vec<u8>, String>;
-
-    /// The names of the files that `pattern` stands for, in which one * of the last part stands for anything; or one sentence
-    /// why there are none.
-    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
-        Err(format!("{pattern}: folders are not looked into here"))
-    }
-
-    /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
-    /// each or for none; or one sentence why not.
-    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
-        Err(format!("{path}: only vtu and vtk files are read here"))
-    }
-
-    /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this
-    /// time (s); or one sentence why not.
-    fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
-        let _ = (surface, size, limit);
-        Err(format!("the mesher {name} is not available here"))
-    }
-}
-
-/// A loader for designs that refer to no files.
-pub struct NoFiles;
-
-impl Loader for NoFiles {
-    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
-        Err(format!("{path}: no folder is known to read it from; use a design file"))
-    }
 }
 
 /// A lattice over a tetrahedral mesh.
@@ -277,7 +238,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
         build::space(&Design::from_node(node)?, loader)
     } else {
         let alone = RegionFile::read(&At::root(node))?;
-        region::region(&alone.region, "region", loader, &mut crate::region::Notes::default())
+        environment::region(&alone.region, "region", loader, &mut crate::region::Notes::default())
     };
     found.map_err(|mut e| {
         e.line = e.line.or_else(|| lines.line(&e.path));

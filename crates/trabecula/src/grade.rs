@@ -3,33 +3,90 @@
 use std::sync::Arc;
 
 use crate::field::Field;
-use geometry::math::{Aabb, Interval, Vec3};
+use crate::kind::{DesignError, Kind};
+use geometry::fault::Fault;
+use geometry::math::{Aabb, Interval, Vec3, norm};
 
+mod complement;
+mod control_points;
+mod csv;
 mod depth;
 mod formula;
+mod grid;
 mod linear;
+mod points;
 mod polyline;
+mod quantity;
 mod radial;
 mod rbf;
 mod region_step;
 mod remapped;
+mod result;
 mod samples;
 mod sigmoid;
-mod steps;
 mod stops;
 
+pub use control_points::ControlPoints;
 pub use depth::Depth;
 pub use formula::Formula;
 pub use linear::Linear;
 pub use polyline::Polyline;
+pub(crate) use quantity::{Build, Quantity, key_of};
 pub use radial::Radial;
 pub use rbf::Rbf;
 pub use region_step::region_step;
 pub use remapped::Remapped;
+pub use result::FieldKind;
+pub(crate) use result::several;
 pub use samples::Samples;
-pub use sigmoid::Sigmoid;
-pub use steps::Steps;
-use stops::Stops;
+pub use sigmoid::{Sigmoid, SigmoidKind};
+pub use stops::Stops;
+
+/// A number that may vary in space, as it is declared.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged)]
+pub enum GradeSpec {
+    /// The same everywhere.
+    Constant(f64),
+    /// Varying.
+    Kind(GradeKind),
+}
+
+/// How a number varies in space. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Grade", noun = "grade", family = Build, inherit)]
+#[allow(missing_docs)] // The comment of each type says what it is.
+pub enum GradeKind {
+    Linear(Linear),
+    Depth(depth::DepthKind),
+    Radial(radial::RadialKind),
+    Formula(formula::FormulaKind),
+    Grid(grid::GridKind),
+    Points(points::PointsKind),
+    Field(FieldKind),
+    Sigmoid(SigmoidKind),
+    Region(region_step::WithinKind),
+    Distance(polyline::DistanceKind),
+    Rbf(rbf::RbfKind),
+}
+
+impl GradeSpec {
+    /// The grade; its constants and stops have been checked.
+    pub(crate) fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        match self {
+            GradeSpec::Constant(v) => Ok(Grade::Constant(of.own(*v))),
+            GradeSpec::Kind(kind) => kind.family().build(&of.below(kind.key())),
+        }
+    }
+}
+
+/// Refuses a direction of no length.
+fn directed(key: &str, direction: Option<Vec3>) -> Result<(), Fault> {
+    match direction.is_some_and(|d| norm(d) == 0.0) {
+        true => Err(Fault::new(key, "the direction is zero; give one such as [0, 0, 1]")),
+        false => Ok(()),
+    }
+}
 
 /// A number that varies in space.
 pub trait Varying: Field {
@@ -139,13 +196,12 @@ mod tests {
         vec![
             Grade::Constant(0.3),
             Linear::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
-            Steps::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
             Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
             formula("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)"),
             Radial::new([0.2, 0.1, 0.0], None, stops()).unwrap().into(),
             Radial::new([0.2, 0.1, 0.0], Some([0.6, 0.0, 0.8]), stops()).unwrap().into(),
             grid().into(),
-            Remapped::new(grid(), vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]]).unwrap().into(),
+            Remapped::new(grid(), Stops(vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]])).into(),
             Sigmoid::new(formula("x + y*z"), 0.2, 1.5).unwrap().into(),
             region_step(Arc::new(Ball), 0.7).unwrap().into(),
             Polyline::new(chain(), false, None, None).unwrap().into(),
@@ -232,7 +288,6 @@ mod tests {
         assert_eq!(at(Linear::new(z, vec![[0.0, f64::NAN]])).as_deref(), Some("stops[0]"));
         let late = vec![[0.0, 1.0], [f64::INFINITY, 2.0]];
         assert_eq!(at(Depth::new(Arc::new(Ball), late)).as_deref(), Some("stops[1]"));
-        assert_eq!(at(Remapped::new(grid(), vec![])).as_deref(), Some("stops"));
         assert_eq!(at(Radial::new([0.0; 3], Some([0.0; 3]), one())).as_deref(), Some("axis"));
         assert_eq!(at(Radial::new([f64::INFINITY; 3], None, one())).as_deref(), Some("center"));
         assert_eq!(at(Sigmoid::new(Grade::Constant(0.0), 0.0, 0.0)).as_deref(), Some("width"));

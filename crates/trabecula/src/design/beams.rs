@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::data::*;
 use super::pattern;
-use super::place::{LOOKS, Place};
 use super::{Built, Warning};
 use super::{map, sample};
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::kind::DesignError;
@@ -32,36 +32,40 @@ const ONE: f64 = 1e-6;
 const ON: f64 = 1e-9;
 
 /// The beams of a design, filling the region.
-pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>) -> Result<Beams, DesignError> {
+pub(super) fn beams(
+    spec: &BeamsSpec,
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<Beams, DesignError> {
     if let GraphSpec::Pattern(of) = &spec.graph {
-        return pattern::laid(spec, &of.pattern, place, warnings).map(|p| Beams::Pattern(Arc::new(p)));
+        return pattern::laid(spec, &of.pattern, environment, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
-    let fault = |f: Fault| DesignError::fault(&place.path, f);
-    let radii = radii(spec, place)?;
-    let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &radii, place, warnings)?;
+    let fault = |f: Fault| DesignError::fault(&environment.path, f);
+    let radii = radii(spec, environment)?;
+    let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &radii, environment, warnings)?;
     let trimming = spec.graph.trimming();
     let mut cleaned = wire.clean(trimming.merge.unwrap_or_else(|| ONE * mean_length(&wire)), &mut own);
     let cell = match &spec.graph {
         GraphSpec::Cell(of) => graph::named(&of.cell.0),
         _ => None,
     };
-    check_left(&wire, if cell.is_some() { "map" } else { "struts" }, place)?;
+    check_left(&wire, if cell.is_some() { "map" } else { "struts" }, environment)?;
     if cell.is_none() {
-        tell_cleaned(&cleaned, &place.path, warnings);
+        tell_cleaned(&cleaned, &environment.path, warnings);
     }
     let trim = match trimming.trim {
         TrimSpec::Cut => Trim::Cut,
         TrimSpec::Drop => Trim::Drop,
         TrimSpec::Snap => Trim::Snap,
     };
-    let space: &dyn Field = &**place.region;
-    let slack = ON * norm(place.region.bounds().size());
+    let space: &dyn Field = &**environment.region;
+    let slack = ON * norm(environment.region.bounds().size());
     let trimmed = trim.apply(&mut wire, &|p, out| space.values(p, out), reach, slack, &mut own);
-    check_left(&wire, "trim", place)?;
+    check_left(&wire, "trim", environment)?;
     let held = |p: Vec3| space.value(p) >= -slack;
     if trimming.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
-        check_left(&wire, "dangling", place)?;
+        check_left(&wire, "dangling", environment)?;
     }
     let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
@@ -90,8 +94,8 @@ pub(super) fn beams(spec: &BeamsSpec, place: &Place, warnings: &mut Vec<Warning>
         trimmed,
         dangling: wire.dangling(&held),
     };
-    check_open(&*truss.quadors, place)?;
-    warn(&truss, &fillets, spec, place, warnings);
+    check_open(&*truss.quadors, environment)?;
+    warn(&truss, &fillets, spec, environment, warnings);
     Ok(Beams::Truss(Arc::new(truss)))
 }
 
@@ -154,12 +158,12 @@ struct Frame {
 fn frame(
     spec: &BeamsSpec,
     radii: &Radii<Grade>,
-    place: &Place,
+    environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Frame, DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
-    let bounds = place.region.bounds();
-    let thick = thickest(radii, &bounds, place);
+    let below = |key: &str| format!("{}.{key}", environment.path);
+    let bounds = environment.region.bounds();
+    let thick = thickest(radii, &bounds, environment);
     // Fillets end halfway along the beams: all those of a hub so near count for what is in the region.
     let reach = |longest: f64| match spec.fillet {
         FilletSpec::None => thick,
@@ -168,20 +172,20 @@ fn frame(
     let (cell, map) = match &spec.graph {
         GraphSpec::Cell(of) => (&of.cell.0, &of.map),
         GraphSpec::Nodes(of) => {
-            let (wire, own) = tables(of, spec, place)?;
+            let (wire, own) = tables(of, spec, environment)?;
             let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
             let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
             return Ok(Frame { wavelength: mean_length(&wire), reach: reach(longest).max(largest), wire, own });
         }
-        GraphSpec::Pattern(_) => return Err(DesignError::new(&place.path, "a pattern is no frame")),
+        GraphSpec::Pattern(_) => return Err(DesignError::new(&environment.path, "a pattern is no frame")),
     };
     let unit = graph::named(cell).ok_or_else(|| DesignError::new(below("cell"), "no such cell"))?;
-    let net = unit.graph().map_err(|f| DesignError::fault(&place.path, f))?;
-    let at = Place { path: below("map"), ..*place };
+    let net = unit.graph().map_err(|f| DesignError::fault(&environment.path, f))?;
+    let at = Environment { path: below("map"), ..*environment };
     let made = map::map(map, &at)?;
-    map::warn(&made, map, &place.path, warnings);
+    map::warn(&made, map, &environment.path, warnings);
     for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
-        let most = grade.as_ref().map_or(0.0, |g| greatest(g, place));
+        let most = grade.as_ref().map_or(0.0, |g| greatest(g, environment));
         if most > made.longest() {
             let message = format!(
                 "{key} is {} mm; it must be greater than 0 and at most the wavelength, {} mm",
@@ -209,19 +213,19 @@ pub(super) fn fillet(spec: FilletSpec) -> Fillet {
 }
 
 /// Refuses beams that leave the region empty or fill it.
-pub(super) fn check_open(field: &dyn Field, place: &Place) -> Result<(), DesignError> {
+pub(super) fn check_open(field: &dyn Field, environment: &Environment) -> Result<(), DesignError> {
     let share = |points: &[Vec3]| {
         let mut values = vec![0.0; points.len()];
         field.values(points, &mut values);
         values.iter().filter(|v| **v <= 0.0).count() as f64 / points.len().max(1) as f64
     };
     let mixed = |v: f64| v > 0.0 && v < 1.0;
-    if mixed(share(place.points)) {
+    if mixed(share(environment.points)) {
         return Ok(());
     }
-    match share(&sample::inside(place.region, 10 * LOOKS).0) {
+    match share(&sample::inside(environment.region, 10 * sample::COUNT).0) {
         v if v >= 1.0 => Err(DesignError::new(
-            format!("{}.radius", place.path),
+            format!("{}.radius", environment.path),
             "the beams are so thick that the region is solid everywhere: nothing is open",
         )),
         // A few thin beams may be missed by every look.

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::Warning;
 use super::data::{BlendKind, BlendSpec, BySpec, GradeKind, GradeSpec};
-use super::grade::Asked;
-use super::place::Place;
 use super::sample;
 use crate::blend::{Blend, By, Constituent, Weights};
+use crate::environment::Environment;
+use crate::grade::Quantity;
 use crate::kind::{DesignError, Key};
 use geometry::fault::number;
 use geometry::math::{Vec3, add, norm, scale, sub};
@@ -75,12 +75,17 @@ pub struct Functions {
 }
 
 /// The radial basis functions in a weight, itself or under a step.
-fn functions(spec: &GradeSpec, path: &str, place: &Place, out: &mut Vec<Functions>) -> Result<(), DesignError> {
+fn functions(
+    spec: &GradeSpec,
+    path: &str,
+    environment: &Environment,
+    out: &mut Vec<Functions>,
+) -> Result<(), DesignError> {
     match spec {
-        GradeSpec::Kind(GradeKind::Sigmoid(s)) => functions(&s.of, &format!("{path}.sigmoid.of"), place, out),
+        GradeSpec::Kind(GradeKind::Sigmoid(s)) => functions(&s.of, &format!("{path}.sigmoid.of"), environment, out),
         GradeSpec::Kind(GradeKind::Rbf(r)) => {
             let path = format!("{path}.rbf");
-            let made = r.functions(&path, place)?;
+            let made = r.functions(&path, environment)?;
             let (points, delta, condition) = (made.len(), made.delta(), made.condition());
             out.push(Functions { path, points, delta, condition });
             Ok(())
@@ -93,7 +98,7 @@ fn functions(spec: &GradeSpec, path: &str, place: &Place, out: &mut Vec<Function
 pub(super) fn blend(
     spec: &BlendSpec,
     members: &[Member],
-    place: &Place,
+    environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Blended, DesignError> {
     let names = spec.names();
@@ -109,24 +114,24 @@ pub(super) fn blend(
     }
     let (mut grades, mut rbf) = (Vec::new(), Vec::new());
     for (path, spec) in spec.weights() {
-        functions(spec, &path, place, &mut rbf)?;
-        let here = Place { path: path.clone(), ..*place };
-        grades.push(spec.build(&Asked::new(path, &here, Key::NONE))?);
+        functions(spec, &path, environment, &mut rbf)?;
+        let here = Environment { path: path.clone(), ..*environment };
+        grades.push(spec.build(&Quantity::new(path, &here, Key::NONE))?);
     }
     let weights = match (&spec.lattices, grades.pop()) {
         (BlendKind::Between(_), Some(weight)) => Weights::between(weight),
         (_, last) => Weights::shares(grades.into_iter().chain(last).collect()),
     };
-    check_weights(&weights, spec, place)?;
+    check_weights(&weights, spec, environment)?;
     let by = match spec.by {
         BySpec::Fraction => By::Fraction,
         BySpec::Value => By::Value,
     };
-    let bounds = place.region.bounds();
-    let width = narrowest(&weights, place.points);
+    let bounds = environment.region.bounds();
+    let width = narrowest(&weights, environment.points);
     let longest = members.iter().map(|m| m.of.longest()).fold(0.0, f64::max);
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
-    unused(&blend, &names, members, place, warnings);
+    unused(&blend, &names, members, environment, warnings);
     if let Some(width) = width.filter(|w| *w < 2.0 * longest) {
         let message = format!(
             "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
@@ -140,10 +145,10 @@ pub(super) fn blend(
 }
 
 /// Refuses weights that are no number, or none of which counts, at any sample position.
-fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(), DesignError> {
+fn check_weights(weights: &Weights, spec: &BlendSpec, environment: &Environment) -> Result<(), DesignError> {
     let paths = spec.weights();
-    let (points, _) = sample::inside(place.region, 60_000);
-    let points: Vec<Vec3> = points.into_iter().chain(place.points.iter().copied()).collect();
+    let (points, _) = sample::inside(environment.region, 60_000);
+    let points: Vec<Vec3> = points.into_iter().chain(environment.points.iter().copied()).collect();
     let mut most = vec![f64::NEG_INFINITY; points.len()];
     let mut values = vec![0.0; points.len()];
     let at = |i: usize| points[i].map(|v| format!("{v:.4}")).join(", ");
@@ -166,10 +171,10 @@ fn check_weights(weights: &Weights, spec: &BlendSpec, place: &Place) -> Result<(
 }
 
 /// Warns of lattices that count nowhere.
-fn unused(blend: &Blend, names: &[&str], members: &[Member], place: &Place, warnings: &mut Vec<Warning>) {
+fn unused(blend: &Blend, names: &[&str], members: &[Member], environment: &Environment, warnings: &mut Vec<Warning>) {
     let n = names.len();
-    let mut w = vec![0.0; n * place.points.len()];
-    blend.weights().values(place.points, &mut w);
+    let mut w = vec![0.0; n * environment.points.len()];
+    blend.weights().values(environment.points, &mut w);
     for (i, name) in names.iter().enumerate() {
         if w.chunks_exact(n).all(|w| w[i] == 0.0) {
             let message = "the weight of this lattice is 0 at every sample position in the region".to_string();

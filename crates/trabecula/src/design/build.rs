@@ -4,12 +4,10 @@ use std::sync::Arc;
 
 use super::cell::cell;
 use super::data::*;
-use super::place::{LOOKS, Place};
-use super::{
-    Built, Design, Loader, Tiled, Warning, beams, blend, level, map, region, sample, skin, tets, tiling, warn,
-};
+use super::{Built, Design, Loader, Tiled, Warning, beams, blend, level, map, sample, skin, tets, tiling, warn};
 use crate::blend::Constituent;
 use crate::cell::Part;
+use crate::environment::{self, Environment};
 use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
@@ -46,7 +44,7 @@ fn given(
     loader: &dyn Loader,
     notes: &mut crate::region::Notes,
 ) -> Result<(Region, Option<tets::Tets>), DesignError> {
-    match region::region(&d.region, "region", loader, notes) {
+    match environment::region(&d.region, "region", loader, notes) {
         Ok(space) => Ok((space, None)),
         Err(why) => {
             let (made, space) = tiling::of_soup(d, loader, why)?;
@@ -80,7 +78,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     let space = domain.as_ref().map_or(space, |d| d.region.clone());
     let bounds = space.bounds();
-    let (mut points, _) = sample::inside(&space, LOOKS);
+    let (mut points, _) = sample::inside(&space, sample::COUNT);
     if points.is_empty() {
         let [x, y, z] = bounds.size().map(number);
         let message = format!("the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm");
@@ -96,14 +94,14 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let crate::region::Notes { mut warnings, repairs } = notes;
     let (mut lattices, mut tilings) = (Vec::new(), Vec::new());
     if let Some(domain) = domain {
-        let place = Place {
+        let environment = Environment {
             path: format!("lattice.{}", domain.name),
             region: &space,
             points: &points,
             filled: &filled,
             loader,
         };
-        let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, &place, &mut warnings)?;
+        let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, &environment, &mut warnings)?;
         tilings.push(Tiled {
             name: domain.name.to_string(),
             tiling: tiling.clone(),
@@ -129,21 +127,22 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let others = d.lattice.iter();
     for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapSpec::Tets(_))) {
         let path = format!("lattice.{name}");
-        let place = Place { path: path.clone(), region: &space, points: &points, filled: &filled, loader };
+        let environment = Environment { path: path.clone(), region: &space, points: &points, filled: &filled, loader };
         if spec.level.of == Of::Part && d.blend.is_some() {
             let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
             return Err(DesignError::new(format!("{path}.level.of"), message));
         }
-        let built = Arc::new(lattice(spec, &place)?);
-        warn::check(&built, &place, spec)?;
-        warn::warn(&built, &place, spec, &mut warnings);
+        let built = Arc::new(lattice(spec, &environment)?);
+        warn::check(&built, &environment, spec)?;
+        warn::warn(&built, &environment, spec, &mut warnings);
         map::warn(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
     let mut graphs = Vec::new();
     for (name, spec) in &d.beams.0 {
-        let place = Place { path: format!("beams.{name}"), region: &space, points: &points, filled: &filled, loader };
-        let made = beams::beams(spec, &place, &mut warnings)?;
+        let environment =
+            Environment { path: format!("beams.{name}"), region: &space, points: &points, filled: &filled, loader };
+        let made = beams::beams(spec, &environment, &mut warnings)?;
         graphs.push((name.clone(), made));
     }
     let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
@@ -153,8 +152,9 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut blended = None;
     let field: Arc<dyn Implicit> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
         (Some(spec), ..) => {
-            let place = Place { path: "blend".into(), region: &space, points: &points, filled: &filled, loader };
-            let made = blend::blend(spec, &members(&lattices, &tilings, &graphs), &place, &mut warnings)?;
+            let environment =
+                Environment { path: "blend".into(), region: &space, points: &points, filled: &filled, loader };
+            let made = blend::blend(spec, &members(&lattices, &tilings, &graphs), &environment, &mut warnings)?;
             let field = made.blend.clone();
             blended = Some(made);
             field
@@ -200,18 +200,18 @@ fn members(lattices: &[(String, Arc<Lattice>)], tilings: &[Tiled], graphs: &[(St
     lattices.chain(tilings).chain(graphs).collect()
 }
 
-fn lattice(spec: &LatticeSpec, place: &Place) -> Result<Lattice, DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
-    let (name, cell) = cell(&spec.cell, &below("cell"), place.loader)?;
+fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, DesignError> {
+    let below = |key: &str| format!("{}.{key}", environment.path);
+    let (name, cell) = cell(&spec.cell, &below("cell"), environment.loader)?;
     let left_out = cell.truncation();
     let mut cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
     if let Some(share) = left_out {
         cell = cell.truncated(share);
     }
     let cell = Arc::new(cell);
-    let here = Place { path: below("map"), ..*place };
+    let here = Environment { path: below("map"), ..*environment };
     let map = map::map(&spec.map, &here)?;
-    let here = Place { path: below("level"), ..*place };
+    let here = Environment { path: below("level"), ..*environment };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
 }

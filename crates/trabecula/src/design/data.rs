@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::cell::tet::tet_catalogue;
 use crate::cell::{catalogue, named};
+pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
+pub use crate::kind::Unit;
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
-pub use crate::kind::{OneOrThree, Unit};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::symmetry::Group;
 
@@ -56,12 +57,10 @@ macro_rules! name_of {
 
 mod beams;
 mod blend;
-mod grade;
 mod map;
 
 pub use beams::*;
 pub use blend::*;
-pub use grade::*;
 pub use map::*;
 
 /// A lattice: a cell seen through a map, cut by a part at a level.

@@ -1,12 +1,12 @@
 //! How much is solid: data to [`Level`].
 
 use super::data::{AmountSpec, Fit, GradeSpec, LevelSpec, Of, PartSpec};
-use super::grade::{Asked, key_of};
-use super::place::Place;
 use super::sample;
 use crate::cell::{Cell, Part};
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
@@ -58,14 +58,14 @@ pub(super) fn level(
     name: Option<&str>,
     cell: &Arc<Cell>,
     map: &Map,
-    place: &Place,
+    environment: &Environment,
 ) -> Result<Level, DesignError> {
-    let path = |key: &str| format!("{}.{key}", place.path);
+    let path = |key: &str| format!("{}.{key}", environment.path);
     let (key, value) = (spec.amount.key(), spec.amount.grade());
     if key == "thickness" {
         check_sheet(part, key, &path(key))?;
     }
-    let asked = spec.amount.asked(path(key), place);
+    let asked = spec.amount.asked(path(key), environment);
     let amount = value.build(&asked)?;
     if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
@@ -98,7 +98,7 @@ pub(super) fn level(
                     format!("of = \"part\" solves for one level and takes a constant {key}; found one that varies");
                 return Err(DesignError::new(path("of"), message));
             };
-            let solved = solve(target, part.into(), cell, map, place);
+            let solved = solve(target, part.into(), cell, map, environment);
             let iso = solved.map_err(|m| DesignError::new(path(key), m))?;
             Ok(Level::Iso(Grade::Constant(iso)))
         }
@@ -137,13 +137,16 @@ impl AmountSpec {
     }
 
     /// What it is asked for as; of a porosity the complement is meant.
-    pub(super) fn asked<'a>(&self, path: String, place: &'a Place<'a>) -> Asked<'a> {
-        Asked { complement: self.key() == "porosity", ..Asked::new(path, place, key_of::<AmountSpec>(self.key())) }
+    pub(super) fn asked<'a>(&self, path: String, environment: &'a Environment<'a>) -> Quantity<'a> {
+        Quantity {
+            complement: self.key() == "porosity",
+            ..Quantity::new(path, environment, key_of::<AmountSpec>(self.key()))
+        }
     }
 }
 
 /// Refuses a wall thicker than the greatest wavelength, mm.
-pub(super) fn within_wavelength(thickness: &Grade, asked: &Asked, most: f64) -> Result<(), DesignError> {
+pub(super) fn within_wavelength(thickness: &Grade, asked: &Quantity, most: f64) -> Result<(), DesignError> {
     asked.check(thickness, |v, position| {
         if v <= most {
             return Ok(());
@@ -193,15 +196,15 @@ pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str
 /// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's
 /// values at a million points inside, those that are filled anyway coming first. Error about 1e-4 in the fraction.
 /// Refuses, in a sentence, less than what is filled.
-fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, place: &Place) -> Result<f64, String> {
-    let (points, _) = sample::inside(place.region, 1_000_000);
+fn solve(target: f64, part: Part, cell: &Arc<Cell>, map: &Map, environment: &Environment) -> Result<f64, String> {
+    let (points, _) = sample::inside(environment.region, 1_000_000);
     // At level zero the field is |f|, f or −f; the part at level t is where that is at most t, t or −t.
     let at_zero = Lattice::new(cell.clone(), map.clone(), part, Level::Iso(Grade::Constant(0.0)));
     let mut values = vec![0.0; points.len()];
     at_zero.values(&points, &mut values);
     let mut filled = vec![0.0; points.len()];
     let mut count = 0;
-    for body in place.filled {
+    for body in environment.filled {
         body.values(&points, &mut filled);
         for (v, _) in values.iter_mut().zip(&filled).filter(|(_, f)| **f <= 0.0) {
             count += usize::from(*v != f64::NEG_INFINITY);

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::Warning;
 use super::data::*;
-use super::grade::{Asked, key_of};
-use super::place::Place;
-use super::samples;
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
+use crate::grade::several;
+use crate::grade::{Quantity, key_of};
 use crate::kind::{DesignError, Key};
 use crate::map::{Affine, Map, Mapping, Orientation, Path, Phase, Round, Settings, Sweep, Wanted};
 use geometry::fault::Fault;
@@ -22,12 +22,12 @@ const OUTSIDE: f64 = 0.05;
 /// A kind of map, as it is declared.
 pub(super) trait BuildMap {
     /// The map. `path` is that of the kind's table.
-    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError>;
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError>;
 }
 
-/// The map at `place.path`.
-pub(super) fn map(spec: &MapSpec, place: &Place) -> Result<Map, DesignError> {
-    spec.family().build(&format!("{}.{}", place.path, spec.key()), place)
+/// The map at `environment.path`.
+pub(super) fn map(spec: &MapSpec, environment: &Environment) -> Result<Map, DesignError> {
+    spec.family().build(&format!("{}.{}", environment.path, spec.key()), environment)
 }
 
 fn shared(made: Result<impl Mapping + 'static, Fault>, path: &str) -> Result<Map, DesignError> {
@@ -35,46 +35,46 @@ fn shared(made: Result<impl Mapping + 'static, Fault>, path: &str) -> Result<Map
 }
 
 impl BuildMap for AffineSpec {
-    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
         let made = Affine::rigid(self.wavelength.three(), self.rotate, self.offset, &self.skew.shears());
         shared(made, path)
     }
 }
 
 impl BuildMap for SpartanSpec {
-    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
         let made = Affine::spartan(self.wavelength.three(), self.rotate, self.offset);
         shared(made, path)
     }
 }
 
 impl BuildMap for CylinderMapSpec {
-    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
-        let radii = radii(self.center, self.axis, place);
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let radii = radii(self.center, self.axis, environment);
         let made = Round::cylinder(self.center, self.axis, self.wavelength.two(), self.around.into(), radii);
         shared(made, path)
     }
 }
 
 impl BuildMap for SphereMapSpec {
-    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
-        let radii = radii(self.center, self.axis, place);
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let radii = radii(self.center, self.axis, environment);
         let made = Round::sphere(self.center, self.axis, self.wavelength, self.around.into(), radii);
         shared(made, path)
     }
 }
 
 impl BuildMap for SweepSpec {
-    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
-        let (points, _) = self.points.read(path, place)?;
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let (points, _) = self.points.read(path, environment)?;
         let line = Path { points, closed: self.closed, wavelength: self.wavelength.three(), normal: self.normal };
-        let made = Sweep::new(&line, &**place.region, place.points);
+        let made = Sweep::new(&line, &**environment.region, environment.points);
         made.map(|s| Arc::new(s) as Map).map_err(|f| self.points.fault(path, f))
     }
 }
 
 impl BuildMap for TetsSpec {
-    fn build(&self, path: &str, _: &Place) -> Result<Map, DesignError> {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
         let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
                        face to face";
         Err(DesignError::new(path, message))
@@ -82,11 +82,11 @@ impl BuildMap for TetsSpec {
 }
 
 impl BuildMap for PhaseSpec {
-    fn build(&self, path: &str, place: &Place) -> Result<Map, DesignError> {
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
-        let any = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, Key::NONE));
+        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));
         let length = key_of::<PhaseSpec>("wavelength");
-        let length = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, length));
+        let length = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, length));
         let wavelength = match &self.wavelength {
             GradeOrThree::One(g) => {
                 let one = length(g, below("wavelength"))?;
@@ -97,23 +97,23 @@ impl BuildMap for PhaseSpec {
         let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
         let wanted = Wanted {
             wavelength,
-            orientation: self.orientation.build(path, place)?,
+            orientation: self.orientation.build(path, environment)?,
             weight: weight.transpose()?,
             angle_weight: self.angle_weight,
             offset: self.offset,
         };
-        let region: &dyn Field = &**place.region;
+        let region: &dyn Field = &**environment.region;
         let settings =
             Settings { step: self.step, region: (self.domain == Domain::Region).then_some(region), folds: self.folds };
-        let made = Phase::solve(&place.region.bounds(), &wanted, &settings);
+        let made = Phase::solve(&environment.region.bounds(), &wanted, &settings);
         shared(made, path)
     }
 }
 
 impl OrientationSpec {
-    fn build(&self, path: &str, place: &Place) -> Result<Orientation, DesignError> {
+    fn build(&self, path: &str, environment: &Environment) -> Result<Orientation, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
-        let any = |of: &GradeSpec, path: String| of.build(&Asked::new(path, place, Key::NONE));
+        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));
         let angle = |of: &Option<GradeSpec>, key: &str| match of {
             Some(of) => any(of, below(key)),
             None => Ok(Grade::Constant(0.0)),
@@ -121,7 +121,7 @@ impl OrientationSpec {
         let vector = |of: &VectorSpec, key: &str| match of {
             VectorSpec::Components(of) => each(of, &below(key), &any),
             VectorSpec::Field(of) => {
-                samples::several(&of.field, &below(&format!("{key}.field")), place, |n| (n == 3).then_some([0, 1, 2]))
+                several(&of.field, &below(&format!("{key}.field")), environment, |n| (n == 3).then_some([0, 1, 2]))
             }
         };
         Ok(match self {
@@ -138,7 +138,7 @@ impl OrientationSpec {
             OrientationSpec::Stress(of) => Orientation::Stress(match &of.stress {
                 TensorSpec::Components(of) => each(of, &below("stress"), &any)?,
                 TensorSpec::Field(of) => {
-                    samples::several(&of.field, &below("stress.field"), place, |n| match (n, of.order) {
+                    several(&of.field, &below("stress.field"), environment, |n| match (n, of.order) {
                         (9, _) => Some([0, 4, 8, 5, 2, 1]),
                         (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
                         (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
@@ -151,9 +151,9 @@ impl OrientationSpec {
 }
 
 /// Least, mean and greatest distance from an axis in the region.
-fn radii(center: [f64; 3], axis: [f64; 3], place: &Place) -> [f64; 3] {
+fn radii(center: [f64; 3], axis: [f64; 3], environment: &Environment) -> [f64; 3] {
     let n = unit(axis);
-    let of = place.points.iter().map(|p| {
+    let of = environment.points.iter().map(|p| {
         let d = sub(*p, center);
         norm(sub(d, scale(n, dot(d, n))))
     });
@@ -161,7 +161,7 @@ fn radii(center: [f64; 3], axis: [f64; 3], place: &Place) -> [f64; 3] {
     for r in of {
         (least, most, sum) = (least.min(r), most.max(r), sum + r);
     }
-    [least, sum / place.points.len() as f64, most]
+    [least, sum / environment.points.len() as f64, most]
 }
 
 /// The same for each, with its index in the path.

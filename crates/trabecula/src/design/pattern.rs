@@ -2,8 +2,8 @@
 
 use super::beams::{check_open, fillet, given, inside, share};
 use super::data::*;
-use super::place::Place;
 use super::{Built, Warning};
+use crate::environment::Environment;
 use crate::kind::DesignError;
 use crate::report::{BeamsReport, PatternReport};
 use ::beams::graph::{Hub, Profile};
@@ -14,10 +14,10 @@ use geometry::fault::{counted, number};
 pub(super) fn laid(
     spec: &BeamsSpec,
     of: &PatternSpec,
-    place: &Place,
+    environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<PatternField, DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
+    let below = |key: &str| format!("{}.{key}", environment.path);
     let single = |given: &Option<GradeSpec>| match given {
         Some(GradeSpec::Constant(v)) => Some(*v),
         _ => None,
@@ -62,7 +62,7 @@ pub(super) fn laid(
     let pattern = Pattern { nodes: hubs, struts: of.struts.iter().map(strut).collect(), steps };
     pattern.check().map_err(|f| DesignError::fault(&at, f))?;
     let laid = PatternField::new(pattern, fillet(spec.fillet)).map_err(|f| DesignError::fault(&at, f))?;
-    let region = place.region.bounds();
+    let region = environment.region.bounds();
     if laid.bounds().intersection(region).is_empty() {
         let (b, r) = (laid.bounds(), region);
         let corner = |v: [f64; 3]| v.map(number).join(", ");
@@ -75,7 +75,7 @@ pub(super) fn laid(
         );
         return Err(DesignError::new(at, message));
     }
-    check_open(&laid, place)?;
+    check_open(&laid, environment)?;
     let found = laid.collisions().map_err(|f| DesignError::fault(&at, f))?;
     if let Some(c) = found
         && let Some(p) = c.at

@@ -3,7 +3,7 @@
 use std::cell::LazyCell;
 
 use super::blend::Functions;
-use super::{Blended, Built, Joins, Tiled, beams, place::LOOKS, sample};
+use super::{Blended, Built, Joins, Tiled, beams, sample};
 use crate::analysis::{self, Transition};
 use crate::blend::Phases;
 use crate::cell::Part;
@@ -74,7 +74,7 @@ impl core::fmt::Display for Varied {
 /// The solid share of the region and the region's volume.
 pub(super) fn expected(built: &Built) -> (f64, f64) {
     let region = &built.solid.region;
-    let (points, share) = sample::inside(region, 2 * LOOKS);
+    let (points, share) = sample::inside(region, 2 * sample::COUNT);
     let mut values = vec![0.0; points.len()];
     built.solid.values(&points, &mut values);
     let solid = values.iter().filter(|v| **v <= 0.0).count();
@@ -88,7 +88,7 @@ fn filling(built: &Built, beams: &Beams) -> f64 {
     if built.blend.is_none() {
         return expected(built).0;
     }
-    let (points, _) = sample::inside(&built.solid.region, 2 * LOOKS);
+    let (points, _) = sample::inside(&built.solid.region, 2 * sample::COUNT);
     let mut values = vec![0.0; points.len()];
     beams.field().values(&points, &mut values);
     let solid = values.iter().filter(|v| **v <= 0.0).count();
@@ -99,7 +99,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
     let region = &built.solid.region;
     let bounds = region.bounds();
     let exact = region.volume();
-    let count = if exact.is_some() { LOOKS } else { 25 * LOOKS };
+    let count = if exact.is_some() { sample::COUNT } else { 25 * sample::COUNT };
     let (mut points, share) = sample::inside(region, count);
     points.extend(sample::nodes(region));
     let volume = exact.unwrap_or_else(|| share * bounds.size().iter().product::<f64>());

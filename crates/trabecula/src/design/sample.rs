@@ -3,6 +3,9 @@
 use crate::region::Region;
 use geometry::math::{Aabb, Vec3};
 
+/// Number of sample points of a design.
+pub(super) const COUNT: usize = 8_000;
+
 /// About `count` points inside the region, spread evenly: Halton's sequence in bases 2, 3 and 5 over the bounds, which
 /// keeps step with no lattice, unlike a grid. Fewer come where the region is a tiny share of its bounds. Also the
 /// share of the bounds that is inside.

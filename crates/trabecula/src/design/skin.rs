@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::data::{OpenSpec, SkinSpec};
-use super::grade::{Asked, key_of};
-use super::place::{LOOKS, Place};
 use super::report::Varied;
-use super::{Design, Loader, region, sample};
+use super::{Design, Loader, sample};
 use crate::csg_tree::CsgSolid;
+use crate::environment::{self, Environment};
 use crate::field::Field;
+use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
 use crate::region::{HalfSpace, Intersection, Region};
 use crate::skin::skin;
@@ -26,14 +26,14 @@ pub(super) fn filled(
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
-        let place = Place { path: "skin".into(), region: space, points, filled: &[], loader };
-        let (body, least) = grown(spec, &place)?;
+        let environment = Environment { path: "skin".into(), region: space, points, filled: &[], loader };
+        let (body, least) = grown(spec, &environment)?;
         filled.push(body);
         thinnest = Some(least);
     }
     for (name, spec) in &d.keep.0 {
         let path = format!("keep.{name}");
-        let zone = region::region(spec, &path, loader, notes)?;
+        let zone = environment::region(spec, &path, loader, notes)?;
         check_zone(&zone, space, points, &path)?;
         let mut surfaces = Vec::new();
         let tree = zone.surfaces(0.0, &mut surfaces);
@@ -62,17 +62,17 @@ fn is_open(filled: &[CsgSolid], space: &Region, points: &[Vec3]) -> bool {
         least.iter().any(|v| *v > 0.0)
     };
     // Too few looks for a small hollow: look closer before saying so.
-    open(points) || open(&sample::inside(space, 50 * LOOKS).0)
+    open(points) || open(&sample::inside(space, 50 * sample::COUNT).0)
 }
 
 /// The skin and its least thickness.
-fn grown(spec: &SkinSpec, place: &Place) -> Result<(CsgSolid, f64), DesignError> {
-    let Place { region: space, points, .. } = *place;
+fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), DesignError> {
+    let Environment { region: space, points, .. } = *environment;
     let path = "skin.thickness";
-    let thickness = spec.thickness.build(&Asked::new(path, place, key_of::<SkinSpec>("thickness")))?;
+    let thickness = spec.thickness.build(&Quantity::new(path, environment, key_of::<SkinSpec>("thickness")))?;
     let bounds = space.bounds();
     let open = spec.open.iter().enumerate().map(|(i, o)| match o {
-        OpenSpec::Plane(h) => region::halfspace(h, &format!("skin.open[{i}]")),
+        OpenSpec::Plane(h) => environment::half_space(h, &format!("skin.open[{i}]")),
         OpenSpec::Side(side) => {
             let (axis, upper) = side.axis();
             let mut normal = [0.0; 3];
@@ -117,7 +117,7 @@ fn check_zone(zone: &Region, space: &Region, points: &[Vec3], path: &str) -> Res
     if b.is_empty() {
         return Err(DesignError::new(path, "it is empty"));
     }
-    if !both.bounds().is_empty() && !sample::inside(&both, LOOKS).0.is_empty() {
+    if !both.bounds().is_empty() && !sample::inside(&both, sample::COUNT).0.is_empty() {
         return Ok(());
     }
     let corner = |v: Vec3| v.map(number).join(", ");

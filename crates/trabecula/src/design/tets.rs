@@ -3,9 +3,9 @@
 mod source;
 
 use super::data::*;
-use super::grade::{Asked, key_of};
-use super::place::{LOOKS, Place};
-use super::{Design, Loader, Node, Warning, region, sample};
+use super::{Design, Loader, Node, Warning, sample};
+use crate::environment::{self, Environment};
+use crate::grade::{Quantity, key_of};
 use crate::kind::{At, DesignError, Key, Kind};
 use crate::mesher::{self, Fit, background};
 use crate::report::{FitReport, TetMeshReport};
@@ -64,7 +64,7 @@ impl Tets {
             spec.check(&Key::NONE).map_err(|f| DesignError::fault(&path, f))?;
             let region_spec = region_of(node)?;
             let mut notes = crate::region::Notes::default();
-            let space = match region::region(&region_spec, "region", loader, &mut notes) {
+            let space = match environment::region(&region_spec, "region", loader, &mut notes) {
                 Ok(space) => space,
                 Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
             };
@@ -73,13 +73,13 @@ impl Tets {
                 let message = "the region has no end; intersect it with a box or another bounded region";
                 return Err(DesignError::new("region", message));
             }
-            let (mut points, _) = sample::inside(&space, LOOKS);
+            let (mut points, _) = sample::inside(&space, sample::COUNT);
             if bounds.is_empty() || points.is_empty() {
                 return Err(DesignError::new("region", "the region is empty"));
             }
             points.extend(sample::nodes(&space));
-            let place = Place { path, region: &space, points: &points, filled: &[], loader };
-            let mut made = tets(&spec, &region_spec, &place)?;
+            let environment = Environment { path, region: &space, points: &points, filled: &[], loader };
+            let mut made = tets(&spec, &region_spec, &environment)?;
             made.warnings.splice(0..0, notes.warnings);
             Ok(made)
         };
@@ -136,23 +136,23 @@ fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), De
     Err(DesignError::new("lattice", message))
 }
 
-/// The tetrahedral mesh that `spec` asks for; `place.path` is that of its table.
-pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, place: &Place) -> Result<Tets, DesignError> {
-    let wrong = |f: Fault| DesignError::fault(&place.path, f);
+/// The tetrahedral mesh that `spec` asks for; `environment.path` is that of its table.
+pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
+    let wrong = |f: Fault| DesignError::fault(&environment.path, f);
     // Points that lie on the surface tell nothing of what is lost.
     let inside: Vec<Vec3> = {
-        let mut values = vec![0.0; place.points.len()];
-        place.region.values(place.points, &mut values);
-        let deep = place.points.iter().zip(&values).filter(|(_, v)| **v < 0.0);
+        let mut values = vec![0.0; environment.points.len()];
+        environment.region.values(environment.points, &mut values);
+        let deep = environment.points.iter().zip(&values).filter(|(_, v)| **v < 0.0);
         deep.map(|(p, _)| *p).collect()
     };
-    let bounds = place.region.bounds();
+    let bounds = environment.region.bounds();
     let (mut mesh, fit, checked, mesher) = match spec {
         TetsSpec::Made(made) => {
-            let below = |key: &str| format!("{}.{key}", place.path);
-            let size = made.size.build(&Asked::new(below("size"), place, key_of::<MadeTetsSpec>("size")))?;
+            let below = |key: &str| format!("{}.{key}", environment.path);
+            let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsSpec>("size")))?;
             if made.mesher == MesherSpec::Background {
-                let (mesh, fit) = background(&**place.region, &bounds, &size, &inside).map_err(wrong)?;
+                let (mesh, fit) = background(&**environment.region, &bounds, &size, &inside).map_err(wrong)?;
                 (mesh, Some(fit), Checked::default(), "background".to_string())
             } else {
                 let Some(size) = size.constant() else {
@@ -160,26 +160,26 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, place: &Place) -> Result
                         "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
                     return Err(DesignError::new(below("size"), message));
                 };
-                let surface = surface(space, place, size)?;
-                let (mesh, checked) = wild(made, &surface, size, &place.path, place.loader)?;
+                let surface = surface(space, environment, size)?;
+                let (mesh, checked) = wild(made, &surface, size, &environment.path, environment.loader)?;
                 (mesh, None, checked, "ftetwild".to_string())
             }
         }
         TetsSpec::File(file) => {
-            let (mesh, checked) = from_file(file, &place.path, place.loader)?;
+            let (mesh, checked) = from_file(file, &environment.path, environment.loader)?;
             (mesh, None, checked, file.path.clone())
         }
     };
     let mut notes = crate::region::Notes::default();
     if let TetsSpec::Made(made) = spec {
-        mesh.zones = zones(&mesh, made, &place.path, place.loader, &mut notes)?;
+        mesh.zones = zones(&mesh, made, &environment.path, environment.loader, &mut notes)?;
     }
-    let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**place.region, &inside));
+    let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**environment.region, &inside));
     let todo = match spec {
         TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
-        TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
+        TetsSpec::File(_) => "is it a mesh of this region, in the right environment and unit?",
     };
-    let mut told = told(mesh, &checked, mesher, Some(fit), &place.path, todo)?;
+    let mut told = told(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
     told.warnings.extend(notes.warnings);
     Ok(told)
 }
@@ -203,7 +203,7 @@ fn zones(
     let mut of: Vec<Option<u32>> = vec![None; middles.len()];
     for (&zone, spec) in &made.zones {
         let path = format!("{path}.zones.{zone}");
-        let region = region::region(spec, &path, loader, notes)?;
+        let region = environment::region(spec, &path, loader, notes)?;
         let mut values = vec![0.0; middles.len()];
         region.values(&middles, &mut values);
         let mut count = 0;

@@ -5,17 +5,17 @@ use std::sync::Arc;
 
 use super::cell::orbit_terms;
 use super::data::*;
-use super::grade::Asked;
 use super::joins::{Joins, joins};
 use super::level::within_wavelength;
-use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::tets::{self, TetReport};
 use super::warn::gaps;
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::cell::{Part, Series, named};
+use crate::environment::Environment;
 use crate::grade::Grade;
+use crate::grade::Quantity;
 use crate::kind::DesignError;
 use crate::map::Tets;
 use crate::region::{MeshRegion, Region};
@@ -118,10 +118,10 @@ pub(super) fn domain<'a>(
     let (made, filled) = match soup {
         Some(made) => (made, Some(space.clone())),
         None => {
-            let (mut points, _) = sample::inside(space, LOOKS);
+            let (mut points, _) = sample::inside(space, sample::COUNT);
             points.extend(sample::nodes(space));
-            let place = Place { path: path.clone(), region: space, points: &points, filled: &[], loader };
-            (tets::tets(spec_of_mesh, &d.region, &place)?, None)
+            let environment = Environment { path: path.clone(), region: space, points: &points, filled: &[], loader };
+            (tets::tets(spec_of_mesh, &d.region, &environment)?, None)
         }
     };
     warnings.extend(made.warnings);
@@ -141,7 +141,7 @@ fn ready_cell(name: &TetCellName, path: &str) -> Result<TetCell, DesignError> {
 
 /// The cell that a series describes; `path` is that of its table.
 fn series_cell(spec: &TetSeriesSpec, path: &str) -> Result<TetCell, DesignError> {
-    let wrong = |place: &str, f| DesignError::fault(&format!("{path}{place}"), f);
+    let wrong = |key: &str, f| DesignError::fault(&format!("{path}{key}"), f);
     let group = Group::named(&spec.group.0).map_err(|f| wrong(".group", f))?;
     let sites = group.tetrahedral_sites().map_err(|f| wrong("", f))?;
     let mut all = Vec::new();
@@ -191,11 +191,15 @@ pub(super) struct Made {
 pub(super) type Zoned = BTreeMap<u32, Arc<TetCell>>;
 
 /// The lattice.
-pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning>) -> Result<Made, DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
+pub(super) fn lattice(
+    domain: &Domain,
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<Made, DesignError> {
+    let below = |key: &str| format!("{}.{key}", environment.path);
     let at = below("cell.tet");
     let mut stencil = match domain.cell {
-        TetCellSpec::Zones(zones) => return zoned(domain, &zones.zones, place, warnings),
+        TetCellSpec::Zones(zones) => return zoned(domain, &zones.zones, environment, warnings),
         TetCellSpec::Ready(of) => ready_cell(&of.name, &at)?,
         TetCellSpec::Series(of) => series_cell(of, &at)?,
     };
@@ -223,7 +227,7 @@ pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning
         }
         AmountSpec::Thickness(_) => Amount::Thickness,
     };
-    let asked = spec.amount.asked(path.clone(), place);
+    let asked = spec.amount.asked(path.clone(), environment);
     let grade = spec.amount.grade().build(&asked)?;
     if amount == Amount::Thickness {
         within_wavelength(&grade, &asked, domain.map.mean_edge())?;
@@ -236,13 +240,13 @@ pub(super) fn lattice(domain: &Domain, place: &Place, warnings: &mut Vec<Warning
     let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, place), joins: None })
+    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, environment), joins: None })
 }
 
 /// Whether the surface is made without a grid.
-fn explicit(domain: &Domain, place: &Place) -> bool {
+fn explicit(domain: &Domain, environment: &Environment) -> bool {
     let joined = domain.joined;
-    joined.method == Method::Explicit && joined.overlap == 0.0 && place.filled.is_empty()
+    joined.method == Method::Explicit && joined.overlap == 0.0 && environment.filled.is_empty()
 }
 
 /// A lattice of other cells in other zones. A node has each of the cells by the share of the volume about it that is of its
@@ -250,10 +254,10 @@ fn explicit(domain: &Domain, place: &Place) -> bool {
 fn zoned(
     domain: &Domain,
     zones: &BTreeMap<u32, TetCellName>,
-    place: &Place,
+    environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Made, DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
+    let below = |key: &str| format!("{}.{key}", environment.path);
     let at = below("cell.tet.zones");
     let map = &domain.map;
     let part: Part = domain.spec.part.into();
@@ -276,7 +280,7 @@ fn zoned(
         let message = format!("no tetrahedron of the mesh is of zone {zone}; its zones are {}", listed.join(", "));
         return Err(DesignError::new(format!("{at}.{zone}"), message));
     }
-    let asked = amount.asked(path.clone(), place);
+    let asked = amount.asked(path.clone(), environment);
     let values = at_nodes(&value.build(&asked)?, &asked, map)?;
     let names: BTreeSet<&TetCellName> = zones.values().collect();
     let (lo, hi) = values.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -292,7 +296,7 @@ fn zoned(
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level);
-    let explicit = explicit(domain, place);
+    let explicit = explicit(domain, environment);
     let joins = explicit.then(|| joins(&tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
     if let Some(joins) = &joins {
@@ -318,7 +322,7 @@ fn about(stencil: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, 
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.
-fn at_nodes(grade: &Grade, asked: &Asked, map: &Tets) -> Result<Vec<f64>, DesignError> {
+fn at_nodes(grade: &Grade, asked: &Quantity, map: &Tets) -> Result<Vec<f64>, DesignError> {
     if let Some(v) = grade.constant() {
         return Ok(vec![v]);
     }

@@ -1,10 +1,10 @@
 //! What a lattice in a region is refused for, and warned of.
 
 use super::data::*;
-use super::place::{LOOKS, Place};
 use super::report::Varied;
 use super::{Warning, sample};
 use crate::cell::Distance;
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::DesignError;
 use crate::lattice::Lattice;
@@ -17,10 +17,10 @@ const TRUNCATED: f64 = 0.25;
 const FINEST: usize = 24;
 
 /// Refuses a lattice that leaves the region empty or solid everywhere.
-pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Result<(), DesignError> {
-    let mut values = vec![0.0; place.points.len()];
-    lattice.values(place.points, &mut values);
-    let path = format!("{}.level.{}", place.path, spec.level.amount.key());
+pub(super) fn check(lattice: &Lattice, environment: &Environment, spec: &LatticeSpec) -> Result<(), DesignError> {
+    let mut values = vec![0.0; environment.points.len()];
+    lattice.values(environment.points, &mut values);
+    let path = format!("{}.level.{}", environment.path, spec.level.amount.key());
     if values.iter().any(|v| v.is_nan()) {
         return Err(DesignError::new(path, "the level is not a number somewhere in the region"));
     }
@@ -29,7 +29,7 @@ pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Res
         return Ok(());
     }
     // Too few looks for a sparse lattice or a thin gap: look closer before refusing.
-    let (points, _) = sample::inside(place.region, 50 * LOOKS);
+    let (points, _) = sample::inside(environment.region, 50 * sample::COUNT);
     let mut values = vec![0.0; points.len()];
     lattice.values(&points, &mut values);
     let solid = values.iter().filter(|v| **v <= 0.0).count();
@@ -37,7 +37,7 @@ pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Res
         return Ok(());
     }
     let what = if solid == 0 { "empty: nothing is solid" } else { "solid everywhere: nothing is open" };
-    let iso = Varied::of_iso(lattice, place.points);
+    let iso = Varied::of_iso(lattice, environment.points);
     let why = if lattice.distance().is_some() {
         lattice.cores(&points, &mut values);
         let (near, far) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), d| (a.min(d.abs()), b.max(d.abs())));
@@ -48,7 +48,7 @@ pub(super) fn check(lattice: &Lattice, place: &Place, spec: &LatticeSpec) -> Res
         let range = lattice.cell.range();
         format!("the level t is {iso}, the cell's values run from {:.4} to {:.4}", range.lo, range.hi)
     };
-    let (size, wavelength) = (place.region.bounds().size(), lattice.map.wavelength());
+    let (size, wavelength) = (environment.region.bounds().size(), lattice.map.wavelength());
     let largest = size.into_iter().fold(0.0, f64::max);
     let unit = if largest < wavelength {
         format!(
@@ -86,9 +86,9 @@ fn figure(v: f64) -> String {
 }
 
 /// Warns of what may not be meant.
-pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
-    let path = &place.path;
-    let fraction = Varied::of_fraction(lattice, place.points);
+pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
+    let path = &environment.path;
+    let fraction = Varied::of_fraction(lattice, environment.points);
     let whole = lattice.connected_fraction();
     let broken = gaps([fraction.min, fraction.max], &whole);
     if !broken.is_empty() {
@@ -100,12 +100,12 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             [] => "it is in one piece at no fraction".to_string(),
             some => format!("it is in one piece at fractions {}", ranges(some)),
         };
-        let place = if broken == [[fraction.min, fraction.max]] {
+        let environment = if broken == [[fraction.min, fraction.max]] {
             format!("at solid fraction {fraction}")
         } else {
             format!("the solid fraction is {fraction} over the region, and at {}", ranges(&broken))
         };
-        let message = format!("{place} the periodic solid is not one piece in space; {limit}");
+        let message = format!("{environment} the periodic solid is not one piece in space; {limit}");
         warnings.push(Warning { path: format!("{}.level.{}", path, spec.level.amount.key()), message });
     }
     if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
@@ -113,7 +113,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             "the waves that are kept leave out {:.1} % (root mean square) of the cell in the file; keep more terms",
             100.0 * share
         );
-        warnings.push(Warning { path: format!("{}.cell.file.terms", place.path), message });
+        warnings.push(Warning { path: format!("{}.cell.file.terms", environment.path), message });
     }
     let top = lattice.cell.plain().top();
     if top > FINEST {
@@ -121,10 +121,10 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             "indices reach {top}: beyond {FINEST} waves are finer than the grids on which the fraction, the walls and \
              the connectivity of a cell are found, and these figures are rough"
         );
-        warnings.push(Warning { path: format!("{}.cell.series.terms", place.path), message });
+        warnings.push(Warning { path: format!("{}.cell.series.terms", environment.path), message });
     }
     if let Some(error) = lattice.distance().map(Distance::error) {
-        let half = Varied::of_iso(lattice, place.points);
+        let half = Varied::of_iso(lattice, environment.points);
         if error > 0.025 * half.min {
             let message = format!(
                 "the mid-surface bends too sharply for its table of distances: a thickness of {} mm is met only within {} mm; \
@@ -132,11 +132,11 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
                 figure(2.0 * half.min),
                 figure(2.0 * error)
             );
-            warnings.push(Warning { path: format!("{}.level.{}", place.path, spec.level.amount.key()), message });
+            warnings.push(Warning { path: format!("{}.level.{}", environment.path, spec.level.amount.key()), message });
         }
     }
     if let Some(limit) = lattice.folding() {
-        let thickness = Varied::of_iso(lattice, place.points).map(|t| 2.0 * t);
+        let thickness = Varied::of_iso(lattice, environment.points).map(|t| 2.0 * t);
         if thickness.max > limit {
             let most = figure(thickness.max);
             let message = format!(
@@ -144,11 +144,11 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
                  mid-surface: the wall's faces meet in creases there, and it is less than {most} mm thick",
                 figure(limit)
             );
-            warnings.push(Warning { path: format!("{}.level.{}", place.path, spec.level.amount.key()), message });
+            warnings.push(Warning { path: format!("{}.level.{}", environment.path, spec.level.amount.key()), message });
         }
     }
     let wavelength = lattice.map.wavelength();
-    let least = place.region.bounds().size().into_iter().fold(f64::INFINITY, f64::min);
+    let least = environment.region.bounds().size().into_iter().fold(f64::INFINITY, f64::min);
     if wavelength > least {
         let message = format!(
             "the wavelength, {} mm, is more than the region's least extent, {} mm: the part is less than one cell thick and \
@@ -157,7 +157,7 @@ pub(super) fn warn(lattice: &Lattice, place: &Place, spec: &LatticeSpec, warning
             number(least)
         );
         let kind = spec.map.key();
-        warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", place.path), message });
+        warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", environment.path), message });
     }
 }
 

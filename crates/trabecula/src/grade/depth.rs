@@ -2,10 +2,26 @@
 
 use std::sync::Arc;
 
-use super::{Stops, Varying};
+use super::{Build, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
+use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, scale};
+
+/// By depth below the region's surface: piecewise linear, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Depth", noun = "a grade by depth")]
+pub struct DepthKind {
+    /// Pairs [depth in mm, value], depth rising.
+    #[kind(inherit)]
+    stops: Stops,
+}
+
+impl Build for DepthKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        Ok(Depth { region: of.environment.region.clone(), stops: of.stops(&self.stops) }.into())
+    }
+}
 
 /// Piecewise linear in the depth (mm) below the surface of a region, constant beyond the first and last stop.
 #[derive(Clone)]
@@ -18,9 +34,11 @@ impl Depth {
     /// Below the surface of `region`, a signed distance (mm, negative inside); stops `[depth, value]`.
     ///
     /// # Errors
-    /// Stops that are none, not finite or not ascending in depth.
+    /// Stops that are none, not finite or not rising in depth.
     pub fn new(region: Arc<dyn Field>, stops: Vec<[f64; 2]>) -> Result<Depth, Fault> {
-        Ok(Depth { region, stops: Stops::new(stops, "depth")? })
+        let kind = DepthKind { stops: Stops(stops) };
+        kind.valid()?;
+        Ok(Depth { region, stops: kind.stops })
     }
 }
 

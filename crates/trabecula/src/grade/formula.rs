@@ -1,7 +1,8 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
 
-use super::Varying;
+use super::{Build, Grade, Quantity, Varying};
 use crate::field::Field;
+use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -12,6 +13,20 @@ use parse::parse;
 
 /// Points that an instruction is done for at once.
 const LANES: usize = 16;
+
+/// A formula in x, y, z (mm), such as "0.3 + 0.1*sin(x/5)"; parsed, never run as code.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Formula")]
+pub struct FormulaKind(pub String);
+
+impl Build for FormulaKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        let parse = |text: &str| Formula::parse(text).map_err(|f| DesignError::fault(&of.path, f).found(&self.0));
+        let made = parse(&self.0)?;
+        let made = if of.complement { parse(&format!("1 - ({})", self.0))? } else { made };
+        if of.key.allowed().is_some() { of.checked(made) } else { Ok(made.into()) }
+    }
+}
 
 /// A parsed formula in x, y, z (mm). Angles of its functions are in radians.
 ///
@@ -31,12 +46,12 @@ enum Instruction {
 }
 
 /// What a program can be run on: numbers, numbers with gradients, intervals.
-trait Quantity: Copy {
+trait Operand: Copy {
     fn constant(v: f64) -> Self;
     fn apply(op: Operation, args: [Self; 3]) -> Self;
 }
 
-impl Quantity for f64 {
+impl Operand for f64 {
     fn constant(v: f64) -> f64 {
         v
     }
@@ -46,7 +61,7 @@ impl Quantity for f64 {
     }
 }
 
-impl Quantity for Interval {
+impl Operand for Interval {
     fn constant(v: f64) -> Interval {
         Interval::new(v, v)
     }
@@ -59,7 +74,7 @@ impl Quantity for Interval {
 #[derive(Clone, Copy)]
 struct Dual<const N: usize>(f64, [f64; N]);
 
-impl<const N: usize> Quantity for Dual<N> {
+impl<const N: usize> Operand for Dual<N> {
     fn constant(v: f64) -> Dual<N> {
         Dual(v, [0.0; N])
     }
@@ -109,7 +124,7 @@ impl Formula {
     }
 
     /// Runs the program on some points at once, instruction by instruction.
-    fn run_lanes<T: Quantity>(&self, variable: impl Fn(usize, usize) -> T, stack: &mut Vec<[T; LANES]>) -> [T; LANES] {
+    fn run_lanes<T: Operand>(&self, variable: impl Fn(usize, usize) -> T, stack: &mut Vec<[T; LANES]>) -> [T; LANES] {
         stack.clear();
         for instruction in &self.program {
             match *instruction {
@@ -131,7 +146,7 @@ impl Formula {
         stack.pop().unwrap_or([T::constant(f64::NAN); LANES])
     }
 
-    fn run<T: Quantity>(&self, variables: [T; 3], stack: &mut Vec<T>) -> T {
+    fn run<T: Operand>(&self, variables: [T; 3], stack: &mut Vec<T>) -> T {
         stack.clear();
         for instruction in &self.program {
             match *instruction {
@@ -185,7 +200,7 @@ impl Varying for Formula {
 }
 
 /// Applies an operation to each lane, in place of its first argument. Each of the quick ones has a loop of its own.
-fn apply_lanes<T: Quantity>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c: &[T; LANES]) {
+fn apply_lanes<T: Operand>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c: &[T; LANES]) {
     macro_rules! lanes {
         ($($quick:ident)*) => {
             match op {

@@ -1,21 +1,19 @@
 //! A grade along a direction.
 
-use super::{Stops, Varying};
+use super::{Build, Grade, Quantity, Stops, Varying, directed};
 use crate::field::Field;
+use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, dot, scale};
 
 /// A direction along which a position is measured: s = along · x, in mm times the length of `along`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Along(Vec3);
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(check = Along::directed)]
+pub struct Along(Vec3);
 
 impl Along {
-    /// **Errors** where the direction is zero or not finite.
-    pub fn new(along: Vec3) -> Result<Along, Fault> {
-        if along.iter().any(|v| !v.is_finite()) || along == [0.0; 3] {
-            return Err(Fault::new("along", format!("found {along:?}; give three finite numbers, not all zero")));
-        }
-        Ok(Along(along))
+    fn directed(&self, _: &Key) -> Result<(), Fault> {
+        directed("", Some(self.0))
     }
 
     /// s at a point.
@@ -49,10 +47,14 @@ impl Along {
     }
 }
 
-/// Piecewise linear in s = along · x (mm), constant beyond the first and last stop.
-#[derive(Clone, Debug, PartialEq)]
+/// Along a direction: piecewise linear in s = along · x, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a linear grade")]
 pub struct Linear {
+    /// The direction [x, y, z]; s is measured in multiples of its length.
     along: Along,
+    /// Pairs [s, value], s rising.
+    #[kind(inherit)]
     stops: Stops,
 }
 
@@ -60,9 +62,17 @@ impl Linear {
     /// Along a direction, in multiples of whose length s is measured; stops `[s, value]`.
     ///
     /// # Errors
-    /// A direction that is zero or not finite; stops that are none, not finite or not ascending in s.
+    /// A direction that is zero or not finite; stops that are none, not finite or not rising in s.
     pub fn new(along: Vec3, stops: Vec<[f64; 2]>) -> Result<Linear, Fault> {
-        Ok(Linear { along: Along::new(along)?, stops: Stops::new(stops, "s")? })
+        let made = Linear { along: Along(along), stops: Stops(stops) };
+        made.valid()?;
+        Ok(made)
+    }
+}
+
+impl Build for Linear {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        Ok(Linear { along: self.along, stops: of.stops(&self.stops) }.into())
     }
 }
 

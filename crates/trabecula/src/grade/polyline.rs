@@ -1,12 +1,45 @@
 //! Distance to a line of control points.
 
-use super::Varying;
+use super::control_points::ControlPoints;
+use super::{Build, Grade, Quantity, Varying, directed};
 use crate::field::Field;
+use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, counted};
 use geometry::math::{Aabb, Interval, Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// Least sharpness of the smooth form: below it its weights make noticeably more than one.
 pub const LEAST_SHARPNESS: f64 = 10.0;
+
+/// Distance to a chain of straight segments through control points.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Distance", noun = "a distance to a line", check = DistanceKind::directed)]
+pub struct DistanceKind {
+    /// The corners of the line, in order.
+    #[kind(flatten)]
+    points: ControlPoints,
+    /// Whether the last is joined to the first.
+    #[kind(default = false)]
+    closed: bool,
+    /// Direction of projection: the distance is that from a wall through the line along it. Inside a closed line it is negative.
+    axis: Option<[f64; 3]>,
+    /// The smooth form instead of the exact distance: off by at most 0.2785/sharpness of the longest segment, without a sign.
+    #[kind(min = 10.0)]
+    sharpness: Option<f64>,
+}
+
+impl DistanceKind {
+    fn directed(&self, _: &Key) -> Result<(), Fault> {
+        directed("axis", self.axis)
+    }
+}
+
+impl Build for DistanceKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        let (points, _) = self.points.read(&of.path, of.environment)?;
+        let line = Polyline::new(points, self.closed, self.axis, self.sharpness);
+        of.function(Ok(line.map_err(|f| self.points.fault(&of.path, f))?))
+    }
+}
 
 /// The distance (mm) to a chain of straight segments.
 ///

@@ -1,9 +1,40 @@
 //! A grade by distance from a point or a line.
 
-use super::{Stops, Varying};
+use super::{Build, Grade, Quantity, Stops, Varying, directed};
 use crate::field::Field;
+use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale, sub, unit};
+
+/// By the distance from a point or a line: piecewise linear, constant beyond the ends.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Radial", noun = "a radial grade", check = RadialKind::directed)]
+pub struct RadialKind {
+    /// Pairs [distance in mm, value], distance rising.
+    #[kind(inherit)]
+    stops: Stops,
+    /// The point, or a point on the line.
+    #[kind(unit = "mm", default = [0.0; 3])]
+    center: Vec3,
+    /// Direction of the line; without it, distances are from the point.
+    axis: Option<Vec3>,
+}
+
+impl RadialKind {
+    fn directed(&self, _: &Key) -> Result<(), Fault> {
+        directed("axis", self.axis)
+    }
+
+    fn made(self) -> Radial {
+        Radial { center: self.center, axis: self.axis.map(unit), stops: self.stops }
+    }
+}
+
+impl Build for RadialKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        Ok(RadialKind { stops: of.stops(&self.stops), ..*self }.made().into())
+    }
+}
 
 /// Piecewise linear in the distance (mm) from a point, or from a line through it, constant beyond the first and last stop.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,15 +50,11 @@ impl Radial {
     ///
     /// # Errors
     /// A point or a direction that is not finite, a direction that is zero; stops that are none, not finite or not
-    /// ascending in distance.
+    /// rising in distance.
     pub fn new(center: Vec3, axis: Option<Vec3>, stops: Vec<[f64; 2]>) -> Result<Radial, Fault> {
-        if center.iter().any(|v| !v.is_finite()) {
-            return Err(Fault::new("center", format!("found {center:?}; give three finite numbers, mm")));
-        }
-        if let Some(axis) = axis.filter(|n| n.iter().any(|v| !v.is_finite()) || norm(*n) == 0.0) {
-            return Err(Fault::new("axis", format!("found {axis:?}; give three finite numbers, not all zero")));
-        }
-        Ok(Radial { center, axis: axis.map(unit), stops: Stops::new(stops, "distance")? })
+        let kind = RadialKind { center, axis, stops: Stops(stops) };
+        kind.valid()?;
+        Ok(kind.made())
     }
 
     /// From the point, or from the nearest point of the line, to `p`.

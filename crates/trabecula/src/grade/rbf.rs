@@ -1,8 +1,11 @@
 //! Gaussian radial basis functions through control points.
 
-use super::Varying;
+use super::control_points::ControlPoints;
+use super::{Build, Grade, Quantity, Varying, directed};
+use crate::environment::Environment;
 use crate::field::Field;
-use geometry::fault::{Fault, number};
+use crate::kind::{DesignError, Key, Kind};
+use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Interval, Vec3, add, dot, norm, scale, sub, unit};
 
 /// Most control points: their equations are solved as they are.
@@ -12,6 +15,56 @@ const WORST: f64 = 1e12;
 /// δ in mean distances between neighbours, unless given: the surface sags little between points, and the condition
 /// number of points on a cubic grid stays near 10⁶.
 const WIDTH: f64 = 1.5;
+
+/// Gaussian radial basis functions through control points: the sum of β exp(−r²/δ²).
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Rbf", noun = "radial basis functions", check = RbfKind::complete)]
+pub struct RbfKind {
+    /// The control points.
+    #[kind(flatten)]
+    points: ControlPoints,
+    /// The values taken at the points: 1 at all unless given here or as a fourth column of the file.
+    values: Option<Vec<f64>>,
+    /// δ; one and a half times the mean distance of a point from its nearest neighbour unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    delta: Option<f64>,
+    /// Direction of projection, so that a point stands for a line.
+    axis: Option<[f64; 3]>,
+}
+
+impl RbfKind {
+    fn complete(&self, _: &Key) -> Result<(), Fault> {
+        if let (Some(values), ControlPoints::Points(points)) = (&self.values, &self.points)
+            && values.len() != points.len()
+        {
+            let message =
+                format!("{} for {}; give one for each", counted(values.len(), "value"), counted(points.len(), "point"));
+            return Err(Fault::new("values", message));
+        }
+        directed("axis", self.axis)
+    }
+}
+
+impl RbfKind {
+    /// The functions.
+    pub(crate) fn functions(&self, path: &str, environment: &Environment) -> Result<Rbf, DesignError> {
+        let (points, column) = self.points.read(path, environment)?;
+        let ones = || vec![1.0; points.len()];
+        let values = self.values.clone().or(column).unwrap_or_else(ones);
+        if values.len() != points.len() {
+            let message =
+                format!("{} for {}; give one for each", counted(values.len(), "value"), counted(points.len(), "point"));
+            return Err(DesignError::new(format!("{path}.values"), message));
+        }
+        Rbf::new(points, &values, self.delta, self.axis).map_err(|f| self.points.fault(path, f))
+    }
+}
+
+impl Build for RbfKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        of.function(Ok(self.functions(&of.path, of.environment)?))
+    }
+}
 
 /// α(x) = Σ βᵢ exp(−|x − xᵢ|²/δ²) that takes given values at control points: equations 18 to 20 of the hybrid paper, with
 /// the distance of vectors.

@@ -2,9 +2,31 @@
 
 use std::sync::Arc;
 
-use super::{Depth, Grade, Sigmoid};
+use super::{Build, Depth, Grade, Quantity, Sigmoid};
+use crate::environment;
 use crate::field::Field;
+use crate::kind::{DesignError, Kind};
+use crate::region::{Notes, RegionKind};
 use geometry::fault::{Fault, number};
+
+/// 1 inside a region and 0 outside, with a smooth step at its surface.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Within", noun = "a region as a number")]
+pub struct WithinKind {
+    /// The region.
+    of: Box<RegionKind>,
+    /// Width of the step, half of it on either side of the surface.
+    #[kind(unit = "mm", above = 0.0)]
+    width: f64,
+}
+
+impl Build for WithinKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        let (path, mut notes) = (format!("{}.of", of.path), Notes::default());
+        let region = environment::region(&self.of, &path, of.environment.loader, &mut notes)?;
+        of.function(region_step(region, self.width))
+    }
+}
 
 /// The smooth step from 0 outside a region to 1 inside, one half on its surface, over `width` (mm) across it. `region` is a
 /// signed distance (mm, negative inside).

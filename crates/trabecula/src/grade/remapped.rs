@@ -1,8 +1,8 @@
 //! Numbers on a grid, each replaced by what it stands for.
 
-use super::{Samples, Stops, Varying};
+use super::{Grade, Quantity, Samples, Stops, Varying};
 use crate::field::Field;
-use geometry::fault::Fault;
+use crate::kind::DesignError;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// Piecewise linear in numbers on a grid, constant beyond the first and last stop.
@@ -12,13 +12,24 @@ pub struct Remapped {
 }
 
 impl Remapped {
-    /// The numbers, and stops `[number, value]`.
-    ///
-    /// # Errors
-    /// Stops that are none, not finite or not ascending in the number.
-    pub fn new(of: Samples, stops: Vec<[f64; 2]>) -> Result<Remapped, Fault> {
-        Ok(Remapped { of, stops: Stops::new(stops, "number")? })
+    /// The numbers, and checked stops `[number, value]`.
+    pub fn new(of: Samples, stops: Stops) -> Remapped {
+        Remapped { of, stops }
     }
+}
+
+/// The grade of samples.
+pub(super) fn sampled(samples: Samples, remap: &Option<Stops>, of: &Quantity) -> Result<Grade, DesignError> {
+    let stops = match (remap, of.complement) {
+        (None, false) => return of.checked(samples),
+        (None, true) => {
+            let r = samples.bound(&Aabb::ALL);
+            // One stop would do where all numbers are the same.
+            Stops(vec![[r.lo, r.lo], [r.hi.max(r.lo + 1.0), r.hi.max(r.lo + 1.0)]])
+        }
+        (Some(stops), _) => stops.clone(),
+    };
+    of.checked(Remapped::new(samples, of.stops(&stops)))
 }
 
 impl Field for Remapped {

@@ -1,12 +1,33 @@
 //! A smooth step: how a weight passes from 0 to 1 across a boundary.
 
-use super::{Grade, Varying};
+use super::{Build, Grade, GradeSpec, Quantity, Varying};
 use crate::field::Field;
+use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
 /// The share of a logistic curve that is left out at either end, so that the step has ends.
 const TAIL: f64 = 0.02;
+
+/// A smooth step from 0 to 1 of another number: the logistic function, with ends.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Sigmoid", noun = "a smooth step")]
+pub struct SigmoidKind {
+    /// The number that it is a step of.
+    pub(crate) of: Box<GradeSpec>,
+    /// From where it is 0 to where it is 1, in the unit of the number; a negative width falls.
+    width: f64,
+    /// Where it is one half.
+    #[kind(default = 0.0)]
+    at: f64,
+}
+
+impl Build for SigmoidKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        let inner = self.of.build(&Quantity::new(format!("{}.of", of.path), of.environment, Key::NONE))?;
+        of.function(Sigmoid::new(inner, self.at, self.width))
+    }
+}
 
 /// The logistic function of a number, 1/(1 + e^(−k (v − at))), as in equation 17 of the hybrid paper as corrected: stretched
 /// by a fiftieth at either end so that it is 0 below at − width/2 and 1 above at + width/2. A negative width falls.
@@ -26,8 +47,9 @@ impl Sigmoid {
             return Err(Fault::new("at", format!("found {at}; give a finite number")));
         }
         if width == 0.0 || width.is_subnormal() || !width.is_finite() {
-            let message = format!("found {}; a step needs a finite width that is not 0 to rise in", number(width));
-            return Err(Fault::new("width", message));
+            let message =
+                format!("the width is {}; a step needs a finite width that is not 0 to rise in", number(width));
+            return Err(Fault::new("width", message).found(number(width)));
         }
         Ok(Sigmoid { of, at, width })
     }

@@ -1,38 +1,65 @@
 //! Stops: a function of one number, given by pairs.
 
-use geometry::fault::Fault;
+use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node};
+use geometry::fault::number;
 use geometry::math::Interval;
 
 /// Pairs `[s, value]`, at least one, finite, s ascending. Between them a function is linear ([`Stops::at`]) or constant
 /// ([`Stops::step`]); before the first and after the last it is constant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stops(Vec<[f64; 2]>);
+pub struct Stops(pub Vec<[f64; 2]>);
+
+impl Kind for Stops {
+    const DOC: &'static str = "Positions and the values taken there.";
+
+    fn expected() -> String {
+        "a list of [position, value]".into()
+    }
+
+    fn fits(node: &Node) -> u8 {
+        Vec::<[f64; 2]>::fits(node)
+    }
+
+    fn read(at: &At) -> Result<Self, DesignError> {
+        let stops = at.list(&Self::expected())?;
+        stops.iter().map(|s| s.numbers("[position, value]")).collect::<Result<Vec<_>, _>>().map(Stops)
+    }
+
+    fn write(&self) -> Node {
+        self.0.write()
+    }
+
+    /// The limits of `key` are those of the values.
+    fn check(&self, key: &Key) -> Result<(), Fault> {
+        if self.0.is_empty() {
+            return Err(Fault::new("", "no stops given; give at least one [position, value]"));
+        }
+        let mut last = f64::NEG_INFINITY;
+        for (i, &[at, value]) in self.0.iter().enumerate() {
+            let here = |f: Fault| f.under(&format!("[{i}]"));
+            Key::NONE.admit(at).map_err(here)?;
+            if at <= last {
+                let message =
+                    format!("positions must rise from stop to stop, found {} after {}", number(at), number(last));
+                return Err(here(Fault::new("", message).found(number(at))));
+            }
+            last = at;
+            key.admit_at(value, &format!(" at position {}", number(at))).map_err(here)?;
+        }
+        Ok(())
+    }
+
+    fn schema(_: &Key, defs: &mut Defs) -> Node {
+        let pairs = Vec::<[f64; 2]>::schema(&Key { least: 1, ..Key::NONE }, defs);
+        pairs.with("x-type", "Stops".into())
+    }
+}
 
 impl Stops {
-    /// The stops; `name` is what s is called in errors.
-    ///
-    /// # Errors
-    /// No stop; numbers that are not finite; an s that does not exceed the one before.
-    pub fn new(stops: Vec<[f64; 2]>, name: &str) -> Result<Stops, Fault> {
-        if stops.is_empty() {
-            return Err(Fault::new("stops", format!("found none; give at least one [{name}, value]")));
-        }
-        for (i, [s, v]) in stops.iter().enumerate() {
-            if !s.is_finite() || !v.is_finite() {
-                return Err(Fault::new(
-                    format!("stops[{i}]"),
-                    format!("found [{s}, {v}]; both numbers must be finite"),
-                ));
-            }
-            if i > 0 && *s <= stops[i - 1][0] {
-                let before = stops[i - 1][0];
-                return Err(Fault::new(
-                    format!("stops[{i}]"),
-                    format!("{name} = {s} follows {name} = {before}; {name} must grow from stop to stop"),
-                ));
-            }
-        }
-        Ok(Stops(stops))
+    /// One less each value.
+    pub fn complement(mut self) -> Stops {
+        self.0.iter_mut().for_each(|s| s[1] = 1.0 - s[1]);
+        self
     }
 
     /// Value and slope of the piecewise linear function at `s`. At a stop, the slope of the piece that begins there.

@@ -2,8 +2,8 @@
 
 use super::whole;
 use crate::design::data::*;
-use crate::design::place::Place;
 use crate::design::{Built, Warning, pattern};
+use crate::environment::Environment;
 use crate::report::{BeamsReport, CleanedReport, GraphReport, TrimmedReport};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
@@ -16,7 +16,7 @@ const NARROW: f64 = 15.0;
 
 pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     let told: Vec<String> = [
-        (c.merged, "node", "merged into another at the same place"),
+        (c.merged, "node", "merged into another at the same environment"),
         (c.short, "strut", "of no length left out"),
         (c.duplicates, "strut", "left out because another joins the same nodes"),
         (c.isolated, "node", "left out because no strut ends there"),
@@ -34,11 +34,11 @@ pub(super) fn warn(
     truss: &Truss,
     fillets: &[(usize, f64)],
     spec: &BeamsSpec,
-    place: &Place,
+    environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) {
     let mut say = |message: String| {
-        warnings.push(Warning { path: place.path.clone(), message });
+        warnings.push(Warning { path: environment.path.clone(), message });
     };
     let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
     if truss.dangling > 0 && truss.cleaned.dangling == 0 {
@@ -47,7 +47,7 @@ pub(super) fn warn(
             counted(truss.dangling, "node")
         ));
     }
-    let inside = |hub: usize| place.region.value(truss.quadors.center(hub)) <= 0.0;
+    let inside = |hub: usize| environment.region.value(truss.quadors.center(hub)) <= 0.0;
     let short: Vec<(usize, f64)> = match spec.fillet {
         FilletSpec::Radius(r) => {
             let less = |f: &&(usize, f64)| f.1 < r * (1.0 - 1e-9);

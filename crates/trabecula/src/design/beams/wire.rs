@@ -3,10 +3,9 @@
 use rayon::prelude::*;
 
 use crate::design::data::*;
-use crate::design::grade::{Asked, key_of};
-use crate::design::place::Place;
-use crate::design::samples;
+use crate::environment::Environment;
 use crate::grade::Grade;
+use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
 use ::beams::graph::{self, Graph, Nodes, Profile, Radii, Wireframe};
 use ::beams::quador::Pencil;
@@ -42,9 +41,9 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
     Err(Fault::new(key, message))
 }
 
-pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii<Grade>, DesignError> {
+pub(super) fn radii(spec: &BeamsSpec, environment: &Environment) -> Result<Radii<Grade>, DesignError> {
     let varied = |spec: &Option<GradeSpec>, key: &str| {
-        let asked = Asked::new(format!("{}.{key}", place.path), place, key_of::<BeamsSpec>(key));
+        let asked = Quantity::new(format!("{}.{key}", environment.path), environment, key_of::<BeamsSpec>(key));
         spec.as_ref().map(|spec| spec.build(&asked)).transpose()
     };
     let profile = spec.profile.map(|p| match p {
@@ -57,17 +56,17 @@ pub(super) fn radii(spec: &BeamsSpec, place: &Place) -> Result<Radii<Grade>, Des
 }
 
 /// The greatest value at points in the region.
-pub(super) fn greatest(grade: &Grade, place: &Place) -> f64 {
-    let mut values = vec![0.0; place.points.len()];
-    grade.values(place.points, &mut values);
+pub(super) fn greatest(grade: &Grade, environment: &Environment) -> f64 {
+    let mut values = vec![0.0; environment.points.len()];
+    grade.values(environment.points, &mut values);
     values.into_iter().fold(0.0, f64::max)
 }
 
 /// A bound of the radius of balls in the region.
-pub(super) fn thickest(radii: &Radii<Grade>, bounds: &Aabb, place: &Place) -> f64 {
+pub(super) fn thickest(radii: &Radii<Grade>, bounds: &Aabb, environment: &Environment) -> f64 {
     let most = |g: &Grade| match g.bound(bounds).hi {
         v if v.is_finite() => v,
-        _ => 2.0 * greatest(g, place),
+        _ => 2.0 * greatest(g, environment),
     };
     let of = [&radii.radius, &radii.hub].into_iter().flatten();
     of.map(most).fold(0.0, f64::max).min(norm(bounds.size()))
@@ -79,7 +78,7 @@ pub(super) fn mean_length(wire: &Wireframe) -> f64 {
 }
 
 /// Refuses a frame of which nothing is left.
-pub(super) fn check_left(wire: &Wireframe, key: &str, place: &Place) -> Result<(), DesignError> {
+pub(super) fn check_left(wire: &Wireframe, key: &str, environment: &Environment) -> Result<(), DesignError> {
     if !wire.struts.is_empty() {
         return Ok(());
     }
@@ -89,18 +88,22 @@ pub(super) fn check_left(wire: &Wireframe, key: &str, place: &Place) -> Result<(
         }
         "struts" => "no beam has two different ends".to_string(),
         _ => {
-            let b = place.region.bounds();
+            let b = environment.region.bounds();
             let corner = |v: Vec3| v.map(number).join(", ");
             format!("no beam lies in the region, which reaches from ({}) to ({}) mm", corner(b.min), corner(b.max))
         }
     };
-    Err(DesignError::new(format!("{}.{key}", place.path), message))
+    Err(DesignError::new(format!("{}.{key}", environment.path), message))
 }
 
 /// Nodes and struts of the user's own.
-pub(super) fn tables(graph: &NodeGraph, spec: &BeamsSpec, place: &Place) -> Result<(Wireframe, Vec<f64>), DesignError> {
-    let below = |key: &str| format!("{}.{key}", place.path);
-    let read = |path: &str, key: &str| samples::bytes(path, &below(key), place);
+pub(super) fn tables(
+    graph: &NodeGraph,
+    spec: &BeamsSpec,
+    environment: &Environment,
+) -> Result<(Wireframe, Vec<f64>), DesignError> {
+    let below = |key: &str| format!("{}.{key}", environment.path);
+    let read = |path: &str, key: &str| environment.load(path, &below(key));
     let wrong =
         |path: &str, key: &str, f: Fault| DesignError::new(below(key), format!("{path}: {}", f.message)).found(path);
     let nodes = match &graph.nodes {
@@ -132,7 +135,7 @@ pub(super) fn tables(graph: &NodeGraph, spec: &BeamsSpec, place: &Place) -> Resu
     };
     if spec.radius.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
         let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
-        return Err(DesignError::new(&place.path, message));
+        return Err(DesignError::new(&environment.path, message));
     }
     Ok((wire, nodes.radii))
 }

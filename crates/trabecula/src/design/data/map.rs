@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::super::map::BuildMap;
-use super::{ControlSpec, FieldSpec, GradeSpec, RegionKind, constant};
-use crate::kind::{At, DesignError, Fault, Key, Kind, OneOrThree, OneOrTwo, Unit};
+use super::{ControlPoints, FieldKind, GradeSpec, RegionKind};
+use crate::kind::{At, DesignError, Fault, Key, Kind, OneOrThree, OneOrTwo, Unit, Value};
 
 /// Position (mm) to phase (turns).
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -219,7 +219,7 @@ pub enum VectorSpec {
 #[kind(noun = "a vector")]
 pub struct VectorField {
     /// An array of three components of a result.
-    pub field: FieldSpec,
+    pub field: FieldKind,
 }
 
 /// Two of the cell's axes; the third is at right angles to both.
@@ -247,7 +247,7 @@ pub enum TensorSpec {
 #[kind(noun = "a tensor")]
 pub struct TensorField {
     /// An array of six or nine components of a result.
-    pub field: FieldSpec,
+    pub field: FieldKind,
     /// The order of six components.
     #[kind(default)]
     pub order: TensorOrder,
@@ -331,7 +331,7 @@ pub struct SweepSpec {
     pub wavelength: OneOrThree,
     /// The control points.
     #[kind(flatten)]
-    pub points: ControlSpec,
+    pub points: ControlPoints,
     /// Whether the last point is followed by the first.
     #[kind(default = false)]
     pub closed: bool,
@@ -421,4 +421,14 @@ pub enum Method {
     Explicit,
     /// On a grid over the part, like other lattices.
     Implicit,
+}
+
+/// A value that is one number: what may not vary says so.
+fn constant(at: &At, message: &str) -> Result<(), DesignError> {
+    let varies = |at: &At| matches!(at.node.value, Value::Table(_));
+    match at.is_list() {
+        true => at.list("")?.iter().find(|i| varies(i)).map_or(Ok(()), |i| Err(i.error(message))),
+        false if varies(at) => Err(at.error(message)),
+        false => Ok(()),
+    }
 }

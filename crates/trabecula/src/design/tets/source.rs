@@ -2,7 +2,7 @@
 
 use crate::design::Loader;
 use crate::design::data::*;
-use crate::design::place::Place;
+use crate::environment::Environment;
 use crate::extract;
 use crate::kind::DesignError;
 use crate::solid::Solid;
@@ -18,15 +18,15 @@ const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "Ma
 
 /// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
 /// the region's.
-pub(super) fn surface(space: &RegionKind, place: &Place, size: f64) -> Result<Mesh, DesignError> {
+pub(super) fn surface(space: &RegionKind, environment: &Environment, size: f64) -> Result<Mesh, DesignError> {
     if let RegionKind::Mesh(file) = space {
-        return triangles(file, place.loader);
+        return triangles(file, environment.loader);
     }
-    let solid = Solid::new(place.region.clone(), None, size);
+    let solid = Solid::new(environment.region.clone(), None, size);
     match extract::surface(&solid, size / 4.0, &Silent) {
         Ok(made) => Ok(made.mesh),
-        Err(Stopped::Refused(f)) => Err(DesignError::fault(&place.path, f)),
-        Err(_) => Err(DesignError::new(&place.path, "the region's surface could not be made")),
+        Err(Stopped::Refused(f)) => Err(DesignError::fault(&environment.path, f)),
+        Err(_) => Err(DesignError::new(&environment.path, "the region's surface could not be made")),
     }
 }
 

@@ -1,18 +1,43 @@
-//! Grids of numbers: arrays, images, stacks of pictures.
+//! Numbers on a grid from a file: arrays, images, stacks of pictures.
 
-use super::{bytes, extension, percent, pick};
-use crate::design::data::*;
-use crate::design::place::Place;
-use crate::grade::Samples;
-use crate::kind::DesignError;
+use super::remapped::sampled;
+use super::result::{percent, pick};
+use super::{Build, Grade, Quantity, Samples, Stops};
+use crate::environment::{Environment, extension};
+use crate::kind::{DesignError, Kind, OneOrThree};
 use geometry::fault::Fault;
 use geometry::formats::{self, Shape};
 
-pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
+/// Numbers on a grid, from a file; linear between them.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Grid", noun = "a grade on a grid")]
+pub struct GridKind {
+    /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif), where
+    /// a * in the last part stands for anything: "scan/*.png". Columns run along x, rows along y, pictures along z.
+    path: String,
+    /// Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it.
+    #[kind(unit = "mm")]
+    origin: Option<[f64; 3]>,
+    /// Distance between numbers, one or three. VTI and VTK files contain it.
+    #[kind(unit = "mm")]
+    step: Option<OneOrThree>,
+    /// Name of the array, where a file has several.
+    array: Option<String>,
+    /// What the numbers stand for: pairs [number, value], number rising, linear between.
+    remap: Option<Stops>,
+}
+
+impl Build for GridKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        sampled(read(self, &of.path, of.environment)?, &self.remap, of)
+    }
+}
+
+fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
     let at = format!("{path}.path");
     let kind = extension(&spec.path);
     let pictures = ["png", "tif", "tiff"].contains(&kind.as_str());
-    let file = if pictures { Vec::new() } else { bytes(&spec.path, &at, place)? };
+    let file = if pictures { Vec::new() } else { environment.load(&spec.path, &at)? };
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     let (origin, step, shape, values) = match extension(&spec.path).as_str() {
         "npy" => {
@@ -63,7 +88,7 @@ pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Res
             let step = spec
                 .step
                 .ok_or_else(|| need("step", "the distance between pixels and pictures in mm, one or three"))?;
-            let (shape, values) = stack(spec, &at, place)?;
+            let (shape, values) = stack(spec, &at, environment)?;
             (origin, step.three(), shape, values)
         }
         _ => {
@@ -79,9 +104,9 @@ pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Res
     // A number stands for half a step about it as well.
     let reach = samples.step().into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
     let covered = samples.bounds().grown(reach);
-    let missing = place.points.iter().filter(|p| covered.distance(**p) > 0.0).count();
+    let missing = environment.points.iter().filter(|p| covered.distance(**p) > 0.0).count();
     if missing > 0 {
-        let (b, share) = (samples.bounds(), missing as f64 / place.points.len() as f64);
+        let (b, share) = (samples.bounds(), missing as f64 / environment.points.len() as f64);
         let message = format!(
             "{}: the grid does not cover {} of the region; it reaches from {:?} to {:?} mm",
             spec.path,
@@ -96,16 +121,16 @@ pub(in crate::design) fn grid(spec: &GridSpec, path: &str, place: &Place) -> Res
 
 /// Grey pictures one above the other: the files that the path stands for in the order of their names, in which 10 comes after 9,
 /// each with one picture or more.
-fn stack(spec: &GridSpec, at: &str, place: &Place) -> Result<([usize; 3], Vec<f64>), DesignError> {
+fn stack(spec: &GridKind, at: &str, environment: &Environment) -> Result<([usize; 3], Vec<f64>), DesignError> {
     let mut names = match spec.path.contains('*') {
-        true => place.loader.list(&spec.path).map_err(|m| DesignError::new(at, m).found(&spec.path))?,
+        true => environment.loader.list(&spec.path).map_err(|m| DesignError::new(at, m).found(&spec.path))?,
         false => vec![spec.path.clone()],
     };
     names.sort_by_cached_key(|n| counted_name(n));
     let (mut size, mut values, mut count) = (None, Vec::new(), 0);
     for name in &names {
         let wrong = |message: String| DesignError::new(at, format!("{name}: {message}")).found(name);
-        let file = bytes(name, at, place)?;
+        let file = environment.load(name, at)?;
         for picture in formats::read_pictures(&file).map_err(|f| wrong(f.message))? {
             let [w, h] = picture.size;
             let first = *size.get_or_insert(picture.size);

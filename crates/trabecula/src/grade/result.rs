@@ -1,10 +1,9 @@
-//! Results on meshes: an array of points or cells.
+//! Results on meshes from a file: an array of points or cells.
 
-use super::{bytes, extension, percent, pick};
-use crate::design::data::*;
-use crate::design::place::Place;
-use crate::grade::{Grade, Samples};
-use crate::kind::DesignError;
+use super::remapped::sampled;
+use super::{Build, Grade, Quantity, Samples, Stops};
+use crate::environment::{Environment, extension};
+use crate::kind::{DesignError, Kind};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{self, Shape};
 use geometry::math::Aabb;
@@ -12,9 +11,61 @@ use geometry::math::Aabb;
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
 
-pub(in crate::design) fn field(spec: &FieldSpec, path: &str, place: &Place) -> Result<Samples, DesignError> {
+/// An array of a result on a mesh of volume elements, from a file.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Field", noun = "a field of a result")]
+pub struct FieldKind {
+    /// Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
+    path: String,
+    /// Name of the array, of points or cells.
+    array: String,
+    /// Which of its components, from 0, where it has several.
+    component: Option<u32>,
+    /// What the numbers stand for: pairs [number, value], number rising, linear between.
+    remap: Option<Stops>,
+}
+
+impl Build for FieldKind {
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
+        sampled(read(self, &of.path, of.environment)?, &self.remap, of)
+    }
+}
+
+/// The array of this name, or the only one.
+pub(super) fn pick<'a>(arrays: &'a [formats::Array], name: Option<&str>) -> Result<&'a formats::Array, String> {
+    let listed = || {
+        let names: Vec<String> = arrays
+            .iter()
+            .map(|a| {
+                format!(
+                    "\"{}\" ({} each, of {})",
+                    a.name,
+                    counted(a.components, "number"),
+                    if a.of_cells { "cells" } else { "points" }
+                )
+            })
+            .collect();
+        if names.is_empty() { "it has none".to_string() } else { format!("it has {}", names.join(", ")) }
+    };
+    match name {
+        Some(name) => arrays
+            .iter()
+            .find(|a| a.name == name)
+            .ok_or_else(|| format!("the file has no array \"{name}\"; {}", listed())),
+        None => match arrays {
+            [one] => Ok(one),
+            _ => Err(format!("the file does not have exactly one array, so name one; {}", listed())),
+        },
+    }
+}
+
+pub(super) fn percent(share: f64) -> String {
+    if share >= 0.01 { format!("{:.0} %", 100.0 * share) } else { format!("{:.2} %", 100.0 * share) }
+}
+
+fn read(spec: &FieldKind, path: &str, environment: &Environment) -> Result<Samples, DesignError> {
     let at = format!("{path}.component");
-    let made = components(spec, path, place, |array| match (spec.component, array.components) {
+    let made = components(spec, path, environment, |array| match (spec.component, array.components) {
         (_, 0) => Err(DesignError::new(path, format!("the array \"{}\" has no components", array.name))),
         (None, 1) => Ok(vec![0]),
         (None, n) => Err(DesignError::new(
@@ -32,13 +83,13 @@ pub(in crate::design) fn field(spec: &FieldSpec, path: &str, place: &Place) -> R
 }
 
 /// The components of a vector (three) or a symmetric tensor (six, in the order 11, 22, 33, 23, 13, 12).
-pub(in crate::design) fn several<const N: usize>(
-    spec: &FieldSpec,
+pub(crate) fn several<const N: usize>(
+    spec: &FieldKind,
     path: &str,
-    place: &Place,
+    environment: &Environment,
     order: impl Fn(usize) -> Option<[usize; N]>,
 ) -> Result<[Grade; N], DesignError> {
-    let made = components(spec, path, place, |array| {
+    let made = components(spec, path, environment, |array| {
         order(array.components).map(|o| o.to_vec()).ok_or_else(|| {
             let needed = if N == 3 { "a vector has three" } else { "a tensor has six or nine" };
             DesignError::new(
@@ -53,13 +104,13 @@ pub(in crate::design) fn several<const N: usize>(
 
 /// The chosen components of an array, on grids over the region.
 fn components(
-    spec: &FieldSpec,
+    spec: &FieldKind,
     path: &str,
-    place: &Place,
+    environment: &Environment,
     choose: impl Fn(&formats::Array) -> Result<Vec<usize>, DesignError>,
 ) -> Result<Vec<Samples>, DesignError> {
     let at = format!("{path}.path");
-    let file = bytes(&spec.path, &at, place)?;
+    let file = environment.load(&spec.path, &at)?;
     let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", spec.path, f.message)).found(&spec.path);
     if !["vtu", "vtk", "vti"].contains(&extension(&spec.path).as_str()) {
         let message = format!("the name must end in vtu, vtk or vti; found \"{}\"", spec.path);
@@ -119,7 +170,7 @@ fn components(
         })
         .collect();
     let (made, share) =
-        Samples::meshed(&points, &tets, &values, &place.region.bounds(), place.points).map_err(wrong)?;
+        Samples::meshed(&points, &tets, &values, &environment.region.bounds(), environment.points).map_err(wrong)?;
     if share > UNCOVERED {
         let b = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
         let message = format!(

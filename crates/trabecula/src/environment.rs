@@ -1,0 +1,85 @@
+//! What a kind is built in: its path in the design, the region with points inside it, and the files that a design refers to.
+
+use crate::csg_tree::CsgSolid;
+use crate::kind::DesignError;
+use crate::region::{Context, HalfSpace, HalfSpaceKind, Notes, Region, RegionKind};
+use geometry::formats::Elements;
+use geometry::math::Vec3;
+use geometry::mesh::Mesh;
+use geometry::tetmesh::TetMesh;
+
+/// Hands over the files that a design refers to.
+pub trait Loader {
+    /// The bytes of the file at `path`, or one sentence why not.
+    fn load(&self, path: &str) -> Result<Vec<u8>, String>;
+
+    /// The names of the files that `pattern` stands for, in which one * of the last part stands for anything; or one sentence
+    /// why there are none.
+    fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
+        Err(format!("{pattern}: folders are not looked into here"))
+    }
+
+    /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
+    /// each or for none; or one sentence why not.
+    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+        Err(format!("{path}: only vtu and vtk files are read here"))
+    }
+
+    /// The tetrahedra that the mesher `name` makes of a surface (soups of triangles too), of this edge (mm) and within this
+    /// time (s); or one sentence why not.
+    fn tetrahedra(&self, name: &str, surface: &Mesh, size: f64, limit: f64) -> Result<TetMesh, String> {
+        let _ = (surface, size, limit);
+        Err(format!("the mesher {name} is not available here"))
+    }
+}
+
+/// A loader for designs that refer to no files.
+pub struct NoFiles;
+
+impl Loader for NoFiles {
+    fn load(&self, path: &str) -> Result<Vec<u8>, String> {
+        Err(format!("{path}: no folder is known to read it from; use a design file"))
+    }
+}
+
+/// What a kind of a lattice is built in.
+pub(crate) struct Environment<'a> {
+    /// The path of its table.
+    pub path: String,
+    /// The region that the lattice is to fill.
+    pub region: &'a Region,
+    /// Points inside the region, mm.
+    pub points: &'a [Vec3],
+    /// What is solid in the region whatever the lattice is.
+    pub filled: &'a [CsgSolid],
+    /// The files.
+    pub loader: &'a dyn Loader,
+}
+
+impl Environment<'_> {
+    /// The bytes of a file that is named at the path `at` of the design.
+    pub fn load(&self, file: &str, at: &str) -> Result<Vec<u8>, DesignError> {
+        self.loader.load(file).map_err(|m| DesignError::new(at, m).found(file))
+    }
+}
+
+/// The region at `path`; its warnings and repairs are added to `notes`.
+pub(crate) fn region(
+    kind: &RegionKind,
+    path: &str,
+    loader: &dyn Loader,
+    notes: &mut Notes,
+) -> Result<Region, DesignError> {
+    let load = |file: &str| loader.load(file);
+    kind.build(&mut Context::new(path, &load, notes)).map_err(|f| DesignError::fault(path, f))
+}
+
+/// The half-space at `path`.
+pub(crate) fn half_space(kind: &HalfSpaceKind, path: &str) -> Result<HalfSpace, DesignError> {
+    kind.made().map_err(|f| DesignError::fault(path, f))
+}
+
+/// What a file's name ends in, in small letters.
+pub(crate) fn extension(path: &str) -> String {
+    path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase()
+}

@@ -1,0 +1,32 @@
+//! One less another number.
+
+use super::Varying;
+use crate::field::Field;
+use geometry::math::{Aabb, Interval, Vec3, scale};
+
+/// One less a number.
+pub(super) struct Complement<V>(pub V);
+
+impl<V: Varying> Varying for Complement<V> {
+    fn varies(&self) -> [bool; 3] {
+        self.0.varies()
+    }
+}
+
+impl<V: Varying> Field for Complement<V> {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.0.values(points, out);
+        out.iter_mut().for_each(|v| *v = 1.0 - *v);
+    }
+
+    fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+        self.0.gradients(points, values, gradients);
+        values.iter_mut().for_each(|v| *v = 1.0 - *v);
+        gradients.iter_mut().for_each(|g| *g = scale(*g, -1.0));
+    }
+
+    fn bound(&self, b: &Aabb) -> Interval {
+        let r = self.0.bound(b);
+        Interval::new(1.0 - r.hi, 1.0 - r.lo)
+    }
+}

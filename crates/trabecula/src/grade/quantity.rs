@@ -1,0 +1,83 @@
+//! A number of a design that is being built.
+
+use super::complement::Complement;
+use super::{Grade, Stops, Varying};
+use crate::environment::Environment;
+use crate::kind::{DesignError, Key, Table};
+use geometry::fault::Fault;
+
+/// A number of a design: its path, what it is built in, its limits, and whether its complement, 1 − value, is what counts.
+pub(crate) struct Quantity<'a> {
+    pub path: String,
+    pub environment: &'a Environment<'a>,
+    pub key: Key,
+    pub complement: bool,
+}
+
+/// The declaration of a key of a table.
+pub(crate) fn key_of<T: Table>(name: &str) -> Key {
+    T::keys().into_iter().find(|k| k.name == name).unwrap_or(Key::NONE)
+}
+
+impl<'a> Quantity<'a> {
+    /// A number at `path`, under a key of these limits.
+    pub fn new(path: impl Into<String>, environment: &'a Environment<'a>, key: Key) -> Self {
+        Quantity { path: path.into(), environment, key, complement: false }
+    }
+
+    pub fn below(&self, key: &str) -> Self {
+        Quantity { path: format!("{}.{key}", self.path), ..*self }
+    }
+
+    /// The value that counts.
+    pub fn own(&self, v: f64) -> f64 {
+        if self.complement { 1.0 - v } else { v }
+    }
+
+    /// The stops of the values that count.
+    pub fn stops(&self, stops: &Stops) -> Stops {
+        if self.complement { stops.clone().complement() } else { stops.clone() }
+    }
+
+    /// A function whose values cannot be checked where they are declared: they are sampled in the region.
+    pub fn checked(&self, of: impl Varying + 'static) -> Result<Grade, DesignError> {
+        let grade = Grade::from(of);
+        self.check(&grade, |v, position| self.key.admit_at(v, position))?;
+        Ok(grade)
+    }
+
+    /// The same of a function that does not know of complements.
+    pub fn function<V: Varying + 'static>(&self, of: Result<V, Fault>) -> Result<Grade, DesignError> {
+        let of = of.map_err(|f| DesignError::fault(&self.path, f))?;
+        if self.complement { self.checked(Complement(of)) } else { self.checked(of) }
+    }
+
+    /// Checks a number at the positions of the region where it is least and greatest, of some thousands.
+    pub fn check(&self, grade: &Grade, admit: impl Fn(f64, &str) -> Result<(), Fault>) -> Result<(), DesignError> {
+        let Environment { region, points, .. } = *self.environment;
+        let bounds = region.bounds();
+        let corner = |i: usize| core::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
+        let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+        let mut distance = [0.0; 8];
+        region.values(&corners, &mut distance);
+        let in_corners = corners.iter().zip(distance).filter(|(_, d)| *d <= 1e-9).map(|(c, _)| *c);
+        let points: Vec<[f64; 3]> = points.iter().copied().chain(in_corners).collect();
+        let mut values = vec![0.0; points.len()];
+        grade.values(&points, &mut values);
+        let order = |a: &usize, b: &usize| self.own(values[*a]).total_cmp(&self.own(values[*b]));
+        // Not a number comes first or last in this order.
+        let ends = [(0..values.len()).min_by(order), (0..values.len()).max_by(order)];
+        for i in ends.into_iter().flatten() {
+            let [x, y, z] = points[i];
+            admit(self.own(values[i]), &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"))
+                .map_err(|f| DesignError::fault(&self.path, f))?;
+        }
+        Ok(())
+    }
+}
+
+/// A kind of grade, as it is declared.
+pub(crate) trait Build {
+    /// The grade. `of.path` is that of the kind's table; declared ranges have been checked.
+    fn build(&self, of: &Quantity) -> Result<Grade, DesignError>;
+}
