@@ -10,7 +10,6 @@ mod cell;
 mod data;
 mod joins;
 mod level;
-mod map;
 mod pattern;
 mod report;
 mod sample;

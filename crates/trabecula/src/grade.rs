@@ -31,7 +31,7 @@ pub use depth::Depth;
 pub use formula::Formula;
 pub use linear::Linear;
 pub use polyline::Polyline;
-pub(crate) use quantity::{Build, Quantity, key_of};
+pub(crate) use quantity::{BuildGrade, Quantity, key_of};
 pub use radial::Radial;
 pub use rbf::Rbf;
 pub use region_step::region_step;
@@ -54,7 +54,7 @@ pub enum GradeSpec {
 
 /// How a number varies in space. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(name = "Grade", noun = "grade", family = Build, inherit)]
+#[kind(name = "Grade", noun = "grade", family = BuildGrade, inherit)]
 #[allow(missing_docs)] // The comment of each type says what it is.
 pub enum GradeKind {
     Linear(Linear),
@@ -281,7 +281,7 @@ mod tests {
         }
         let one = || vec![[0.0, 1.0]];
         assert_eq!(at(Linear::new([0.0; 3], one())).as_deref(), Some("along"));
-        assert_eq!(at(Linear::new([f64::NAN, 0.0, 1.0], one())).as_deref(), Some("along"));
+        assert_eq!(at(Linear::new([f64::NAN, 0.0, 1.0], one())).as_deref(), Some("along[0]"));
         let z = [0.0, 0.0, 1.0];
         assert_eq!(at(Linear::new(z, vec![])).as_deref(), Some("stops"));
         assert_eq!(at(Linear::new(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(), Some("stops[1]"));
@@ -289,7 +289,7 @@ mod tests {
         let late = vec![[0.0, 1.0], [f64::INFINITY, 2.0]];
         assert_eq!(at(Depth::new(Arc::new(Ball), late)).as_deref(), Some("stops[1]"));
         assert_eq!(at(Radial::new([0.0; 3], Some([0.0; 3]), one())).as_deref(), Some("axis"));
-        assert_eq!(at(Radial::new([f64::INFINITY; 3], None, one())).as_deref(), Some("center"));
+        assert_eq!(at(Radial::new([f64::INFINITY; 3], None, one())).as_deref(), Some("center[0]"));
         assert_eq!(at(Sigmoid::new(Grade::Constant(0.0), 0.0, 0.0)).as_deref(), Some("width"));
         assert_eq!(at(region_step(Arc::new(Ball), -1.0)).as_deref(), Some("width"));
     }

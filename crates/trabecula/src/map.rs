@@ -1,16 +1,21 @@
 //! Maps from position (mm) to phase (turns).
 
 mod affine;
+mod affine_kind;
 mod distortion;
 mod frame;
 mod grid;
 mod inverse;
 mod phase;
+mod phase_kind;
 mod poisson;
 mod round;
+mod round_kind;
 mod spline;
 mod sweep;
+mod sweep_kind;
 pub(crate) mod tets;
+mod tets_kind;
 mod tilt;
 
 pub use affine::{Affine, Skew};
@@ -20,11 +25,46 @@ pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;
 pub use sweep::{Path, Sweep};
 pub use tets::Tets;
+pub use tets_kind::{Joined, MadeTetsSpec, MesherSpec, Method, TetFileSpec, TetsSpec};
 
 use std::sync::Arc;
 
+use crate::environment::Environment;
 use crate::field::Block;
+use crate::kind::{DesignError, Kind};
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Mat3, Vec3};
+
+/// Position (mm) to phase (turns).
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Map", noun = "map", family = BuildMap)]
+#[allow(missing_docs)] // The comment of each type says what it is.
+pub enum MapKind {
+    Affine(affine_kind::AffineKind),
+    Spartan(affine_kind::SpartanKind),
+    Phase(Box<phase_kind::PhaseKind>),
+    Cylinder(round_kind::CylinderMapKind),
+    Sphere(round_kind::SphereMapKind),
+    Sweep(sweep_kind::SweepKind),
+    Tets(TetsSpec),
+}
+
+/// A kind of map, as it is declared.
+pub(crate) trait BuildMap {
+    /// The map. `path` is that of the kind's table.
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError>;
+}
+
+impl MapKind {
+    /// The map at `environment.path`.
+    pub(crate) fn build(&self, environment: &Environment) -> Result<Map, DesignError> {
+        self.family().build(&format!("{}.{}", environment.path, self.key()), environment)
+    }
+}
+
+fn shared(made: Result<impl Mapping + 'static, Fault>, path: &str) -> Result<Map, DesignError> {
+    made.map(|m| Arc::new(m) as Map).map_err(|f| DesignError::fault(path, f))
+}
 
 /// A function u(x) from position (mm) to phase (turns). Cells are where the phases have the same whole parts.
 pub trait Mapping: Send + Sync {

@@ -36,7 +36,7 @@ pub use tetrahedron::Tetrahedron;
 
 /// Where the part may be. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(name = "Region", noun = "region", family = Build)]
+#[kind(name = "Region", noun = "region", family = BuildRegion)]
 #[allow(missing_docs)] // The comment of each type says what it is.
 pub enum RegionKind {
     Box(cuboid::BoxKind),
@@ -53,7 +53,7 @@ pub enum RegionKind {
 }
 
 /// A kind of region, as it is declared.
-pub(crate) trait Build {
+pub(crate) trait BuildRegion {
     /// The region. Errors name the key; ranges are checked here.
     fn build(&self, context: &mut Context) -> Result<Region, Fault>;
 }

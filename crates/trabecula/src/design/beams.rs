@@ -1,6 +1,6 @@
 //! Beams: data to a graph and its field.
 
-mod told;
+mod beam_report;
 mod wire;
 
 use std::sync::Arc;
@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::data::*;
 use super::pattern;
+use super::sample;
+use super::warn::solved_map;
 use super::{Built, Warning};
-use super::{map, sample};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
@@ -21,8 +22,8 @@ use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
 
-pub(super) use told::{held, inside, lone, report, share};
-use told::{tell_cleaned, warn};
+pub(super) use beam_report::{held, inside, lone, report, share};
+use beam_report::{warn, warn_cleaned};
 pub(super) use wire::given;
 use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
 
@@ -51,7 +52,7 @@ pub(super) fn beams(
     };
     check_left(&wire, if cell.is_some() { "map" } else { "struts" }, environment)?;
     if cell.is_none() {
-        tell_cleaned(&cleaned, &environment.path, warnings);
+        warn_cleaned(&cleaned, &environment.path, warnings);
     }
     let trim = match trimming.trim {
         TrimSpec::Cut => Trim::Cut,
@@ -182,8 +183,8 @@ fn frame(
     let unit = graph::named(cell).ok_or_else(|| DesignError::new(below("cell"), "no such cell"))?;
     let net = unit.graph().map_err(|f| DesignError::fault(&environment.path, f))?;
     let at = Environment { path: below("map"), ..*environment };
-    let made = map::map(map, &at)?;
-    map::warn(&made, map, &environment.path, warnings);
+    let made = map.build(&at)?;
+    solved_map(&made, map, &environment.path, warnings);
     for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
         let most = grade.as_ref().map_or(0.0, |g| greatest(g, environment));
         if most > made.longest() {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::cell::cell;
 use super::data::*;
-use super::{Built, Design, Loader, Tiled, Warning, beams, blend, level, map, sample, skin, tets, tiling, warn};
+use super::{Built, Design, Loader, Tiled, Warning, beams, blend, level, sample, skin, tets, tiling, warn};
 use crate::blend::Constituent;
 use crate::cell::Part;
 use crate::environment::{self, Environment};
@@ -125,7 +125,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         }
     }
     let others = d.lattice.iter();
-    for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapSpec::Tets(_))) {
+    for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapKind::Tets(_))) {
         let path = format!("lattice.{name}");
         let environment = Environment { path: path.clone(), region: &space, points: &points, filled: &filled, loader };
         if spec.level.of == Of::Part && d.blend.is_some() {
@@ -135,7 +135,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         let built = Arc::new(lattice(spec, &environment)?);
         warn::check(&built, &environment, spec)?;
         warn::warn(&built, &environment, spec, &mut warnings);
-        map::warn(&built.map, &spec.map, &path, &mut warnings);
+        warn::solved_map(&built.map, &spec.map, &path, &mut warnings);
         lattices.push((name.clone(), built));
     }
     let mut graphs = Vec::new();
@@ -210,7 +210,7 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     }
     let cell = Arc::new(cell);
     let here = Environment { path: below("map"), ..*environment };
-    let map = map::map(&spec.map, &here)?;
+    let map = spec.map.build(&here)?;
     let here = Environment { path: below("level"), ..*environment };
     let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))

@@ -7,6 +7,7 @@ use crate::cell::{catalogue, named};
 pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
+pub use crate::map::{Joined, MadeTetsSpec, MapKind, MesherSpec, Method, TetFileSpec, TetsSpec};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::symmetry::Group;
 
@@ -57,11 +58,9 @@ macro_rules! name_of {
 
 mod beams;
 mod blend;
-mod map;
 
 pub use beams::*;
 pub use blend::*;
-pub use map::*;
 
 /// A lattice: a cell seen through a map, cut by a part at a level.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -72,7 +71,7 @@ pub struct LatticeSpec {
     /// Which side of the level is solid: sheet (|f| ≤ t), lower (f ≤ t) or upper (f ≥ t).
     pub part: PartSpec,
     /// Position (mm) to phase (turns), such as map.affine with wavelength = 4.
-    pub map: MapSpec,
+    pub map: MapKind,
     /// How much is solid: exactly one of iso, fraction, porosity, thickness.
     pub level: LevelSpec,
 }

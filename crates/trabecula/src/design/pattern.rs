@@ -82,7 +82,7 @@ pub(super) fn laid(
     {
         let message = format!(
             "{} of beams run into each other without a common node, as many about one hub of each kind, the first at {}: they are \
-             joined there, but not filleted, and no exact volume is told; make them thinner, or put nodes there",
+             joined there, but not filleted, and no exact volume is given; make them thinner, or put nodes there",
             counted(c.count, "pair"),
             beams::graph::position_text(p)
         );

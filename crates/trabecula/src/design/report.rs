@@ -58,7 +58,7 @@ impl Varied {
         }
     }
 
-    fn told(self) -> Varying {
+    fn varying(self) -> Varying {
         if self.min == self.max { Varying::Number(self.min) } else { Varying::Range([self.min, self.max]) }
     }
 }
@@ -126,11 +126,11 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
         wavelength: lattice.map.wavelength(),
         // A wall of even thickness is not bounded by a level of f: the one that would leave as much solid.
         iso: Some(match lattice.distance() {
-            Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).told(),
-            None => iso.told(),
+            Some(_) => fraction.map(|f| lattice.cell.iso(lattice.part, f).0).varying(),
+            None => iso.varying(),
         }),
-        fraction: fraction.told(),
-        porosity: fraction.map(|f| 1.0 - f).told(),
+        fraction: fraction.varying(),
+        porosity: fraction.map(|f| 1.0 - f).varying(),
         thickness: thickness(lattice, iso),
         folding: lattice.folding(),
         connected_fraction: lattice.connected_fraction(),
@@ -226,14 +226,14 @@ fn tiled(it: &Tiled) -> LatticeReport {
         pieces: it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
         thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
         ports: Some(stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports),
-        face_fraction: Some(iso.map(|t| stencil.face_fraction(part, t)).told()),
+        face_fraction: Some(iso.map(|t| stencil.face_fraction(part, t)).varying()),
         creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max }),
         ..mesh
     };
     LatticeReport {
-        iso: Some(iso.told()),
-        fraction: share.told(),
-        porosity: share.map(|f| 1.0 - f).told(),
+        iso: Some(iso.varying()),
+        fraction: share.varying(),
+        porosity: share.map(|f| 1.0 - f).varying(),
         thickness: spread.map(|s| Varying::Range([s.min, s.max])),
         connected_fraction: stencil.connected_fraction(part),
         tets: Some(tets),
@@ -275,7 +275,7 @@ fn along(f: &[f64; 4]) -> FractionAlong {
 /// The thinnest wall or narrowest neck (mm), at five levels where the level varies; `None` where there is none.
 fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
     if lattice.distance().is_some() {
-        return Some(iso.map(|t| 2.0 * t).told());
+        return Some(iso.map(|t| 2.0 * t).varying());
     }
     let to_phase = lattice.map.extremes();
     let steps = if iso.min == iso.max { 1 } else { 5 };
@@ -285,7 +285,7 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
         .flat_map(|m| (0..steps).map(move |i| (i, m)))
         .filter_map(|(i, m)| lattice.cell.thickness(lattice.part, level(i), m))
         .collect();
-    (!found.is_empty()).then(|| Varied::of(&found).told())
+    (!found.is_empty()).then(|| Varied::of(&found).varying())
 }
 
 /// How far a solved map is from what was asked for.

@@ -142,7 +142,7 @@ fn skins_and_keep_zones_survive() {
 }
 
 #[test]
-fn slips_are_told_with_path_line_and_nearest_word() {
+fn slips_are_reported_with_path_line_and_nearest_word() {
     for (line, instead, path, number, nearest) in [
         ("[region.box]", "[region.bxo]", "region.bxo", 3, "box"),
         ("size =", "siez =", "region.box.siez", 4, "size"),

@@ -92,7 +92,7 @@ impl Tets {
     /// The tetrahedral mesh in a file, of no region.
     pub fn in_file(file: &TetFileSpec, loader: &dyn Loader) -> Result<Tets, DesignError> {
         let (mesh, checked) = from_file(file, "", loader)?;
-        told(mesh, &checked, file.path.clone(), None, "", "")
+        checked_mesh(mesh, &checked, file.path.clone(), None, "", "")
     }
 
     /// The figures and the warnings.
@@ -179,9 +179,9 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, environment: &Environmen
         TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
         TetsSpec::File(_) => "is it a mesh of this region, in the right environment and unit?",
     };
-    let mut told = told(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
-    told.warnings.extend(notes.warnings);
-    Ok(told)
+    let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
+    made.warnings.extend(notes.warnings);
+    Ok(made)
 }
 
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
@@ -221,7 +221,7 @@ fn zones(
 }
 
 /// The mesh with its figures, and warnings at `path`; `todo` against what is lost.
-fn told(
+fn checked_mesh(
     mesh: TetMesh,
     checked: &Checked,
     mesher: String,
@@ -265,12 +265,12 @@ pub(super) fn of_soup(
     let (mut mesh, checked) = wild(made, &surface, size, path, loader)?;
     let mut notes = crate::region::Notes::default();
     mesh.zones = zones(&mesh, made, path, loader, &mut notes)?;
-    let mut told = told(mesh, &checked, "ftetwild".into(), None, path, "")?;
-    told.warnings.extend(notes.warnings);
+    let mut made = checked_mesh(mesh, &checked, "ftetwild".into(), None, path, "")?;
+    made.warnings.extend(notes.warnings);
     let message = format!("no region, so the boundary of the tetrahedra is taken for one: {}", why.message);
     let path = "region.mesh".into();
-    told.warnings.push(Warning { path, message });
-    Ok(told)
+    made.warnings.push(Warning { path, message });
+    Ok(made)
 }
 
 /// What may not be meant.

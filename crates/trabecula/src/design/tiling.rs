@@ -51,7 +51,7 @@ impl Domain<'_> {
 /// The lattice over tetrahedra of a design, by name, and their mesh.
 fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsSpec)> {
     d.lattice.iter().find_map(|(name, spec)| match &spec.map {
-        MapSpec::Tets(t) => Some((name, spec, t)),
+        MapKind::Tets(t) => Some((name, spec, t)),
         _ => None,
     })
 }
@@ -100,7 +100,7 @@ pub(super) fn domain<'a>(
         return Err(DesignError::new(format!("{path}.cell"), message));
     };
     let others = d.lattice.iter().filter(|(n, _)| *n != name);
-    if let Some((other, _)) = others.clone().find(|o| matches!(o.1.map, MapSpec::Tets(_))) {
+    if let Some((other, _)) = others.clone().find(|o| matches!(o.1.map, MapKind::Tets(_))) {
         let message = "two lattices over tetrahedra; keep one, with zones where cells differ";
         return Err(DesignError::new(format!("lattice.{other}"), message));
     }

@@ -8,8 +8,13 @@ use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::DesignError;
 use crate::lattice::Lattice;
+use crate::map::Map;
 use geometry::fault::number;
 
+/// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
+const TURN: f64 = 45.0;
+/// The share of places and axes with spacings outside 1/1.5 to 1.5 above which it is warned of.
+const OUTSIDE: f64 = 0.05;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
 
@@ -158,6 +163,35 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
         );
         let kind = spec.map.key();
         warnings.push(Warning { path: format!("{}.map.{kind}.wavelength", environment.path), message });
+    }
+}
+
+/// Warns of a map that is far from what was asked for.
+pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mut Vec<Warning>) {
+    let Some(phase) = map.solved() else { return };
+    let d = phase.distortion();
+    let mut say = |message: String| {
+        warnings.push(Warning { path: format!("{lattice}.map.{}", spec.key()), message });
+    };
+    let at = |[x, y, z]: [f64; 3]| format!("({x:.3}, {y:.3}, {z:.3}) mm");
+    if d.turn > TURN {
+        say(format!(
+            "the orientation turns by {:.0} degrees within one cell at {}: above {TURN} neighbouring cells no longer fit \
+             together without being torn out of shape; let it turn more slowly, or use smaller cells",
+            d.turn,
+            at(d.turn_at)
+        ));
+    }
+    if d.outside > OUTSIDE {
+        let worst = d.spacing.iter().fold(0.0, |m: f64, s| m.max(s.max));
+        say(format!(
+            "no map follows this orientation and wavelength closely: {:.0} % of the spacings are outside 1/1.5 to 1.5 of \
+             what is asked for, the worst by a factor of {worst:.2}",
+            100.0 * d.outside
+        ));
+    }
+    if d.density[0] <= 0.0 {
+        say(format!("the map folds: cells turn inside out at {}", at(d.least_at)));
     }
 }
 

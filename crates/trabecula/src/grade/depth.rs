@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Build, Grade, Quantity, Stops, Varying};
+use super::{BuildGrade, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
@@ -17,7 +17,7 @@ pub struct DepthKind {
     stops: Stops,
 }
 
-impl Build for DepthKind {
+impl BuildGrade for DepthKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         Ok(Depth { region: of.environment.region.clone(), stops: of.stops(&self.stops) }.into())
     }

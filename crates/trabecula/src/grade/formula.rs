@@ -1,6 +1,6 @@
 //! Formulas: parsed to a short stack program, never evaluated as code.
 
-use super::{Build, Grade, Quantity, Varying};
+use super::{BuildGrade, Grade, Quantity, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
@@ -19,7 +19,7 @@ const LANES: usize = 16;
 #[kind(name = "Formula")]
 pub struct FormulaKind(pub String);
 
-impl Build for FormulaKind {
+impl BuildGrade for FormulaKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let parse = |text: &str| Formula::parse(text).map_err(|f| DesignError::fault(&of.path, f).found(&self.0));
         let made = parse(&self.0)?;

@@ -2,7 +2,7 @@
 
 use super::remapped::sampled;
 use super::result::{percent, pick};
-use super::{Build, Grade, Quantity, Samples, Stops};
+use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
 use crate::kind::{DesignError, Kind, OneOrThree};
 use geometry::fault::Fault;
@@ -27,7 +27,7 @@ pub struct GridKind {
     remap: Option<Stops>,
 }
 
-impl Build for GridKind {
+impl BuildGrade for GridKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         sampled(read(self, &of.path, of.environment)?, &self.remap, of)
     }

@@ -1,6 +1,6 @@
 //! A grade along a direction.
 
-use super::{Build, Grade, Quantity, Stops, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Stops, Varying, directed};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
@@ -9,7 +9,7 @@ use geometry::math::{Aabb, Interval, Vec3, dot, scale};
 /// A direction along which a position is measured: s = along · x, in mm times the length of `along`.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
 #[kind(check = Along::directed)]
-pub struct Along(Vec3);
+pub struct Along(pub Vec3);
 
 impl Along {
     fn directed(&self, _: &Key) -> Result<(), Fault> {
@@ -70,7 +70,7 @@ impl Linear {
     }
 }
 
-impl Build for Linear {
+impl BuildGrade for Linear {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         Ok(Linear { along: self.along, stops: of.stops(&self.stops) }.into())
     }

@@ -2,7 +2,7 @@
 
 use super::csv::table;
 use super::remapped::sampled;
-use super::{Build, Grade, Quantity, Samples, Stops};
+use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::kind::{DesignError, Kind};
 use geometry::fault::Fault;
 use geometry::math::Vec3;
@@ -20,7 +20,7 @@ pub struct PointsKind {
     remap: Option<Stops>,
 }
 
-impl Build for PointsKind {
+impl BuildGrade for PointsKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let (environment, at) = (of.environment, format!("{}.path", of.path));
         let file = environment.load(&self.path, &at)?;

@@ -1,7 +1,7 @@
 //! Distance to a line of control points.
 
 use super::control_points::ControlPoints;
-use super::{Build, Grade, Quantity, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Varying, directed};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, counted};
@@ -33,7 +33,7 @@ impl DistanceKind {
     }
 }
 
-impl Build for DistanceKind {
+impl BuildGrade for DistanceKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let (points, _) = self.points.read(&of.path, of.environment)?;
         let line = Polyline::new(points, self.closed, self.axis, self.sharpness);

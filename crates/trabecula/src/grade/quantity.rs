@@ -77,7 +77,7 @@ impl<'a> Quantity<'a> {
 }
 
 /// A kind of grade, as it is declared.
-pub(crate) trait Build {
+pub(crate) trait BuildGrade {
     /// The grade. `of.path` is that of the kind's table; declared ranges have been checked.
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError>;
 }

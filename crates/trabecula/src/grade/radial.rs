@@ -1,6 +1,6 @@
 //! A grade by distance from a point or a line.
 
-use super::{Build, Grade, Quantity, Stops, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Stops, Varying, directed};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::Fault;
@@ -30,7 +30,7 @@ impl RadialKind {
     }
 }
 
-impl Build for RadialKind {
+impl BuildGrade for RadialKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         Ok(RadialKind { stops: of.stops(&self.stops), ..*self }.made().into())
     }

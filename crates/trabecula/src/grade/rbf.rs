@@ -1,7 +1,7 @@
 //! Gaussian radial basis functions through control points.
 
 use super::control_points::ControlPoints;
-use super::{Build, Grade, Quantity, Varying, directed};
+use super::{BuildGrade, Grade, Quantity, Varying, directed};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
@@ -60,7 +60,7 @@ impl RbfKind {
     }
 }
 
-impl Build for RbfKind {
+impl BuildGrade for RbfKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         of.function(Ok(self.functions(&of.path, of.environment)?))
     }

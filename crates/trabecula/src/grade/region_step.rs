@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Build, Depth, Grade, Quantity, Sigmoid};
+use super::{BuildGrade, Depth, Grade, Quantity, Sigmoid};
 use crate::environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
@@ -20,7 +20,7 @@ pub struct WithinKind {
     width: f64,
 }
 
-impl Build for WithinKind {
+impl BuildGrade for WithinKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let (path, mut notes) = (format!("{}.of", of.path), Notes::default());
         let region = environment::region(&self.of, &path, of.environment.loader, &mut notes)?;

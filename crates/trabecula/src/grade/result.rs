@@ -1,7 +1,7 @@
 //! Results on meshes from a file: an array of points or cells.
 
 use super::remapped::sampled;
-use super::{Build, Grade, Quantity, Samples, Stops};
+use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
 use crate::kind::{DesignError, Kind};
 use geometry::fault::{Fault, counted};
@@ -25,7 +25,7 @@ pub struct FieldKind {
     remap: Option<Stops>,
 }
 
-impl Build for FieldKind {
+impl BuildGrade for FieldKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         sampled(read(self, &of.path, of.environment)?, &self.remap, of)
     }

@@ -1,6 +1,6 @@
 //! A smooth step: how a weight passes from 0 to 1 across a boundary.
 
-use super::{Build, Grade, GradeSpec, Quantity, Varying};
+use super::{BuildGrade, Grade, GradeSpec, Quantity, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, number};
@@ -22,7 +22,7 @@ pub struct SigmoidKind {
     at: f64,
 }
 
-impl Build for SigmoidKind {
+impl BuildGrade for SigmoidKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
         let inner = self.of.build(&Quantity::new(format!("{}.of", of.path), of.environment, Key::NONE))?;
         of.function(Sigmoid::new(inner, self.at, self.width))

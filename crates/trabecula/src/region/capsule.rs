@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows};
-use super::{Build, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -27,7 +27,7 @@ pub struct Capsule {
     radius: f64,
 }
 
-impl Build for Capsule {
+impl BuildRegion for Capsule {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         self.valid()?;
         Ok(Arc::new(*self))

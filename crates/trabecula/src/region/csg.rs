@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::meshes::{List, Meshes};
-use super::{Build, Context, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
+use super::{BuildRegion, Context, HalfSpace, MeshRegion, Region, RegionKind, Shape, bodies};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -30,7 +30,7 @@ fn each(of: &[RegionKind], context: &mut Context) -> Result<Vec<Region>, Fault> 
     of.iter().enumerate().map(|(i, r)| context.below(&format!("[{i}]"), |context| r.build(context))).collect()
 }
 
-impl Build for UnionKind {
+impl BuildRegion for UnionKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let of = each(&self.0, context)?;
         bodies::warn(&of, context);
@@ -38,13 +38,13 @@ impl Build for UnionKind {
     }
 }
 
-impl Build for IntersectionKind {
+impl BuildRegion for IntersectionKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(Intersection::new(each(&self.0, context)?)?))
     }
 }
 
-impl Build for DifferenceKind {
+impl BuildRegion for DifferenceKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(Difference::new(each(&self.0, context)?)?))
     }

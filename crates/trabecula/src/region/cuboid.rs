@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{field, fill_rows, flat, joined, joined_gradient, rounded};
-use super::{Build, Context, Region, Shape};
+use super::{BuildRegion, Context, Region, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -44,7 +44,7 @@ pub struct Cuboid {
     max: Vec3,
 }
 
-impl Build for BoxKind {
+impl BuildRegion for BoxKind {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(match self {
             BoxKind::Size(s) => {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::primitive::{
     along, apart, coordinate_axis, direction, field, fill_rows, flat, joined, joined_gradient, rounded,
 };
-use super::{Build, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -32,7 +32,7 @@ pub struct CylinderKind {
     axis: Vec3,
 }
 
-impl Build for CylinderKind {
+impl BuildRegion for CylinderKind {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(Cylinder::new(self.base, self.axis, self.radius, self.height)?))
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Build, Context, MeshRegion, Region, Shape};
+use super::{BuildRegion, Context, MeshRegion, Region, Shape};
 use crate::kind::{Kind, Unit};
 use geometry::fault::Fault;
 use geometry::formats;
@@ -38,7 +38,7 @@ pub enum RepairKind {
     Refuse,
 }
 
-impl Build for MeshFile {
+impl BuildRegion for MeshFile {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let extension = self.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
         if formats::Format::of(&extension).is_none() {

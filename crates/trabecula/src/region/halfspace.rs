@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, coordinate_axis, direction, field, fill_rows, flat};
-use super::{Build, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -37,7 +37,7 @@ impl HalfSpaceKind {
     }
 }
 
-impl Build for HalfSpaceKind {
+impl BuildRegion for HalfSpaceKind {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(self.made()?))
     }

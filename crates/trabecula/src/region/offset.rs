@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Build, Context, Region, RegionKind, Shape};
+use super::{BuildRegion, Context, Region, RegionKind, Shape};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -21,7 +21,7 @@ pub struct OffsetKind {
     by: f64,
 }
 
-impl Build for OffsetKind {
+impl BuildRegion for OffsetKind {
     fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         let of = context.below("of", |context| self.of.build(context))?;
         Ok(Arc::new(Offset::new(of, self.by)?))

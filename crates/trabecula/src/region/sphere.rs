@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use super::primitive::{apart, field, fill_rows};
-use super::{Build, Context, Region, Shape, one_surface};
+use super::{BuildRegion, Context, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -23,7 +23,7 @@ pub struct Sphere {
     center: Vec3,
 }
 
-impl Build for Sphere {
+impl BuildRegion for Sphere {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(Sphere::new(self.center, self.radius)?))
     }

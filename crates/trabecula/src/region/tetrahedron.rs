@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::primitive::{along, field, rounded};
-use super::{Build, Context, HalfSpace, Region, Shape, one_surface};
+use super::{BuildRegion, Context, HalfSpace, Region, Shape, one_surface};
 use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
@@ -29,7 +29,7 @@ pub struct TetrahedronKind {
     sharpness: Option<f64>,
 }
 
-impl Build for TetrahedronKind {
+impl BuildRegion for TetrahedronKind {
     fn build(&self, _: &mut Context) -> Result<Region, Fault> {
         Ok(Arc::new(Tetrahedron::new(self.corners, self.sharpness)?))
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{GradeSpec, MapSpec};
+use super::{GradeSpec, MapKind};
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
 
 /// Graphs of beams, by name.
@@ -88,7 +88,7 @@ pub struct CellGraph {
     /// A ready unit cell, such as "octet".
     pub cell: BeamCellName,
     /// Position of the cells: nodes are mapped, beams stay straight.
-    pub map: MapSpec,
+    pub map: MapKind,
     /// Trimming to the region.
     #[kind(flatten)]
     pub trimming: Trimming,

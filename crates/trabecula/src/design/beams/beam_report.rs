@@ -14,8 +14,8 @@ use geometry::math::Vec3;
 /// An angle between beams (degrees) below which it is warned of.
 const NARROW: f64 = 15.0;
 
-pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
-    let told: Vec<String> = [
+pub(super) fn warn_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
+    let parts: Vec<String> = [
         (c.merged, "node", "merged into another at the same environment"),
         (c.short, "strut", "of no length left out"),
         (c.duplicates, "strut", "left out because another joins the same nodes"),
@@ -25,8 +25,8 @@ pub(super) fn tell_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>)
     .filter(|t| t.0 > 0)
     .map(|(n, what, done)| format!("{} {done}", counted(n, what)))
     .collect();
-    if !told.is_empty() {
-        warnings.push(Warning { path: path.into(), message: told.join(", ") });
+    if !parts.is_empty() {
+        warnings.push(Warning { path: path.into(), message: parts.join(", ") });
     }
 }
 
@@ -77,7 +77,7 @@ pub(super) fn warn(
     if let Some(c) = truss.collisions.first() {
         say(format!(
             "{} of beams run into each other without a common node, the first at {}: they are joined there, but not filleted, and \
-             exact figures of the whole are not told; make them thinner, or put nodes there",
+             no exact figures of the whole are given; make them thinner, or put nodes there",
             counted(truss.collisions.len(), "pair"),
             at(c.at)
         ));

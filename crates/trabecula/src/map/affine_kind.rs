@@ -1,0 +1,102 @@
+//! Affine maps, as they are declared.
+
+use super::{Affine, BuildMap, Map, shared};
+use crate::environment::Environment;
+use crate::kind::{At, DesignError, Kind, OneOrThree, Value};
+
+/// A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Affine", noun = "an affine map", before = uniform)]
+pub struct AffineKind {
+    /// Cell edge, one number or three.
+    #[kind(unit = "mm", above = 0.0)]
+    wavelength: OneOrThree,
+    /// Angles about x, y, z: z is turned first, then y, then x.
+    #[kind(unit = "degrees", default = [0.0; 3])]
+    rotate: [f64; 3],
+    /// Moves the lattice.
+    #[kind(unit = "mm", default = [0.0; 3])]
+    offset: [f64; 3],
+    /// Shears.
+    #[kind(default)]
+    skew: SkewKind,
+}
+
+/// Explains that numbers of this map are constant.
+fn uniform(at: &At) -> Result<(), DesignError> {
+    let message = "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary";
+    let keys = ["wavelength", "rotate", "offset"];
+    at.entries("a map").iter().flatten().filter(|e| keys.contains(&e.0)).try_for_each(|(_, at)| constant(at, message))
+}
+
+/// Shears: `xz = 20` moves x by tan(20°) · z.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Kind)]
+#[kind(name = "Skew", noun = "shears in degrees")]
+pub struct SkewKind {
+    /// x by tan · y.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    xy: f64,
+    /// x by tan · z.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    xz: f64,
+    /// y by tan · x.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    yx: f64,
+    /// y by tan · z.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    yz: f64,
+    /// z by tan · x.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    zx: f64,
+    /// z by tan · y.
+    #[kind(unit = "degrees", above = -89.0, below = 89.0, default)]
+    zy: f64,
+}
+
+impl SkewKind {
+    /// The shears that are not zero: (of, by, degrees).
+    pub fn shears(&self) -> Vec<(usize, usize, f64)> {
+        let s = self;
+        let all = [(0, 1, s.xy), (0, 2, s.xz), (1, 0, s.yx), (1, 2, s.yz), (2, 0, s.zx), (2, 1, s.zy)];
+        all.into_iter().filter(|s| s.2 != 0.0).collect()
+    }
+}
+
+/// The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+#[kind(name = "Spartan", noun = "a spartan map", before = uniform)]
+pub struct SpartanKind {
+    /// Wavelength, one number or three.
+    #[kind(unit = "mm", above = 0.0)]
+    wavelength: OneOrThree,
+    /// Angles about x, y, z.
+    #[kind(unit = "degrees", default = [0.0; 3])]
+    rotate: [f64; 3],
+    /// Moves the lattice.
+    #[kind(unit = "mm", default = [0.0; 3])]
+    offset: [f64; 3],
+}
+
+impl BuildMap for AffineKind {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
+        let made = Affine::rigid(self.wavelength.three(), self.rotate, self.offset, &self.skew.shears());
+        shared(made, path)
+    }
+}
+
+impl BuildMap for SpartanKind {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
+        let made = Affine::spartan(self.wavelength.three(), self.rotate, self.offset);
+        shared(made, path)
+    }
+}
+
+/// A value that is one number: what may not vary says so.
+fn constant(at: &At, message: &str) -> Result<(), DesignError> {
+    let varies = |at: &At| matches!(at.node.value, Value::Table(_));
+    match at.is_list() {
+        true => at.list("")?.iter().find(|i| varies(i)).map_or(Ok(()), |i| Err(i.error(message))),
+        false if varies(at) => Err(at.error(message)),
+        false => Ok(()),
+    }
+}

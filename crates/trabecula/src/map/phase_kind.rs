@@ -1,0 +1,269 @@
+//! The solved map, as it is declared.
+
+use super::{BuildMap, Map, Orientation, Phase, Settings, Wanted, shared};
+use crate::environment::Environment;
+use crate::field::Field;
+use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, several};
+use crate::kind::{DesignError, Key, Kind};
+
+/// Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares. At most one of
+/// rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Phase", noun = "a phase map")]
+pub struct PhaseKind {
+    /// Cell edge, one number or three; each may vary.
+    #[kind(unit = "mm", above = 0.0)]
+    wavelength: GradeOrThree,
+    /// How cells are turned.
+    #[kind(flatten)]
+    orientation: OrientationKind,
+    /// Weight of the cell's shape here, compared with other positions (0 or more): where no map can follow everything, the error
+    /// goes where this is small.
+    #[kind(keyword)]
+    weight: Option<GradeSpec>,
+    /// Weight of an error of angle against the same error of spacing: where no map can follow both, above 1 cells are nearer to
+    /// their directions, below 1 to their sizes.
+    #[kind(default = 1.0, min = 0.001, max = 1000.0)]
+    angle_weight: f64,
+    /// Moves the lattice.
+    #[kind(unit = "mm", default = [0.0; 3])]
+    offset: [f64; 3],
+    /// Spacing of the grid that the phases are solved on; a quarter of the least wavelength unless given.
+    #[kind(unit = "mm", above = 0.0)]
+    step: Option<f64>,
+    /// What counts when the phases are solved.
+    #[kind(default)]
+    domain: Domain,
+    /// Whether the map may fold, where cells turn inside out.
+    #[kind(default = false)]
+    folds: bool,
+}
+
+/// How the cells of a phase map are turned.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "an orientation", alternatives)]
+pub enum OrientationKind {
+    /// By one angle or several.
+    Axes(AxisAngles),
+    /// By three angles.
+    Rotate(Angles),
+    /// By a vector.
+    Direction(AlongDirection),
+    /// By two vectors.
+    Frame(AlongFrame),
+    /// By a tensor.
+    Stress(AlongStress),
+}
+
+impl Default for OrientationKind {
+    fn default() -> Self {
+        OrientationKind::Axes(AxisAngles { rotate_x: None, rotate_y: None, rotate_z: None })
+    }
+}
+
+/// Turned about each axis.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct AxisAngles {
+    /// The angle about x alone, in addition to or in place of `rotate_y` and `rotate_z`.
+    #[kind(unit = "degrees", keyword)]
+    rotate_x: Option<GradeSpec>,
+    /// The angle about y alone.
+    #[kind(unit = "degrees")]
+    rotate_y: Option<GradeSpec>,
+    /// The angle about z alone.
+    #[kind(unit = "degrees")]
+    rotate_z: Option<GradeSpec>,
+}
+
+/// Turned by three angles.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct Angles {
+    /// Angles about x, y, z: z is turned first, then y, then x. Each may vary.
+    #[kind(unit = "degrees")]
+    rotate: [GradeSpec; 3],
+}
+
+/// Turned to a direction.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct AlongDirection {
+    /// Direction of the cell's z axis; its sign and length do not matter.
+    #[kind(keyword)]
+    direction: VectorKind,
+}
+
+/// Turned to two directions.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct AlongFrame {
+    /// The directions of the cell's x and z axes.
+    #[kind(keyword)]
+    frame: FrameKind,
+}
+
+/// Turned to the principal directions of a tensor.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct AlongStress {
+    /// A stress tensor whose principal directions the cell's axes take.
+    #[kind(keyword)]
+    stress: TensorKind,
+}
+
+/// A number that may vary, or three of them.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged)]
+pub enum GradeOrThree {
+    /// The same along all three axes.
+    One(GradeSpec),
+    /// Along the cell's x, y, z.
+    Three(Box<[GradeSpec; 3]>),
+}
+
+/// A vector that may vary.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged, noun = "three numbers [x, y, z], each of which may vary, or the field of a result")]
+pub enum VectorKind {
+    /// By its components along x, y, z.
+    Components(Box<[GradeSpec; 3]>),
+    /// An array of three numbers of a result.
+    Field(VectorField),
+}
+
+/// An array of three numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a vector")]
+pub struct VectorField {
+    /// An array of three components of a result.
+    field: FieldKind,
+}
+
+/// Two of the cell's axes; the third is at right angles to both.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Frame", noun = "a frame")]
+pub struct FrameKind {
+    /// Direction of the cell's x axis; its component along z is left out.
+    x: VectorKind,
+    /// Direction of the cell's z axis.
+    z: VectorKind,
+}
+
+/// A symmetric tensor that may vary.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(untagged, noun = "six numbers [11, 22, 33, 23, 13, 12], each of which may vary, or the field of a result")]
+pub enum TensorKind {
+    /// By its components 11, 22, 33, 23, 13, 12.
+    Components(Box<[GradeSpec; 6]>),
+    /// An array of six or nine numbers of a result.
+    Field(TensorField),
+}
+
+/// An array of six or nine numbers for each point or cell of a result.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a tensor")]
+pub struct TensorField {
+    /// An array of six or nine components of a result.
+    field: FieldKind,
+    /// The order of six components.
+    #[kind(default)]
+    order: TensorOrder,
+}
+
+/// The order of the six components of a symmetric tensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "order")]
+pub enum TensorOrder {
+    /// 11, 22, 33, 12, 23, 13, as in VTK.
+    #[default]
+    Vtk,
+    /// 11, 22, 33, 23, 13, 12, as in Voigt's notation.
+    Voigt,
+}
+
+/// What counts when phases are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "domain")]
+pub enum Domain {
+    /// The region; its surroundings within its bounds as little as possible.
+    #[default]
+    Region,
+    /// All of the region's bounds alike.
+    Box,
+}
+
+impl BuildMap for PhaseKind {
+    fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
+        let below = |key: &str| format!("{path}.{key}");
+        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));
+        let length = key_of::<PhaseKind>("wavelength");
+        let length = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, length));
+        let wavelength = match &self.wavelength {
+            GradeOrThree::One(g) => {
+                let one = length(g, below("wavelength"))?;
+                [one.clone(), one.clone(), one]
+            }
+            GradeOrThree::Three(of) => each(of, &below("wavelength"), &length)?,
+        };
+        let weight = self.weight.as_ref().map(|g| any(g, below("weight")));
+        let wanted = Wanted {
+            wavelength,
+            orientation: self.orientation.build(path, environment)?,
+            weight: weight.transpose()?,
+            angle_weight: self.angle_weight,
+            offset: self.offset,
+        };
+        let region: &dyn Field = &**environment.region;
+        let settings =
+            Settings { step: self.step, region: (self.domain == Domain::Region).then_some(region), folds: self.folds };
+        let made = Phase::solve(&environment.region.bounds(), &wanted, &settings);
+        shared(made, path)
+    }
+}
+
+impl OrientationKind {
+    fn build(&self, path: &str, environment: &Environment) -> Result<Orientation, DesignError> {
+        let below = |key: &str| format!("{path}.{key}");
+        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));
+        let angle = |of: &Option<GradeSpec>, key: &str| match of {
+            Some(of) => any(of, below(key)),
+            None => Ok(Grade::Constant(0.0)),
+        };
+        let vector = |of: &VectorKind, key: &str| match of {
+            VectorKind::Components(of) => each(of, &below(key), &any),
+            VectorKind::Field(of) => {
+                several(&of.field, &below(&format!("{key}.field")), environment, |n| (n == 3).then_some([0, 1, 2]))
+            }
+        };
+        Ok(match self {
+            OrientationKind::Axes(AxisAngles { rotate_x, rotate_y, rotate_z }) => Orientation::Angles([
+                angle(rotate_x, "rotate_x")?,
+                angle(rotate_y, "rotate_y")?,
+                angle(rotate_z, "rotate_z")?,
+            ]),
+            OrientationKind::Rotate(of) => Orientation::Angles(each(&of.rotate, &below("rotate"), &any)?),
+            OrientationKind::Direction(of) => Orientation::Direction(vector(&of.direction, "direction")?),
+            OrientationKind::Frame(AlongFrame { frame }) => {
+                Orientation::Frame { x: vector(&frame.x, "frame.x")?, z: vector(&frame.z, "frame.z")? }
+            }
+            OrientationKind::Stress(of) => Orientation::Stress(match &of.stress {
+                TensorKind::Components(of) => each(of, &below("stress"), &any)?,
+                TensorKind::Field(of) => {
+                    several(&of.field, &below("stress.field"), environment, |n| match (n, of.order) {
+                        (9, _) => Some([0, 4, 8, 5, 2, 1]),
+                        (6, TensorOrder::Vtk) => Some([0, 1, 2, 4, 5, 3]),
+                        (6, TensorOrder::Voigt) => Some([0, 1, 2, 3, 4, 5]),
+                        _ => None,
+                    })?
+                }
+            }),
+        })
+    }
+}
+
+/// The same for each, with its index in the path.
+fn each<const N: usize>(
+    of: &[GradeSpec; N],
+    path: &str,
+    one: &impl Fn(&GradeSpec, String) -> Result<Grade, DesignError>,
+) -> Result<[Grade; N], DesignError> {
+    let made = of.iter().enumerate().map(|(i, g)| one(g, format!("{path}[{i}]")));
+    let mut made = made.collect::<Result<Vec<Grade>, DesignError>>()?.into_iter();
+    Ok(core::array::from_fn(|_| made.next().unwrap_or(Grade::Constant(0.0))))
+}

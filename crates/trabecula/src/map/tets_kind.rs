@@ -1,0 +1,101 @@
+//! The map over a tetrahedral mesh, as it is declared.
+
+use std::collections::BTreeMap;
+
+use super::{BuildMap, Map};
+use crate::environment::Environment;
+use crate::grade::GradeSpec;
+use crate::kind::{DesignError, Kind, Unit};
+use crate::region::RegionKind;
+
+/// Piecewise affine over a tetrahedral mesh of the region, made or from a file: a cell in each tetrahedron.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(name = "Tets", noun = "a map over tetrahedra", alternatives)]
+pub enum TetsSpec {
+    /// Made to a size.
+    Made(MadeTetsSpec),
+    /// From a file.
+    File(TetFileSpec),
+}
+
+/// A tetrahedral mesh that is made.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct MadeTetsSpec {
+    /// Edge of a regular tetrahedron of the volume that tetrahedra are to have, a number or a grade.
+    #[kind(unit = "mm", above = 0.0)]
+    pub size: GradeSpec,
+    /// The program that makes it.
+    #[kind(default)]
+    pub mesher: MesherSpec,
+    /// Time that another mesher than the background one may take.
+    #[kind(unit = "s", above = 0.0, default = 600.0)]
+    pub limit: f64,
+    /// Regions whose tetrahedra, by their middles, are of a zone of this number, such as `{ 1 = { sphere = { radius = 5 } } }`;
+    /// the first of several counts, and all others are of zone 0.
+    #[kind(default, keyword)]
+    pub zones: BTreeMap<u32, RegionKind>,
+    /// How cells are joined.
+    #[kind(flatten)]
+    pub joined: Joined,
+}
+
+/// The program that makes a tetrahedral mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(name = "Mesher", noun = "mesher")]
+pub enum MesherSpec {
+    /// A body-centred cubic lattice fitted to the region: nodes moved onto its surface, the rest cut. Takes any region.
+    #[default]
+    #[kind(hints("stuffing"))]
+    Background,
+    /// fTetWild (Hu et al. 2020), which takes soups of triangles; in the extra "tets" of the Python package.
+    #[kind(hints("wildmeshing", "tetwild"))]
+    FTetWild,
+}
+
+/// A tetrahedral mesh in a file.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct TetFileSpec {
+    /// Path of the file, relative to the design file: vtu, vtk; with the extra "fe" of the Python package also msh, inp, med,
+    /// mesh and others.
+    #[kind(keyword)]
+    pub path: String,
+    /// Unit of the file's coordinates (mm unless given).
+    pub unit: Option<Unit>,
+    /// Whether hexahedra, wedges and pyramids are cut into tetrahedra that fit face to face; refused otherwise.
+    #[kind(default = false)]
+    pub split: bool,
+    /// How cells are joined.
+    #[kind(flatten)]
+    pub joined: Joined,
+}
+
+/// How the cells of tetrahedra are joined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Kind)]
+pub struct Joined {
+    /// Smooths the creases at the faces of tetrahedra: by how much of their barycentric coordinates they reach beyond
+    /// themselves and are mixed with their neighbours, from 0 (creases) to 0.2.
+    #[kind(default = 0.0, min = 0.0, max = 0.2)]
+    pub overlap: f64,
+    /// How the surface is made.
+    #[kind(default)]
+    pub method: Method,
+}
+
+/// How the surface of a tetrahedral lattice is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
+#[kind(noun = "method")]
+pub enum Method {
+    /// In each tetrahedron apart, without a grid, where nothing else is in the part: no skin, keep zones or overlap.
+    #[default]
+    Explicit,
+    /// On a grid over the part, like other lattices.
+    Implicit,
+}
+
+impl BuildMap for TetsSpec {
+    fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
+        let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
+                       face to face";
+        Err(DesignError::new(path, message))
+    }
+}
