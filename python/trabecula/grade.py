@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from .given import Points, Stops, control, pairs, settings
 
-__all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid"]
+__all__ = ["depth", "distance", "field", "formula", "grid", "linear", "points", "radial", "rbf", "region", "sigmoid", "steps"]
 
 
 def linear(along: Sequence[float], stops: Stops) -> dict:
@@ -18,6 +18,16 @@ def linear(along: Sequence[float], stops: Stops) -> dict:
     stops: Pairs [s, value], s rising.
     """
     return {"linear": settings(along=along, stops=pairs(stops))}
+
+
+def steps(along: Sequence[float], stops: Stops) -> dict:
+    """In steps along a direction: piecewise constant in s = along · x, the value of the last stop at or below s; before
+    the first stop its value. Its gradient is 0 everywhere.
+
+    along: The direction [x, y, z]; s is measured in multiples of its length.
+    stops: Pairs [s, value], s rising: the value from s on.
+    """
+    return {"steps": settings(along=along, stops=pairs(stops))}
 
 
 def depth(stops: Stops) -> dict:

@@ -24,6 +24,7 @@ mod remapped;
 mod result;
 mod samples;
 mod sigmoid;
+mod steps;
 mod stops;
 
 pub use control_points::ControlPoints;
@@ -40,6 +41,7 @@ pub use result::FieldKind;
 pub(crate) use result::several;
 pub use samples::Samples;
 pub use sigmoid::{Sigmoid, SigmoidKind};
+pub use steps::Steps;
 pub use stops::Stops;
 
 /// A number that may vary in space, as it is declared.
@@ -58,6 +60,7 @@ pub enum GradeSpec {
 #[allow(missing_docs)] // The comment of each type says what it is.
 pub enum GradeKind {
     Linear(Linear),
+    Steps(Steps),
     Depth(depth::DepthKind),
     Radial(radial::RadialKind),
     Formula(formula::FormulaKind),
@@ -196,6 +199,7 @@ mod tests {
         vec![
             Grade::Constant(0.3),
             Linear::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
+            Steps::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
             Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
             formula("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)"),
             Radial::new([0.2, 0.1, 0.0], None, stops()).unwrap().into(),
