@@ -11,10 +11,11 @@ use crate::environment::{self, Environment};
 use crate::implicit::Implicit;
 use crate::kind::{DesignError, Kind};
 use crate::lattice::Lattice;
-use crate::region::Region;
+use crate::region::{Notes, Region};
 use crate::solid::Solid;
 use crate::truss::Beams;
 use geometry::fault::number;
+use geometry::math::Vec3;
 
 /// How far from the origin a region may reach, mm: a thousand kilometres.
 const FARTHEST: f64 = 1e9;
@@ -32,18 +33,14 @@ impl From<PartSpec> for Part {
 /// The region that a design's solid is in.
 pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
-    let mut notes = crate::region::Notes::default();
+    let mut notes = Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     Ok(domain.map_or(space, |d| d.region))
 }
 
 /// The region as given; with the tetrahedra that fill it, if it is only known by them.
-fn given(
-    d: &Design,
-    loader: &dyn Loader,
-    notes: &mut crate::region::Notes,
-) -> Result<(Region, Option<tets::Tets>), DesignError> {
+fn given(d: &Design, loader: &dyn Loader, notes: &mut Notes) -> Result<(Region, Option<tets::Tets>), DesignError> {
     match environment::region(&d.region, "region", loader, notes) {
         Ok(space) => Ok((space, None)),
         Err(why) => {
@@ -53,10 +50,53 @@ fn given(
     }
 }
 
+/// The solid of a design.
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
-    let mut notes = crate::region::Notes::default();
+    let mut notes = Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
+    check_bounds(&space)?;
+    let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
+    let space = domain.as_ref().map_or(space, |d| d.region.clone());
+    let points = sampled(&space, &mut notes.warnings)?;
+    let (filled, skin) = skin::filled(d, &space, &points, loader, &mut notes)?;
+    let Notes { mut warnings, repairs } = notes;
+    let at = |path: String| Environment { path, region: &space, points: &points, filled: &filled, loader };
+
+    let (mut lattices, mut tilings, mut graphs) = (Vec::new(), Vec::new(), Vec::new());
+    if let Some(domain) = domain {
+        let environment = at(format!("lattice.{}", domain.name));
+        tilings.push(tiled(domain, &environment, &mut warnings)?);
+    }
+    for (name, spec) in d.lattice.iter().filter(|(_, s)| !matches!(s.map, MapKind::Tets(_))) {
+        let environment = at(format!("lattice.{name}"));
+        lattices.push((name.clone(), Arc::new(checked_lattice(spec, d, &environment, &mut warnings)?)));
+    }
+    for (name, spec) in &d.beams.0 {
+        graphs.push((name.clone(), beams::beams(spec, &at(format!("beams.{name}")), &mut warnings)?));
+    }
+
+    let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
+    let wavelengths = wavelengths.chain(graphs.iter().map(|g| g.1.wavelength()));
+    let wavelengths = wavelengths.chain(tilings.iter().map(|t| t.tiling.wavelength()));
+    let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
+    let blend = d.blend.as_ref().map(|spec| {
+        let members = members(&lattices, &tilings, &graphs);
+        blend::blend(spec, &members, &at("blend".into()), &mut warnings)
+    });
+    let blend = blend.transpose()?;
+    let field = match &blend {
+        Some(made) => made.blend.clone(),
+        None => only(&lattices, &tilings, &graphs)?,
+    };
+    let mut solid = Solid::new(space.clone(), Some(field), wavelength);
+    solid.transition = blend.as_ref().and_then(|b| b.width);
+    let solid = filled.into_iter().fold(solid, Solid::with);
+    Ok(Built { solid, lattices, tilings, beams: graphs, blend, skin, warnings, repairs })
+}
+
+/// Refuses a region that is empty, unbounded or too far away.
+fn check_bounds(space: &Region) -> Result<(), DesignError> {
     let bounds = space.bounds();
     if bounds.is_empty() {
         return Err(DesignError::new("region", "the region is empty"));
@@ -75,106 +115,64 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         );
         return Err(DesignError::new("region", message));
     }
-    let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
-    let space = domain.as_ref().map_or(space, |d| d.region.clone());
-    let bounds = space.bounds();
-    let (mut points, _) = sample::inside(&space, sample::COUNT);
+    Ok(())
+}
+
+/// Points inside the region, at which numbers that vary are checked. Warns of a size that is none of a part.
+fn sampled(space: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, DesignError> {
+    let size = space.bounds().size();
+    let (mut points, _) = sample::inside(space, sample::COUNT);
     if points.is_empty() {
-        let [x, y, z] = bounds.size().map(number);
+        let [x, y, z] = size.map(number);
         let message = format!("the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm");
         return Err(DesignError::new("region", message));
     }
-    points.extend(sample::nodes(&space));
-    let largest = bounds.size().into_iter().fold(0.0, f64::max);
-    if !(0.1..=2000.0).contains(&largest) && !notes.warnings.iter().any(|w| w.message.contains("unit")) {
+    points.extend(sample::nodes(space));
+    let largest = size.into_iter().fold(0.0, f64::max);
+    if !(0.1..=2000.0).contains(&largest) && !warnings.iter().any(|w| w.message.contains("unit")) {
         let message = format!("the region is {} mm across; is its unit right?", number(largest));
-        notes.warnings.push(Warning { path: "region".into(), message });
+        warnings.push(Warning { path: "region".into(), message });
     }
-    let (filled, thinnest) = skin::filled(d, &space, &points, loader, &mut notes)?;
-    let crate::region::Notes { mut warnings, repairs } = notes;
-    let (mut lattices, mut tilings) = (Vec::new(), Vec::new());
-    if let Some(domain) = domain {
-        let environment = Environment {
-            path: format!("lattice.{}", domain.name),
-            region: &space,
-            points: &points,
-            filled: &filled,
-            loader,
-        };
-        let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, &environment, &mut warnings)?;
-        tilings.push(Tiled {
-            name: domain.name.to_string(),
-            tiling: tiling.clone(),
-            zones: domain.zones(),
-            mesh: domain.report,
-            explicit,
-            joins,
-        });
-        if d.blend.is_none() {
-            let solid = Solid::new(space.clone(), Some(tiling.clone()), tiling.wavelength());
-            return Ok(Built {
-                solid: filled.into_iter().fold(solid, Solid::with),
-                lattices,
-                tilings,
-                beams: Vec::new(),
-                blend: None,
-                skin: thinnest,
-                warnings,
-                repairs,
-            });
-        }
+    Ok(points)
+}
+
+/// The lattice over a tetrahedral mesh.
+fn tiled(domain: tiling::Domain, environment: &Environment, warnings: &mut Vec<Warning>) -> Result<Tiled, DesignError> {
+    let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, environment, warnings)?;
+    Ok(Tiled { name: domain.name.to_string(), tiling, zones: domain.zones(), mesh: domain.report, explicit, joins })
+}
+
+/// A lattice, with warnings of what may not be meant.
+fn checked_lattice(
+    spec: &LatticeSpec,
+    d: &Design,
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<Lattice, DesignError> {
+    let path = &environment.path;
+    if spec.level.of == Of::Part && d.blend.is_some() {
+        let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
+        return Err(DesignError::new(format!("{path}.level.of"), message));
     }
-    let others = d.lattice.iter();
-    for (name, spec) in others.filter(|(_, s)| !matches!(s.map, MapKind::Tets(_))) {
-        let path = format!("lattice.{name}");
-        let environment = Environment { path: path.clone(), region: &space, points: &points, filled: &filled, loader };
-        if spec.level.of == Of::Part && d.blend.is_some() {
-            let message = "of = \"part\" speaks of the part, of which a lattice in a blend is not alone; leave it out";
-            return Err(DesignError::new(format!("{path}.level.of"), message));
-        }
-        let built = Arc::new(lattice(spec, &environment)?);
-        warn::check(&built, &environment, spec)?;
-        warn::warn(&built, &environment, spec, &mut warnings);
-        warn::solved_map(&built.map, &spec.map, &path, &mut warnings);
-        lattices.push((name.clone(), built));
+    let built = lattice(spec, environment)?;
+    warn::check(&built, environment, spec)?;
+    warn::warn(&built, environment, spec, warnings);
+    warn::solved_map(&built.map, &spec.map, path, warnings);
+    Ok(built)
+}
+
+/// The field of a design without a blend.
+fn only(
+    lattices: &[(String, Arc<Lattice>)],
+    tilings: &[Tiled],
+    graphs: &[(String, Beams)],
+) -> Result<Arc<dyn Implicit>, DesignError> {
+    match (lattices, tilings, graphs) {
+        ([(_, one)], [], []) => Ok(one.clone()),
+        ([], [one], []) => Ok(one.tiling.clone()),
+        ([], [], [(_, one)]) => Ok(one.field()),
+        _ => Err(DesignError::new("blend", "several lattices need a blend to say where each is")),
     }
-    let mut graphs = Vec::new();
-    for (name, spec) in &d.beams.0 {
-        let environment =
-            Environment { path: format!("beams.{name}"), region: &space, points: &points, filled: &filled, loader };
-        let made = beams::beams(spec, &environment, &mut warnings)?;
-        graphs.push((name.clone(), made));
-    }
-    let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
-    let wavelengths = wavelengths.chain(graphs.iter().map(|g| g.1.wavelength()));
-    let wavelengths = wavelengths.chain(tilings.iter().map(|t| t.tiling.wavelength()));
-    let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
-    let mut blended = None;
-    let field: Arc<dyn Implicit> = match (&d.blend, lattices.as_slice(), graphs.as_slice()) {
-        (Some(spec), ..) => {
-            let environment =
-                Environment { path: "blend".into(), region: &space, points: &points, filled: &filled, loader };
-            let made = blend::blend(spec, &members(&lattices, &tilings, &graphs), &environment, &mut warnings)?;
-            let field = made.blend.clone();
-            blended = Some(made);
-            field
-        }
-        (None, [(_, one)], []) => one.clone(),
-        (None, [], [(_, one)]) => one.field(),
-        (None, [_, (name, _), ..], _) => {
-            let message = "several lattices need a blend to say where each is";
-            return Err(DesignError::new(format!("lattice.{name}"), message));
-        }
-        (None, _, [.., (name, _)]) => {
-            let message = "several blocks of beams, or beams and a lattice, need a blend to say where each is";
-            return Err(DesignError::new(format!("beams.{name}"), message));
-        }
-        (None, [], []) => return Err(DesignError::new("lattice", "no lattice given; give one")),
-    };
-    let mut solid = Solid::new(space.clone(), Some(field), wavelength);
-    solid.transition = blended.as_ref().and_then(|b| b.width);
-    let solid = filled.into_iter().fold(solid, Solid::with);
-    Ok(Built { solid, lattices, tilings, beams: graphs, blend: blended, skin: thinnest, warnings, repairs })
 }
 
 /// What may be named in a blend.
