@@ -92,7 +92,7 @@ pub trait Mapping: Send + Sync {
         None
     }
 
-    /// The solved map that this is, if it is one: it is defined in a box, and may be off from what was asked for.
+    /// The solved map that this is, if it is one: it is defined in a box, and may deviate from the target.
     fn solved(&self) -> Option<&Phase> {
         None
     }

@@ -27,7 +27,7 @@ impl Affine {
     /// the angles (degrees), then sheared, then moved by +offset (mm).
     ///
     /// # Errors
-    /// Wavelengths that are not positive and finite, angles that are not finite, shears that flatten space.
+    /// Wavelengths that are not positive and finite, angles that are not finite, shears that are singular.
     pub fn rigid(wavelength: Vec3, rotate: Vec3, offset: Vec3, skew: &[Skew]) -> Result<Affine, Fault> {
         let d = per_wavelength(wavelength)?;
         finite("rotate", &rotate)?;
@@ -169,7 +169,7 @@ mod tests {
         for (got, want) in v.iter().zip([1.0, 1.0, 2.0]) {
             assert!((got - want).abs() < 1e-14);
         }
-        // Figures for the phase-space reading: columns of diag(λ) R.
+        // Expected values, rotated after scaling: columns of diag(λ) R.
         let spartan = Affine::spartan(w, r, [0.0; 3]).expect("valid");
         let v = transpose(&inverse(&spartan.matrix)).map(norm);
         for (got, want) in v.iter().zip([1.011, 1.484, 1.667]) {

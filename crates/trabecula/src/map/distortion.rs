@@ -1,4 +1,4 @@
-//! How far a solved map is from what was asked for.
+//! Deviation of a solved map from its target: angle, spacing, shear, anisotropy and density of cells.
 
 use std::cmp::Ordering;
 
@@ -30,33 +30,33 @@ impl Spread {
     }
 }
 
-/// How far the gradients ∇Φᵢ are from the wanted Kᵢ, over the nodes of the solution's grid that lie in the region.
+/// Deviation of the gradients ∇Φᵢ from the targets Kᵢ, over the nodes of the solution's grid that lie in the region.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
     pub angle: [Spread; 3],
-    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. `max` and `p95` are of the ratio or its
+    /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than the target. `max` and `p95` are of the ratio or its
     /// inverse, whichever is greater.
     pub spacing: [Spread; 3],
-    /// Share of the places and axes where the spacing ratio is outside 1/1.5 to 1.5.
+    /// Fraction of the nodes and axes where the spacing ratio is outside 1/1.5 to 1.5.
     pub outside: f64,
     /// The greatest deviation from a right angle between two gradients, degrees.
     pub shear: Spread,
     /// Greatest over least stretch of a cell.
     pub anisotropy: Spread,
-    /// Least and greatest det J over the one asked for: cells for each cell wanted. Zero or less where the map folds.
+    /// Least and greatest det J over that of the target: cells for each target cell. Zero or less where the map folds.
     pub density: [f64; 2],
     /// Where the density is least, mm.
     pub least_at: Vec3,
     /// |curl Kᵢ| λᵢ² before solving: what no map can follow; zero where K is a gradient.
     pub curl: Spread,
-    /// The most that the wanted orientation turns within a cell, degrees, and where.
+    /// The greatest rotation of the target orientation within a cell, degrees.
     pub turn: f64,
     /// Where that is, mm.
     pub turn_at: Vec3,
 }
 
-/// How far the gradients are from the wanted ones at one place.
+/// Deviation of the gradients from the targets at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
@@ -67,11 +67,11 @@ pub struct Misfit {
     pub shear: f64,
     /// Greatest over least stretch of a cell.
     pub anisotropy: f64,
-    /// det J over the one asked for.
+    /// det J over that of the target.
     pub density: f64,
 }
 
-/// Compares J with K (rows of both: the three gratings) at a place.
+/// Compares J with K (rows of both: the three gradients) at a position.
 pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
     let angle = |a: Vec3, b: Vec3| {
         let c = dot(a, b) / (norm(a) * norm(b));

@@ -1,4 +1,4 @@
-//! Which way a cell is turned: orthonormal frames from angles, vectors or a stress tensor.
+//! Orientation of cells: orthonormal frames from angles, vectors or a stress tensor.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -10,7 +10,7 @@ use geometry::math::{
     IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
 
-/// Which way a cell is turned at each place. A frame's columns are the directions of the cell's axes in space.
+/// Orientation of the cell at each position. A frame's columns are the directions of the cell's axes in space.
 #[derive(Clone)]
 pub enum Orientation {
     /// R = Rx Ry Rz of three angles (degrees).
@@ -101,7 +101,7 @@ fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>,
         let x = sub(x, scale(z, dot(x, z)));
         if norm(x) < 1e-6 {
             let message =
-                format!("the first and the third axis are parallel at {}; give two that differ", place(points[n]));
+                format!("the first and the third axis are parallel at {}; give two that differ", in_mm(points[n]));
             return Err(Fault::new("frame.x", message));
         }
         let x = unit(x);
@@ -110,7 +110,7 @@ fn squared(x: &[Grade; 3], z: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Mat3>,
     .collect()
 }
 
-/// Values of some grades at points, side by side.
+/// Values of several grades at points: one tuple for each point.
 fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Result<Vec<[f64; N]>, Fault> {
     let mut out = vec![[0.0; N]; points.len()];
     let mut values = vec![0.0; points.len()];
@@ -123,7 +123,7 @@ fn columns<const N: usize>(of: &[Grade; N], points: &[Vec3], key: &str) -> Resul
                     format!(
                         "found {} at {}; it must be a finite number all over the region's bounds",
                         number(*v),
-                        place(points[n])
+                        in_mm(points[n])
                     ),
                 ));
             }
@@ -140,7 +140,7 @@ fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fau
         if norm(*v) < 1e-12 {
             return Err(Fault::new(
                 key,
-                format!("the vector is zero at {}; it needs a direction all over the region's bounds", place(*p)),
+                format!("the vector is zero at {}; it needs a direction all over the region's bounds", in_mm(*p)),
             ));
         }
         *v = unit(*v);
@@ -148,7 +148,7 @@ fn vectors(of: &[Grade; 3], points: &[Vec3], key: &str) -> Result<Vec<Vec3>, Fau
     Ok(found)
 }
 
-pub(super) fn place([x, y, z]: Vec3) -> String {
+pub(super) fn in_mm([x, y, z]: Vec3) -> String {
     format!("({x:.4}, {y:.4}, {z:.4}) mm")
 }
 
@@ -175,7 +175,7 @@ fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
     if size == 0.0 {
         return (v, [0.0; 3]);
     }
-    // Jacobi's rotations: a few rounds leave nothing off the diagonal.
+    // Jacobi's rotations: a few sweeps bring the off-diagonal entries to rounding.
     for _ in 0..8 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             if a[p][q].abs() <= 1e-300 {
@@ -202,7 +202,7 @@ fn principal(t: &[f64; 6]) -> (Mat3, Vec3) {
     (v, gaps)
 }
 
-/// The 24 turns of a cube.
+/// The 24 rotations of a cube.
 fn cube() -> Vec<Mat3> {
     let mut all = Vec::new();
     for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
@@ -285,7 +285,7 @@ impl Ord for Step {
 }
 
 /// Goes from node to node, the surest first, and makes each agree with the one that it was reached from: doubtful
-/// places come last, where they can do no harm. The first is made to agree with the axes of space.
+/// nodes come last, so that none depends on them. The first is made to agree with the coordinate axes.
 fn comb<T: Copy + FirstOf>(
     grid: &Grid,
     values: &mut [T],
@@ -293,13 +293,13 @@ fn comb<T: Copy + FirstOf>(
     agree: impl Fn(usize, &T, &T) -> T,
 ) {
     let strides = grid.strides();
-    let mut seen = vec![false; values.len()];
+    let mut reached = vec![false; values.len()];
     let mut heap = BinaryHeap::new();
     let start = (0..values.len()).max_by(|&a, &b| sure(a).total_cmp(&sure(b)).then(b.cmp(&a))).unwrap_or(0);
     values[start] = agree(start, &values[start], &T::FIRST);
     heap.push(Step { sure: sure(start), behind: sure(start), node: start, from: start });
     while let Some(Step { node, from, .. }) = heap.pop() {
-        if core::mem::replace(&mut seen[node], true) {
+        if core::mem::replace(&mut reached[node], true) {
             continue;
         }
         values[node] = agree(node, &values[node], &values[from]);
@@ -307,14 +307,14 @@ fn comb<T: Copy + FirstOf>(
         for a in 0..3 {
             let below = (at[a] > 0).then(|| node - strides[a]);
             let above = (at[a] + 1 < grid.shape[a]).then(|| node + strides[a]);
-            for next in below.into_iter().chain(above).filter(|&n| !seen[n]) {
+            for next in below.into_iter().chain(above).filter(|&n| !reached[n]) {
                 heap.push(Step { sure: sure(next), behind: sure(node), node: next, from: node });
             }
         }
     }
 }
 
-/// What the first node is made to agree with.
+/// The frame that the first node is made to agree with.
 trait FirstOf {
     const FIRST: Self;
 }
@@ -347,7 +347,7 @@ mod tests {
         ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
     }
 
-    /// A stress made from a smoothly turning frame, its principal values changing order half way: the frames found are
+    /// A stress made from a smoothly turning frame, its principal values changing order in the middle: the frames found are
     /// that frame everywhere, up to one turn of the cube.
     #[test]
     fn combed_frames_are_smooth_through_a_crossing_of_principal_values() {
@@ -372,7 +372,7 @@ mod tests {
         );
         let by = product(&transpose(&frame(nodes[0])), &frames[0]);
         for ((f, p), gaps) in frames.iter().zip(&nodes).zip(&gaps) {
-            // The eigenvectors' rounding over the gap; where values agree, the way to the next node that is sure.
+            // The eigenvectors' rounding over the gap; where values agree, the path to the next node that is sure.
             let within = if gaps.iter().all(|g| *g > DOUBT) { 1e-3 } else { 15.0 };
             assert!(angle(f, &product(&frame(*p), &by)) < within, "{} {within}", angle(f, &product(&frame(*p), &by)));
             assert!((determinant(f) - 1.0).abs() < 1e-12);
@@ -406,7 +406,7 @@ mod tests {
             }
             for s in g.strides() {
                 if n >= s && g.index(n - s).iter().zip(g.index(n)).filter(|(a, b)| **a != *b).count() == 1 {
-                    // The axis turns from node to node, and so does what the ways there make of the rest; another of the 24
+                    // The axis turns from node to node, and so does the rest of the frame along each path; another of the 24
                     // frames would be 45 degrees away or more.
                     assert!(angle(f, &frames[n - s]) < 30.0, "{} {:?}", angle(f, &frames[n - s]), nodes[n]);
                 }

@@ -21,7 +21,7 @@ impl Grid {
         self.shape.iter().product()
     }
 
-    /// The place along each axis of node `n`.
+    /// The index along each axis of node `n`.
     pub fn index(&self, n: usize) -> [usize; 3] {
         let [nx, ny, _] = self.shape;
         [n % nx, n / nx % ny, n / nx / ny]

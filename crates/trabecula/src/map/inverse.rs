@@ -1,4 +1,4 @@
-//! Phase to position: where the nodes of a graph on the torus come to lie.
+//! The inverse of a map, phase to position, by Newton's method.
 
 use std::collections::BTreeMap;
 
@@ -7,9 +7,9 @@ use geometry::math::{Aabb, Vec3, add, apply, determinant, inverse, norm, scale, 
 
 /// Steps of Newton's method, after which a phase counts as not found.
 const STEPS: usize = 40;
-/// How near (turns) a phase is met.
+/// Tolerance of the phase, turns.
 const NEAR: f64 = 1e-11;
-/// Looks on a wavelength for the cells that a solved map has in a box.
+/// Samples per wavelength in the search for the cells of a solved map in a box.
 const FINE: f64 = 2.0;
 
 /// The cells in ranges of indices along each phase, each with a position (mm) near it: that of its middle, or else the
@@ -31,7 +31,7 @@ pub(super) fn listed(map: &impl Mapping, ranges: [[i32; 2]; 3], b: &Aabb, reach:
     cells
 }
 
-/// The whole number below, within what a cell may be called.
+/// The whole number below, within the range of cell indices.
 pub(super) fn whole(v: f64) -> i32 {
     v.floor().clamp(-1e9, 1e9) as i32
 }
@@ -62,7 +62,7 @@ pub(super) fn search(map: &Phase, u: Vec3, near: Vec3) -> Option<Vec3> {
     None
 }
 
-/// The cells of a solved map that have a place in the box, and those about them.
+/// The cells of a solved map that contain a sample of the box, and their neighbours.
 pub(super) fn searched(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
     let step = map.wavelength() / FINE;
     let count = b.size().map(|s| (s / step).ceil().max(1.0) as usize);
@@ -83,11 +83,11 @@ pub(super) fn searched(map: &Phase, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
         }
     }
     let own: Vec<([i32; 3], Vec3)> = nearest.iter().map(|(c, s)| (*c, s.1)).collect();
-    for (cell, place) in own {
+    for (cell, near) in own {
         for n in 0..27 {
             let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
-            let beside = core::array::from_fn(|a| cell[a] + by[a]);
-            nearest.entry(beside).or_insert((f64::INFINITY, place));
+            let adjacent = core::array::from_fn(|a| cell[a] + by[a]);
+            nearest.entry(adjacent).or_insert((f64::INFINITY, near));
         }
     }
     nearest.into_iter().map(|(c, s)| (c, s.1)).collect()
@@ -101,7 +101,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn positions_have_the_phases_that_were_asked_for() {
+    fn positions_have_the_requested_phases() {
         let bounds = Aabb { min: [-10.0; 3], max: [10.0; 3] };
         let turn = Grade::from(Formula::parse("3*x").expect("formula"));
         let still = Grade::Constant(0.0);

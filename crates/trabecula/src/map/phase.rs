@@ -1,4 +1,4 @@
-//! Maps that turn and stretch the cells as asked for, by three phases whose gradients are nearest to three wanted ones.
+//! Maps of given orientation and wavelength: three phases whose gradients are nearest to three target gradients.
 //!
 //! Where orientation and wavelength vary there is mostly no phase with ∇Φᵢ = Kᵢ, Kᵢ = R eᵢ / λᵢ: least squares. The
 //! phases are solved on a coarse grid over the region's bounds and carried between its nodes by splines.
@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
-use super::frame::{Orientation, place};
+use super::frame::{Orientation, in_mm};
 use super::grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
@@ -19,29 +19,29 @@ use geometry::math::{
     Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
 };
 
-/// Most nodes of a grid that is chosen, and of one that is asked for.
+/// Most nodes of a grid that is chosen, and of one that the design requests.
 const NODES: [f64; 2] = [2.2e6, 4e7];
 /// Nodes on a wavelength.
 const FINE: f64 = 4.0;
-/// The most that a wavelength may change between neighbouring nodes, as a factor.
+/// The greatest ratio of wavelengths at adjacent nodes.
 const ABRUPT: f64 = 1.5;
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
-/// Nodes at which a solution is held against what was asked for.
-const LOOKS: usize = 60_000;
+/// Most nodes at which a solution is compared with the target.
+const COMPARED: usize = 60_000;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
-/// Least weight, as its root.
-const FAINT: f64 = 1e-3;
+/// Least root of a weight.
+const LEAST_ROOT: f64 = 1e-3;
 
-/// What a map is asked for.
+/// The target of a map.
 #[derive(Clone)]
 pub struct Wanted {
     /// Cell edges (mm) along the cell's axes.
     pub wavelength: [Grade; 3],
-    /// Which way the cells are turned.
+    /// Orientation of the cells.
     pub orientation: Orientation,
-    /// How much it matters that the map is what is asked for, compared with other places; the same everywhere if none.
+    /// Relative weight of the map's error; the same everywhere if none.
     pub weight: Option<Grade>,
     /// What an error of angle counts, for the same error of spacing (squares of the parts of ∇Φ − K across and along K); 1 if
     /// both count alike.
@@ -57,7 +57,7 @@ pub struct Settings<'a> {
     pub step: Option<f64>,
     /// Signed distance of the region that counts; all of the box if none.
     pub region: Option<&'a dyn Field>,
-    /// Whether the map may fold.
+    /// Whether the map may fold (det J ≤ 0).
     pub folds: bool,
 }
 
@@ -66,7 +66,7 @@ pub struct Phase {
     spline: Spline,
     wanted: Wanted,
     shift: Vec3,
-    /// Least and greatest wavelength asked for, mm.
+    /// Least and greatest target wavelength, mm.
     wavelengths: [f64; 2],
     /// The mean wavelengths along the three axes of the cell, mm.
     mean: Vec3,
@@ -90,8 +90,8 @@ impl Phase {
         let frames = wanted.orientation.frames(&grid, &nodes)?;
         let mut depth = vec![f64::NEG_INFINITY; grid.len()];
         if let Some(region) = settings.region {
-            let pieces = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
-            pieces.for_each(|(d, p)| region.values(p, d));
+            let chunks = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
+            chunks.for_each(|(d, p)| region.values(p, d));
         }
         let reach = 1e-9 * norm(bounds.size());
         let inside: Vec<bool> = depth.iter().map(|d| *d <= reach).collect();
@@ -113,7 +113,7 @@ impl Phase {
         let (values, mean, steps) = integrate(&grid, &k, close.as_deref(), ratio);
         let spline = Spline::through(grid, values);
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
-        // Cells for each cell wanted, everywhere; the rest, which costs more, at some tens of thousands of nodes.
+        // The density at every node; the other measures, which cost more, at some tens of thousands.
         let density: Vec<f64> = within
             .par_iter()
             .map(|&n| {
@@ -121,17 +121,17 @@ impl Phase {
                 cells * wavelength[n].iter().product::<f64>()
             })
             .collect();
-        let keep = LOOKS as f64 / within.len().max(1) as f64;
-        let looked: Vec<usize> =
+        let keep = COMPARED as f64 / within.len().max(1) as f64;
+        let compared: Vec<usize> =
             (within.iter().copied()).filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep).collect();
-        let jacobians: Vec<Mat3> = looked.par_iter().map(|&n| spline.jacobian(nodes[n]).1).collect();
-        let found: Vec<_> = (looked.par_iter().zip(&jacobians))
+        let jacobians: Vec<Mat3> = compared.par_iter().map(|&n| spline.jacobian(nodes[n]).1).collect();
+        let found: Vec<_> = (compared.par_iter().zip(&jacobians))
             .map(|(&n, j)| {
                 let wanted = [k[0][n], k[1][n], k[2][n]];
                 distortion::compare(j, &wanted)
             })
             .collect();
-        let curl = (looked.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
+        let curl = (compared.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
         let range =
             wavelength.iter().flatten().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         let turn = distortion::turning(&grid, &frames, &inside, range[1]);
@@ -166,12 +166,12 @@ impl Phase {
         })
     }
 
-    /// How far the map is from what was asked for.
+    /// Deviation of the map from the target.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
     }
 
-    /// How far the map is from what was asked for at points (mm) within the box. What was asked for is taken there itself,
+    /// Deviation of the map from the target at points (mm) within the box. The target is evaluated at the points,
     /// with the signs and axes that are nearest to the map's.
     ///
     /// # Errors
@@ -198,7 +198,7 @@ impl Phase {
 }
 
 impl Mapping for Phase {
-    /// As asked for.
+    /// Those of the target.
     fn wavelengths(&self) -> [f64; 2] {
         self.wavelengths
     }
@@ -269,7 +269,7 @@ impl Rows for SplineRows<'_> {
     }
 }
 
-/// The grid that resolves the least wavelength, or has the spacing asked for.
+/// The grid that resolves the least wavelength, or has the requested spacing `step` (mm).
 fn grid(bounds: &Aabb, wanted: &Wanted, step: Option<f64>) -> Result<Grid, Fault> {
     let size = bounds.size();
     let coarse: Vec<Vec3> = {
@@ -325,7 +325,7 @@ fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
                     format!(
                         "{} mm at {}; a wavelength is a positive, finite length all over the region's bounds",
                         number(*v),
-                        place(*p)
+                        in_mm(*p)
                     ),
                 ));
             }
@@ -335,7 +335,7 @@ fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
     Ok(out)
 }
 
-/// Refuses wavelengths that jump between nodes, or that nodes do not see vary.
+/// Refuses wavelengths that jump between nodes, or whose variation the nodes do not resolve.
 fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
     if of.iter().all(|g| g.constant().is_some()) {
         return Ok(());
@@ -346,7 +346,7 @@ fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Res
             number(a),
             number(b),
             number(apart),
-            place(p)
+            in_mm(p)
         );
         Err(Fault::new("wavelength", message))
     };
@@ -381,7 +381,7 @@ fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Res
     Ok(())
 }
 
-/// The roots of the weights of nodes: how close they are to the region, and what is asked for. `None` if all are one.
+/// The roots of the weights of nodes: closeness to the region times the target's weight. `None` if all are one.
 fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3]) -> Result<Option<Vec<f64>>, Fault> {
     let fall = FALL * grid.step.into_iter().fold(0.0, f64::max);
     let mut roots = vec![1.0; nodes.len()];
@@ -393,7 +393,7 @@ fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3])
             let message = format!(
                 "{} at {}; a weight is a finite number from 0 up, all over the region's bounds",
                 number(*w),
-                place(*p)
+                in_mm(*p)
             );
             return Err(Fault::new("weight", message));
         }
@@ -406,11 +406,11 @@ fn closeness(grid: &Grid, depth: &[f64], weight: Option<&Grade>, nodes: &[Vec3])
         return Ok(None);
     }
     let near = |d: &f64| (-d.max(0.0) / fall).exp();
-    let roots = roots.iter().zip(depth).map(|(w, d)| (w * near(d)).max(FAINT));
+    let roots = roots.iter().zip(depth).map(|(w, d)| (w * near(d)).max(LEAST_ROOT));
     Ok(Some(roots.collect()))
 }
 
-/// The three phases at the nodes, the mean of the rows of K, and the steps that it took. With K̄ the mean of K, that of
+/// The three phases at the nodes, the mean of the rows of K, and the number of steps. With K̄ the mean of K, that of
 /// Φ − K̄ x is zero; means and squares are weighted by the trapezoid rule and by s².
 fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> ([Vec<f64>; 3], Mat3, usize) {
     let even = (ratio != 1.0 && s.is_none()).then(|| vec![1.0; grid.len()]);
@@ -448,7 +448,7 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> 
     (core::array::from_fn(|_| values.next().unwrap_or_default()), mean, steps)
 }
 
-/// Refuses a map that turns inside out at a node or between nodes in the region.
+/// Refuses a map whose det J is not positive at a node or between nodes in the region.
 fn refuse_folds(grid: &Grid, spline: &Spline, distortion: &Distortion, inside: &[bool]) -> Result<(), Fault> {
     let at_node = (distortion.density[0] <= 0.0).then_some(distortion.least_at);
     let (strides, half) = (grid.strides(), scale(grid.step, 0.5));
@@ -466,7 +466,7 @@ fn refuse_folds(grid: &Grid, spline: &Spline, distortion: &Distortion, inside: &
             "",
             format!(
                 "the map folds at {}: cells turn inside out there. Let orientation and wavelength vary more slowly, or allow it with folds = true",
-                place(p)
+                in_mm(p)
             ),
         )),
     }

@@ -59,7 +59,7 @@ impl Poisson {
         let n = self.grid.len();
         let t: Vec<f64> = (0..n).map(|i| self.grid.trapezoid(i)).collect();
         let dot = |a: &[f64], b: &[f64]| -> f64 {
-            // In pieces of one length, so that the sum does not depend on the number of threads.
+            // In chunks of one length, so that the sum does not depend on the number of threads.
             let sums: Vec<f64> = (a.par_chunks(4096), b.par_chunks(4096), t.par_chunks(4096))
                 .into_par_iter()
                 .map(|(a, b, t)| a.iter().zip(b).zip(t).map(|((a, b), t)| a * b * t).sum())
@@ -225,8 +225,8 @@ fn turn(from: &[f64], to: &mut [f64], n: usize) {
     to.par_chunks_mut(SLAB * rows).enumerate().for_each(|(slab, to)| {
         let width = to.len() / rows;
         for (r, line) in from.chunks_exact(n).enumerate() {
-            let piece = &line[slab * SLAB..slab * SLAB + width];
-            for (i, v) in piece.iter().enumerate() {
+            let strip = &line[slab * SLAB..slab * SLAB + width];
+            for (i, v) in strip.iter().enumerate() {
                 to[i * rows + r] = *v;
             }
         }
@@ -252,8 +252,8 @@ mod tests {
         a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
     }
 
-    /// The iteration of the paper with its signs put right and, for unequal steps, the weights 1/h²: it stands still at
-    /// the direct solution and comes to it from zero, for a random K, which no phase has as its gradient.
+    /// The iteration of the paper with its signs put right and, for unequal steps, the weights 1/h²: its fixed point is
+    /// the direct solution, and it converges to it from zero, for a random K, which no phase has as its gradient.
     #[test]
     fn the_iteration_of_the_paper_ends_where_the_direct_solution_is() {
         let g = grid([9, 11, 8], [2.0, 3.0, 1.4]);
@@ -282,7 +282,7 @@ mod tests {
         assert!(largest(&sweep(&direct), &direct) < 1e-13);
         let mut f = vec![0.0; g.len()];
         for _ in 0..6000 {
-            // Half way: the plain iteration leaves the checkerboard for ever.
+            // Half a step: the plain iteration never damps the checkerboard.
             let next = sweep(&f);
             f.iter_mut().zip(&next).for_each(|(f, n)| *f = 0.5 * (*f + n));
         }
@@ -375,7 +375,7 @@ mod tests {
     }
 
     /// With a weight, what is found is stationary: the weighted sum of squares does not fall in any direction, which a
-    /// direct look at the sum shows; and where all edges weigh the same it is the direct solution.
+    /// direct evaluation of the sum shows; and where all edges weigh the same it is the direct solution.
     #[test]
     fn weighted_least_squares_are_least() {
         let g = grid([14, 12, 11], [2.0, 3.0, 1.4]);

@@ -202,8 +202,8 @@ impl Mapping for Round {
     }
 
     fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
-        let places = corners(b).map(|p| self.local(p));
-        let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| places.iter().map(v).fold(f64::NEG_INFINITY, f64::max);
+        let positions = corners(b).map(|p| self.local(p));
+        let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| positions.iter().map(v).fold(f64::NEG_INFINITY, f64::max);
         let away = |l: &(Vec3, f64)| if self.sphere { l.1.hypot(l.0[2]) } else { l.1 };
         let far = most(&away);
         let near = away(&self.local(b.center())) - 0.5 * norm(b.size());
@@ -228,7 +228,7 @@ mod tests {
     use super::*;
     use geometry::math::spectral_norm;
 
-    fn places() -> impl Iterator<Item = Vec3> {
+    fn positions() -> impl Iterator<Item = Vec3> {
         (1..400).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| 20.0 * (s * f64::from(i)).fract() - 10.0))
     }
 
@@ -239,7 +239,7 @@ mod tests {
             Round::cylinder([1.0, 2.0, 3.0], axis, [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder"),
             Round::sphere([1.0, 2.0, 3.0], axis, 2.0, 12.0, [1.0, 5.0, 9.0]).expect("sphere"),
         ] {
-            for p in places() {
+            for p in positions() {
                 let (j, r) = (map.jacobian(p), map.local(p).1);
                 if r < 0.5 {
                     continue;
@@ -256,7 +256,7 @@ mod tests {
                     }
                 }
                 let b = Aabb { min: p, max: p }.grown(0.1);
-                for q in places().take(20) {
+                for q in positions().take(20) {
                     let q = core::array::from_fn(|a| p[a] + 0.01 * q[a]);
                     assert!(spectral_norm(&map.jacobian(q)) <= map.lipschitz(&b));
                 }

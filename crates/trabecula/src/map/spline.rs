@@ -1,7 +1,7 @@
 //! Three cubic splines through the nodes of a grid in a box: a map with two continuous derivatives.
 //!
-//! Along each axis the spline has no knot at the second and last but one node, so that a cubic is met exactly and the
-//! gradient keeps its order up to the faces. Beyond the box it goes on straight. Coefficients are those of B-splines.
+//! End conditions are not-a-knot: no knot at the second and last but one node, so that a cubic is reproduced exactly and the
+//! gradient keeps its order up to the faces. Beyond the box it is extended linearly. Coefficients are those of B-splines.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -199,9 +199,9 @@ impl Spline {
         let (along_x, along_y) = (range(&x), range(&y));
         // On an interval a spline is a cubic; beyond the box it is another one, which is straight.
         let last = self.grid.shape[0] - 1;
-        let place = |x: &f64| (x - self.grid.origin[0]) / self.grid.step[0];
+        let in_steps = |x: &f64| (x - self.grid.origin[0]) / self.grid.step[0];
         let runs = block.axes[0].iter().zip(&x).map(|(at, spot)| {
-            let s = place(at);
+            let s = in_steps(at);
             let beyond = if s < 0.0 {
                 0
             } else if s > last as f64 {
@@ -216,13 +216,13 @@ impl Spline {
             };
             (beyond, spot.first - along_x.0, t)
         });
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut segments: Vec<Segment> = Vec::new();
         let mut t = Vec::with_capacity(x.len());
         for (n, (beyond, first, at)) in runs.enumerate() {
             t.push(at);
-            match pieces.last_mut() {
+            match segments.last_mut() {
                 Some(p) if p.first == first && p.beyond == beyond => p.to = n + 1,
-                _ => pieces.push(Piece { beyond, first, from: n, to: n + 1 }),
+                _ => segments.push(Segment { beyond, first, from: n, to: n + 1 }),
             }
         }
         Rows {
@@ -232,7 +232,7 @@ impl Spline {
             y,
             z,
             t,
-            pieces,
+            segments,
             layer: core::array::from_fn(|_| vec![0.0; along_x.1 * along_y.1]),
             line: vec![0.0; along_x.1],
         }
@@ -241,7 +241,7 @@ impl Spline {
 
 /// Nodes of a row in one interval.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
+struct Segment {
     /// Before the box, in it, after it.
     beyond: u8,
     first: usize,
@@ -259,7 +259,7 @@ pub(in super::super) struct Rows<'a> {
     y: Vec<Spot>,
     z: Vec<Spot>,
     t: Vec<f64>,
-    pieces: Vec<Piece>,
+    segments: Vec<Segment>,
     layer: [Vec<f64>; 3],
     line: Vec<f64>,
 }
@@ -288,7 +288,7 @@ impl Rows<'_> {
         for (layer, out) in self.layer.iter().zip(out) {
             let row = |j: usize| &layer[(first + j) * nx..][..nx];
             blend([row(0), row(1), row(2), row(3)], &y.value, &mut self.line);
-            cubics(&self.line, &self.pieces, &self.t, out);
+            cubics(&self.line, &self.segments, &self.t, out);
         }
     }
 }
@@ -302,8 +302,8 @@ fn blend(rows: [&[f64]; 4], w: &[f64; 4], out: &mut [f64]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn cubics(line: &[f64], pieces: &[Piece], t: &[f64], out: &mut [f64]) {
-    for p in pieces {
+fn cubics(line: &[f64], segments: &[Segment], t: &[f64], out: &mut [f64]) {
+    for p in segments {
         let c = &line[p.first..][..4];
         // The powers of t in the value.
         let mut a = [
@@ -361,7 +361,7 @@ mod tests {
         Spline::through(g, [at(0), at(1), at(2)])
     }
 
-    fn places() -> Vec<Vec3> {
+    fn positions() -> Vec<Vec3> {
         let mut s = 9u64;
         let mut next = || (geometry::random::random(&mut s) + 1.0) / 2.0;
         // In the box and about it.
@@ -379,7 +379,7 @@ mod tests {
             s.values(&[g.node(n)], &mut u);
             assert!(norm(sub(u[0], bent(g.node(n)))) < 1e-13);
         }
-        for p in places() {
+        for p in positions() {
             let b = Aabb { min: [-1.0, 0.5, 2.0], max: [2.0, 2.5, 4.4] };
             if b.distance(p) == 0.0 {
                 let mut u = [[0.0; 3]];
@@ -393,7 +393,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences_and_rows_with_points_also_outside() {
         let s = spline(bent);
-        for p in places() {
+        for p in positions() {
             let (u, m) = s.jacobian(p);
             let mut v = [[0.0; 3]; 2];
             s.values(&[p, p], &mut v);
@@ -431,7 +431,7 @@ mod tests {
     #[test]
     fn no_jacobian_in_a_box_is_longer_than_the_bound() {
         let s = spline(bent);
-        let p = places();
+        let p = positions();
         for pair in p.windows(2) {
             let b = Aabb { min: pair[0], max: pair[0] }.with(pair[1]);
             let bound = s.lipschitz(&b);

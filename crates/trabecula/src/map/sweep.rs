@@ -1,6 +1,6 @@
-//! A map that carries a lattice along a line: cells across it and along it, in a frame that turns about it as little as may be.
+//! A map that sweeps a lattice along a curve: cells across it and along it, in a rotation-minimizing frame.
 //!
-//! A cubic spline c goes through the control points. A place belongs to the nearest point of it, s is the length up to there, and
+//! A cubic spline c goes through the control points. A position belongs to the nearest point of it, s is the arc length up to there (mm), and
 //! its coordinates across are those in a frame N₁, N₂ that does not rotate about the line (double reflection: Wang, Jüttler,
 //! Zheng, Liu, Computation of rotation minimizing frames, ACM Trans. Graph. 27, 2008). With the curvature vector κ and
 //! d = x − c then ∇s = T/(1 − κ·d), ∇(d·N₁) = N₁. Cells fold where κ·d ≥ 1, at the centre of curvature, and tear where two points
@@ -17,13 +17,13 @@ use super::inverse::{listed, whole};
 use crate::field::Field;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, scale, sub, unit};
-use line::{Knot, Spans, carried, spline};
+use line::{SamplePoint, Spans, carried, spline};
 
-/// Steps of the line between control points.
+/// Sample points of the line for each span between control points.
 const FINE: usize = 24;
-/// Steps of Newton's method from the nearest of these; the error squares each time.
+/// Steps of Newton's method from the nearest sample point; convergence is quadratic.
 const STEPS: usize = 6;
-/// Places and weights of Gauss and Legendre on [−1, 1].
+/// Nodes and weights of Gauss–Legendre quadrature on [−1, 1].
 const GAUSS: [(f64, f64); 5] = [
     (0.0, 0.568_888_888_888_888_9),
     (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -32,7 +32,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// A line along which a lattice is swept, and what it is asked for.
+/// A line along which a lattice is swept, and the cells requested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     /// Control points, mm.
@@ -41,7 +41,7 @@ pub struct Path {
     pub closed: bool,
     /// Cell edges (mm): two across the line and one along it.
     pub wavelength: Vec3,
-    /// Which way the first edge points at the start, but for what it has along the line; chosen if not given.
+    /// Direction of the cell's first edge at the start, projected across the line; chosen if not given.
     pub normal: Option<Vec3>,
 }
 
@@ -52,21 +52,21 @@ pub struct Sweep {
     spans: Spans,
     /// Where the last span ends: they are as long as their chords.
     end: f64,
-    knots: Vec<Knot>,
+    sample_points: Vec<SamplePoint>,
     closed: bool,
     wavelength: Vec3,
     length: f64,
-    /// By how much the frame is turned for each mm, radians.
+    /// Rotation of the frame about the line, radians per mm.
     twist: f64,
-    /// Within this distance of the line the nearest point is one, mm.
+    /// The reach of the line (Federer), mm: within this distance the nearest point is unique.
     reach: f64,
-    /// Least and greatest length of a cell along the line where the lattice is wanted, mm.
+    /// Least and greatest length of a cell along the line in the region, mm.
     along: [f64; 2],
     /// The Jacobians where cells are shortest and longest.
     extremes: [Mat3; 2],
 }
 
-/// How a place lies to the line.
+/// Coordinates of a position relative to the line.
 struct Local {
     s: f64,
     /// Coordinates along N₁ and N₂.
@@ -74,16 +74,16 @@ struct Local {
     tangent: Vec3,
     normals: [Vec3; 2],
     /// 1 − κ·d.
-    room: f64,
+    stretch: f64,
 }
 
 impl Sweep {
-    /// Solves for the line; `looks` are places in the region, in which the map must neither fold nor tear.
+    /// Solves for the line; `samples` are positions in the region, at which the map must neither fold nor tear.
     ///
     /// # Errors
     /// Too few points, neighbours that coincide, lengths that are not positive, a normal along the line; a fold or a tear in
-    /// the region, with the place.
-    pub fn new(path: &Path, region: &dyn Field, looks: &[Vec3]) -> Result<Sweep, Fault> {
+    /// the region, with the position.
+    pub fn new(path: &Path, region: &dyn Field, samples: &[Vec3]) -> Result<Sweep, Fault> {
         let Path { points, closed, .. } = path;
         let least = if *closed { 3 } else { 2 };
         if points.len() < least || points.iter().flatten().any(|v| !v.is_finite()) {
@@ -99,7 +99,7 @@ impl Sweep {
         let mut made = Sweep {
             spans,
             end,
-            knots: Vec::new(),
+            sample_points: Vec::new(),
             closed: *closed,
             wavelength: path.wavelength,
             length: 0.0,
@@ -109,25 +109,25 @@ impl Sweep {
             extremes: [[[0.0; 3]; 3]; 2],
         };
         made.walk(path.normal)?;
-        let around = looks.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
+        let around = samples.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
         made.reach = made.found_reach(norm(around.size()));
-        made.refuse_folds(region, looks)?;
+        made.refuse_folds(region, samples)?;
         Ok(made)
     }
 
-    /// The spline at t: place, first and second derivative. Straight on beyond the ends of an open line.
+    /// The spline at t: position, first and second derivative. Straight on beyond the ends of an open line.
     fn curve(&self, t: f64) -> (Vec3, Vec3, Vec3) {
         let end = self.end;
         let inside = if self.closed { t.rem_euclid(end) } else { t.clamp(0.0, end) };
         let i = self.spans.partition_point(|s| s.0 <= inside).max(1) - 1;
         let (from, [a, b, c, d]) = self.spans[i];
         let x = inside - from;
-        let place = add(a, scale(add(b, scale(add(c, scale(d, x)), x)), x));
+        let position = add(a, scale(add(b, scale(add(c, scale(d, x)), x)), x));
         let first = add(b, scale(add(scale(c, 2.0), scale(d, 3.0 * x)), x));
         if !self.closed && t != inside {
-            return (add(place, scale(first, t - inside)), first, [0.0; 3]);
+            return (add(position, scale(first, t - inside)), first, [0.0; 3]);
         }
-        (place, first, add(scale(c, 2.0), scale(d, 6.0 * x)))
+        (position, first, add(scale(c, 2.0), scale(d, 6.0 * x)))
     }
 
     /// The length from t₀ to t, mm.
@@ -137,7 +137,7 @@ impl Sweep {
         half * GAUSS.iter().map(|(x, w)| w * at(*x)).sum::<f64>()
     }
 
-    /// Lays the knots: lengths and frames.
+    /// Computes the sample points: arc lengths and frames.
     fn walk(&mut self, normal: Option<Vec3>) -> Result<(), Fault> {
         let end = self.end;
         let starts = self.spans.iter().map(|s| s.0);
@@ -155,33 +155,33 @@ impl Sweep {
             let message = format!("{wanted:?} lies along the line at its start; give a direction across it");
             return Err(Fault::new("normal", message));
         }
-        let mut knots = vec![Knot { t: 0.0, place: start, tangent, normal: unit(flat), s: 0.0 }];
+        let mut sample_points = vec![SamplePoint { t: 0.0, position: start, tangent, normal: unit(flat), s: 0.0 }];
         for t in ts.into_iter().skip(1) {
-            let last = knots[knots.len() - 1];
-            // An end that is the start again is not taken round it.
-            let (place, slope, _) = self.curve(if self.closed && t == end { 0.0 } else { t });
+            let last = sample_points[sample_points.len() - 1];
+            // The end of a closed line is evaluated at t = 0, so that it equals the start exactly.
+            let (position, slope, _) = self.curve(if self.closed && t == end { 0.0 } else { t });
             let tangent = unit(slope);
             let s = last.s + self.length_between(last.t, t);
-            let normal = carried(&last, place, tangent);
-            knots.push(Knot { t, place, tangent, normal, s });
+            let normal = carried(&last, position, tangent);
+            sample_points.push(SamplePoint { t, position, tangent, normal, s });
         }
-        let last = knots[knots.len() - 1];
+        let last = sample_points[sample_points.len() - 1];
         self.length = last.s;
         if self.closed {
-            let (n, m) = (knots[0].normal, cross(knots[0].tangent, knots[0].normal));
+            let (n, m) = (sample_points[0].normal, cross(sample_points[0].tangent, sample_points[0].normal));
             self.twist = -dot(last.normal, m).atan2(dot(last.normal, n)) / self.length;
             let count = (self.length / self.wavelength[2]).round().max(1.0);
             self.wavelength[2] = self.length / count;
             self.along = [self.wavelength[2]; 2];
         }
-        self.knots = knots;
+        self.sample_points = sample_points;
         Ok(())
     }
 
-    /// The frame at t, after the knot before it.
-    fn frame(&self, i: usize, t: f64, place: Vec3, tangent: Vec3, s: f64) -> [Vec3; 2] {
-        let knot = &self.knots[i];
-        let n = if t == knot.t { knot.normal } else { carried(knot, place, tangent) };
+    /// The frame at t, carried from sample point i, the last before it.
+    fn frame(&self, i: usize, t: f64, position: Vec3, tangent: Vec3, s: f64) -> [Vec3; 2] {
+        let sample = &self.sample_points[i];
+        let n = if t == sample.t { sample.normal } else { carried(sample, position, tangent) };
         let (sin, cos) = (self.twist * s).sin_cos();
         let m = cross(tangent, n);
         [add(scale(n, cos), scale(m, sin)), sub(scale(m, cos), scale(n, sin))]
@@ -189,28 +189,28 @@ impl Sweep {
 
     fn local(&self, p: Vec3) -> Local {
         let mut near = (f64::INFINITY, 0);
-        for (i, k) in self.knots.iter().enumerate() {
-            let d = sub(p, k.place);
+        for (i, k) in self.sample_points.iter().enumerate() {
+            let d = sub(p, k.position);
             let r = dot(d, d);
             if r < near.0 {
                 near = (r, i);
             }
         }
-        let last = self.knots.len() - 1;
+        let last = self.sample_points.len() - 1;
         let end = self.end;
         // Straight on beyond the ends of an open line.
         let beyond = [(0, -1.0), (last, 1.0)].into_iter().find_map(|(i, sign)| {
-            let k = &self.knots[i];
-            let d = sub(p, k.place);
-            let way = dot(d, k.tangent);
-            let ahead = !self.closed && sign * way > 0.0 && dot(d, d) - way * way < near.0;
-            ahead.then(|| self.knots[i].t + way / norm(self.curve(k.t).1))
+            let k = &self.sample_points[i];
+            let d = sub(p, k.position);
+            let along = dot(d, k.tangent);
+            let ahead = !self.closed && sign * along > 0.0 && dot(d, d) - along * along < near.0;
+            ahead.then(|| self.sample_points[i].t + along / norm(self.curve(k.t).1))
         });
         let i = near.1;
-        let step = |i: usize| self.knots[i + 1].t - self.knots[i].t;
-        let lo = self.knots[i].t - step(if i == 0 { last - 1 } else { i - 1 });
-        let hi = self.knots[i].t + step(if i == last { 0 } else { i });
-        let mut t = beyond.unwrap_or(self.knots[i].t);
+        let step = |i: usize| self.sample_points[i + 1].t - self.sample_points[i].t;
+        let lo = self.sample_points[i].t - step(if i == 0 { last - 1 } else { i - 1 });
+        let hi = self.sample_points[i].t + step(if i == last { 0 } else { i });
+        let mut t = beyond.unwrap_or(self.sample_points[i].t);
         for _ in 0..if beyond.is_some() { 0 } else { STEPS } {
             let (c, first, second) = self.curve(t);
             let d = sub(p, c);
@@ -227,18 +227,18 @@ impl Sweep {
         let (d, speed) = (sub(p, c), norm(first));
         let tangent = scale(first, 1.0 / speed);
         let bend = scale(sub(second, scale(tangent, dot(second, tangent))), 1.0 / (speed * speed));
-        // Round a closed line t has one turn alone.
+        // On a closed line t is periodic.
         let round = if self.closed { t.rem_euclid(end) } else { t };
-        let i = if round <= 0.0 { 0 } else { self.knots.partition_point(|k| k.t <= round).clamp(1, last) - 1 };
+        let i = if round <= 0.0 { 0 } else { self.sample_points.partition_point(|k| k.t <= round).clamp(1, last) - 1 };
         let s = if !self.closed && round > end {
             self.length + (round - end) * speed
         } else if !self.closed && round < 0.0 {
             round * speed
         } else {
-            self.knots[i].s + self.length_between(self.knots[i].t, round)
+            self.sample_points[i].s + self.length_between(self.sample_points[i].t, round)
         };
         let normals = self.frame(i, round, c, tangent, s);
-        Local { s, across: normals.map(|n| dot(d, n)), tangent, normals, room: 1.0 - dot(bend, d) }
+        Local { s, across: normals.map(|n| dot(d, n)), tangent, normals, stretch: 1.0 - dot(bend, d) }
     }
 
     /// The distance from the line, mm.
@@ -264,11 +264,11 @@ impl Sweep {
         [l.across[0] / w[0], l.across[1] / w[1], l.s / w[2]]
     }
 
-    /// A Lipschitz bound (turns per mm) where the room is at least `room` and the distance from the line at most `away`.
-    fn lipschitz_within(&self, room: f64, away: f64) -> f64 {
+    /// A Lipschitz bound (turns per mm) where 1 − κ·d is at least `stretch` and the distance from the line at most `away`.
+    fn lipschitz_within(&self, stretch: f64, away: f64) -> f64 {
         let [a, b, c] = self.wavelength;
-        // Rows at right angles but for the twist, whose norm is added.
-        (1.0 / a.min(b)).max(1.0 / (room * c)) + self.twist.abs() * away / (room * a.min(b))
+        // The rows are orthogonal but for the twist, whose norm is added.
+        (1.0 / a.min(b)).max(1.0 / (stretch * c)) + self.twist.abs() * away / (stretch * a.min(b))
     }
 
     /// How many cells a line that closes has along it.
@@ -291,7 +291,7 @@ impl Mapping for Sweep {
 
     fn jacobian(&self, p: Vec3) -> Mat3 {
         let l = self.local(p);
-        let along = scale(l.tangent, 1.0 / l.room.max(1e-6));
+        let along = scale(l.tangent, 1.0 / l.stretch.max(1e-6));
         let [a, b] = l.across;
         let w = self.wavelength;
         [
@@ -320,8 +320,8 @@ impl Mapping for Sweep {
     }
 
     fn max_lipschitz(&self) -> f64 {
-        let room = self.along[0] / self.wavelength[2];
-        self.lipschitz_within(room.max(1e-3), self.reach)
+        let stretch = self.along[0] / self.wavelength[2];
+        self.lipschitz_within(stretch.max(1e-3), self.reach)
     }
 
     fn position(&self, u: Vec3, _: Vec3) -> Option<Vec3> {
@@ -330,15 +330,15 @@ impl Mapping for Sweep {
         if self.closed {
             s = s.rem_euclid(self.length);
         }
-        let last = self.knots.len() - 1;
-        let i = self.knots.partition_point(|k| k.s <= s).clamp(1, last) - 1;
+        let last = self.sample_points.len() - 1;
+        let i = self.sample_points.partition_point(|k| k.s <= s).clamp(1, last) - 1;
         // s rises with t at the speed of the spline, which is near one.
-        let mut t = self.knots[i].t;
+        let mut t = self.sample_points[i].t;
         for _ in 0..STEPS {
             let have = if t > self.end && !self.closed {
                 self.length + (t - self.end) * norm(self.curve(t).1)
             } else {
-                self.knots[i].s + self.length_between(self.knots[i].t, t)
+                self.sample_points[i].s + self.length_between(self.sample_points[i].t, t)
             };
             t += (s - have) / norm(self.curve(t).1);
         }

@@ -46,7 +46,7 @@ struct Boxes {
 }
 
 impl Boxes {
-    fn place(&self, p: Vec3) -> [usize; 3] {
+    fn box_at(&self, p: Vec3) -> [usize; 3] {
         [0, 1, 2].map(|a| {
             let i = ((p[a] - self.min[a]) / self.edge).floor();
             (i.max(0.0) as usize).min(self.shape[a] - 1)
@@ -142,7 +142,7 @@ impl Tets {
         for t in 0..self.tets.len() {
             let corners = self.grown(t);
             let b = corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-            let (lo, hi) = (self.boxes.place(b.min), self.boxes.place(b.max));
+            let (lo, hi) = (self.boxes.box_at(b.min), self.boxes.box_at(b.max));
             let planes = planes(&corners);
             for k in lo[2]..=hi[2] {
                 for j in lo[1]..=hi[1] {
@@ -330,7 +330,7 @@ impl Tets {
     /// with some coordinates negative.
     pub fn locate(&self, p: Vec3) -> (usize, [f64; 4]) {
         let mut best = (f64::NEG_INFINITY, 0, [0.25; 4]);
-        for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
+        for &t in self.boxes.of(self.boxes.index(self.boxes.box_at(p))) {
             let l = self.bary(t as usize, p);
             let least = l.iter().copied().fold(f64::INFINITY, f64::min);
             if least > best.0 {
@@ -346,7 +346,7 @@ impl Tets {
     /// Calls `f` with every tetrahedron in whose overlap a point lies; with that of `locate` if there is none.
     pub fn each_near(&self, p: Vec3, mut f: impl FnMut(usize, [f64; 4])) {
         let mut none = true;
-        for &t in self.boxes.of(self.boxes.index(self.boxes.place(p))) {
+        for &t in self.boxes.of(self.boxes.index(self.boxes.box_at(p))) {
             let l = self.bary(t as usize, p);
             if l.iter().all(|v| *v > -self.overlap) {
                 none = false;
@@ -362,7 +362,7 @@ impl Tets {
     /// Calls `f` with all tetrahedra, possibly repeated, in which points of a box may be located; `false` if there are
     /// more than `most`.
     pub fn each_in(&self, b: &Aabb, most: usize, mut f: impl FnMut(usize)) -> bool {
-        let (lo, hi) = (self.boxes.place(b.min), self.boxes.place(b.max));
+        let (lo, hi) = (self.boxes.box_at(b.min), self.boxes.box_at(b.max));
         let boxes: usize = (0..3).map(|a| hi[a] - lo[a] + 1).product();
         if boxes > most {
             return false;

@@ -1,4 +1,4 @@
-//! Errors of a gradient across and along what is wanted, made to count differently.
+//! Different weights for the errors of a gradient across and along the target.
 //!
 //! ∇Φ may be off K in length, which is the spacing of cells, or in direction, which is their angle. With K̂ = K/|K| the square of
 //! the one is |K̂·(∇Φ − K)|², of the other |(I − K̂K̂ᵀ)(∇Φ − K)|². With r times the second the weight is a tensor,
@@ -7,7 +7,7 @@
 //! Numer. Meth. Engng 113, 2018; least squares stay linear.
 //!
 //! The identity is the edges' part (`poisson`). The rest is taken at the middles of the grid's cells, where the gradient is the
-//! mean of four differences along each axis: second order, and what such a mean does not see the edges do.
+//! mean of four differences along each axis: second order, and the edges' part covers the modes that such a mean leaves out.
 
 use rayon::prelude::*;
 
@@ -21,7 +21,7 @@ pub(super) struct Tilt {
     cells: [usize; 3],
     /// For each cell K̂ and what the part counts.
     of: Vec<(Vec3, f64)>,
-    /// Whether what lies across K counts, or what lies along it.
+    /// Whether the component across K is penalised, or the one along it.
     across: bool,
 }
 
@@ -57,7 +57,7 @@ impl Tilt {
         core::array::from_fn(|n| first + (0..3).map(|a| (n >> a & 1) * strides[a]).sum::<usize>())
     }
 
-    /// What the part makes of a gradient in a cell.
+    /// The part applied to a gradient in a cell.
     fn weighted(&self, c: usize, g: Vec3) -> Vec3 {
         let (along, weight) = self.of[c];
         let part = scale(along, dot(along, g));

@@ -196,7 +196,7 @@ fn a_grating_of_its_own_agrees_with_the_sum_of_three_phases() {
     }
 }
 
-/// Outside counts little: in a bent strip the map is nearer to what was asked for than if the whole box counted.
+/// Outside counts little: in a bent strip the map is nearer to the target than if the whole box counted.
 #[test]
 fn the_region_counts_and_its_surroundings_hardly() {
     use crate::region::{Cuboid, Cylinder, Difference, Intersection};
@@ -297,11 +297,11 @@ fn errors_go_where_they_weigh_least() {
         Phase::solve(&b, &wanted, &Settings::default()).expect("solved")
     };
     let miss = |map: &Phase, weight: &dyn Fn(Vec3) -> f64| -> f64 {
-        let places = (0..4000).map(|i| {
+        let positions = (0..4000).map(|i| {
             let s = [0.8191725, 0.6710436, 0.5497005].map(|s| (s * f64::from(i)).fract());
             [0, 1, 2].map(|a| s[a] * b.max[a])
         });
-        let each = places.map(|p| {
+        let each = positions.map(|p| {
             let angle = (40.0 * (p[0] / 4.0).sin()).to_radians();
             let (s, c) = angle.sin_cos();
             let j = map.jacobian(p);
@@ -321,8 +321,8 @@ fn errors_go_where_they_weigh_least() {
     }
 }
 
-/// What counts more is nearer to what was asked for: the steeper an angle weighs the smaller its error and the greater that of
-/// spacing, and the other way round. What does not vary is met exactly, whatever counts.
+/// What counts more is nearer to the target: the steeper an angle weighs the smaller its error and the greater that of
+/// spacing, and the reverse. What does not vary is met exactly, whatever counts.
 #[test]
 fn angles_are_bought_with_spacings() {
     let b = bounds([0.0; 3], [16.0, 16.0, 4.0]);
@@ -368,8 +368,8 @@ fn misfits_at_nodes_are_those_of_the_report() {
         let found = map.misfits(&nodes).expect("misfits");
         let most = |f: &dyn Fn(&Misfit) -> f64| found.iter().map(f).fold(0.0, f64::max);
         let d = map.distortion();
-        // The report looks at every node of a grid as small as this; angles are good to √ε.
-        assert!(grid.len() < LOOKS);
+        // The report evaluates every node of a grid as small as this; angles are good to √ε.
+        assert!(grid.len() < COMPARED);
         let shear = most(&|m| m.shear);
         assert!((shear - d.shear.max).abs() < 1e-5, "{shear} {}", d.shear.max);
         for i in 0..3 {

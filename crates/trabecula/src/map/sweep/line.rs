@@ -1,29 +1,29 @@
-//! A line through control points: its cubics, and frames carried along it.
+//! A cubic spline through control points, and rotation-minimizing frames at its sample points.
 
 use geometry::fault::Fault;
 use geometry::math::{Vec3, add, dot, norm, scale, sub, unit};
 
-/// A step of the line.
+/// A sample point of the line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Knot {
-    /// Where it is on the spline.
+pub(super) struct SamplePoint {
+    /// Parameter of the spline.
     pub t: f64,
-    pub place: Vec3,
+    pub position: Vec3,
     pub tangent: Vec3,
-    /// N₁, not yet turned.
+    /// N₁, before the twist.
     pub normal: Vec3,
-    /// Length up to here, mm.
+    /// Arc length up to here, mm.
     pub s: f64,
 }
 
-/// The normal of a knot carried to the next place of the line by two reflections.
-pub(super) fn carried(knot: &Knot, place: Vec3, tangent: Vec3) -> Vec3 {
+/// The normal of a sample point carried to the next one by two reflections.
+pub(super) fn carried(sample: &SamplePoint, position: Vec3, tangent: Vec3) -> Vec3 {
     let mirrored = |v: Vec3, n: Vec3| {
         let long = dot(n, n);
         if long > 0.0 { sub(v, scale(n, 2.0 * dot(n, v) / long)) } else { v }
     };
-    let way = sub(place, knot.place);
-    let (normal, along) = (mirrored(knot.normal, way), mirrored(knot.tangent, way));
+    let step = sub(position, sample.position);
+    let (normal, along) = (mirrored(sample.normal, step), mirrored(sample.tangent, step));
     let n = mirrored(normal, sub(tangent, along));
     unit(sub(n, scale(tangent, dot(n, tangent))))
 }

@@ -1,6 +1,7 @@
-//! How far from its line a sweep is sound: where cells fold, where they tear, and within what distance neither can be.
+//! The reach of a line (Federer, Curvature measures, Trans. Amer. Math. Soc. 93, 1959), within which a sweep neither folds nor
+//! tears, and the refusal of regions in which it does.
 
-use super::{FINE, Knot, Sweep};
+use super::{FINE, SamplePoint, Sweep};
 use crate::field::Field;
 use crate::map::Mapping;
 use geometry::fault::Fault;
@@ -12,33 +13,35 @@ impl Sweep {
     /// beyond their ends.
     pub(super) fn found_reach(&self, far: f64) -> f64 {
         let mut least = f64::INFINITY;
-        let mut all = self.knots.clone();
-        let ends = [(0, -1.0), (self.knots.len() - 1, 1.0)];
+        let mut all = self.sample_points.clone();
+        let ends = [(0, -1.0), (self.sample_points.len() - 1, 1.0)];
         for (end, sign) in ends.into_iter().filter(|_| !self.closed) {
-            let k = self.knots[end];
-            let way = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
-            all.extend((1..=8 * FINE).map(|i| Knot { place: add(k.place, scale(k.tangent, way(i))), ..k }));
+            let k = self.sample_points[end];
+            let ahead = |i: usize| sign * far * i as f64 / (8 * FINE) as f64;
+            all.extend(
+                (1..=8 * FINE).map(|i| SamplePoint { position: add(k.position, scale(k.tangent, ahead(i))), ..k }),
+            );
         }
-        for k in &self.knots {
+        for k in &self.sample_points {
             let (_, slope, second) = self.curve(k.t);
             let bend = norm(cross(slope, second)) / norm(slope).powi(3);
             least = least.min(1.0 / bend.max(1e-300));
         }
         for k in &all {
             for q in &all {
-                let way = sub(q.place, k.place);
-                let off = norm(cross(way, k.tangent));
+                let step = sub(q.position, k.position);
+                let off = norm(cross(step, k.tangent));
                 if off > 1e-9 * self.length {
-                    least = least.min(dot(way, way) / (2.0 * off));
+                    least = least.min(dot(step, step) / (2.0 * off));
                 }
             }
         }
-        // Between the knots it may be a little less.
+        // A tenth off: between the sample points it may be less.
         0.9 * least
     }
 
-    /// Refuses a map that folds or tears at places in the region.
-    pub(super) fn refuse_folds(&mut self, region: &dyn Field, looks: &[Vec3]) -> Result<(), Fault> {
+    /// Refuses a map that folds or tears at one of the positions `samples` in the region.
+    pub(super) fn refuse_folds(&mut self, region: &dyn Field, samples: &[Vec3]) -> Result<(), Fault> {
         let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
         let fold = |p: Vec3, radius: f64| {
             let message = format!(
@@ -48,7 +51,7 @@ impl Sweep {
             );
             Err(Fault::new("points", message))
         };
-        for k in &self.knots {
+        for k in &self.sample_points {
             let (c, first, second) = self.curve(k.t);
             let speed = norm(first);
             let bend = scale(sub(second, scale(k.tangent, dot(second, k.tangent))), 1.0 / (speed * speed));
@@ -63,14 +66,14 @@ impl Sweep {
         }
         let mut range: [Option<(f64, Vec3)>; 2] = [None; 2];
         let h = 0.125 * self.wavelength.iter().copied().fold(f64::INFINITY, f64::min);
-        for p in looks {
+        for p in samples {
             let own = self.local(*p);
-            if own.room <= 0.0 {
+            if own.stretch <= 0.0 {
                 return fold(*p, self.reach);
             }
             for (r, better) in range.iter_mut().zip([f64::lt, f64::gt]) {
-                if r.is_none_or(|r| better(&own.room, &r.0)) {
-                    *r = Some((own.room, *p));
+                if r.is_none_or(|r| better(&own.stretch, &r.0)) {
+                    *r = Some((own.stretch, *p));
                 }
             }
             for a in 0..3 {
@@ -80,14 +83,14 @@ impl Sweep {
                     continue;
                 }
                 let other = self.local(q);
-                let mut way = (other.s - own.s).abs();
+                let mut apart = (other.s - own.s).abs();
                 if self.closed {
-                    way = way.min(self.length - way);
+                    apart = apart.min(self.length - apart);
                 }
-                // A step moves s by no more than it is long over the room there is.
-                if way > 4.0 * h / own.room.min(other.room).max(1e-3) {
+                // A step of length h changes s by at most h / (1 − κ·d).
+                if apart > 4.0 * h / own.stretch.min(other.stretch).max(1e-3) {
                     let message = format!(
-                        "the lattice tears at {}: two places of the line are as near, {way:.3} mm apart along it; keep the \
+                        "the lattice tears at {}: two places of the line are as near, {apart:.3} mm apart along it; keep the \
                          region nearer to the line, or the line farther from itself",
                         at(*p)
                     );
@@ -95,7 +98,7 @@ impl Sweep {
                 }
             }
         }
-        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.knots[0].place)));
+        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.sample_points[0].position)));
         self.along = [least.0, most.0].map(|r| r * self.wavelength[2]);
         self.extremes = [least.1, most.1].map(|p| self.jacobian(p));
         Ok(())

@@ -16,7 +16,7 @@ fn path(points: Vec<Vec3>, closed: bool) -> Path {
     Path { points, closed, wavelength: [2.0, 2.5, 3.0], normal: None }
 }
 
-/// Places about the line, none farther than `far`.
+/// Positions about the line, none farther than `far`.
 fn about(points: &[Vec3], far: f64) -> Vec<Vec3> {
     let each = (0..600).map(|i| {
         let s = [0.8191725, 0.6710436, 0.5497005, 0.3247].map(|s| (s * f64::from(i)).fract());
@@ -28,21 +28,21 @@ fn about(points: &[Vec3], far: f64) -> Vec<Vec3> {
 }
 
 fn tube(line: Vec<Vec3>, closed: bool) -> (Sweep, Vec<Vec3>) {
-    let looks = about(&line, 1.6);
+    let samples = about(&line, 1.6);
     // All sampled positions, and no others.
     let region = Sphere::new([0.0; 3], 1e-3).expect("ball");
-    (Sweep::new(&path(line, closed), &region, &looks).expect("map"), looks)
+    (Sweep::new(&path(line, closed), &region, &samples).expect("map"), samples)
 }
 
 #[test]
 fn a_straight_line_is_the_affine_map() {
     let line = vec![[1.0, 2.0, 3.0], [1.0, 2.0, 5.0], [1.0, 2.0, 11.0]];
-    let mut asked = path(line.clone(), false);
-    asked.normal = Some([1.0, 0.0, 0.5]);
+    let mut target = path(line.clone(), false);
+    target.normal = Some([1.0, 0.0, 0.5]);
     let ball = Sphere::new([1.0, 2.0, 5.0], 20.0).expect("ball");
-    let looks = about(&line, 9.0);
-    let map = Sweep::new(&asked, &ball, &looks).expect("map");
-    for p in looks {
+    let samples = about(&line, 9.0);
+    let map = Sweep::new(&target, &ball, &samples).expect("map");
+    for p in samples {
         let want = [(p[0] - 1.0) / 2.0, (p[1] - 2.0) / 2.5, (p[2] - 3.0) / 3.0];
         assert!(norm(sub(map.phase(p), want)) < 1e-12, "{p:?}");
     }
@@ -53,8 +53,8 @@ fn a_straight_line_is_the_affine_map() {
 #[test]
 fn slopes_places_and_bounds_agree() {
     for (line, closed) in [(wave(), false), (ring(10, 9.0), true)] {
-        let (map, looks) = tube(line, closed);
-        for p in &looks {
+        let (map, samples) = tube(line, closed);
+        for p in &samples {
             let j = map.jacobian(*p);
             for a in 0..3 {
                 let (mut lo, mut hi) = (*p, *p);
@@ -64,7 +64,7 @@ fn slopes_places_and_bounds_agree() {
                 // Round a closed line phases begin anew.
                 d[2] -= (d[2] / 1e-1).round() * 1e-1;
                 for i in 0..3 {
-                    // Frames between knots are of fourth order in their distance.
+                    // The error of frames between sample points is of fourth order in their distance.
                     assert!((d[i] / 2e-5 - j[i][a]).abs() < 2e-4, "{closed} {p:?} {i}{a}");
                 }
             }
@@ -80,13 +80,13 @@ fn slopes_places_and_bounds_agree() {
 /// Round a ring the frame comes back, whole cells fit, and phases are those of the cylinder map.
 #[test]
 fn a_ring_closes_with_whole_cells() {
-    let (map, looks) = tube(ring(24, 9.0), true);
+    let (map, samples) = tube(ring(24, 9.0), true);
     // A spline through 24 points is the circle to about (2π/24)⁴/384.
     assert!((map.length() / (18.0 * core::f64::consts::PI) - 1.0).abs() < 1e-4);
     let count = map.around().expect("closed");
     assert_eq!(count, 19);
     assert!((map.length() / map.edges()[2] - f64::from(count)).abs() < 1e-12);
-    for p in looks {
+    for p in samples {
         let u = map.phase(p);
         let turned = p[1].atan2(p[0]) / core::f64::consts::TAU * f64::from(count);
         let off = u[2] - turned;
@@ -101,9 +101,9 @@ fn a_ring_closes_with_whole_cells() {
 fn folds_tears_and_slips_are_refused() {
     let fault = |line: Vec<Vec3>, closed: bool, radius: f64, center: Vec3| {
         let ball = Sphere::new(center, radius).expect("ball");
-        let looks = about(&[center], 3f64.sqrt() * radius);
-        let looks: Vec<Vec3> = looks.into_iter().filter(|p| ball.value(*p) <= 0.0).collect();
-        Sweep::new(&path(line, closed), &ball, &looks).err().map(|f| (f.at, f.message))
+        let samples = about(&[center], 3f64.sqrt() * radius);
+        let samples: Vec<Vec3> = samples.into_iter().filter(|p| ball.value(*p) <= 0.0).collect();
+        Sweep::new(&path(line, closed), &ball, &samples).err().map(|f| (f.at, f.message))
     };
     // The centre of a ring.
     let (at, words) = fault(ring(12, 6.0), true, 8.0, [0.0; 3]).expect("refused");
