@@ -30,7 +30,7 @@ mod level_offset;
 mod levels;
 mod mixed_rows;
 mod node_table;
-mod points;
+mod point_values;
 mod row_cache;
 mod share_grid;
 mod sum;

@@ -3,22 +3,22 @@
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
 
-mod beams;
-mod blend;
 mod build;
-mod cell;
+mod build_beams;
+mod build_blend;
+mod build_cell;
+mod build_level;
+mod build_pattern;
+mod build_skin;
+mod build_tets;
+mod build_tiling;
+mod built_report;
 mod data;
+mod design_schema;
 mod joins;
-mod level;
-mod pattern;
-mod report;
 mod sample;
-mod schema;
-mod skin;
 #[cfg(test)]
 mod tests;
-mod tets;
-mod tiling;
 mod warn;
 
 use std::collections::BTreeMap;
@@ -43,11 +43,11 @@ use geometry::repair::Repaired;
 
 pub use crate::environment::{Loader, NoFiles};
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
-pub use blend::Blended;
+pub use build_blend::Blended;
+pub use build_tets::{TetReport, Tets};
 pub use data::*;
+pub use design_schema::schema;
 pub use joins::Joins;
-pub use schema::schema;
-pub use tets::{TetReport, Tets};
 
 /// A lattice part, as data.
 #[derive(Clone, Debug, PartialEq, Kind)]
@@ -249,13 +249,13 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
 pub fn cell(node: &Node) -> Result<Cell, DesignError> {
     let spec = CellSpec::read(&At::alone(node, "cell"))?;
     spec.valid().map_err(|f| DesignError::fault("cell", f))?;
-    Ok(cell::cell(&spec, "cell", &NoFiles)?.1)
+    Ok(build_cell::cell(&spec, "cell", &NoFiles)?.1)
 }
 
 impl Built {
     /// The figures of the design, without meshing it.
     pub fn report(&self) -> DesignReport {
-        report::report(self)
+        built_report::report(self)
     }
 
     /// The surface maker whose resolution is a grid spacing: cutting of tetrahedra for an explicit tiling, marching cubes for
@@ -272,24 +272,24 @@ impl Built {
     /// # Errors
     /// What else the design contains: lattices, a blend, a skin or kept zones, a region that cuts the beams.
     pub fn beam_surface(&self) -> Result<BeamSurface, Fault> {
-        Ok(BeamSurface(beams::alone(self)?))
+        Ok(BeamSurface(build_beams::alone(self)?))
     }
 
     /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a large pattern, by a box
     /// that holds it.
     pub fn whole_beams(&self, name: &str) -> bool {
         let found = self.beams.iter().find(|b| b.0 == name);
-        found.is_some_and(|(_, made)| beams::lone(self) && beams::held(made, self))
+        found.is_some_and(|(_, made)| build_beams::lone(self) && build_beams::held(made, self))
     }
 
     /// The transitions between the lattices of a blend; empty without one.
     pub fn transitions(&self) -> Vec<TransitionReport> {
-        report::transitions(self)
+        built_report::transitions(self)
     }
 
     /// The solid share of the region, by looks at some ten thousand points, and the region's volume (mm³), exact where
     /// that is known: what an extraction is held against.
     pub fn expected(&self) -> (f64, f64) {
-        report::expected(self)
+        built_report::expected(self)
     }
 }

@@ -14,7 +14,6 @@ mod depth;
 mod formula;
 mod grid;
 mod linear;
-mod points;
 mod polyline;
 mod quantity;
 mod radial;
@@ -23,6 +22,7 @@ mod region_step;
 mod remapped;
 mod result;
 mod samples;
+mod scattered;
 mod sigmoid;
 mod steps;
 mod stops;
@@ -65,7 +65,7 @@ pub enum GradeKind {
     Radial(radial::RadialKind),
     Formula(formula::FormulaKind),
     Grid(grid::GridKind),
-    Points(points::PointsKind),
+    Points(scattered::PointsKind),
     Field(FieldKind),
     Sigmoid(SigmoidKind),
     Region(region_step::WithinKind),

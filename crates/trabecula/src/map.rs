@@ -4,9 +4,9 @@ mod affine;
 mod affine_kind;
 mod distortion;
 mod frame;
-mod grid;
 mod inverse;
 mod phase;
+mod phase_grid;
 mod phase_kind;
 mod poisson;
 mod round;
@@ -14,7 +14,7 @@ mod round_kind;
 mod spline;
 mod sweep;
 mod sweep_kind;
-pub(crate) mod tets;
+pub(crate) mod tet_map;
 mod tets_kind;
 mod tilt;
 
@@ -24,7 +24,7 @@ pub use frame::Orientation;
 pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;
 pub use sweep::{Path, Sweep};
-pub use tets::Tets;
+pub use tet_map::Tets;
 pub use tets_kind::{Joined, MadeTetsSpec, MesherSpec, Method, TetFileSpec, TetsSpec};
 
 use std::sync::Arc;

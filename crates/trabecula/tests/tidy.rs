@@ -2,7 +2,7 @@
 //!
 //! - *Layers*: a module of `trabecula` imports only from modules of lower layers. (Between crates cargo checks it.)
 //! - *Length*: a function has at most 100 lines, a file at most 600; tables of data apart.
-//! - *Names*: no file name occurs twice in a crate, so that a name leads to one place. (`trabecula` does not keep this yet.)
+//! - *Names*: no file name occurs twice in a crate, so that a name leads to one place.
 //! - *Words*: messages and documentation use the field's terms (docs/glossary.md), not private ones.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -162,7 +162,7 @@ fn functions_and_files_are_short() {
 #[test]
 fn a_file_name_occurs_once_in_a_crate() {
     let mut wrong = Vec::new();
-    for of in ["geometry", "beams", "trabecula-py"] {
+    for of in CRATES {
         let mut by_name: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         for (path, _) in files(of).into_iter().filter(|(p, _)| !is_test(p)) {
             let name = path.file_name().and_then(|n| n.to_str()).expect("name").to_string();

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use super::cell::cell;
+use super::build_cell::cell;
 use super::data::*;
-use super::{Built, Design, Loader, Tiled, Warning, beams, blend, level, sample, skin, tets, tiling, warn};
+use super::{
+    Built, Design, Loader, Tiled, Warning, build_beams, build_blend, build_level, build_skin, build_tets, build_tiling,
+    sample, warn,
+};
 use crate::blend::Constituent;
 use crate::cell::Part;
 use crate::environment::{self, Environment};
@@ -35,16 +38,20 @@ pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignErr
     d.valid().map_err(|f| DesignError::fault("", f))?;
     let mut notes = Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
-    let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
+    let domain = build_tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     Ok(domain.map_or(space, |d| d.region))
 }
 
 /// The region as given; with the tetrahedra that fill it, if it is only known by them.
-fn given(d: &Design, loader: &dyn Loader, notes: &mut Notes) -> Result<(Region, Option<tets::Tets>), DesignError> {
+fn given(
+    d: &Design,
+    loader: &dyn Loader,
+    notes: &mut Notes,
+) -> Result<(Region, Option<build_tets::Tets>), DesignError> {
     match environment::region(&d.region, "region", loader, notes) {
         Ok(space) => Ok((space, None)),
         Err(why) => {
-            let (made, space) = tiling::of_soup(d, loader, why)?;
+            let (made, space) = build_tiling::of_soup(d, loader, why)?;
             Ok((space, Some(made)))
         }
     }
@@ -56,10 +63,10 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let mut notes = Notes::default();
     let (space, soup) = given(d, loader, &mut notes)?;
     check_bounds(&space)?;
-    let domain = tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
+    let domain = build_tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
     let space = domain.as_ref().map_or(space, |d| d.region.clone());
     let points = sampled(&space, &mut notes.warnings)?;
-    let (filled, skin) = skin::filled(d, &space, &points, loader, &mut notes)?;
+    let (filled, skin) = build_skin::filled(d, &space, &points, loader, &mut notes)?;
     let Notes { mut warnings, repairs } = notes;
     let at = |path: String| Environment { path, region: &space, points: &points, filled: &filled, loader };
 
@@ -73,7 +80,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         lattices.push((name.clone(), Arc::new(checked_lattice(spec, d, &environment, &mut warnings)?)));
     }
     for (name, spec) in &d.beams.0 {
-        graphs.push((name.clone(), beams::beams(spec, &at(format!("beams.{name}")), &mut warnings)?));
+        graphs.push((name.clone(), build_beams::beams(spec, &at(format!("beams.{name}")), &mut warnings)?));
     }
 
     let wavelengths = lattices.iter().map(|l| l.1.map.wavelength());
@@ -82,7 +89,7 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
     let wavelength = wavelengths.fold(f64::INFINITY, f64::min);
     let blend = d.blend.as_ref().map(|spec| {
         let members = members(&lattices, &tilings, &graphs);
-        blend::blend(spec, &members, &at("blend".into()), &mut warnings)
+        build_blend::blend(spec, &members, &at("blend".into()), &mut warnings)
     });
     let blend = blend.transpose()?;
     let field = match &blend {
@@ -137,8 +144,12 @@ fn sampled(space: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, Des
 }
 
 /// The lattice over a tetrahedral mesh.
-fn tiled(domain: tiling::Domain, environment: &Environment, warnings: &mut Vec<Warning>) -> Result<Tiled, DesignError> {
-    let tiling::Made { tiling, explicit, joins } = tiling::lattice(&domain, environment, warnings)?;
+fn tiled(
+    domain: build_tiling::Domain,
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<Tiled, DesignError> {
+    let build_tiling::Made { tiling, explicit, joins } = build_tiling::lattice(&domain, environment, warnings)?;
     Ok(Tiled { name: domain.name.to_string(), tiling, zones: domain.zones(), mesh: domain.report, explicit, joins })
 }
 
@@ -176,13 +187,17 @@ fn only(
 }
 
 /// What may be named in a blend.
-fn members(lattices: &[(String, Arc<Lattice>)], tilings: &[Tiled], graphs: &[(String, Beams)]) -> Vec<blend::Member> {
-    let lattices = lattices.iter().map(|(name, l)| blend::Member {
+fn members(
+    lattices: &[(String, Arc<Lattice>)],
+    tilings: &[Tiled],
+    graphs: &[(String, Beams)],
+) -> Vec<build_blend::Member> {
+    let lattices = lattices.iter().map(|(name, l)| build_blend::Member {
         table: "lattice",
         name: name.clone(),
         of: Constituent::Lattice(l.clone()),
     });
-    let tilings = tilings.iter().map(|t| blend::Member {
+    let tilings = tilings.iter().map(|t| build_blend::Member {
         table: "lattice",
         name: t.name.clone(),
         of: match <[_; 2]>::try_from(t.tiling.parts()) {
@@ -190,7 +205,7 @@ fn members(lattices: &[(String, Arc<Lattice>)], tilings: &[Tiled], graphs: &[(St
             Err(_) => Constituent::Field { field: t.tiling.clone(), wavelength: t.tiling.wavelength() },
         },
     });
-    let graphs = graphs.iter().map(|(name, b)| blend::Member {
+    let graphs = graphs.iter().map(|(name, b)| build_blend::Member {
         table: "beams",
         name: name.clone(),
         of: Constituent::Field { field: b.field(), wavelength: b.wavelength() },
@@ -202,7 +217,7 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     let below = |key: &str| format!("{}.{key}", environment.path);
     let (name, cell) = cell(&spec.cell, &below("cell"), environment.loader)?;
     let left_out = cell.truncation();
-    let mut cell = level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
+    let mut cell = build_level::about_mid(cell, &spec.level, spec.part, &below("level"))?;
     if let Some(share) = left_out {
         cell = cell.truncated(share);
     }
@@ -210,6 +225,6 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     let here = Environment { path: below("map"), ..*environment };
     let map = spec.map.build(&here)?;
     let here = Environment { path: below("level"), ..*environment };
-    let level = level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
+    let level = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
 }

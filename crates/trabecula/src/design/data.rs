@@ -56,11 +56,11 @@ macro_rules! name_of {
     };
 }
 
-mod beams;
-mod blend;
+mod beams_kind;
+mod blend_kind;
 
-pub use beams::*;
-pub use blend::*;
+pub use beams_kind::*;
+pub use blend_kind::*;
 
 /// A lattice: a cell seen through a map, cut by a part at a level.
 #[derive(Clone, Debug, PartialEq, Kind)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Warning, tiling::Zoned};
+use super::{Warning, build_tiling::Zoned};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
 use crate::report::ZoneJoin;

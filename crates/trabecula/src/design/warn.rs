@@ -1,7 +1,7 @@
 //! What a lattice in a region is refused for, and warned of.
 
+use super::built_report::Varied;
 use super::data::*;
-use super::report::Varied;
 use super::{Warning, sample};
 use crate::cell::Distance;
 use crate::environment::Environment;

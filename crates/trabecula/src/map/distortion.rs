@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use geometry::math::{Aabb, Mat3, Vec3, determinant, dot, norm, product, spectral_norm, transpose};
 
 /// A number over the region: its mean, its 95th percentile, its greatest value.

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{

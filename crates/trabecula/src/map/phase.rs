@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
 use super::frame::{Orientation, in_mm};
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
 use super::tilt::Tilt;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
 
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use super::tilt::Tilt;
 use geometry::math::Vec3;
 

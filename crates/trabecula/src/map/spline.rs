@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use crate::field::Block;
 use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
 use geometry::math::{Aabb, Mat3, Vec3};

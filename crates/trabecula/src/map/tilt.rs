@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::phase_grid::Grid;
 use geometry::math::{Vec3, add, dot, norm, scale, sub};
 
 /// The part of the weight that is no multiple of the identity.

@@ -3,7 +3,7 @@
 use super::Tiling;
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Subdivision};
-use crate::map::tets::NONE;
+use crate::map::tet_map::NONE;
 use geometry::math::{Vec3, add, dot, norm, scale};
 
 /// Steps along the edge of a face on which traces are sampled.

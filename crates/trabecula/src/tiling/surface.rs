@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use super::{Level, Tiling};
 use crate::cell::tet::{NamedTetCell, Nodes, Subdivision};
 use crate::map::Tets;
-use crate::map::tets::NONE;
+use crate::map::tet_map::NONE;
 use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty};
 use component_links::ComponentLinks;
 pub use connectivity::{Connectivity, ZonePair, connectivity};

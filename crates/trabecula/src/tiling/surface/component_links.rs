@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 use super::small_simplices::PAIRS;
 use super::tet_surface::{NONE as NOBODY, Run, TetSurface};
 use crate::map::Tets;
-use crate::map::tets::NONE;
+use crate::map::tet_map::NONE;
 use crate::surface_maker::{ComponentGraph, Totals};
 use geometry::fault::Fault;
 use geometry::union_find::{find, unite};

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::component_links::ComponentLinks;
 use super::tet_surface::{Scratch, TetSurface};
 use super::{TetSurfaceRef, Work};
-use crate::map::tets::NONE;
+use crate::map::tet_map::NONE;
 use crate::surface_maker::Totals;
 use crate::tiling::{Level, Tiling};
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::tet_surface::TetSurface;
-use crate::map::tets::NONE;
+use crate::map::tet_map::NONE;
 use geometry::fault::Fault;
 use geometry::math::Vec3;
 use geometry::progress::Stopped;

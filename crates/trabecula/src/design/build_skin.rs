@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::built_report::Varied;
 use super::data::{OpenSpec, SkinSpec};
-use super::report::Varied;
 use super::{Design, Loader, sample};
 use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};

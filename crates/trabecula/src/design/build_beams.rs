@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::build_pattern;
 use super::data::*;
-use super::pattern;
 use super::sample;
 use super::warn::solved_map;
 use super::{Built, Warning};
@@ -39,7 +39,7 @@ pub(super) fn beams(
     warnings: &mut Vec<Warning>,
 ) -> Result<Beams, DesignError> {
     if let GraphSpec::Pattern(of) = &spec.graph {
-        return pattern::laid(spec, &of.pattern, environment, warnings).map(|p| Beams::Pattern(Arc::new(p)));
+        return build_pattern::laid(spec, &of.pattern, environment, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&environment.path, f);
     let radii = radii(spec, environment)?;

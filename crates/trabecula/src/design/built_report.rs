@@ -2,8 +2,8 @@
 
 use std::cell::LazyCell;
 
-use super::blend::Functions;
-use super::{Blended, Built, Joins, Tiled, beams, sample};
+use super::build_blend::Functions;
+use super::{Blended, Built, Joins, Tiled, build_beams, sample};
 use crate::analysis::{self, Transition};
 use crate::blend::Phases;
 use crate::cell::Part;
@@ -107,7 +107,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
     let tilings = built.tilings.iter().map(|it| (it.name.clone(), tiled(it)));
     let beams = built.beams.iter().map(|(name, made)| {
         let sampled = LazyCell::new(|| filling(built, made));
-        (name.clone(), beams::report(made, built, &sampled))
+        (name.clone(), build_beams::report(made, built, &sampled))
     });
     DesignReport {
         lattices: lattices.chain(tilings).collect(),

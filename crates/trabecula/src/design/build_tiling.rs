@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::cell::orbit_terms;
+use super::build_cell::orbit_terms;
+use super::build_level::within_wavelength;
+use super::build_tets::{self, TetReport};
+use super::built_report::Varied;
 use super::data::*;
 use super::joins::{Joins, joins};
-use super::level::within_wavelength;
-use super::report::Varied;
-use super::tets::{self, TetReport};
 use super::warn::gaps;
 use super::{Design, Loader, Warning, sample};
 use crate::cell::tet::{TetCell, named_tet_cell};
@@ -58,12 +58,16 @@ fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsSpec)> {
 
 /// The tetrahedra of a design whose region is none, for the reason `why`, if they can be made without one, and the region
 /// that they fill.
-pub(super) fn of_soup(d: &Design, loader: &dyn Loader, why: DesignError) -> Result<(tets::Tets, Region), DesignError> {
+pub(super) fn of_soup(
+    d: &Design,
+    loader: &dyn Loader,
+    why: DesignError,
+) -> Result<(build_tets::Tets, Region), DesignError> {
     let Some((name, _, spec)) = over_tets(d) else {
         return Err(why);
     };
     let path = format!("lattice.{name}.map.tets");
-    let made = tets::of_soup(spec, &d.region, &path, loader, why)?;
+    let made = build_tets::of_soup(spec, &d.region, &path, loader, why)?;
     let region = enclosed(made.mesh.boundary(), &path)?;
     Ok((made, region))
 }
@@ -79,7 +83,7 @@ fn enclosed(boundary: Mesh, path: &str) -> Result<Region, DesignError> {
 pub(super) fn domain<'a>(
     d: &'a Design,
     space: &Region,
-    soup: Option<tets::Tets>,
+    soup: Option<build_tets::Tets>,
     loader: &dyn Loader,
     warnings: &mut Vec<Warning>,
 ) -> Result<Option<Domain<'a>>, DesignError> {
@@ -121,7 +125,7 @@ pub(super) fn domain<'a>(
             let (mut points, _) = sample::inside(space, sample::COUNT);
             points.extend(sample::nodes(space));
             let environment = Environment { path: path.clone(), region: space, points: &points, filled: &[], loader };
-            (tets::tets(spec_of_mesh, &d.region, &environment)?, None)
+            (build_tets::tets(spec_of_mesh, &d.region, &environment)?, None)
         }
     };
     warnings.extend(made.warnings);

@@ -2,7 +2,7 @@
 
 use super::whole;
 use crate::design::data::*;
-use crate::design::{Built, Warning, pattern};
+use crate::design::{Built, Warning, build_pattern};
 use crate::environment::Environment;
 use crate::report::{BeamsReport, CleanedReport, GraphReport, TrimmedReport};
 use crate::truss::{Beams, Truss};
@@ -136,7 +136,7 @@ pub(in crate::design) fn report(
 ) -> BeamsReport {
     let truss = match beams {
         Beams::Truss(truss) => truss,
-        Beams::Pattern(laid) => return pattern::report(laid, built, sampled),
+        Beams::Pattern(laid) => return build_pattern::report(laid, built, sampled),
     };
     let (frame, graph, quadors) = (&truss.report, &truss.graph, &truss.quadors);
     let radii = graph.hubs.iter().map(|h| h.radius);

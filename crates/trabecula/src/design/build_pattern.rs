@@ -1,6 +1,6 @@
 //! Patterns of beams: data to a program of repeats.
 
-use super::beams::{check_open, fillet, given, inside, share};
+use super::build_beams::{check_open, fillet, given, inside, share};
 use super::data::*;
 use super::{Built, Warning};
 use crate::environment::Environment;
