@@ -1,4 +1,4 @@
-//! What a kind is built in: its path in the design, the region with points inside it, and the files that a design refers to.
+//! The environment in which a kind is built: its path in the design, the region, points inside it, and the design's files.
 
 use crate::csg_tree::CsgSolid;
 use crate::kind::DesignError;
@@ -13,7 +13,7 @@ pub trait Loader {
     /// The bytes of the file at `path`, or one sentence why not.
     fn load(&self, path: &str) -> Result<Vec<u8>, String>;
 
-    /// The names of the files that `pattern` stands for, in which one * of the last part stands for anything; or one sentence
+    /// The names of the files that match `pattern`, in which one * of the last part matches any text; or one sentence
     /// why there are none.
     fn list(&self, pattern: &str) -> Result<Vec<String>, String> {
         Err(format!("{pattern}: folders are not looked into here"))
@@ -42,7 +42,7 @@ impl Loader for NoFiles {
     }
 }
 
-/// What a kind of a lattice is built in.
+/// The environment of a kind of a lattice.
 pub(crate) struct Environment<'a> {
     /// The path of its table.
     pub path: String,
@@ -50,7 +50,7 @@ pub(crate) struct Environment<'a> {
     pub region: &'a Region,
     /// Points inside the region, mm.
     pub points: &'a [Vec3],
-    /// What is solid in the region whatever the lattice is.
+    /// Skin and keep zones: solid in the region for any lattice.
     pub filled: &'a [CsgSolid],
     /// The files.
     pub loader: &'a dyn Loader,
@@ -79,7 +79,7 @@ pub(crate) fn half_space(kind: &HalfSpaceKind, path: &str) -> Result<HalfSpace, 
     kind.made().map_err(|f| DesignError::fault(path, f))
 }
 
-/// What a file's name ends in, in small letters.
+/// The extension of a file's name, in lower case.
 pub(crate) fn extension(path: &str) -> String {
     path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase()
 }

@@ -99,7 +99,7 @@ pub trait Varying: Field {
     }
 }
 
-/// A number that may vary in space. Its unit is that of the key it stands under.
+/// A number that may vary in space. Its unit is that of its key.
 #[derive(Clone)]
 pub enum Grade {
     /// The same everywhere.
@@ -139,7 +139,7 @@ impl Grade {
         }
     }
 
-    /// Fills values and gradients (per mm). At a stop, the gradient of the piece that begins there.
+    /// Fills values and gradients (per mm). At a stop, the gradient of the segment that begins there.
     pub fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         match self {
             Grade::Constant(v) => {

@@ -26,7 +26,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// The number that was given.
+    /// The value as given.
     pub fn grade(&self) -> &Grade {
         match self {
             Level::Iso(g) | Level::Fraction(g) | Level::Thickness(g) => g,
@@ -34,8 +34,8 @@ impl Level {
     }
 }
 
-/// A distance under a map that varies is at most this many times the one in the table: beyond it a cell is stretched out
-/// of all likeness.
+/// Greatest ratio of a distance under a map that varies to the one in the table; a cell that is stretched more keeps
+/// this ratio.
 const STRETCHED: f64 = 8.0;
 
 /// A lattice as a field: sheet |f| − t, lower f − t, upper t − f.
@@ -63,7 +63,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Joins the pieces.
+    /// A lattice of its four parts; bounds and tables are computed here.
     pub fn new(cell: Arc<Cell>, map: Map, part: Part, level: Level) -> Lattice {
         let typical = map.typical();
         let distance = match &level {
@@ -121,7 +121,7 @@ impl Lattice {
         }
     }
 
-    /// What a distance on the torus is to be multiplied with where the Jacobian is this one.
+    /// The ratio of the distance in space to the tabulated one where the Jacobian is `jacobian`.
     fn ratio(&self, d: &Distance, gradient: Vec3, jacobian: &Mat3) -> f64 {
         d.under(1.0, gradient, jacobian).min(STRETCHED)
     }
@@ -143,7 +143,7 @@ impl Lattice {
         }
     }
 
-    /// The same where the Jacobian varies.
+    /// As `core_gradients`, under a map whose Jacobian varies.
     fn curved_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         if self.distance.is_none() {
             let mut u = vec![[0.0; 3]; points.len()];
@@ -155,7 +155,7 @@ impl Lattice {
             return;
         }
         self.cores(points, values);
-        // The factor of a distance has the second derivatives of both tables in its own: differences are as good.
+        // The exact gradient needs second derivatives of map and table; central differences are as accurate.
         let step = 1e-5 * self.map.wavelength();
         for (g, p) in gradients.iter_mut().zip(points) {
             let near: [Vec3; 6] = core::array::from_fn(|i| {
@@ -277,7 +277,7 @@ impl Lattice {
         self.uniform
     }
 
-    /// The intervals of solid fraction in which the periodic solid is one piece in R³.
+    /// The intervals of solid fraction in which the periodic solid is connected in R³.
     pub fn connected_fraction(&self) -> Vec<[f64; 2]> {
         match &self.distance {
             Some(d) => d.connected_fraction(self.part),
@@ -340,7 +340,7 @@ impl Implicit for Lattice {
 }
 
 impl Lattice {
-    /// Only a level that varies is looked up node by node, and only where it is wanted.
+    /// Only a level that varies is evaluated node by node, and only at the nodes in `wanted`.
     fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
         let mut cores = Rows::new(self, block);
         let [xs, ys, zs] = block.axes;

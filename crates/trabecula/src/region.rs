@@ -59,7 +59,7 @@ pub(crate) trait BuildRegion {
 }
 
 impl RegionKind {
-    /// The region. Errors name the key below this kind's place.
+    /// The region. Errors name the key below this kind's path.
     pub(crate) fn build(&self, context: &mut Context) -> Result<Region, Fault> {
         context.below(self.key(), |context| self.family().build(context))
     }
@@ -74,7 +74,7 @@ pub(crate) struct Notes {
     pub repairs: Vec<(String, Repaired)>,
 }
 
-/// Where a region is built: its place in the design, and where files come from.
+/// Where a region is built: its path in the design, and where files come from.
 pub(crate) struct Context<'a> {
     path: String,
     load: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
@@ -86,7 +86,7 @@ impl<'a> Context<'a> {
         Context { path: path.into(), load, notes }
     }
 
-    /// Builds what stands under `key`, or at an index such as "[0]"; a fault has the key before its place.
+    /// Builds the value of `key`, or of an index such as "[0]"; a fault has the key before its path.
     fn below<T>(&mut self, key: &str, build: impl FnOnce(&mut Self) -> Result<T, Fault>) -> Result<T, Fault> {
         let outer = self.path.len();
         self.path.push_str(if key.starts_with('[') { "" } else { "." });
@@ -164,7 +164,7 @@ pub trait Shape: Field {
         None
     }
 
-    /// The same region seen without the parts of its surface that lie on `cuts` and face as they do, where it can
+    /// The same region without the parts of its surface that lie on `cuts` and face as they do, where it can
     /// leave them out only as a whole: distances are then to the rest. Sets `found` for the cuts at which it did;
     /// `None` if at none. (Faces that are planes by themselves stay: a caller of `surfaces` can drop them.)
     fn opened(self: Arc<Self>, cuts: &[HalfSpace], found: &mut [bool]) -> Option<Region> {

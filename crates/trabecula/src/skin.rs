@@ -78,7 +78,7 @@ fn lies_on(surface: &dyn Field, cut: &HalfSpace, depth: f64, bounds: &Aabb) -> b
     least[axis] = 1.0;
     let u = unit(cross(n, least));
     let v = cross(n, u);
-    // Farther out than the region, where a surface that is flat in part has ended.
+    // Positions on the plane outside the region, beyond the end of a surface that is flat in part.
     let middle = sub(bounds.center(), scale(n, cut.value(bounds.center())));
     let spread = [[0.0, 0.0], [2.0, 0.3], [-1.7, 1.9], [0.4, -2.3]];
     let points = spread.map(|[a, b]| add(middle, add(scale(u, a * size), scale(v, b * size))));

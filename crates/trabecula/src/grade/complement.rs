@@ -1,4 +1,4 @@
-//! One less another number.
+//! The complement of a number: 1 − value.
 
 use super::Varying;
 use crate::field::Field;

@@ -37,7 +37,7 @@ impl ControlPoints {
         }
     }
 
-    /// A fault of control points stands where they do.
+    /// A fault of control points, at their path.
     pub(crate) fn fault(&self, path: &str, f: Fault) -> DesignError {
         let f = match self {
             ControlPoints::Path(_) if f.at == "points" => Fault { at: "path".into(), ..f },

@@ -2,8 +2,8 @@
 
 use geometry::fault::Fault;
 
-/// Rows of numbers, apart by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width; one
-/// line of words before them is passed over.
+/// Rows of numbers, separated by commas, semicolons or spaces, x, y, z and a value if `widths` says so, all of one width; one
+/// header line is ignored.
 pub(super) fn table(text: &str, widths: &[usize]) -> Result<Vec<Vec<f64>>, Fault> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let what = match widths {

@@ -85,7 +85,7 @@ impl<const N: usize> Operand for Dual<N> {
         let mut slopes = [0.0; N];
         for (d, partial) in args.iter().zip(partials) {
             for a in 0..N {
-                // An argument that stands still adds nothing, even where the partial is infinite or undefined.
+                // A constant argument adds nothing, even where the partial is infinite or undefined.
                 if d.1[a] != 0.0 {
                     slopes[a] += partial * d.1[a];
                 }
@@ -98,7 +98,7 @@ impl<const N: usize> Operand for Dual<N> {
 impl Formula {
     /// Parses a formula.
     ///
-    /// **Errors** name the column, what was found there and what may stand there; an unknown word gets the nearest
+    /// **Errors** name the column, what was found there and what is expected; an unknown word gets the nearest
     /// known one.
     pub fn parse(text: &str) -> Result<Formula, Fault> {
         Ok(Formula { program: parse(text)? })
@@ -199,7 +199,7 @@ impl Varying for Formula {
     }
 }
 
-/// Applies an operation to each lane, in place of its first argument. Each of the quick ones has a loop of its own.
+/// Applies an operation to each lane, overwriting its first argument. Each of the quick ones has a loop of its own.
 fn apply_lanes<T: Operand>(op: Operation, a: &mut [T; LANES], b: &[T; LANES], c: &[T; LANES]) {
     macro_rules! lanes {
         ($($quick:ident)*) => {

@@ -101,7 +101,7 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
         "path" => wrong(f),
         _ => DesignError::fault(path, f),
     })?;
-    // A number stands for half a step about it as well.
+    // A number also covers half a step about it.
     let reach = samples.step().into_iter().fold(0.0, f64::max) * 0.5 + 1e-9;
     let covered = samples.bounds().grown(reach);
     let missing = environment.points.iter().filter(|p| covered.distance(**p) > 0.0).count();
@@ -119,7 +119,7 @@ fn read(spec: &GridKind, path: &str, environment: &Environment) -> Result<Sample
     Ok(samples)
 }
 
-/// Grey pictures one above the other: the files that the path stands for in the order of their names, in which 10 comes after 9,
+/// A stack of grey images: the files that match the path in the order of their names, in which 10 comes after 9,
 /// each with one picture or more.
 fn stack(spec: &GridKind, at: &str, environment: &Environment) -> Result<([usize; 3], Vec<f64>), DesignError> {
     let mut names = match spec.path.contains('*') {

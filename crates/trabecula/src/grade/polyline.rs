@@ -48,7 +48,7 @@ impl BuildGrade for DistanceKind {
 /// k t: smooth where a segment's end takes over, and off by at most 0.2785 L/k (on the line near its ends; it is not zero
 /// on the segment). Weights there make up to 1 + (1 + e^(k/2))⁻².
 ///
-/// With an axis all is seen along it: distances are those from a wall through the line. A closed line with an axis has an
+/// With an axis all is projected along it: distances are those from a wall through the line. A closed line with an axis has an
 /// inside, where exact distances are negative.
 pub struct Polyline {
     points: Vec<Vec3>,
@@ -63,7 +63,7 @@ impl Polyline {
     /// Through the points (mm) in order, and back to the first if `closed`.
     ///
     /// # Errors
-    /// Fewer than two points (three if closed), two in a row that coincide seen along the axis, a sharpness below 10.
+    /// Fewer than two points (three if closed), two in a row that coincide after projection along the axis, a sharpness below 10.
     pub fn new(points: Vec<Vec3>, closed: bool, axis: Option<Vec3>, sharpness: Option<f64>) -> Result<Polyline, Fault> {
         let least = if closed { 3 } else { 2 };
         if points.len() < least {
@@ -105,7 +105,7 @@ impl Polyline {
         self.sharpness.map_or(0.0, |k| 0.2785 * self.longest / k)
     }
 
-    /// The distance to the nearest segment without sign, and the nearest place.
+    /// The unsigned distance to the nearest segment (mm), and the nearest point.
     fn nearest(&self, p: Vec3) -> (f64, Vec3) {
         let mut best = (f64::INFINITY, self.points[0]);
         for w in self.points.windows(2) {
@@ -134,7 +134,7 @@ impl Polyline {
         each.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a point lies inside a closed line, seen along the axis: the line crosses a ray from it an odd number of times.
+    /// Whether a point lies inside a closed line, projected along the axis: a ray from it crosses the line an odd number of times.
     fn inside(&self, p: Vec3) -> bool {
         let Some([u, v]) = self.plane else {
             return false;
@@ -192,7 +192,7 @@ impl Field for Polyline {
         if !b.is_finite() {
             return Interval::new(f64::NEG_INFINITY, f64::INFINITY);
         }
-        // Distances, with or without sign, change by no more than the way between two places.
+        // Distances, signed or not, are 1-Lipschitz.
         let middle = self.across(b.center());
         let d = self.nearest(middle).0 * if self.inside(middle) { -1.0 } else { 1.0 };
         let reach = norm(b.size()) / 2.0 * (1.0 + 1e-12) + 1e-12 * (1.0 + norm(middle));
@@ -213,7 +213,7 @@ impl Varying for Polyline {}
 mod tests {
     use super::*;
 
-    fn places() -> impl Iterator<Item = Vec3> {
+    fn positions() -> impl Iterator<Item = Vec3> {
         (0..3000).map(|i| [0.754877666, 0.569840291, 0.819172513].map(|a| (i as f64 * a).fract() * 10.0 - 5.0))
     }
 
@@ -245,7 +245,7 @@ mod tests {
             Polyline::new(chain(), true, None, Some(25.0)).unwrap(),
         ];
         for line in &made {
-            for (i, p) in places().enumerate() {
+            for (i, p) in positions().enumerate() {
                 let size = 0.002 * (i % 500) as f64;
                 let b = line.bound(&Aabb { min: p, max: p.map(|x| x + size) });
                 let q = [0.3, 0.9, 0.6].map(|t| t * size);

@@ -1,4 +1,4 @@
-//! A number of a design that is being built.
+//! A quantity of a design: its path, limits and environment, from which its grade is built.
 
 use super::complement::Complement;
 use super::{Grade, Stops, Varying};
@@ -6,7 +6,7 @@ use crate::environment::Environment;
 use crate::kind::{DesignError, Key, Table};
 use geometry::fault::Fault;
 
-/// A number of a design: its path, what it is built in, its limits, and whether its complement, 1 − value, is what counts.
+/// A number of a design: its path, environment and limits, and whether its complement, 1 − value, is meant.
 pub(crate) struct Quantity<'a> {
     pub path: String,
     pub environment: &'a Environment<'a>,
@@ -29,12 +29,12 @@ impl<'a> Quantity<'a> {
         Quantity { path: format!("{}.{key}", self.path), ..*self }
     }
 
-    /// The value that counts.
+    /// The value that is meant: v or 1 − v.
     pub fn own(&self, v: f64) -> f64 {
         if self.complement { 1.0 - v } else { v }
     }
 
-    /// The stops of the values that count.
+    /// The stops of the values that are meant.
     pub fn stops(&self, stops: &Stops) -> Stops {
         if self.complement { stops.clone().complement() } else { stops.clone() }
     }

@@ -77,7 +77,7 @@ pub struct Rbf {
 }
 
 impl Rbf {
-    /// Through `values` at `points` (mm). With an axis all is seen along it. `delta` (mm) is one and a half times the mean
+    /// Through `values` at `points` (mm). With an axis all is projected along it. `delta` (mm) is one and a half times the mean
     /// distance of a point from its nearest neighbour unless given.
     ///
     /// # Errors
@@ -315,7 +315,7 @@ mod tests {
             let rbf = Rbf::new(ring(n), &vec![1.0; n], Some(delta), None).unwrap();
             assert!((rbf.value([0.0; 3]) - middle).abs() < 2e-3, "{delta}: {}", rbf.value([0.0; 3]));
         }
-        // Seen along an axis a point's height does not matter.
+        // Projected along an axis, a point's height does not matter.
         let rbf = Rbf::new(ring(16), &[1.0; 16], Some(0.6), Some([0.0, 0.0, 3.0])).unwrap();
         assert!((rbf.value([0.0, 0.0, 7.0]) - 0.358).abs() < 2e-3);
     }

@@ -1,4 +1,4 @@
-//! Numbers on a grid, each replaced by what it stands for.
+//! Numbers on a grid, each mapped by a piecewise linear function.
 
 use super::{Grade, Quantity, Samples, Stops, Varying};
 use crate::field::Field;

@@ -148,7 +148,7 @@ fn components(
             return made.collect::<Result<Vec<Samples>, Fault>>().map_err(wrong);
         }
     };
-    // What cells have goes to their corners, by volume.
+    // Values of cells go to their corners, weighted by volume.
     let values: Vec<Vec<f64>> = chosen
         .iter()
         .map(|&c| {

@@ -1,4 +1,4 @@
-//! Numbers on a grid, and numbers at points or on a mesh put on one.
+//! Numbers on a grid, trilinear between its nodes; resampling of numbers at points or on a mesh to a grid.
 
 use std::collections::VecDeque;
 
@@ -88,9 +88,9 @@ impl Samples {
         self.step
     }
 
-    /// The interval of a coordinate, the share of it, and whether the coordinate is within the grid.
+    /// The interval of a coordinate, the fraction within it (0 to 1), and whether the coordinate is within the grid.
     #[inline]
-    fn place(&self, x: f64, a: usize) -> (usize, f64, bool) {
+    fn interval(&self, x: f64, a: usize) -> (usize, f64, bool) {
         let last = (self.shape[a] - 1) as f64;
         let s = (x - self.origin[a]) / self.step[a];
         let inside = s.clamp(0.0, last);
@@ -100,7 +100,7 @@ impl Samples {
 
     /// Value and gradient (per mm) at a point.
     pub fn at(&self, p: Vec3) -> (f64, Vec3) {
-        let [(i, x, inx), (j, y, iny), (k, z, inz)] = [0, 1, 2].map(|a| self.place(p[a], a));
+        let [(i, x, inx), (j, y, iny), (k, z, inz)] = [0, 1, 2].map(|a| self.interval(p[a], a));
         let [nx, ny, nz] = self.shape;
         let v = |di: usize, dj: usize, dk: usize| {
             let (i, j, k) = ((i + di).min(nx - 1), (j + dj).min(ny - 1), (k + dk).min(nz - 1));
@@ -124,7 +124,7 @@ impl Samples {
     /// the square of the distance (Shepard).
     ///
     /// # Errors
-    /// No points; numbers or places that are not finite.
+    /// No points; numbers or positions that are not finite.
     pub fn scattered(points: &[Vec3], values: &[f64], neighbours: usize, bounds: &Aabb) -> Result<Samples, Fault> {
         if points.is_empty() {
             return Err(Fault::new("path", "there are no points"));
@@ -164,7 +164,7 @@ impl Samples {
                         }
                     }
                 }
-                // Whoever is not in a ring yet is farther than it reaches, from a place that may lie beyond the buckets.
+                // Points outside the rings so far are at least this distance (squared) from p, which may lie outside the buckets.
                 let reach = (ring as f64 * edge - all.distance(p)).max(0.0).powi(2);
                 if near.len() >= wanted {
                     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -188,7 +188,7 @@ impl Samples {
     }
 
     /// Numbers given at the points of a mesh of tetrahedra, put on a grid over `bounds`, linear in each tetrahedron: one
-    /// grid for each of `values`. Beyond the mesh they are those of the nearest node in it. Also the share of the places
+    /// grid for each of `values`. Beyond the mesh they are those of the nearest node in it. Also the fraction of the positions
     /// in `of` that lie beyond it by more than a step of the grid.
     ///
     /// # Errors
@@ -278,7 +278,7 @@ impl Field for Samples {
     fn bound(&self, b: &Aabb) -> Interval {
         let mut range = [(0, 0); 3];
         for a in 0..3 {
-            let at = |x: f64| self.place(x, a).0 / BLOCK;
+            let at = |x: f64| self.interval(x, a).0 / BLOCK;
             // Infinite ends are clamped as all others.
             range[a] = (at(b.min[a]).min(self.blocks[a] - 1), at(b.max[a]).min(self.blocks[a] - 1));
         }
@@ -332,7 +332,7 @@ fn spread(values: &mut [Vec<f64>], found: &[bool], shape: [usize; 3]) {
 mod tests {
     use super::*;
 
-    fn places(n: usize) -> impl Iterator<Item = Vec3> {
+    fn positions(n: usize) -> impl Iterator<Item = Vec3> {
         (1..=n).map(|i| [0.8191725, 0.6710436, 0.5497005].map(|s| (s * i as f64).fract()))
     }
 
@@ -349,7 +349,7 @@ mod tests {
         let values =
             (0..6 * 9 * 11).map(|n| linear([0.2 * (n % 6) as f64, 0.125 * (n / 6 % 9) as f64, 0.1 * (n / 54) as f64]));
         let s = Samples::new([0.0; 3], step, shape, values.collect()).unwrap();
-        for p in places(500) {
+        for p in positions(500) {
             let p = p.map(|v| 1.6 * v - 0.3);
             let held = p.map(|v| v.clamp(0.0, 1.0));
             let (v, g) = s.at(p);
@@ -360,7 +360,7 @@ mod tests {
             }
             let b = Aabb { min: p, max: p.map(|v| v + 0.17) };
             let bound = s.bound(&b);
-            for q in places(20) {
+            for q in positions(20) {
                 let v = s.at(core::array::from_fn(|a| p[a] + 0.17 * q[a])).0;
                 assert!(bound.lo <= v && v <= bound.hi);
             }
@@ -387,11 +387,11 @@ mod tests {
             }
         }
         let values = vec![points.iter().map(|p| linear(*p)).collect::<Vec<f64>>()];
-        let inside: Vec<Vec3> = places(2000).collect();
+        let inside: Vec<Vec3> = positions(2000).collect();
         let (made, share) = Samples::meshed(&points, &tets, &values, &UNIT, &inside).unwrap();
         // A fifth less about a step.
         assert!((0.05..0.2).contains(&share), "{share}");
-        for p in places(500).filter(|p| p[0] < 0.7) {
+        for p in positions(500).filter(|p| p[0] < 0.7) {
             assert!((made[0].at(p).0 - linear(p)).abs() < 1e-12);
         }
         assert!((made[0].at([1.0, 0.5, 0.5]).0 - linear([0.8, 0.5, 0.5])).abs() < 0.4);
@@ -401,13 +401,13 @@ mod tests {
 
     #[test]
     fn scattered_points_are_met_and_nothing_overshoots() {
-        let points: Vec<Vec3> = places(300).collect();
+        let points: Vec<Vec3> = positions(300).collect();
         let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
         let s = Samples::scattered(&points, &values, 8, &UNIT).unwrap();
-        let worst = places(900).skip(300).fold(0.0f64, |m, p| m.max((s.at(p).0 - linear(p)).abs()));
+        let worst = positions(900).skip(300).fold(0.0f64, |m, p| m.max((s.at(p).0 - linear(p)).abs()));
         // A field of slope 2.3 over points 0.15 apart; corners have theirs on one side.
         assert!(worst < 0.45, "{worst}");
-        let mean = places(900).skip(300).map(|p| s.at(p).0 - linear(p)).sum::<f64>() / 600.0;
+        let mean = positions(900).skip(300).map(|p| s.at(p).0 - linear(p)).sum::<f64>() / 600.0;
         assert!(mean.abs() < 0.02, "{mean}");
         let all = s.bound(&Aabb::ALL);
         let given = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));

@@ -26,8 +26,8 @@ impl BuildGrade for PointsKind {
         let file = environment.load(&self.path, &at)?;
         let wrong = |f: Fault| DesignError::new(&at, format!("{}: {}", self.path, f.message)).found(&self.path);
         let rows = table(&String::from_utf8_lossy(&file), &[4]).map_err(wrong)?;
-        let (places, values): (Vec<Vec3>, Vec<f64>) = rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
-        let samples = Samples::scattered(&places, &values, self.neighbours as usize, &environment.region.bounds());
+        let (positions, values): (Vec<Vec3>, Vec<f64>) = rows.iter().map(|r| ([r[0], r[1], r[2]], r[3])).unzip();
+        let samples = Samples::scattered(&positions, &values, self.neighbours as usize, &environment.region.bounds());
         sampled(samples.map_err(wrong)?, &self.remap, of)
     }
 }

@@ -1,4 +1,4 @@
-//! Stops: a function of one number, given by pairs.
+//! Stops: a piecewise linear function of one number, given by pairs.
 
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node};
 use geometry::fault::number;
@@ -62,7 +62,7 @@ impl Stops {
         self
     }
 
-    /// Value and slope of the piecewise linear function at `s`. At a stop, the slope of the piece that begins there.
+    /// Value and slope of the piecewise linear function at `s`. At a stop, the slope of the segment that begins there.
     #[inline]
     pub fn at(&self, s: f64) -> (f64, f64) {
         let i = self.0.partition_point(|p| p[0] <= s);

@@ -109,7 +109,7 @@ impl Grid {
 
     /// The box of a block of cubes.
     fn block(&self, low: [i32; 3], high: [i32; 3]) -> Aabb {
-        let reach = |c: [i32; 3]| self.place(c.map(|c| c * UNIT));
+        let reach = |c: [i32; 3]| self.position(c.map(|c| c * UNIT));
         Aabb { min: reach(low), max: reach(high) }
     }
 
@@ -142,13 +142,13 @@ impl Grid {
     }
 
     /// The position of a node (mm).
-    pub fn place(&self, key: [i32; 3]) -> Vec3 {
+    pub fn position(&self, key: [i32; 3]) -> Vec3 {
         core::array::from_fn(|a| self.origin[a] + self.unit * f64::from(key[a]))
     }
 
     /// The positions of all nodes (mm).
-    pub fn places(&self) -> Vec<Vec3> {
-        self.keys.iter().map(|k| self.place(*k)).collect()
+    pub fn positions(&self) -> Vec<Vec3> {
+        self.keys.iter().map(|k| self.position(*k)).collect()
     }
 
     /// The squared length of an edge, in units.
@@ -233,7 +233,7 @@ impl Grid {
 
     /// Whether a tetrahedron that may intersect the region is larger than requested.
     fn coarse(&self, t: [u32; 4], region: &dyn Field, size: &Grade) -> Result<bool, Fault> {
-        let p = t.map(|n| self.place(self.keys[n as usize]));
+        let p = t.map(|n| self.position(self.keys[n as usize]));
         let middle: Vec3 = core::array::from_fn(|k| (p[0][k] + p[1][k] + p[2][k] + p[3][k]) / 4.0);
         let reach = p.iter().map(|p| norm(sub(*p, middle))).fold(0.0, f64::max);
         let mine = size_of(geometry::tetmesh::volume(p));

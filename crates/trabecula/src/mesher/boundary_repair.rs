@@ -36,15 +36,15 @@ pub(super) fn repair(mesh: &mut TetMesh) -> f64 {
 
 /// The tetrahedra of fragments.
 fn fragments(mesh: &TetMesh) -> HashSet<u32> {
-    let (count, piece) = mesh.pieces();
+    let (count, component) = mesh.pieces();
     let (mut size, mut tets) = (vec![0.0; count], vec![0; count]);
-    for (i, p) in piece.iter().enumerate() {
+    for (i, p) in component.iter().enumerate() {
         size[*p as usize] += volume(mesh.corners(i));
         tets[*p as usize] += 1;
     }
     let most = size.iter().copied().fold(0.0, f64::max);
     let fragment = |p: u32| size[p as usize] < FRAGMENT_FRACTION * most && tets[p as usize] <= FRAGMENT_TETS;
-    let of = piece.iter().enumerate().filter(|(_, p)| fragment(**p));
+    let of = component.iter().enumerate().filter(|(_, p)| fragment(**p));
     of.map(|(i, _)| i as u32).collect()
 }
 

@@ -41,18 +41,18 @@ pub(super) fn features(work: &mut Work, least: f64) {
         .filter_map(|n| {
             let p = mesh.nodes[n];
             let near: Vec<Plane> = at[n].iter().map(|f| planes[*f as usize]).collect();
-            let (place, rank) = meeting(region, p, &near)?;
+            let (target, rank) = meeting(region, p, &near)?;
             let others = at[n].iter().flat_map(|f| faces[*f as usize]).filter(|m| *m as usize != n);
             let shortest = others.map(|m| norm(sub(mesh.nodes[m as usize], p))).fold(f64::INFINITY, f64::min);
-            let way = norm(sub(place, p));
-            let near = way < REACH * shortest && region.value(place).abs() < 0.02 * shortest;
-            near.then_some((rank, way / shortest, n, place))
+            let distance = norm(sub(target, p));
+            let near = distance < REACH * shortest && region.value(target).abs() < 0.02 * shortest;
+            near.then_some((rank, distance / shortest, n, target))
         })
         .collect();
     moves.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    for (rank, _, n, place) in moves {
+    for (rank, _, n, target) in moves {
         let bar = least.min(work.worst(n).0);
-        let old = core::mem::replace(&mut work.mesh.nodes[n], place);
+        let old = core::mem::replace(&mut work.mesh.nodes[n], target);
         if work.worst(n).0 < bar {
             work.mesh.nodes[n] = old;
         } else {

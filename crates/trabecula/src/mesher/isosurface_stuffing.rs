@@ -32,7 +32,7 @@ enum Side {
 
 /// The tetrahedra of the grid inside the region, cut along its surface, and which nodes lie on it.
 pub(super) fn stuff(grid: &Grid, region: &dyn Field) -> (TetMesh, Vec<bool>) {
-    let mut nodes = grid.places();
+    let mut nodes = grid.positions();
     let values = values(region, &nodes);
     let mut sides: Vec<Side> = values.iter().map(|v| if *v < 0.0 { Side::Inside } else { Side::Outside }).collect();
     let tets: Vec<[u32; 4]> =
@@ -41,14 +41,14 @@ pub(super) fn stuff(grid: &Grid, region: &dyn Field) -> (TetMesh, Vec<bool>) {
     let cuts = roots(region, &nodes, &values, &crossing);
 
     let reach = reach(grid, &tets);
-    // Each node goes to the nearest of the places that are too close to it.
+    // Each node moves to the nearest of the cuts that are too close to it.
     let mut nearest: HashMap<u32, (f64, usize)> = HashMap::new();
     for (i, ([inside, outside], cut)) in crossing.iter().zip(&cuts).enumerate() {
         let share = SHARES[grid.along(*inside, *outside) as usize];
         let length = (grid.length2(*inside, *outside) as f64).sqrt();
-        for (node, way) in [(inside, cut.1), (outside, 1.0 - cut.1)] {
-            if way < share && way * length < reach[*node as usize] {
-                let here = (way * length, i);
+        for (node, fraction) in [(inside, cut.1), (outside, 1.0 - cut.1)] {
+            if fraction < share && fraction * length < reach[*node as usize] {
+                let here = (fraction * length, i);
                 let best = nearest.entry(*node).or_insert(here);
                 if here < *best {
                     *best = here;
@@ -117,8 +117,8 @@ fn crossings(tets: &[[u32; 4]], sides: &[Side]) -> Vec<[u32; 2]> {
     found
 }
 
-/// Where each edge crosses the surface, and the share of the way from its inner node: by false position with halved
-/// weights (the Illinois method), which brackets the place.
+/// The position at which each edge crosses the surface, and its fraction of the edge from the inner node: by false position
+/// with halved weights (the Illinois method), which brackets the root.
 fn roots(region: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]]) -> Vec<(Vec3, f64)> {
     const ROUNDS: usize = 40;
     let mut found = vec![([0.0; 3], 0.0); edges.len()];
@@ -127,7 +127,7 @@ fn roots(region: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]])
             let (p, q) = (nodes[e[0] as usize], nodes[e[1] as usize]);
             core::array::from_fn(|k| p[k] + t * (q[k] - p[k]))
         };
-        // Of each: the bracket, and the values at its ends.
+        // For each edge the bracket, and the values at its ends.
         let mut state: Vec<[f64; 4]> =
             edges.iter().map(|[a, b]| [0.0, 1.0, values[*a as usize], values[*b as usize]]).collect();
         let mut last = vec![0i8; edges.len()];
@@ -139,7 +139,7 @@ fn roots(region: &dyn Field, nodes: &[Vec3], values: &[f64], edges: &[[u32; 2]])
                 .iter()
                 .map(|i| {
                     let [lo, hi, vlo, vhi] = state[*i];
-                    // Bisection now and then, for fields with kinks.
+                    // Every eighth round bisects, for fields with discontinuous gradients.
                     let t = if round % 8 == 7 { 0.5 * (lo + hi) } else { lo + (hi - lo) * vlo / (vlo - vhi) };
                     t.clamp(lo, hi)
                 })
@@ -186,7 +186,7 @@ struct Filler<'a> {
     out: Vec<[u32; 4]>,
 }
 
-/// A corner of a piece: a node of the tetrahedron (twice the same), or the cut between an inner and an outer one.
+/// A corner of a cut tetrahedron: a node of the uncut one (twice the same), or the cut between an inner and an outer one.
 type Corner = [usize; 2];
 
 impl Filler<'_> {
@@ -199,8 +199,8 @@ impl Filler<'_> {
             ([], _, _) => {}
             (_, _, []) => self.out.push(t),
             ([a], _, _) => {
-                let piece = core::array::from_fn(|k| if outside.contains(&k) { [*a, k] } else { node(k) });
-                self.emit(t, piece);
+                let cut = core::array::from_fn(|k| if outside.contains(&k) { [*a, k] } else { node(k) });
+                self.emit(t, cut);
             }
             (&[a, b], &[z], &[d]) => {
                 let [a, b] = self.ordered(t, [[a, d], [b, d]]);
@@ -233,7 +233,7 @@ impl Filler<'_> {
         }
     }
 
-    /// What the order of crossed edges goes by: length, then the name of the inner node. It is the same in every
+    /// The rank of a crossed edge: length, then the index of the inner node. It is the same in every
     /// tetrahedron that has the edges, and so are the diagonals that follow from it.
     fn rank(&self, t: [u32; 4], [inside, outside]: [usize; 2]) -> (i64, u32) {
         (self.grid.length2(t[inside], t[outside]), t[inside])
@@ -244,29 +244,29 @@ impl Filler<'_> {
         if self.rank(t, e) > self.rank(t, f) { [e[0], f[0]] } else { [f[0], e[0]] }
     }
 
-    /// Adds a piece, turned so that it is oriented as the tetrahedron is.
-    fn emit(&mut self, t: [u32; 4], piece: [Corner; 4]) {
+    /// Adds a cut tetrahedron, oriented as the uncut one is.
+    fn emit(&mut self, t: [u32; 4], cut: [Corner; 4]) {
         let name = |[i, o]: Corner| {
             if i == o { t[i] } else { self.names[&[t[i], t[o]]] }
         };
-        let mut nodes = piece.map(name);
-        if turned(piece) {
+        let mut nodes = cut.map(name);
+        if turned(cut) {
             nodes.swap(2, 3);
         }
         self.out.push(nodes);
     }
 }
 
-/// Whether a piece is oriented against its tetrahedron: the sign of the determinant of its corners' barycentric
-/// coordinates, which is the same wherever on their edges the cuts lie.
-fn turned(piece: [Corner; 4]) -> bool {
+/// Whether a cut tetrahedron is oriented against the uncut one: the sign of the determinant of its corners' barycentric
+/// coordinates, which does not depend on the positions of the cuts on their edges.
+fn turned(cut: [Corner; 4]) -> bool {
     let row = |[i, o]: Corner| {
         let mut r = [0.0; 4];
         r[i] += 1.0;
         r[o] += 1.0;
         r
     };
-    let r = piece.map(row);
+    let r = cut.map(row);
     let d = |k: usize| -> Vec3 { core::array::from_fn(|c| r[k][c + 1] - r[0][c + 1]) };
     geometry::math::determinant(&[d(1), d(2), d(3)]) < 0.0
 }

@@ -11,13 +11,13 @@ use geometry::tetmesh::TetMesh;
 /// The fit of a mesh to a region, given its signed distance (mm) and points inside it.
 pub fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3]) -> Fit {
     let boundary = mesh.boundary();
-    let mut looks = Vec::with_capacity(4 * boundary.triangles.len());
+    let mut samples = Vec::with_capacity(4 * boundary.triangles.len());
     for i in 0..boundary.triangles.len() {
         let [a, b, c] = boundary.corners(i);
-        looks.push(scale(add(add(a, b), c), 1.0 / 3.0));
-        looks.extend([(a, b), (b, c), (c, a)].map(|(p, q)| scale(add(p, q), 0.5)));
+        samples.push(scale(add(add(a, b), c), 1.0 / 3.0));
+        samples.extend([(a, b), (b, c), (c, a)].map(|(p, q)| scale(add(p, q), 0.5)));
     }
-    let off = values(region, &looks);
+    let off = values(region, &samples);
     let mut sorted: Vec<f64> = off.iter().map(|v| v.abs()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let p95 = (sorted.len().saturating_sub(1) as f64 * 0.95).round() as usize;
@@ -29,7 +29,7 @@ pub fn fit(mesh: &TetMesh, region: &dyn Field, inside: &[Vec3]) -> Fit {
         deviation_mean: off.iter().map(|v| v.abs()).sum::<f64>() / off.len().max(1) as f64,
         deviation_p95: sorted.get(p95).copied().unwrap_or_default(),
         deviation: off.get(far).map_or(0.0, |v| v.abs()),
-        deviation_at: looks.get(far).copied().unwrap_or_default(),
+        deviation_at: samples.get(far).copied().unwrap_or_default(),
         lost: left.len() as f64 / inside.len().max(1) as f64,
         lost_depth: depths.get(deep).map_or(0.0, |v| -v),
         lost_at: left.get(deep).copied().unwrap_or_default(),

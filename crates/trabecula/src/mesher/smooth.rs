@@ -63,7 +63,7 @@ pub(super) fn improve(work: &mut Work, n: usize) -> bool {
             *d = unit(sub(*d, scale(normal, dot(*d, normal))));
         }
     }
-    let mut place = start;
+    let mut best_position = start;
     for step in STEPS {
         for d in &directions {
             let mut p = add(start, scale(*d, step * edge));
@@ -82,12 +82,12 @@ pub(super) fn improve(work: &mut Work, n: usize) -> bool {
                 }
             }
             if worst > best * 1.001 {
-                (best, place) = (worst, p);
+                (best, best_position) = (worst, p);
             }
         }
     }
-    mesh.nodes[n] = place;
-    place != start
+    mesh.nodes[n] = best_position;
+    best_position != start
 }
 
 /// The surface point near `p`, if a few gradient steps lead there on the same sheet of the surface (by this normal).

@@ -1,4 +1,4 @@
-//! A mesh at work: the tetrahedra at each node, what is known of the nodes, and places that are left alone.
+//! A mesh that is being fitted to its region: the tetrahedra at each node, constraints of the nodes, and excluded balls.
 
 use super::tet_shape::shape;
 use crate::field::Field;
@@ -12,7 +12,7 @@ pub(super) struct Work<'a> {
     pub around: Around,
     /// Whether each node is on the surface.
     pub on: Vec<bool>,
-    /// In how many directions an edge (2) or corner (3) of the region holds it.
+    /// The number of directions in which an edge (2) or corner (3) of the region holds it.
     pub held: Vec<usize>,
     /// Balls in which nothing is moved: the boundary would meet itself there.
     pub barred: Vec<(Vec3, f64)>,
@@ -23,7 +23,7 @@ impl<'a> Work<'a> {
         Work { region, around: Around::new(&mesh), held: vec![0; on.len()], on, mesh, barred: Vec::new() }
     }
 
-    /// Whether nothing may be moved here.
+    /// Whether a position is in one of the excluded balls.
     pub fn bars(&self, p: Vec3) -> bool {
         self.barred.iter().any(|(c, r)| norm(sub(*c, p)) < *r)
     }
@@ -37,14 +37,14 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// Puts a node on an edge, which halves the tetrahedra there.
-    pub fn split(&mut self, edge: [u32; 2], place: Vec3, held: usize) {
-        self.around.split(&mut self.mesh, edge, place);
+    /// Bisects an edge, and with it the tetrahedra that have it, by a node at `position`.
+    pub fn split(&mut self, edge: [u32; 2], position: Vec3, held: usize) {
+        self.around.split(&mut self.mesh, edge, position);
         self.on.push(true);
         self.held.push(held);
     }
 
-    /// Takes the last node away, which was put on this edge when there were `count` tetrahedra.
+    /// Removes the last node, which bisected this edge when there were `count` tetrahedra.
     pub fn unsplit(&mut self, edge: [u32; 2], count: usize) {
         self.around.unsplit(&mut self.mesh, edge, count);
         self.on.pop();
@@ -77,10 +77,10 @@ impl Around {
         self.of(a as usize).iter().filter(has).copied().collect()
     }
 
-    /// Puts a node on an edge, which halves the tetrahedra there.
-    fn split(&mut self, mesh: &mut TetMesh, [a, b]: [u32; 2], place: Vec3) {
+    /// Bisects an edge, and with it the tetrahedra that have it, by a node at `position`.
+    fn split(&mut self, mesh: &mut TetMesh, [a, b]: [u32; 2], position: Vec3) {
         let new = mesh.nodes.len() as u32;
-        mesh.nodes.push(place);
+        mesh.nodes.push(position);
         let halved = self.edge(mesh, [a, b]);
         let mut at = halved.clone();
         for t in halved {
@@ -98,7 +98,7 @@ impl Around {
         self.0.push(at);
     }
 
-    /// Takes the last node away, which was put on this edge when there were `count` tetrahedra.
+    /// Removes the last node, which bisected this edge when there were `count` tetrahedra.
     fn unsplit(&mut self, mesh: &mut TetMesh, [_, b]: [u32; 2], count: usize) {
         mesh.nodes.pop();
         let new = mesh.nodes.len() as u32;

@@ -1,4 +1,4 @@
-//! Whether regions that are united touch each other.
+//! Connectivity of a union of regions.
 
 use super::{Context, Region};
 

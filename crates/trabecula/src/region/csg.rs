@@ -1,4 +1,4 @@
-//! Combinations of regions.
+//! Union, intersection and difference of regions.
 
 use std::sync::Arc;
 
@@ -99,7 +99,7 @@ trait Join: Send + Sync {
     }
     /// Whether region `i` enters by its complement.
     fn negated(&self, i: usize) -> bool;
-    /// Whether a later value takes the place of the one held.
+    /// Whether a later value replaces the one held.
     fn takes(new: f64, held: f64) -> bool;
     /// Whether all must be solid, rather than any.
     const ALL: bool;

@@ -122,7 +122,7 @@ impl Cylinder {
             None => {
                 let far = norm(b.size()) / 2.0;
                 let r = self.sides(b.center())[0] + self.radius;
-                // Rounding of a projection: a few units in the last place of the lengths that enter it.
+                // Rounding of a projection: a few ulps of the lengths that enter it.
                 let far = far + 1e-14 * (far + norm(sub(b.center(), self.base)));
                 let h = along(b, self.base, self.axis);
                 let cap = |v: f64| (-v).max(v - self.height);

@@ -25,7 +25,7 @@ pub struct MeshRegion {
     bounds: Aabb,
     volume: f64,
     planes: [Vec<f64>; 3],
-    /// Found when they are first asked for.
+    /// Computed at first use.
     creases: OnceLock<Arc<Creases>>,
 }
 
@@ -118,7 +118,7 @@ impl Shape for MeshRegion {
         }
     }
 
-    /// Halves the block until a part lies on one side of the level or is eight nodes: most nodes are never asked.
+    /// Halves the block until a part lies on one side of the level or is eight nodes: most nodes are never evaluated.
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
         if block.is_empty() {
             return;

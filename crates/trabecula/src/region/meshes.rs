@@ -1,4 +1,4 @@
-//! Meshes among combined regions, made one.
+//! The Boolean combination of meshes among combined regions.
 //!
 //! Two meshes that meet are two surfaces, each with edges of its own, and a third set where they cross. As one mesh, cut
 //! along each other exactly, they are one surface with all of these edges, and with one distance.
@@ -10,7 +10,7 @@ use super::{MeshRegion, Region};
 /// Regions that are combined.
 pub(super) struct List {
     pub of: Vec<Region>,
-    /// Found when first asked for.
+    /// Computed at first use.
     meshes: OnceLock<Option<Meshes>>,
 }
 

@@ -1,4 +1,4 @@
-//! A region grown or shrunk.
+//! The offset of a region: grown or shrunk by a distance (mm).
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What exact signed distances of simple shapes share.
+//! Shared code of the exact signed distances of simple shapes.
 
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ pub(super) fn joined<const N: usize>(q: [f64; N]) -> f64 {
     if inside <= 0.0 { inside } else { q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt() }
 }
 
-/// The gradient of `joined`, the pieces' own gradients being `g`.
+/// The gradient of `joined`, the operands' own gradients being `g`.
 pub(super) fn joined_gradient<const N: usize>(q: [f64; N], g: [Vec3; N]) -> Vec3 {
     let d = joined(q);
     if d > 0.0 {

@@ -1,4 +1,4 @@
-//! What a formula can compute: every operation's value, partial derivatives and range.
+//! The operations of a formula: value, partial derivatives and range of each.
 
 use core::f64::consts::{LN_10, PI, TAU};
 
@@ -256,7 +256,7 @@ fn ramp(a: f64, b: f64, c: f64) -> f64 {
     if a == b { f64::from(c >= a) } else { ((c - a) / (b - a)).clamp(0.0, 1.0) }
 }
 
-/// aᵇ; small whole powers by multiplication, which is what a reader of x^2 expects.
+/// aᵇ; small whole powers by multiplication.
 fn power(a: f64, b: f64) -> f64 {
     if b == b.trunc() && b.abs() <= 64.0 { a.powi(b as i32) } else { a.powf(b) }
 }
@@ -313,7 +313,7 @@ fn tidy(i: Interval) -> Interval {
     Interval::new(if i.lo.is_nan() { ALL.lo } else { i.lo }, if i.hi.is_nan() { ALL.hi } else { i.hi })
 }
 
-/// The interval widened by the error of library functions (a few units in the last place).
+/// The interval widened by the error of library functions (a few ulps).
 fn outward(i: Interval) -> Interval {
     let wide = |v: f64| {
         if v.is_finite() { v.abs() * 4.0 * f64::EPSILON + f64::MIN_POSITIVE } else { 0.0 }

@@ -1,4 +1,4 @@
-//! Text to a stack program.
+//! Parser: text to a stack program.
 //!
 //! ```text
 //! sum     = product { ("+" | "-") product }
@@ -200,7 +200,7 @@ impl<'a> Parser<'a> {
         Err(self.fault(&format!("expected an operator or {c}")))
     }
 
-    /// The next character that is not white space.
+    /// The next character that is not whitespace.
     fn peek(&mut self) -> Option<char> {
         let rest = &self.text[self.at..];
         let c = rest.chars().find(|c| !c.is_whitespace());
@@ -208,7 +208,7 @@ impl<'a> Parser<'a> {
         c
     }
 
-    /// A fault at the next character: column, what stands there, what to do.
+    /// A fault at the next character: column, what was found, what to do.
     fn fault(&mut self, message: &str) -> Fault {
         let next = self.peek();
         let column = self.text[..self.at].chars().count() + 1;

@@ -10,7 +10,7 @@ use geometry::distance::triangle::Triangle;
 use geometry::distance::triangle_bvh::{Nearest, TriangleBvh};
 use geometry::math::{Aabb, Interval, Vec3, dot, norm, scale};
 
-/// Corners of a triangle on a plane may stand this far off it, as a share of the mesh's size: files hold coordinates in
+/// Corners of a triangle on a plane may be this far off it, as a share of the mesh's size: files hold coordinates in
 /// single precision.
 const OFF: f64 = 1e-6;
 /// The least cosine between the normals of a plane and of a triangle on it.
@@ -115,7 +115,7 @@ impl Shape for OpenMesh {
 
     fn level_planes(&self, _: usize, _: f64, _: &mut Vec<f64>) {}
 
-    /// Halves the block until a part lies on one side of the level or is eight nodes: most nodes are never asked.
+    /// Halves the block until a part lies on one side of the level or is eight nodes: most nodes are never evaluated.
     fn fill_level(&self, block: &Block, level: f64, out: &mut [f32]) {
         if !block.is_empty() {
             let widest = |axis: &[f64]| axis.windows(2).fold(0.0f64, |m, w| m.max(w[1] - w[0]));
