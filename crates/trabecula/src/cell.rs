@@ -108,7 +108,7 @@ impl Cell {
     /// Solid volume fraction on the torus of the part at level `iso`.
     pub fn fraction(&self, part: Part, iso: f64) -> f64 {
         let range = self.range();
-        // Extremes found in two ways differ in the last digit.
+        // Extremes of the same function by two methods differ by rounding.
         let slack = 1e-12 * (range.hi - range.lo);
         let all = match part {
             Part::Lower => iso >= range.hi - slack,
@@ -159,11 +159,11 @@ impl Cell {
         sampled + spectral_norm(to_phase) * self.series.curvature() * half_diagonal
     }
 
-    /// The intervals of solid fraction in which the periodic solid is one piece in R³.
+    /// The intervals of solid fraction in which the periodic solid is connected in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
         let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.plain.gradients(u, v, g);
         let found = || self.connected[part as usize].get_or_init(|| connected(&f, part));
-        // The table is asked for next: both at once.
+        // The table is needed next: both are computed in parallel.
         let (intervals, _) = rayon::join(found, || (self.range(), self.table()));
         intervals.iter().map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0))).collect()
     }

@@ -1,4 +1,4 @@
-//! The design: the data, and its one road to a solid.
+//! The design: its data, and how a solid is built from it.
 //!
 //! Text (TOML or JSON) becomes a tree, the tree becomes data, and the data is built into a [`Solid`]. Whatever is
 //! wrong is one [`DesignError`] with the path, the line and the nearest right word.
@@ -234,7 +234,7 @@ pub fn region(node: &Node, loader: &dyn Loader) -> Result<Region, DesignError> {
     let lines = node.lines();
     let entries = At::root(node).entries("a design or a region")?;
     let found = if entries.iter().any(|(key, _)| ["lattice", "beams"].contains(key)) {
-        build::space(&Design::from_node(node)?, loader)
+        build::region_of(&Design::from_node(node)?, loader)
     } else {
         let alone = RegionFile::read(&At::root(node))?;
         environment::region(&alone.region, "region", loader, &mut crate::region::Notes::default())
@@ -287,7 +287,7 @@ impl Built {
         built_report::transitions(self)
     }
 
-    /// The solid share of the region, by looks at some ten thousand points, and the region's volume (mm³), exact where
+    /// The solid share of the region, by sampling at some ten thousand points, and the region's volume (mm³), exact where
     /// that is known: what an extraction is held against.
     pub fn expected(&self) -> (f64, f64) {
         built_report::expected(self)

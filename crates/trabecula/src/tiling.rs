@@ -25,12 +25,12 @@ pub use crease::Creases;
 pub use node_levels::{Amount, Spread};
 pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity};
 
-/// A cell of a tiling.
+/// A cell of a tiling, with its scale and weights.
 #[derive(Clone)]
 pub struct Share {
     /// The cell.
-    pub stencil: Arc<TetCell>,
-    /// What its values are divided by, so that several cells have like values.
+    pub cell: Arc<TetCell>,
+    /// Divisor of its values, so that several cells have comparable values.
     pub scale: f64,
     /// Its weight at each node of the mesh; one everywhere if there is none.
     pub weights: Option<Arc<Vec<f64>>>,
@@ -62,7 +62,7 @@ pub struct Tiling {
     cut: Cut,
 }
 
-/// How f is known at a point.
+/// f, the level t, and their gradients (per mm) at a point.
 #[derive(Clone, Copy, Default)]
 struct Known {
     f: f64,
@@ -76,8 +76,8 @@ const MOST: usize = 256;
 
 impl Tiling {
     /// A single cell over a mesh.
-    pub fn new(map: Arc<Tets>, stencil: Arc<TetCell>, part: Part, level: Level) -> Tiling {
-        let cell = Share { stencil, scale: 1.0, weights: None };
+    pub fn new(map: Arc<Tets>, cell: Arc<TetCell>, part: Part, level: Level) -> Tiling {
+        let cell = Share { cell, scale: 1.0, weights: None };
         Tiling::of(map, vec![cell], part, level)
     }
 
@@ -85,17 +85,17 @@ impl Tiling {
     pub fn of(map: Arc<Tets>, cells: Vec<Share>, part: Part, level: Level) -> Tiling {
         // |∇f| ≤ Σ amplitude 2π|h| in phase, times |du/dx|.
         let own = cells.iter().map(|c| {
-            let waves = c.stencil.series().terms().iter();
+            let waves = c.cell.series().terms().iter();
             let sum: f64 = waves.map(|t| t.amplitude.abs() * norm(t.hkl.map(f64::from))).sum();
             core::f64::consts::TAU * sum / c.scale
         });
         let own = own.fold(0.0, f64::max);
-        let corners = cells[0].stencil.corners();
+        let corners = cells[0].cell.corners();
         let along = [0, 1, 2].map(|i| geometry::math::sub(corners[i], corners[3]));
         // All tetrahedra of cells are regular: with edges of another length the Jacobian is that much larger.
         let size = |s: &TetCell| norm(geometry::math::sub(s.corners()[0], s.corners()[3]));
-        let longest = cells.iter().map(|c| size(&c.stencil)).fold(0.0, f64::max);
-        let more = longest / size(&cells[0].stencil);
+        let longest = cells.iter().map(|c| size(&c.cell)).fold(0.0, f64::max);
+        let more = longest / size(&cells[0].cell);
         let of = |t: usize| {
             let slopes = map.slopes(t);
             // du/dx = Σ (p_i − p_4) ∇λ_iᵀ.
@@ -104,7 +104,7 @@ impl Tiling {
             // ∇(Σ w f) = Σ w ∇f + f ∇w.
             let turn = |c: &Share| {
                 let w = c.weights.as_ref()?;
-                let most = c.stencil.series().amplitude() / c.scale;
+                let most = c.cell.series().amplitude() / c.scale;
                 Some(most * norm(linear_slope(&map, w, t)))
             };
             own * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
@@ -127,12 +127,12 @@ impl Tiling {
     }
 
     /// f and t, and their gradients, at points in tetrahedra.
-    fn pieces(&self, at: &[(usize, Bary)]) -> Vec<Known> {
+    fn known_in(&self, at: &[(usize, Bary)]) -> Vec<Known> {
         let mut out = vec![Known::default(); at.len()];
-        let places: Vec<Bary> = at.iter().map(|a| a.1).collect();
+        let barys: Vec<Bary> = at.iter().map(|a| a.1).collect();
         let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
         for c in &self.cells {
-            c.stencil.gradients(&places, &mut v, &mut g);
+            c.cell.gradients(&barys, &mut v, &mut g);
             for (i, (t, l)) in at.iter().enumerate() {
                 let m = self.map.slopes(*t);
                 let slope = (0..3).fold([0.0; 3], |s, k| add(s, scale(m[k], g[i][k])));
@@ -159,7 +159,7 @@ impl Tiling {
         out
     }
 
-    /// Coordinates that are farther outside than the overlap, brought back: what is linear must not run away.
+    /// Coordinates that are farther outside than the overlap, clamped and normalised: it bounds the linear extrapolation.
     fn tamed(&self, l: Bary) -> Bary {
         if l.iter().all(|v| *v >= -self.map.overlap() - 1e-9) {
             return l;
@@ -173,14 +173,14 @@ impl Tiling {
         let overlap = self.map.overlap();
         if overlap <= 0.0 {
             let at: Vec<(usize, Bary)> = points.iter().map(|p| self.map.locate(*p)).collect();
-            return self.pieces(&at);
+            return self.known_in(&at);
         }
         let (mut at, mut ends) = (Vec::new(), Vec::with_capacity(points.len()));
         for p in points {
             self.map.each_near(*p, |t, l| at.push((t, l)));
             ends.push(at.len());
         }
-        let each = self.pieces(&at);
+        let each = self.known_in(&at);
         let mut first = 0;
         let mean = |end: &usize| {
             let here = first..*end;
@@ -284,7 +284,7 @@ impl Tiling {
 
     /// The length of a cell's period in tetrahedra of mean edge, mm.
     pub fn wavelength(&self) -> f64 {
-        let s = &self.cells[0].stencil;
+        let s = &self.cells[0].cell;
         let edge = norm(geometry::math::sub(s.corners()[0], s.corners()[1]));
         self.map.mean_edge() / edge
     }
@@ -312,8 +312,8 @@ impl Field for Tiling {
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        let most: f64 = self.cells.iter().map(|c| c.stencil.series().amplitude() / c.scale).fold(0.0, f64::max);
-        // What is linear reaches beyond the nodes' values by the overlap.
+        let most: f64 = self.cells.iter().map(|c| c.cell.series().amplitude() / c.scale).fold(0.0, f64::max);
+        // Linear functions exceed the nodes' values within the overlap.
         let beyond = 8.0 * self.map.overlap();
         let spread = |i: Interval| {
             let by = beyond * (i.hi - i.lo);
@@ -330,7 +330,7 @@ impl Field for Tiling {
             near.sort_unstable();
             near.dedup();
             let at: Vec<(usize, Bary)> = near.iter().map(|t| (*t, self.map.bary(*t, middle))).collect();
-            let here = if weighted { Vec::new() } else { self.pieces(&at) };
+            let here = if weighted { Vec::new() } else { self.known_in(&at) };
             for (i, n) in near.iter().enumerate() {
                 f = f.union(match here.get(i) {
                     None => all,

@@ -1,4 +1,4 @@
-//! How a part cuts a function at a level: the value that is negative in the solid.
+//! The cut of a function f at a level t by a part: sheet |f| − t, lower f − t, upper t − f, negative in the solid.
 
 use std::sync::Arc;
 

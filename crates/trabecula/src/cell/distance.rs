@@ -1,4 +1,4 @@
-//! Signed distance to the mid-surface f = 0, in space: what a wall of a given thickness is measured by.
+//! Signed distance (mm) to the mid-surface f = 0, which defines a wall of a given thickness.
 //!
 //! Phases relate to space by u = M x. For one M the distance is itself a function on the torus. It is found at the
 //! nodes of a grid as the length to the nearest point of the surface and carried between them by a spline. Near the
@@ -99,8 +99,8 @@ impl Distance {
         let own = norm(apply(&transpose(&self.to_phase), gradient));
         let here = norm(apply(&transpose(jacobian), gradient));
         // On creases the gradient may vanish and has no direction: the ratio goes to one there, so that it is continuous.
-        const FAINT: f64 = 1e-4;
-        value * (own.powi(3) + FAINT) / (own.powi(2) * here + FAINT)
+        const SMALL: f64 = 1e-4;
+        value * (own.powi(3) + SMALL) / (own.powi(2) * here + SMALL)
     }
 
     /// A Lipschitz bound: an upper bound of |∂d/∂x| (mm per mm). A distance's own is one; the spline oscillates near
@@ -148,7 +148,7 @@ impl Distance {
         })
     }
 
-    /// The intervals of solid fraction in which the periodic solid of this part is one piece in R³.
+    /// The intervals of solid fraction in which the periodic solid of this part is connected in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
         let found = self.connected[part as usize].get_or_init(|| connected(&|u, v, g| self.gradients(u, v, g), part));
         let share = |t: f64| self.fraction(part, t).clamp(0.0, 1.0);
@@ -246,7 +246,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Offsets of one connected surface are one piece, at any thickness.
+    /// Offsets of one connected surface are connected, at any thickness.
     #[test]
     fn walls_are_one_piece() {
         for name in ["gyroid", "diamond", "primitive", "iwp"] {

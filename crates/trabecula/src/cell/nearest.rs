@@ -1,9 +1,9 @@
 //! The nearest points of the mid-surface f = 0, in space, to the nodes of a grid on the torus.
 //!
-//! Nodes adjacent to the surface find theirs from where the grid's edges cross it. They hand them on to their neighbours, these
-//! to theirs, as long as that is nearer than what they have (Danielsson, Euclidean distance mapping, Computer Graphics and
-//! Image Processing 14, 1980). Then each node sharpens its own: a foot, where the way to the node stands upright on the
-//! surface, by Newton's method. The way is kept as a vector from the node, so a period is crossed like any other step.
+//! Nodes adjacent to the surface start from its crossings with the grid's edges. Nearest points are propagated to neighbours,
+//! while that shortens the distance (vector distance transform: Danielsson, Euclidean distance mapping, Computer Graphics and
+//! Image Processing 14, 1980). Then each is refined to a foot point, at which the vector to the node is normal to the
+//! surface, by Newton's method. Foot points are stored as vectors (mm) from the node, so period boundaries need no special case.
 
 use rayon::prelude::*;
 
@@ -51,7 +51,7 @@ impl<'a> Search<'a> {
     }
 
     /// The phase of a node.
-    fn place(&self, node: usize) -> Vec3 {
+    fn phase(&self, node: usize) -> Vec3 {
         let i = self.index(node);
         core::array::from_fn(|a| i[a] as f64 / self.shape[a] as f64)
     }
@@ -74,26 +74,26 @@ impl<'a> Search<'a> {
         f.iter().zip(&feet).map(|(f, foot)| norm(*foot).min(self.sizes[0]).copysign(*f)).collect()
     }
 
-    /// Values of f at the nodes, and from each the way (mm) to the nearest point of the surface.
+    /// Values of f at the nodes, and the vector (mm) from each to the nearest point of the surface.
     fn feet(&self) -> (Vec<f64>, Vec<Vec3>) {
-        let u: Vec<Vec3> = (0..self.count()).map(|i| self.place(i)).collect();
+        let u: Vec<Vec3> = (0..self.count()).map(|i| self.phase(i)).collect();
         let (mut f, mut g) = (vec![0.0; u.len()], vec![[0.0; 3]; u.len()]);
         f.par_chunks_mut(4096)
             .zip(g.par_chunks_mut(4096))
             .zip(u.par_chunks(4096))
             .for_each(|((f, g), u)| self.series.gradients(u, f, g));
         drop(g);
-        let mut feet = self.beside(&f);
+        let mut feet = self.adjacent_feet(&f);
         let mut changed: Vec<usize> = (0..feet.len()).filter(|i| feet[*i][0].is_finite()).collect();
-        self.hand_on(&mut feet, changed);
-        // Handed on, a foot belongs to a neighbour; sharpened feet may serve their neighbours better than their own.
+        self.propagate(&mut feet, changed);
+        // A propagated foot is that of a neighbour; once refined, it may be nearer to other nodes too, so both alternate.
         changed = (0..feet.len()).collect();
         for _ in 0..6 {
             let sharp: Vec<Vec3> = changed.par_iter().map(|&i| self.nearest(u[i], feet[i])).collect();
             for (i, foot) in changed.iter().zip(sharp) {
                 feet[*i] = foot;
             }
-            changed = self.hand_on(&mut feet, changed);
+            changed = self.propagate(&mut feet, changed);
             if changed.is_empty() {
                 break;
             }
@@ -101,12 +101,12 @@ impl<'a> Search<'a> {
         (f, feet)
     }
 
-    /// Feet (from the node, mm) of nodes adjacent to the surface, found from where the grid's edges cross it.
-    fn beside(&self, f: &[f64]) -> Vec<Vec3> {
+    /// Feet (from the node, mm) of nodes adjacent to the surface, from its crossings with the grid's edges.
+    fn adjacent_feet(&self, f: &[f64]) -> Vec<Vec3> {
         (0..f.len())
             .into_par_iter()
             .map(|node| {
-                let (at, u) = (self.index(node), self.place(node));
+                let (at, u) = (self.index(node), self.phase(node));
                 let mut best = NONE;
                 for (d, step) in &self.around {
                     let other = f[self.neighbour(at, *d)];
@@ -128,10 +128,10 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Hands feet on from the nodes `from` to neighbours they are nearer to, until none changes. Returns the nodes that changed.
-    fn hand_on(&self, feet: &mut [Vec3], from: Vec<usize>) -> Vec<usize> {
+    /// Propagates feet from the nodes `from` to neighbours they are nearer to, until none changes. Returns the nodes that changed.
+    fn propagate(&self, feet: &mut [Vec3], from: Vec<usize>) -> Vec<usize> {
         let mut served = vec![false; feet.len()];
-        let mut asked = vec![0u32; feet.len()];
+        let mut visited = vec![0u32; feet.len()];
         let mut from = from;
         for round in 1.. {
             let mut nodes = Vec::new();
@@ -139,13 +139,13 @@ impl<'a> Search<'a> {
                 let at = self.index(node);
                 for (d, _) in &self.around {
                     let n = self.neighbour(at, *d);
-                    if asked[n] != round {
-                        asked[n] = round;
+                    if visited[n] != round {
+                        visited[n] = round;
                         nodes.push(n);
                     }
                 }
             }
-            // All look at the feet as they were: the result does not depend on the order of the work.
+            // All read the feet of the previous round: the result does not depend on the order of the work.
             let better: Vec<(usize, Vec3)> = nodes
                 .par_iter()
                 .filter_map(|&node| {
@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method on p + λ∇f = 0, f(p) = 0: where p, from u, stands upright on the surface.
+    /// Newton's method on p + λ∇f = 0, f(p) = 0: the vector p from u is normal to the surface.
     fn lagrange(&self, u: Vec3, from: Vec3) -> Option<Vec3> {
         let mut p = from;
         let mut multiplier = None;
@@ -238,7 +238,7 @@ impl<'a> Search<'a> {
     }
 
     /// Towards the nearest point by going to the foot on the tangent plane and back to the surface, while that
-    /// shortens the way.
+    /// shortens the distance.
     fn descend(&self, u: Vec3, from: Vec3) -> Vec3 {
         let (mut p, mut pace) = (from, 1.0);
         for _ in 0..40 {
@@ -261,7 +261,7 @@ mod tests {
     use super::super::distance::tests::{series, stretched, surface};
     use super::*;
 
-    /// Feet stand on the surface, and no point of it is nearer, in whatever period.
+    /// Feet lie on the surface, and no point of it is nearer, in any period.
     #[test]
     fn feet_are_the_nearest_points_of_the_surface() {
         for name in ["iwp", "lidinoid", "frd"] {
@@ -271,17 +271,17 @@ mod tests {
             let points = surface(&s, &m, 3000);
             let to_space = inverse(&m);
             for i in (0..feet.len()).step_by(97) {
-                let u = search.place(i);
+                let u = search.phase(i);
                 let (f, g, _) = search.second(u, feet[i]);
                 assert!(f.abs() < 1e-6 * norm(g), "{name} {u:?}: {f}");
-                let way = |p: &(Vec3, Vec3)| {
+                let distance = |p: &(Vec3, Vec3)| {
                     (0..27)
                         .map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1].map(f64::from))
                         .map(|k| add(sub(p.0, u).map(|c| c - c.round()), k))
                         .map(|d| norm(apply(&to_space, d)))
                         .fold(f64::INFINITY, f64::min)
                 };
-                let nearest = points.iter().map(way).fold(f64::INFINITY, f64::min);
+                let nearest = points.iter().map(distance).fold(f64::INFINITY, f64::min);
                 let found = norm(feet[i]);
                 assert!(found <= nearest + 1e-9, "{name} {u:?}: {found} {nearest}");
             }

@@ -41,7 +41,7 @@ struct Birth {
 
 /// Two components that merge, or one whose sublattice of translations grows.
 struct Event {
-    pieces: [u32; 2],
+    components: [u32; 2],
     shift: Int3,
     level: f64,
     exact: bool,
@@ -124,7 +124,7 @@ impl Sweep<'_> {
         })
     }
 
-    /// The critical point near `start`, seen as one of the amount about `node`.
+    /// The critical point near `start`, with the sign of the amount about `node`.
     fn critical(&self, node: u32, start: Vec3) -> Option<Critical> {
         let c = critical(self.f, start, 1.5 * 3f64.sqrt() / self.grid.n as f64)?;
         let negative = match self.part {
@@ -159,7 +159,7 @@ impl Sweep<'_> {
             nears.clear();
             let near = AROUND.map(self.grid.steps(node));
             if sheet {
-                // An edge stands in the period of its first node.
+                // An edge belongs to the period of its first node.
                 for (k, (behind, wrap)) in near[7..].iter().copied().enumerate() {
                     nears.push((self.grid.edge(node, k), near[k].0, [0; 3]));
                     nears.push((self.grid.edge(behind, k), behind, wrap));
@@ -178,15 +178,15 @@ impl Sweep<'_> {
                 });
             }
             for &(element, towards, wrap) in &nears {
-                let (pieces, shift) = match forest.join(node, element, wrap) {
+                let (components, shift) = match forest.join(node, element, wrap) {
                     Joined::Same => continue,
-                    Joined::Merged { pieces: [_, young], .. } if young == node => continue,
-                    Joined::Merged { pieces, shift } => (pieces, shift),
-                    Joined::Loop { piece, shift } => ([piece; 2], shift),
+                    Joined::Merged { components: [_, young], .. } if young == node => continue,
+                    Joined::Merged { components, shift } => (components, shift),
+                    Joined::Loop { component, shift } => ([component; 2], shift),
                 };
                 let level = self.refine(node, &[towards], 1);
                 let (level, exact) = (level.unwrap_or(self.amounts[node as usize]), level.is_some());
-                events.push(Event { pieces, shift, level, exact });
+                events.push(Event { components, shift, level, exact });
             }
         }
         (births, events)
@@ -254,21 +254,21 @@ impl Sweep<'_> {
         let extreme = |c: &Critical| amount(self.part, c.level) - least <= self.grid.error;
         let h = 1.0 / self.grid.n as f64;
         let mut found = distinct(lines.into_iter().filter(extreme).collect(), 1.8 * h);
-        let mut asked: Vec<_> = distinct(saddles, 0.2 * h)
+        let mut queries: Vec<_> = distinct(saddles, 0.2 * h)
             .into_iter()
             .filter_map(|c| {
                 let level = amount(self.part, c.level);
                 let ends = [1.0, -1.0].map(|side| self.descend(&c, side * h, level - back));
-                // A side may end in a hollow less deep than that.
+                // A descent may end in a minimum less deep than that.
                 let hollow = ends.iter().fold(level - back, |m, (node, _)| m.max(self.amounts[*node as usize]));
                 let limit = hollow + 1e-9 * back;
                 (limit < level).then_some((limit, ends, c))
             })
             .collect();
-        asked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        queries.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut forest = Forest::new(self.order.len());
         let mut grown = 0;
-        for (limit, [(a, v), (b, w)], saddle) in asked {
+        for (limit, [(a, v), (b, w)], saddle) in queries {
             while let Some(&node) = self.order.get(grown).filter(|i| self.amounts[**i as usize] < limit) {
                 grown += 1;
                 forest.insert(node);
@@ -343,22 +343,22 @@ fn replay(births: Vec<Birth>, mut events: Vec<Event>, full: f64, error: f64, ran
         return Vec::new();
     };
     for e in events.iter_mut().filter(|e| !e.exact) {
-        // On a line of extreme values a piece meets its neighbours where it appears, whatever the samples say.
-        let born = e.pieces.map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
+        // On a line of extreme values a component merges with its neighbours at the level where it appears.
+        let born = e.components.map(|p| index(p).map_or(f64::INFINITY, |i| births[i].level));
         let born = born[0].max(born[1]);
         if e.level - born <= error {
             (e.level, e.exact) = (born, true);
         }
     }
     events.sort_by(|a, b| a.level.total_cmp(&b.level));
-    // Spans in which a second piece lives.
+    // Intervals of the level in which there is a second component.
     let mut spans = Vec::new();
     let mut whole = forest.translations(eldest as u32).is_full().then_some(births[eldest].level);
     for e in &events {
-        let (Some(a), Some(b)) = (index(e.pieces[0]), index(e.pieces[1])) else {
+        let (Some(a), Some(b)) = (index(e.components[0]), index(e.components[1])) else {
             continue;
         };
-        if let Joined::Merged { pieces: [_, young], .. } = forest.join(a as u32, b as u32, e.shift) {
+        if let Joined::Merged { components: [_, young], .. } = forest.join(a as u32, b as u32, e.shift) {
             let born = &births[young as usize];
             let noise = if born.exact && e.exact { 1e-6 * range } else { error };
             if e.level - born.level > noise {

@@ -9,7 +9,7 @@ use multiversion::multiversion;
 use geometry::cubic_spline::{Boundary, coefficients, slopes, weights};
 use geometry::math::{Interval, Mat3, Vec3, apply, norm, transpose};
 
-/// Nodes that a knot interval sees beyond its own.
+/// Coefficients per axis, besides that of its own node, on which the spline in a knot interval depends.
 const PAD: usize = 3;
 /// Points handled at once; the compiler turns each loop over them into vector instructions.
 const LANES: usize = 8;
@@ -76,7 +76,7 @@ impl Spline {
         let layer = |k: usize| {
             (0..nx * ny).fold(0.0f64, |most, i| {
                 let mut block = self.block([i % nx, i / nx, k]);
-                // The coefficients' own differences span more, but are at hand: most intervals need no other look.
+                // The coefficients' own differences span more, but are at hand: most intervals need no other bound.
                 if longest(differences(&block, 1.0)) <= most {
                     return most;
                 }
@@ -101,7 +101,7 @@ impl Spline {
         let steps = [1, self.stride[0], self.stride[1]];
         let value = |at: usize| f64::from(self.padded[at]);
         let mean = |[i, j, k]: [usize; 3]| {
-            // Coefficient m stands at entry m + 1, between its neighbours.
+            // Coefficient m is entry m + 1, between its neighbours.
             let at = self.entry(core::array::from_fn(|a| [i, j, k][a] + 1));
             (0..3).fold(value(at), |sum, a| {
                 let bend = value(at - steps[a]) - 2.0 * value(at) + value(at + steps[a]);
@@ -158,7 +158,7 @@ impl Spline {
         }
     }
 
-    /// The entry of the first of the coefficients that count at `u`, and the place in the knot interval.
+    /// The entry of the first of the coefficients that count at `u`, and the position in the knot interval (0 to 1).
     #[inline]
     fn interval(&self, u: Vec3) -> (usize, Vec3) {
         let mut at = [0; 3];
@@ -213,7 +213,7 @@ fn along(row: &[f32], w: &[f64; 4]) -> f64 {
     (c(0) * w[0] + c(1) * w[1]) + (c(2) * w[2] + c(3) * w[3])
 }
 
-/// A row along x sees the same y and z throughout: the spline becomes one of x alone.
+/// On a row along x, y and z are constant: the spline becomes one of x alone.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn fill_straight(spline: &Spline, base: Vec3, along: f64, xs: &[f64], out: &mut [f32]) {
     let [line, plane] = spline.stride;
@@ -270,9 +270,9 @@ fn fill_row(spline: &Spline, [base, along]: [Vec3; 2], xs: &[f64], out: &mut [f3
             }
         }
         for (l, o) in out.iter_mut().enumerate() {
-            let seen = &spline.padded[first[l] as usize..];
+            let coefficients = &spline.padded[first[l] as usize..];
             let planes = [0, 1, 2, 3].map(|k| {
-                let rows = &seen[k * plane..k * plane + 3 * line + 4];
+                let rows = &coefficients[k * plane..k * plane + 3 * line + 4];
                 let [a, b, c, d] = [0, 1, 2, 3].map(|j| {
                     rows[j * line..].first_chunk::<4>().map_or([0.0; 4], |r| {
                         let f = w[1][j][l];
@@ -309,7 +309,7 @@ mod tests {
         Spline::through(values, n)
     }
 
-    fn places(n: usize) -> Vec<Vec3> {
+    fn positions(n: usize) -> Vec<Vec3> {
         (0..n).map(|i| [0.7549, 0.5698, 0.4302].map(|s| 9.0 * (s * i as f64).fract() - 4.0)).collect()
     }
 
@@ -317,7 +317,7 @@ mod tests {
     fn errors_fall_as_the_fourth_power() {
         let errors = [16, 32].map(|n| {
             let s = spline([n, n + 2, n + 5]);
-            let u = places(500);
+            let u = positions(500);
             let mut v = vec![0.0; u.len()];
             s.values(&u, &mut v);
             u.iter().zip(&v).map(|(u, v)| (wave(*u) - v).abs()).fold(0.0, f64::max)
@@ -330,7 +330,7 @@ mod tests {
     #[test]
     fn values_gradients_and_rows_agree_and_bounds_hold() {
         let s = spline([16, 20, 24]);
-        let u = places(300);
+        let u = positions(300);
         let (mut v, mut w, mut g) = (vec![0.0; 300], vec![0.0; 300], vec![[0.0; 3]; 300]);
         s.values(&u, &mut v);
         s.gradients(&u, &mut w, &mut g);
@@ -370,7 +370,7 @@ mod tests {
         let s = spline([32, 32, 48]);
         let h = 1.0 / 32.0;
         let sinc = |k: f64| (core::f64::consts::PI * k * h).sin() / (core::f64::consts::PI * k * h);
-        let (u, mut v) = (places(100), [0.0]);
+        let (u, mut v) = (positions(100), [0.0]);
         for u in u {
             let want = (TAU * u[0]).sin() * (TAU * u[1]).cos() * sinc(1.0).powi(2)
                 + (TAU * (u[1] + 2.0 * u[2])).cos() * sinc(1.0) * sinc(2.0);

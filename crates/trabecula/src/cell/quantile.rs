@@ -40,7 +40,7 @@ impl Quantile {
         Self::of(&|x, yz, v, g| mean.row(x, yz, v, g), n, series.amplitude())
     }
 
-    /// The distribution of a function on the torus of at most `most` either way. `mean` gives, for rows along x at
+    /// The distribution of a function on the torus with values in [−most, most]. `mean` gives, for rows along x at
     /// some y and z, its means over cubes of edge 1/n about phases, and their gradients.
     pub(super) fn of(mean: Rows, n: usize, most: f64) -> Quantile {
         let h = 1.0 / n as f64;
@@ -54,7 +54,7 @@ impl Quantile {
             let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
             for (k, j) in layers.flat_map(|k| (0..n).map(move |j| (k, j))) {
                 // Every row is shifted along itself by another amount (multiples of plastic-number fractions), so that
-                // cubes do not sample symmetric places alike and the errors of their ramps average out.
+                // cubes do not sample symmetric positions alike and the errors of their ramps average out.
                 let shift = (j as f64 * 0.7548776662466927 + k as f64 * 0.5698402909980532).fract();
                 let x: Vec<f64> = (0..n).map(|i| (i as f64 + shift) * h).collect();
                 let at = [(j as f64 + 0.397) * h, (k as f64 + 0.633) * h];
@@ -184,7 +184,7 @@ fn under_plane(g: &[f64; 3], h: f64, s: f64) -> f64 {
     if s.abs() >= (g[0] + g[1] + g[2]) / 2.0 {
         return if s > 0.0 { 1.0 } else { 0.0 };
     }
-    // A slope of a hundredth of the largest stands for smaller ones: their widths add up in squares.
+    // Slopes below a hundredth of the largest are raised to it: widths add up in squares.
     let [a, b, c] = g.map(|g| g.max(0.01 * largest) / 2.0);
     let cube = |v: f64| v.max(0.0).powi(3);
     let pair = |v: f64| cube(v + c) - cube(v - c);

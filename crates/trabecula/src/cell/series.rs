@@ -40,7 +40,7 @@ impl Series {
     /// Non-finite numbers, indices beyond ±64, or a sum that is constant (it has no surface).
     pub fn new(terms: Vec<Term>) -> Result<Series, Fault> {
         let mut sums: Vec<([i32; 3], f64, f64)> = Vec::new();
-        let mut places = HashMap::new();
+        let mut indices = HashMap::new();
         let mut largest: f64 = 0.0;
         for (i, t) in terms.iter().enumerate() {
             let at = |key: &str| format!("terms[{i}].{key}");
@@ -60,14 +60,14 @@ impl Series {
                 return Err(Fault::new(at("amplitude"), message));
             }
             largest = largest.max(t.amplitude.abs());
-            // cos(−a) = cos(a): one wave vector of each pair stands for both.
+            // cos(−a) = cos(a): one wave vector of each pair represents both.
             let first = t.hkl.iter().find(|h| **h != 0).copied().unwrap_or(1);
             let s = first.signum();
             let hkl = t.hkl.map(|h| h * s);
             let (im, re) = sin_cos_turns(t.phase * f64::from(s));
             let (re, im) = (t.amplitude * re, t.amplitude * im);
-            let place = *places.entry(hkl).or_insert(sums.len());
-            match sums.get_mut(place) {
+            let index = *indices.entry(hkl).or_insert(sums.len());
+            match sums.get_mut(index) {
                 Some(e) => (e.1, e.2) = (e.1 + re, e.2 + im),
                 None => sums.push((hkl, re, im)),
             }
@@ -128,7 +128,7 @@ impl Series {
                 if 2 * i > n { i - n } else { i }
             })
         };
-        // One of each pair of opposite waves stands for both.
+        // One of each pair of opposite waves represents both.
         let mut waves: Vec<(f64, [i32; 3], Complex64)> = (0..all)
             .map(|n| (wave(n), f[n] / all as f64))
             .filter(|(h, _)| h.iter().find(|v| **v != 0).is_none_or(|v| *v > 0))
@@ -246,7 +246,7 @@ impl Series {
 
     /// Values and gradients (per turn) at phases `u` (turns). The three slices have equal length.
     ///
-    /// Every point gets the same arithmetic wherever it stands in the batch, so equal points give equal bits.
+    /// The arithmetic of a point does not depend on its index in the batch, so equal points give equal bits.
     pub fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         evaluate(&self.waves, self.top, u, values, gradients);
     }

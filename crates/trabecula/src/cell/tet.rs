@@ -39,7 +39,7 @@ pub struct TetCell {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Count {
     /// Connected components of the solid.
-    pub pieces: usize,
+    pub components: usize,
     /// Connected components of its trace on one face (ports).
     pub ports: usize,
 }
@@ -63,15 +63,15 @@ impl TetCell {
         }
         let m = if dual { -1.0 } else { 1.0 } * edge * 2f64.sqrt() / 4.0;
         let ends = [[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]];
-        let stencil = TetCell {
+        let cell = TetCell {
             series,
             corners: ends.map(|e| add(site, scale(e, m))),
             volume: OnceLock::new(),
             connect: Default::default(),
         };
-        let defect = stencil.asymmetry();
+        let defect = cell.asymmetry();
         // Phases of some turns are accurate to 1e-15 of their size, and f has the Lipschitz bound Σ amplitude · 2π|h|.
-        if defect > 1e-9 * stencil.series.amplitude() {
+        if defect > 1e-9 * cell.series.amplitude() {
             let [x, y, z] = site.map(number);
             let message = format!(
                 "the function has not the full symmetry of a tetrahedron about ({x}, {y}, {z}): values at equivalent points \
@@ -79,7 +79,7 @@ impl TetCell {
             );
             return Err(Fault::new("site", message));
         }
-        Ok(stencil)
+        Ok(cell)
     }
 
     /// The same cell shifted by a constant: its surface f = 0 is the surface f = `level` of this one.
@@ -172,14 +172,14 @@ impl TetCell {
         fraction::of_face(self, part, iso)
     }
 
-    fn pieces(&self, part: Part) -> &component_counts::ComponentCounts {
+    fn component_counts(&self, part: Part) -> &component_counts::ComponentCounts {
         self.connect[part as usize].get_or_init(|| component_counts::ComponentCounts::new(self, part))
     }
 
     /// The intervals of the level in which the solid is connected and reaches all four faces: there the lattice is
     /// connected on any mesh whose tetrahedra are connected by faces. Found on a subdivision of 48 steps per edge.
     pub fn connected(&self, part: Part) -> &[[f64; 2]] {
-        self.pieces(part).whole()
+        self.component_counts(part).whole()
     }
 
     /// The same by solid fraction.
@@ -192,7 +192,7 @@ impl TetCell {
 
     /// Connected components of the solid and of its trace on a face at level `iso`.
     pub fn count(&self, part: Part, iso: f64) -> Count {
-        self.pieces(part).count(iso)
+        self.component_counts(part).count(iso)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The thinnest place of the periodic solid: walls of sheets, necks of networks, in millimetres.
+//! The least thickness (mm) of the periodic solid: of walls of sheets, of necks of networks.
 //!
 //! Phases relate to space by u = M x; a direction d in space is M d in phase, and ∇ₓf = Mᵀ ∇ᵤf.
 
@@ -10,7 +10,7 @@ use geometry::math::{Mat3, Vec3, add, apply, dot, norm, scale, spectral_norm, su
 
 /// Samples of the mid-surface along each axis of the torus.
 const SAMPLES: usize = 24;
-/// Directions in which a surface is first looked for about a point.
+/// Rays from a point along which the surface is first searched.
 const DIRECTIONS: usize = 256;
 
 /// Minimum wall thickness (mm) of the sheet |f| ≤ `iso`, where u = `to_phase` · x.
@@ -93,14 +93,14 @@ fn thickness_at(f: Function, u: Vec3, iso: f64, to_phase: &Mat3, back: &Mat3, sp
 }
 
 /// The least s > 0 (mm) at which `outside`(f(u + s d)) is positive, up to two periods; to about 1e-12 of a period.
-/// Places are tried eight at a time, which a series takes in one go.
+/// The function is evaluated at eight points at once, which is one batch of a series.
 fn first_beyond(f: Function, u: Vec3, d: Vec3, speed: f64, outside: impl Fn(f64) -> f64) -> Option<f64> {
     const STEPS: usize = 192;
     const AT_ONCE: usize = 8;
-    // Which of the places from + step, from + 2 step … is the first outside.
+    // The index of the first of from + step, from + 2 step … that is outside.
     let first = |from: f64, step: f64| {
-        let place = |k: usize| from + (k + 1) as f64 * step;
-        let points: [Vec3; AT_ONCE] = core::array::from_fn(|k| add(u, scale(d, place(k))));
+        let at = |k: usize| from + (k + 1) as f64 * step;
+        let points: [Vec3; AT_ONCE] = core::array::from_fn(|k| add(u, scale(d, at(k))));
         let (mut v, mut g) = ([0.0; AT_ONCE], [[0.0; 3]; AT_ONCE]);
         f(&points, &mut v, &mut g);
         (0..AT_ONCE).find(|k| outside(v[*k]) > 0.0)
@@ -131,7 +131,7 @@ fn across(n: Vec3) -> (Vec3, Vec3) {
 /// least distance from a neck's saddle to the surface f = iso.
 ///
 /// `necks` are those of [`necks`](super::necks): phases and levels. Where every neck is
-/// closed and the pieces are loose it is zero. `None` where the part is empty or full, and for sheets.
+/// closed and the components are disconnected it is zero. `None` where the part is empty or full, and for sheets.
 pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: &Mat3) -> Option<f64> {
     let sign = match part {
         Part::Lower => 1.0,
@@ -140,14 +140,14 @@ pub fn neck(f: Function, part: Part, iso: f64, necks: &[(Vec3, f64)], to_phase: 
     };
     let deep: Vec<Vec3> = necks.iter().filter(|(_, level)| sign * (iso - level) > 0.0).map(|(at, _)| *at).collect();
     if deep.is_empty() {
-        // Every neck is closed: loose pieces, if any.
+        // Every neck is closed: disconnected components, if any.
         return (!extremes(f, sign, iso).is_empty()).then_some(0.0);
     }
     let radii: Vec<f64> = deep.par_iter().filter_map(|u| distance(f, *u, iso, sign, to_phase)).collect();
     radii.into_iter().reduce(f64::min).map(|r| 2.0 * r)
 }
 
-/// The places where sign · f is least, all that a grid resolves, where they are solid at `iso`.
+/// The local minima of sign · f that a grid resolves and that are solid at `iso`.
 fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     let n = 32;
     let points: Vec<Vec3> =
@@ -169,8 +169,8 @@ fn extremes(f: Function, sign: f64, iso: f64) -> Vec<Vec3> {
     let mut found: Vec<Vec3> = Vec::new();
     for i in (0..points.len()).filter(hollow) {
         let at = critical(f, points[i], 2.0 / n as f64).map_or(points[i], |c| c.at);
-        let seen = |p: &Vec3| sub(*p, at).iter().all(|d| (d - d.round()).abs() < 0.5 / n as f64);
-        if sign * (iso - sample(f, at).0) > 0.0 && !found.iter().any(seen) {
+        let known = |p: &Vec3| sub(*p, at).iter().all(|d| (d - d.round()).abs() < 0.5 / n as f64);
+        if sign * (iso - sample(f, at).0) > 0.0 && !found.iter().any(known) {
             found.push(at);
         }
     }

@@ -1,4 +1,4 @@
-//! Data to solid: values are checked, pieces are joined, and what may not be meant is warned of.
+//! Data to solid: values are checked, lattices and regions are combined, and likely mistakes are warned of.
 
 use std::sync::Arc;
 
@@ -33,13 +33,13 @@ impl From<PartSpec> for Part {
     }
 }
 
-/// The region that a design's solid is in.
-pub(super) fn space(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
+/// The region of a design's solid.
+pub(super) fn region_of(d: &Design, loader: &dyn Loader) -> Result<Region, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
     let mut notes = Notes::default();
-    let (space, soup) = given(d, loader, &mut notes)?;
-    let domain = build_tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
-    Ok(domain.map_or(space, |d| d.region))
+    let (region, soup) = given(d, loader, &mut notes)?;
+    let domain = build_tiling::domain(d, &region, soup, loader, &mut notes.warnings)?;
+    Ok(domain.map_or(region, |d| d.region))
 }
 
 /// The region as given; with the tetrahedra that fill it, if it is only known by them.
@@ -49,10 +49,10 @@ fn given(
     notes: &mut Notes,
 ) -> Result<(Region, Option<build_tets::Tets>), DesignError> {
     match environment::region(&d.region, "region", loader, notes) {
-        Ok(space) => Ok((space, None)),
+        Ok(region) => Ok((region, None)),
         Err(why) => {
-            let (made, space) = build_tiling::of_soup(d, loader, why)?;
-            Ok((space, Some(made)))
+            let (made, region) = build_tiling::of_soup(d, loader, why)?;
+            Ok((region, Some(made)))
         }
     }
 }
@@ -61,14 +61,14 @@ fn given(
 pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignError> {
     d.valid().map_err(|f| DesignError::fault("", f))?;
     let mut notes = Notes::default();
-    let (space, soup) = given(d, loader, &mut notes)?;
-    check_bounds(&space)?;
-    let domain = build_tiling::domain(d, &space, soup, loader, &mut notes.warnings)?;
-    let space = domain.as_ref().map_or(space, |d| d.region.clone());
-    let points = sampled(&space, &mut notes.warnings)?;
-    let (filled, skin) = build_skin::filled(d, &space, &points, loader, &mut notes)?;
+    let (region, soup) = given(d, loader, &mut notes)?;
+    check_bounds(&region)?;
+    let domain = build_tiling::domain(d, &region, soup, loader, &mut notes.warnings)?;
+    let region = domain.as_ref().map_or(region, |d| d.region.clone());
+    let points = sampled(&region, &mut notes.warnings)?;
+    let (filled, skin) = build_skin::filled(d, &region, &points, loader, &mut notes)?;
     let Notes { mut warnings, repairs } = notes;
-    let at = |path: String| Environment { path, region: &space, points: &points, filled: &filled, loader };
+    let at = |path: String| Environment { path, region: &region, points: &points, filled: &filled, loader };
 
     let (mut lattices, mut tilings, mut graphs) = (Vec::new(), Vec::new(), Vec::new());
     if let Some(domain) = domain {
@@ -96,15 +96,15 @@ pub(super) fn design(d: &Design, loader: &dyn Loader) -> Result<Built, DesignErr
         Some(made) => made.blend.clone(),
         None => only(&lattices, &tilings, &graphs)?,
     };
-    let mut solid = Solid::new(space.clone(), Some(field), wavelength);
+    let mut solid = Solid::new(region.clone(), Some(field), wavelength);
     solid.transition = blend.as_ref().and_then(|b| b.width);
     let solid = filled.into_iter().fold(solid, Solid::with);
     Ok(Built { solid, lattices, tilings, beams: graphs, blend, skin, warnings, repairs })
 }
 
 /// Refuses a region that is empty, unbounded or too far away.
-fn check_bounds(space: &Region) -> Result<(), DesignError> {
-    let bounds = space.bounds();
+fn check_bounds(region: &Region) -> Result<(), DesignError> {
+    let bounds = region.bounds();
     if bounds.is_empty() {
         return Err(DesignError::new("region", "the region is empty"));
     }
@@ -125,16 +125,16 @@ fn check_bounds(space: &Region) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// Points inside the region, at which numbers that vary are checked. Warns of a size that is none of a part.
-fn sampled(space: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, DesignError> {
-    let size = space.bounds().size();
-    let (mut points, _) = sample::inside(space, sample::COUNT);
+/// Points inside the region, at which numbers that vary are checked. Warns of an implausible size of a part.
+fn sampled(region: &Region, warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, DesignError> {
+    let size = region.bounds().size();
+    let (mut points, _) = sample::inside(region, sample::COUNT);
     if points.is_empty() {
         let [x, y, z] = size.map(number);
         let message = format!("the region is empty: no point inside was found within its bounds, {x} × {y} × {z} mm");
         return Err(DesignError::new("region", message));
     }
-    points.extend(sample::nodes(space));
+    points.extend(sample::nodes(region));
     let largest = size.into_iter().fold(0.0, f64::max);
     if !(0.1..=2000.0).contains(&largest) && !warnings.iter().any(|w| w.message.contains("unit")) {
         let message = format!("the region is {} mm across; is its unit right?", number(largest));
@@ -153,7 +153,7 @@ fn tiled(
     Ok(Tiled { name: domain.name.to_string(), tiling, zones: domain.zones(), mesh: domain.report, explicit, joins })
 }
 
-/// A lattice, with warnings of what may not be meant.
+/// A lattice, with warnings of likely mistakes.
 fn checked_lattice(
     spec: &LatticeSpec,
     d: &Design,
@@ -186,7 +186,7 @@ fn only(
     }
 }
 
-/// What may be named in a blend.
+/// The lattices and beams that a blend may name.
 fn members(
     lattices: &[(String, Arc<Lattice>)],
     tilings: &[Tiled],

@@ -59,11 +59,11 @@ pub(super) fn beams(
         TrimSpec::Drop => Trim::Drop,
         TrimSpec::Snap => Trim::Snap,
     };
-    let space: &dyn Field = &**environment.region;
+    let region: &dyn Field = &**environment.region;
     let slack = ON * norm(environment.region.bounds().size());
-    let trimmed = trim.apply(&mut wire, &|p, out| space.values(p, out), reach, slack, &mut own);
+    let trimmed = trim.apply(&mut wire, &|p, out| region.values(p, out), reach, slack, &mut own);
     check_left(&wire, "trim", environment)?;
-    let held = |p: Vec3| space.value(p) >= -slack;
+    let held = |p: Vec3| region.value(p) >= -slack;
     if trimming.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", environment)?;
@@ -71,7 +71,7 @@ pub(super) fn beams(
     let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
-    let inside = |p: Vec3| space.value(p) <= slack;
+    let inside = |p: Vec3| region.value(p) <= slack;
     let fillets: Vec<(usize, f64)> = (0..quadors.len())
         .into_par_iter()
         .filter(|i| spec.fillet != FilletSpec::None && inside(quadors.center(*i)))
@@ -83,7 +83,7 @@ pub(super) fn beams(
     let mut collisions = quadors.collisions();
     collisions.retain(|c| inside(c.at));
     let truss = Truss {
-        whole: whole(&quadors, space),
+        whole: whole(&quadors, region),
         collisions,
         report: wire.report(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
@@ -149,10 +149,10 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
 /// A frame before it is cleaned and trimmed.
 struct Frame {
     wire: Wireframe,
-    /// Radii that nodes have of their own, NaN where they have none; empty if none has.
+    /// Radii given at nodes (mm), NaN where none is given; empty if there are none.
     own: Vec<f64>,
     wavelength: f64,
-    /// How far from the region a beam may lie and yet have a part in it, mm.
+    /// Greatest distance from the region, mm, of a beam's axis of which a part of the beam may be in the region.
     reach: f64,
 }
 
@@ -229,7 +229,7 @@ pub(super) fn check_open(field: &dyn Field, environment: &Environment) -> Result
             format!("{}.radius", environment.path),
             "the beams are so thick that the region is solid everywhere: nothing is open",
         )),
-        // A few thin beams may be missed by every look.
+        // All samples may miss a few thin beams.
         _ => Ok(()),
     }
 }

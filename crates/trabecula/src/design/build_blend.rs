@@ -1,4 +1,4 @@
-//! Which lattice is where: data to [`Blend`].
+//! Blends: data to [`Blend`], lattices with a weight each.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ impl BlendSpec {
         }
     }
 
-    /// Its weights, by the paths at which they stand.
+    /// Its weights, by their paths in the design.
     fn weights(&self) -> Vec<(String, &GradeSpec)> {
         match &self.lattices {
             BlendKind::Between(b) => vec![("blend.weight".into(), &b.weight)],
@@ -40,9 +40,9 @@ impl BlendSpec {
     }
 }
 
-/// What may be named in a blend.
+/// A lattice or beams that a blend may name.
 pub(super) struct Member {
-    /// Where it stands in the design: `lattice` or `beams`.
+    /// Its table in the design: `lattice` or `beams`.
     pub table: &'static str,
     /// Its name there.
     pub name: String,
@@ -58,13 +58,13 @@ pub struct Blended {
     pub names: Vec<String>,
     /// The radial basis functions among its weights.
     pub functions: Vec<Functions>,
-    /// How wide the narrowest transition is, mm: the inverse of the steepest weight where two lattices count the same.
+    /// Width of the narrowest transition, mm: the inverse of the steepest weight where two lattices have the same weight.
     pub width: Option<f64>,
 }
 
 /// Radial basis functions in a weight.
 pub struct Functions {
-    /// Where they stand in the design.
+    /// Their path in the design.
     pub path: String,
     /// Number of control points.
     pub points: usize,
@@ -144,7 +144,7 @@ pub(super) fn blend(
     Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
 
-/// Refuses weights that are no number, or none of which counts, at any sample position.
+/// Refuses weights that are not finite, or none of which is positive, at any sample position.
 fn check_weights(weights: &Weights, spec: &BlendSpec, environment: &Environment) -> Result<(), DesignError> {
     let paths = spec.weights();
     let (points, _) = sample::inside(environment.region, 60_000);
@@ -170,7 +170,7 @@ fn check_weights(weights: &Weights, spec: &BlendSpec, environment: &Environment)
     Ok(())
 }
 
-/// Warns of lattices that count nowhere.
+/// Warns of lattices whose weight is zero everywhere.
 fn unused(blend: &Blend, names: &[&str], members: &[Member], environment: &Environment, warnings: &mut Vec<Warning>) {
     let n = names.len();
     let mut w = vec![0.0; n * environment.points.len()];
@@ -184,23 +184,23 @@ fn unused(blend: &Blend, names: &[&str], members: &[Member], environment: &Envir
     }
 }
 
-/// The width of the narrowest transition: 1/|∇w| where two lattices count the same, found by halving the way between
-/// places where different ones count most.
+/// The width of the narrowest transition (mm): 1/|∇w| where two lattices have the same weight, found by bisection between
+/// points at which different ones have the greatest weight.
 fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
-    const WAYS: usize = 400;
+    const PAIRS: usize = 400;
     let n = weights.len();
     let mut w = vec![0.0; n * points.len()];
     weights.values(points, &mut w);
     let first = |w: &[f64]| (0..n).fold(0, |m, i| if w[i] > w[m] { i } else { m });
     let owner: Vec<usize> = w.chunks_exact(n).map(first).collect();
     let mut least: Option<f64> = None;
-    let stride = (points.len() / WAYS).max(1);
+    let stride = (points.len() / PAIRS).max(1);
     let mut own = vec![0.0; n];
     for i in (0..points.len()).step_by(stride) {
-        // The nearest of some places that belong to another.
+        // The nearest of some points at which another has the greatest weight.
         let near = (1..200).map(|k| (i + k * 7) % points.len()).filter(|j| owner[*j] != owner[i]);
-        let way = |j: &usize| norm(sub(points[*j], points[i]));
-        let Some(j) = near.min_by(|a, b| way(a).total_cmp(&way(b))) else {
+        let distance = |j: &usize| norm(sub(points[*j], points[i]));
+        let Some(j) = near.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
             continue;
         };
         let (mut a, mut b) = (points[i], points[j]);

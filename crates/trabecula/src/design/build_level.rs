@@ -1,4 +1,4 @@
-//! How much is solid: data to [`Level`].
+//! Levels, which set how much is solid: data to [`Level`].
 
 use super::data::{AmountSpec, Fit, GradeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
@@ -65,8 +65,8 @@ pub(super) fn level(
     if key == "thickness" {
         check_sheet(part, key, &path(key))?;
     }
-    let asked = spec.amount.asked(path(key), environment);
-    let amount = value.build(&asked)?;
+    let quantity = spec.amount.quantity(path(key), environment);
+    let amount = value.build(&quantity)?;
     if matches!(key, "iso" | "thickness") {
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
@@ -79,7 +79,7 @@ pub(super) fn level(
         return Ok(Level::Iso(amount));
     }
     if key == "thickness" {
-        within_wavelength(&amount, &asked, map.longest())?;
+        within_wavelength(&amount, &quantity, map.longest())?;
         let range = cell.range();
         if range.lo >= 0.0 || range.hi <= 0.0 {
             let message = format!(
@@ -136,8 +136,8 @@ impl AmountSpec {
         v
     }
 
-    /// What it is asked for as; of a porosity the complement is meant.
-    pub(super) fn asked<'a>(&self, path: String, environment: &'a Environment<'a>) -> Quantity<'a> {
+    /// The quantity under the key `amount`; of a porosity the complement is meant.
+    pub(super) fn quantity<'a>(&self, path: String, environment: &'a Environment<'a>) -> Quantity<'a> {
         Quantity {
             complement: self.key() == "porosity",
             ..Quantity::new(path, environment, key_of::<AmountSpec>(self.key()))
@@ -146,8 +146,8 @@ impl AmountSpec {
 }
 
 /// Refuses a wall thicker than the greatest wavelength, mm.
-pub(super) fn within_wavelength(thickness: &Grade, asked: &Quantity, most: f64) -> Result<(), DesignError> {
-    asked.check(thickness, |v, position| {
+pub(super) fn within_wavelength(thickness: &Grade, quantity: &Quantity, most: f64) -> Result<(), DesignError> {
+    quantity.check(thickness, |v, position| {
         if v <= most {
             return Ok(());
         }

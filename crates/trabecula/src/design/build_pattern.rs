@@ -101,7 +101,7 @@ pub(super) fn report(laid: &PatternField, built: &Built, sampled: &dyn core::ops
     let found = laid.collisions().ok().flatten();
     let clear = found.is_none_or(|c| c.count == 0);
     let volume = clear.then(|| laid.volume().ok()).flatten();
-    // Of what was not looked for, nothing is sure.
+    // Intersections are known only if they were searched for.
     let whole = found.is_some() && inside(laid, built);
     let (fraction, fraction_exact) = share(volume, whole, built, sampled);
     BeamsReport {

@@ -1,4 +1,4 @@
-//! What is solid whatever the lattice says: data to skin and keep zones.
+//! Skin and keep zones, which are solid for any lattice: data to solids.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use crate::skin::skin;
 use geometry::fault::number;
 use geometry::math::Vec3;
 
-/// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `space`.
+/// The skin and the keep zones, and the least thickness of the skin. `points` are inside the region `region`.
 pub(super) fn filled(
     d: &Design,
-    space: &Region,
+    region: &Region,
     points: &[Vec3],
     loader: &dyn Loader,
     notes: &mut crate::region::Notes,
@@ -26,7 +26,7 @@ pub(super) fn filled(
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
-        let environment = Environment { path: "skin".into(), region: space, points, filled: &[], loader };
+        let environment = Environment { path: "skin".into(), region, points, filled: &[], loader };
         let (body, least) = grown(spec, &environment)?;
         filled.push(body);
         thinnest = Some(least);
@@ -34,12 +34,12 @@ pub(super) fn filled(
     for (name, spec) in &d.keep.0 {
         let path = format!("keep.{name}");
         let zone = environment::region(spec, &path, loader, notes)?;
-        check_zone(&zone, space, points, &path)?;
+        check_zone(&zone, region, points, &path)?;
         let mut surfaces = Vec::new();
         let tree = zone.surfaces(0.0, &mut surfaces);
         filled.push(CsgSolid { surfaces, tree });
     }
-    if filled.len() > 1 && !is_open(&filled, space, points) {
+    if filled.len() > 1 && !is_open(&filled, region, points) {
         let (path, what) = if d.skin.is_some() {
             ("skin", "the skin and the keep zones")
         } else {
@@ -51,8 +51,8 @@ pub(super) fn filled(
     Ok((filled, thinnest))
 }
 
-/// Whether any of many points in the region is left to the lattice.
-fn is_open(filled: &[CsgSolid], space: &Region, points: &[Vec3]) -> bool {
+/// Whether any sample point of the region is outside the skin and the keep zones.
+fn is_open(filled: &[CsgSolid], region: &Region, points: &[Vec3]) -> bool {
     let open = |points: &[Vec3]| {
         let (mut least, mut v) = (vec![f64::INFINITY; points.len()], vec![0.0; points.len()]);
         for body in filled {
@@ -61,16 +61,16 @@ fn is_open(filled: &[CsgSolid], space: &Region, points: &[Vec3]) -> bool {
         }
         least.iter().any(|v| *v > 0.0)
     };
-    // Too few looks for a small hollow: look closer before saying so.
-    open(points) || open(&sample::inside(space, 50 * sample::COUNT).0)
+    // Too few samples for a small cavity: sampled more finely before a warning.
+    open(points) || open(&sample::inside(region, 50 * sample::COUNT).0)
 }
 
 /// The skin and its least thickness.
 fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), DesignError> {
-    let Environment { region: space, points, .. } = *environment;
+    let Environment { region, points, .. } = *environment;
     let path = "skin.thickness";
     let thickness = spec.thickness.build(&Quantity::new(path, environment, key_of::<SkinSpec>("thickness")))?;
-    let bounds = space.bounds();
+    let bounds = region.bounds();
     let open = spec.open.iter().enumerate().map(|(i, o)| match o {
         OpenSpec::Plane(h) => environment::half_space(h, &format!("skin.open[{i}]")),
         OpenSpec::Side(side) => {
@@ -82,13 +82,13 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
         }
     });
     let open = open.collect::<Result<Vec<HalfSpace>, DesignError>>()?;
-    let body = skin(space, &thickness, &open).map_err(|f| DesignError::fault("skin", f))?;
+    let body = skin(region, &thickness, &open).map_err(|f| DesignError::fault("skin", f))?;
     let mut widths = vec![0.0; points.len()];
     thickness.values(points, &mut widths);
     let width = Varied::of(&widths);
-    if !is_open(std::slice::from_ref(&body), space, points) {
+    if !is_open(std::slice::from_ref(&body), region, points) {
         let mut depth = vec![0.0; points.len()];
-        space.values(points, &mut depth);
+        region.values(points, &mut depth);
         let deepest = depth.iter().fold(0.0f64, |m, d| m.max(-d));
         let message = format!(
             "a skin of {} mm is thicker than the region: the part would be solid. Its deepest point is {deepest:.4} mm \
@@ -100,8 +100,8 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
     Ok((body, width.min))
 }
 
-/// Refuses a zone that has nothing of the region or all of it.
-fn check_zone(zone: &Region, space: &Region, points: &[Vec3], path: &str) -> Result<(), DesignError> {
+/// Refuses a zone that is disjoint from the region or contains all of it.
+fn check_zone(zone: &Region, region: &Region, points: &[Vec3], path: &str) -> Result<(), DesignError> {
     let mut distance = vec![0.0; points.len()];
     zone.values(points, &mut distance);
     if distance.iter().all(|d| *d <= 0.0) {
@@ -111,9 +111,9 @@ fn check_zone(zone: &Region, space: &Region, points: &[Vec3], path: &str) -> Res
     if distance.iter().any(|d| *d < 0.0) {
         return Ok(());
     }
-    let both = Intersection::new(vec![space.clone(), zone.clone()]);
+    let both = Intersection::new(vec![region.clone(), zone.clone()]);
     let both: Region = Arc::new(both.map_err(|f| DesignError::fault(path, f))?);
-    let (b, r) = (zone.bounds(), space.bounds());
+    let (b, r) = (zone.bounds(), region.bounds());
     if b.is_empty() {
         return Err(DesignError::new(path, "it is empty"));
     }

@@ -1,4 +1,4 @@
-//! Tetrahedral meshes: made or read, checked, and judged before anything is made of them.
+//! Tetrahedral meshes: made or read, checked, and assessed before a lattice is built on them.
 
 mod source;
 
@@ -17,9 +17,9 @@ use source::{from_file, surface, triangles, wild};
 /// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
 /// short by flat ones, which takes much of a coarse mesh but nothing deep.
 const LOST: f64 = 0.02;
-/// What is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
+/// Depth above which a loss is deep, in sizes: a chord of two sizes over an arc of radius three leaves out a sixth of a size.
 const DEEP: f64 = 0.17;
-/// The share that is warned of however shallow.
+/// The share that is warned of at any depth.
 const MUCH: f64 = 0.1;
 
 /// A tetrahedral mesh of a region, and its report.
@@ -29,14 +29,14 @@ pub struct Tets {
     pub mesh: TetMesh,
     /// Its figures.
     pub report: TetReport,
-    /// What may not be meant.
+    /// Warnings of likely mistakes.
     pub warnings: Vec<Warning>,
 }
 
 /// The figures of a tetrahedral mesh.
 #[derive(Clone, Debug)]
 pub struct TetReport {
-    /// What made it: background, ftetwild, or the file's name.
+    /// Its source: background, ftetwild, or the file's name.
     pub mesher: String,
     /// Shapes and sizes.
     pub quality: Quality,
@@ -64,21 +64,21 @@ impl Tets {
             spec.check(&Key::NONE).map_err(|f| DesignError::fault(&path, f))?;
             let region_spec = region_of(node)?;
             let mut notes = crate::region::Notes::default();
-            let space = match environment::region(&region_spec, "region", loader, &mut notes) {
-                Ok(space) => space,
+            let region = match environment::region(&region_spec, "region", loader, &mut notes) {
+                Ok(region) => region,
                 Err(why) => return of_soup(&spec, &region_spec, &path, loader, why),
             };
-            let bounds = space.bounds();
+            let bounds = region.bounds();
             if !bounds.is_empty() && !bounds.is_finite() {
                 let message = "the region has no end; intersect it with a box or another bounded region";
                 return Err(DesignError::new("region", message));
             }
-            let (mut points, _) = sample::inside(&space, sample::COUNT);
+            let (mut points, _) = sample::inside(&region, sample::COUNT);
             if bounds.is_empty() || points.is_empty() {
                 return Err(DesignError::new("region", "the region is empty"));
             }
-            points.extend(sample::nodes(&space));
-            let environment = Environment { path, region: &space, points: &points, filled: &[], loader };
+            points.extend(sample::nodes(&region));
+            let environment = Environment { path, region: &region, points: &points, filled: &[], loader };
             let mut made = tets(&spec, &region_spec, &environment)?;
             made.warnings.splice(0..0, notes.warnings);
             Ok(made)
@@ -136,10 +136,10 @@ fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), De
     Err(DesignError::new("lattice", message))
 }
 
-/// The tetrahedral mesh that `spec` asks for; `environment.path` is that of its table.
-pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
+/// The tetrahedral mesh of `spec`; `environment.path` is that of its table.
+pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&environment.path, f);
-    // Points that lie on the surface tell nothing of what is lost.
+    // Points on the surface are no evidence of lost volume.
     let inside: Vec<Vec3> = {
         let mut values = vec![0.0; environment.points.len()];
         environment.region.values(environment.points, &mut values);
@@ -160,7 +160,7 @@ pub(super) fn tets(spec: &TetsSpec, space: &RegionKind, environment: &Environmen
                         "ftetwild takes one size for the whole part; give a number, or mesher = \"background\"";
                     return Err(DesignError::new(below("size"), message));
                 };
-                let surface = surface(space, environment, size)?;
+                let surface = surface(region, environment, size)?;
                 let (mesh, checked) = wild(made, &surface, size, &environment.path, environment.loader)?;
                 (mesh, None, checked, "ftetwild".to_string())
             }
@@ -241,12 +241,12 @@ fn checked_mesh(
 /// region then.
 pub(super) fn of_soup(
     spec: &TetsSpec,
-    space: &RegionKind,
+    region: &RegionKind,
     path: &str,
     loader: &dyn Loader,
     why: DesignError,
 ) -> Result<Tets, DesignError> {
-    let (TetsSpec::Made(made), RegionKind::Mesh(file)) = (spec, space) else {
+    let (TetsSpec::Made(made), RegionKind::Mesh(file)) = (spec, region) else {
         return Err(why);
     };
     let Ok(surface) = triangles(file, loader) else {
@@ -273,7 +273,7 @@ pub(super) fn of_soup(
     Ok(made)
 }
 
-/// What may not be meant.
+/// Warnings of likely mistakes.
 fn warnings(report: &TetReport, checked: &Checked, path: &str, todo: &str) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut say = |message: String| {

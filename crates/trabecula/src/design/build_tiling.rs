@@ -1,4 +1,4 @@
-//! Lattices over tetrahedral meshes: data to [`Tiling`], and what is to be said of one.
+//! Lattices over tetrahedral meshes: data to [`Tiling`], with checks and warnings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub(super) struct Domain<'a> {
     cell: &'a TetCellSpec,
     joined: Joined,
     map: Arc<Tets>,
-    /// What is known of the mesh.
+    /// The report on the mesh.
     pub report: TetReport,
     /// The mesh's own boundary.
     pub region: Region,
@@ -82,7 +82,7 @@ fn enclosed(boundary: Mesh, path: &str) -> Result<Region, DesignError> {
 /// The mesh of a design that has one; `soup` is what was made of triangles that are no region.
 pub(super) fn domain<'a>(
     d: &'a Design,
-    space: &Region,
+    region: &Region,
     soup: Option<build_tets::Tets>,
     loader: &dyn Loader,
     warnings: &mut Vec<Warning>,
@@ -120,11 +120,11 @@ pub(super) fn domain<'a>(
         TetsSpec::File(f) => f.joined,
     };
     let (made, filled) = match soup {
-        Some(made) => (made, Some(space.clone())),
+        Some(made) => (made, Some(region.clone())),
         None => {
-            let (mut points, _) = sample::inside(space, sample::COUNT);
-            points.extend(sample::nodes(space));
-            let environment = Environment { path: path.clone(), region: space, points: &points, filled: &[], loader };
+            let (mut points, _) = sample::inside(region, sample::COUNT);
+            points.extend(sample::nodes(region));
+            let environment = Environment { path: path.clone(), region, points: &points, filled: &[], loader };
             (build_tets::tets(spec_of_mesh, &d.region, &environment)?, None)
         }
     };
@@ -202,7 +202,7 @@ pub(super) fn lattice(
 ) -> Result<Made, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let at = below("cell.tet");
-    let mut stencil = match domain.cell {
+    let mut cell = match domain.cell {
         TetCellSpec::Zones(zones) => return zoned(domain, &zones.zones, environment, warnings),
         TetCellSpec::Ready(of) => ready_cell(&of.name, &at)?,
         TetCellSpec::Series(of) => series_cell(of, &at)?,
@@ -218,7 +218,7 @@ pub(super) fn lattice(
     }
     let mid = spec.mid;
     if mid != 0.0 {
-        stencil = about(stencil, mid, part, &format!("{path}.mid"))?;
+        cell = about(cell, mid, part, &format!("{path}.mid"))?;
     }
     let key = spec.amount.key();
     let path = format!("{path}.{key}");
@@ -231,17 +231,17 @@ pub(super) fn lattice(
         }
         AmountSpec::Thickness(_) => Amount::Thickness,
     };
-    let asked = spec.amount.asked(path.clone(), environment);
-    let grade = spec.amount.grade().build(&asked)?;
+    let quantity = spec.amount.quantity(path.clone(), environment);
+    let grade = spec.amount.grade().build(&quantity)?;
     if amount == Amount::Thickness {
-        within_wavelength(&grade, &asked, domain.map.mean_edge())?;
+        within_wavelength(&grade, &quantity, domain.map.mean_edge())?;
     }
-    let values = at_nodes(&grade, &asked, &domain.map)?;
-    if amount == Amount::Thickness && stencil.iso(Part::Sheet, 0.5) <= 0.0 {
+    let values = at_nodes(&grade, &quantity, &domain.map)?;
+    if amount == Amount::Thickness && cell.iso(Part::Sheet, 0.5) <= 0.0 {
         return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
     }
-    let level = Level::of(&domain.map, &stencil, part, amount, values);
-    let tiling = Tiling::new(domain.map.clone(), Arc::new(stencil), part, level);
+    let level = Level::of(&domain.map, &cell, part, amount, values);
+    let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level);
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
     Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, environment), joins: None })
@@ -284,19 +284,19 @@ fn zoned(
         let message = format!("no tetrahedron of the mesh is of zone {zone}; its zones are {}", listed.join(", "));
         return Err(DesignError::new(format!("{at}.{zone}"), message));
     }
-    let asked = amount.asked(path.clone(), environment);
-    let values = at_nodes(&value.build(&asked)?, &asked, map)?;
+    let quantity = amount.quantity(path.clone(), environment);
+    let values = at_nodes(&value.build(&quantity)?, &quantity, map)?;
     let names: BTreeSet<&TetCellName> = zones.values().collect();
     let (lo, hi) = values.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let (mut cells, mut zoned) = (Vec::new(), Zoned::new());
     for name in names {
-        let stencil = Arc::new(ready_cell(name, &at)?);
-        let range = stencil.range();
+        let cell = Arc::new(ready_cell(name, &at)?);
+        let range = cell.range();
         let of = found.iter().filter(|z| zones[z] == *name);
-        zoned.extend(of.map(|z| (*z, stencil.clone())));
-        apart(&stencil, part, [lo, hi], &path, warnings);
+        zoned.extend(of.map(|z| (*z, cell.clone())));
+        apart(&cell, part, [lo, hi], &path, warnings);
         let weights = map.shares(|zone| zones[&zone] == *name);
-        cells.push(Share { stencil, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
+        cells.push(Share { cell, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
     }
     let level = Level::mixed(map, &cells, part, &values);
     let tiling = Tiling::of(map.clone(), cells, part, level);
@@ -310,11 +310,11 @@ fn zoned(
 }
 
 /// The cell about another mid-surface.
-fn about(stencil: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, DesignError> {
+fn about(cell: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, DesignError> {
     if part != Part::Sheet {
         return Err(DesignError::new(path, "mid goes with part = \"sheet\""));
     }
-    let range = stencil.range();
+    let range = cell.range();
     if !(range.lo < mid && mid < range.hi) {
         let message = format!(
             "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
@@ -322,20 +322,20 @@ fn about(stencil: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, 
         );
         return Err(DesignError::new(path, message).found(mid.to_string()));
     }
-    stencil.about(mid).map_err(|f| DesignError::fault(path, f))
+    cell.about(mid).map_err(|f| DesignError::fault(path, f))
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.
-fn at_nodes(grade: &Grade, asked: &Quantity, map: &Tets) -> Result<Vec<f64>, DesignError> {
+fn at_nodes(grade: &Grade, quantity: &Quantity, map: &Tets) -> Result<Vec<f64>, DesignError> {
     if let Some(v) = grade.constant() {
         return Ok(vec![v]);
     }
     let mut values = vec![0.0; map.nodes().len()];
     grade.values(map.nodes(), &mut values);
     for (v, [x, y, z]) in values.iter().zip(map.nodes()) {
-        let own = if asked.complement { 1.0 - v } else { *v };
-        let admitted = asked.key.admit_at(own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"));
-        admitted.map_err(|f| DesignError::fault(&asked.path, f))?;
+        let own = if quantity.complement { 1.0 - v } else { *v };
+        let admitted = quantity.key.admit_at(own, &format!(" at ({x:.4}, {y:.4}, {z:.4}) mm"));
+        admitted.map_err(|f| DesignError::fault(&quantity.path, f))?;
     }
     Ok(values)
 }
@@ -351,8 +351,8 @@ fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
             format!("the half-level of a sheet, |f| ≤ t, goes down to {:.4}; it must be above 0 everywhere", levels.lo);
         return Err(DesignError::new(path, message));
     }
-    let stencil = &tiling.cells[0].stencil;
-    let shares = [levels.lo, levels.hi].map(|t| stencil.fraction(tiling.part, t));
+    let cell = &tiling.cells[0].cell;
+    let shares = [levels.lo, levels.hi].map(|t| cell.fraction(tiling.part, t));
     let what = if shares.iter().all(|s| *s <= 0.0) {
         "empty: nothing is solid"
     } else if shares.iter().all(|s| *s >= 1.0) {
@@ -360,7 +360,7 @@ fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
     } else {
         return Ok(());
     };
-    let range = stencil.range();
+    let range = cell.range();
     let message = format!(
         "the lattice leaves the part {what}; the level t is {}, the cell's values run from {:.4} to {:.4} in the tetrahedron",
         Varied { min: levels.lo, max: levels.hi },
@@ -370,14 +370,14 @@ fn check(tiling: &Tiling, path: &str) -> Result<(), DesignError> {
     Err(DesignError::new(path, message))
 }
 
-/// Warns of levels at which the cell falls apart, and of walls that are far from the thickness asked for.
+/// Warns of levels at which the cell is disconnected, and of the range of wall thicknesses.
 fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
-    let stencil = &tiling.cells[0].stencil;
+    let cell = &tiling.cells[0].cell;
     let part = tiling.part;
     let levels = tiling.levels();
-    let share = |t: f64| stencil.fraction(part, t);
+    let share = |t: f64| cell.fraction(part, t);
     let fraction = Varied::of(&[share(levels.lo), share(levels.hi)]);
-    apart(stencil, part, [fraction.min, fraction.max], path, warnings);
+    apart(cell, part, [fraction.min, fraction.max], path, warnings);
     if path.ends_with("thickness")
         && let Some(s) = tiling.thickness()
     {
@@ -390,12 +390,12 @@ fn warn(tiling: &Tiling, path: &str, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Warns of fractions at which a cell falls apart.
-fn apart(stencil: &TetCell, part: Part, [min, max]: [f64; 2], path: &str, warnings: &mut Vec<Warning>) {
+/// Warns of fractions at which a cell is disconnected.
+fn apart(cell: &TetCell, part: Part, [min, max]: [f64; 2], path: &str, warnings: &mut Vec<Warning>) {
     let fraction = Varied { min, max };
-    let whole = stencil.connected_fraction(part);
+    let whole = cell.connected_fraction(part);
     if !gaps([min, max], &whole).is_empty() {
-        let count = stencil.count(part, stencil.iso(part, 0.5 * (min + max)));
+        let count = cell.count(part, cell.iso(part, 0.5 * (min + max)));
         let texts: Vec<String> = whole.iter().map(|&[min, max]| Varied { min, max }.to_string()).collect();
         let limit = match texts.len() {
             0 => "at no fraction is it one piece that reaches all faces".to_string(),
@@ -403,7 +403,7 @@ fn apart(stencil: &TetCell, part: Part, [min, max]: [f64; 2], path: &str, warnin
         };
         let message = format!(
             "at solid fraction {fraction} the tetrahedral cell is in {} with {} on each face, so the lattice may fall apart; {limit}",
-            geometry::fault::counted(count.pieces, "piece"),
+            geometry::fault::counted(count.components, "piece"),
             geometry::fault::counted(count.ports, "port"),
         );
         warnings.push(Warning { path: path.to_string(), message });

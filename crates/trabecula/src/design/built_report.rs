@@ -1,4 +1,4 @@
-//! What a design is, in numbers, without meshing it.
+//! The report on a design, without meshing it.
 
 use std::cell::LazyCell;
 
@@ -140,7 +140,7 @@ fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
     }
 }
 
-/// How the phases of a blend go together, in a word.
+/// The relation of the phases of a blend, in a word.
 fn phases(phases: Phases) -> &'static str {
     match phases {
         Phases::Locked => "locked",
@@ -204,29 +204,29 @@ fn tiled(it: &Tiled) -> LatticeReport {
         tets: None,
     };
     if !it.zones.is_empty() {
-        // Cells of zones have no level in common, and between them no fraction that they were asked for.
+        // Cells of zones have no level in common, and transitions between them no target fraction.
         let zones = it.zones.iter().map(|(zone, cell)| {
             let (count, volume, solid) = sums(Some(*zone));
             (zone.to_string(), ZoneReport { cell: cell.clone(), count, volume, solid_fraction: solid / volume })
         });
         let tets = TilingReport {
             zones: Some(zones.collect()),
-            pieces: it.joins.as_ref().map(Joins::pieces),
+            pieces: it.joins.as_ref().map(Joins::components),
             joins: it.joins.as_ref().map(Joins::report),
             ..mesh
         };
         return LatticeReport { tets: Some(tets), ..lattice };
     }
-    let stencil = &tiling.cells[0].stencil;
+    let cell = &tiling.cells[0].cell;
     let levels = tiling.levels();
     let iso = Varied { min: levels.lo, max: levels.hi };
-    let share = iso.map(|t| stencil.fraction(part, t));
+    let share = iso.map(|t| cell.fraction(part, t));
     let spread = tiling.thickness();
     let tets = TilingReport {
         pieces: it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
         thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
-        ports: Some(stencil.count(part, 0.5 * (levels.lo + levels.hi)).ports),
-        face_fraction: Some(iso.map(|t| stencil.face_fraction(part, t)).varying()),
+        ports: Some(cell.count(part, 0.5 * (levels.lo + levels.hi)).ports),
+        face_fraction: Some(iso.map(|t| cell.face_fraction(part, t)).varying()),
         creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max }),
         ..mesh
     };
@@ -235,7 +235,7 @@ fn tiled(it: &Tiled) -> LatticeReport {
         fraction: share.varying(),
         porosity: share.map(|f| 1.0 - f).varying(),
         thickness: spread.map(|s| Varying::Range([s.min, s.max])),
-        connected_fraction: stencil.connected_fraction(part),
+        connected_fraction: cell.connected_fraction(part),
         tets: Some(tets),
         ..lattice
     }
@@ -288,7 +288,7 @@ fn thickness(lattice: &Lattice, iso: Varied) -> Option<Varying> {
     (!found.is_empty()).then(|| Varied::of(&found).varying())
 }
 
-/// How far a solved map is from what was asked for.
+/// Deviation of a solved map from its target.
 fn distortion(d: &Distortion) -> DistortionReport {
     let spread = |s: &Spread| MapSpread { mean: s.mean, p95: s.p95, max: s.max };
     DistortionReport {

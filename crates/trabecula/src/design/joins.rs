@@ -1,4 +1,4 @@
-//! Whether the cells of different zones join, predicted without a surface.
+//! Connectivity of a lattice whose zones have different cells, predicted without making the surface.
 
 use std::collections::BTreeMap;
 
@@ -11,14 +11,14 @@ use crate::tiling::{self, Connectivity, Tiling, ZonePair};
 /// Steps along the edge of a face on which ports are sampled.
 const STEPS: usize = 96;
 
-/// What hangs together, and for every two zones with faces in common the share of a face that is solid in both cells.
+/// Connectivity, and for every two zones with common faces the fraction of a face that is solid in both cells.
 #[derive(Clone, Debug)]
 pub struct Joins {
     connectivity: Connectivity,
     shares: Vec<f64>,
 }
 
-/// What hangs together in a lattice of zones whose cells are made at this fraction.
+/// The connectivity of a lattice of zones whose cells have this solid fraction.
 pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joins> {
     let connectivity = tiling::connectivity(tiling)?;
     let share = |zones: [u32; 2]| {
@@ -32,7 +32,7 @@ pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joi
 /// The share of a face that is solid in both of two cells at the same fraction, by points evenly on it.
 fn common(a: &TetCell, b: &TetCell, part: Part, fraction: f64) -> Option<f64> {
     let n = STEPS as f64;
-    // The middles of small triangles that point one way, and the others.
+    // The centroids of the small triangles of both orientations.
     let at = |i: usize, j: usize, third: f64| -> Bary {
         let [x, y] = [i, j].map(|v| (v as f64 + third) / n);
         [x, y, 1.0 - x - y, 0.0]
@@ -56,7 +56,7 @@ fn common(a: &TetCell, b: &TetCell, part: Part, fraction: f64) -> Option<f64> {
 }
 
 impl Joins {
-    /// Warns of zones that do not join, or of a lattice in pieces although they do.
+    /// Warns of zones that are not connected, or of a lattice that is disconnected although they are.
     pub(super) fn warn(&self, names: &BTreeMap<u32, String>, path: &str, warnings: &mut Vec<Warning>) {
         let mut say = |message: String| {
             warnings.push(Warning { path: path.to_string(), message });
@@ -82,12 +82,12 @@ impl Joins {
         }
     }
 
-    /// Pieces of the whole.
-    pub(super) fn pieces(&self) -> usize {
+    /// Number of connected components of the lattice.
+    pub(super) fn components(&self) -> usize {
         self.connectivity.components
     }
 
-    /// For the report.
+    /// The record for the report.
     pub(super) fn report(&self) -> Vec<ZoneJoin> {
         let one = |(j, ports): (&ZonePair, &f64)| ZoneJoin {
             zones: j.zones,

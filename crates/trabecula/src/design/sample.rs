@@ -1,4 +1,4 @@
-//! Points inside a region, always the same ones.
+//! Points inside a region, by a deterministic low-discrepancy sequence (Halton).
 
 use crate::region::Region;
 use geometry::math::{Aabb, Vec3};
@@ -7,7 +7,7 @@ use geometry::math::{Aabb, Vec3};
 pub(super) const COUNT: usize = 8_000;
 
 /// About `count` points inside the region, spread evenly: Halton's sequence in bases 2, 3 and 5 over the bounds, which
-/// keeps step with no lattice, unlike a grid. Fewer come where the region is a tiny share of its bounds. Also the
+/// is in phase with no lattice, unlike a grid. Fewer come where the region is a tiny share of its bounds. Also the
 /// share of the bounds that is inside.
 pub(super) fn inside(region: &Region, count: usize) -> (Vec<Vec3>, f64) {
     let bounds = region.bounds();
@@ -48,7 +48,7 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
     while i < from + tries {
         let n = BATCH.min(from + tries - i);
         points.clear();
-        points.extend((i..i + n).map(|i| place(bounds, i)));
+        points.extend((i..i + n).map(|i| halton(bounds, i)));
         region.values(&points, &mut values[..n]);
         kept.extend(points.iter().zip(&values).filter(|(_, v)| **v < 0.0).map(|(p, _)| *p));
         i += n;
@@ -56,8 +56,8 @@ fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3
     kept
 }
 
-/// Point `i` of the sequence in the box.
-fn place(b: &Aabb, i: usize) -> Vec3 {
+/// Point `i` of Halton's sequence in the box.
+fn halton(b: &Aabb, i: usize) -> Vec3 {
     let size = b.size();
     core::array::from_fn(|a| b.min[a] + size[a] * mirrored(i + 1, [2, 3, 5][a]))
 }
@@ -82,7 +82,7 @@ mod tests {
         let b = Aabb { min: [-1.0, 0.0, 2.0], max: [1.0, 3.0, 6.0] };
         let mut counts = [0usize; 64];
         for i in 0..64_000 {
-            let p = place(&b, i);
+            let p = halton(&b, i);
             let k: [usize; 3] = core::array::from_fn(|a| ((p[a] - b.min[a]) / b.size()[a] * 4.0) as usize);
             counts[k[0] + 4 * k[1] + 16 * k[2]] += 1;
         }

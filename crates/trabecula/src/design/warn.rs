@@ -1,4 +1,4 @@
-//! What a lattice in a region is refused for, and warned of.
+//! Refusals and warnings of a lattice in a region.
 
 use super::built_report::Varied;
 use super::data::*;
@@ -13,7 +13,7 @@ use geometry::fault::number;
 
 /// A turn within one cell (degrees) above which it is warned of: cells are torn out of shape.
 const TURN: f64 = 45.0;
-/// The share of places and axes with spacings outside 1/1.5 to 1.5 above which it is warned of.
+/// The fraction of nodes and axes with spacings outside 1/1.5 to 1.5 above which there is a warning.
 const OUTSIDE: f64 = 0.05;
 /// The share of a cell in a file that may be left out before it is warned of.
 const TRUNCATED: f64 = 0.25;
@@ -33,7 +33,7 @@ pub(super) fn check(lattice: &Lattice, environment: &Environment, spec: &Lattice
     if solid > 0 && solid < values.len() {
         return Ok(());
     }
-    // Too few looks for a sparse lattice or a thin gap: look closer before refusing.
+    // Too few samples for a sparse lattice or a thin gap: sampled more finely before refusing.
     let (points, _) = sample::inside(environment.region, 50 * sample::COUNT);
     let mut values = vec![0.0; points.len()];
     lattice.values(&points, &mut values);
@@ -68,7 +68,7 @@ pub(super) fn check(lattice: &Lattice, environment: &Environment, spec: &Lattice
     Err(DesignError::new(path, message))
 }
 
-/// What the ascending intervals `of` leave of [min, max].
+/// The parts of [min, max] outside the ascending intervals `of`.
 pub(super) fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut left = Vec::new();
     let mut from = min;
@@ -90,7 +90,7 @@ fn figure(v: f64) -> String {
     if (1e-2..1e6).contains(&v) { format!("{v:.4}") } else { format!("{v:.2e}") }
 }
 
-/// Warns of what may not be meant.
+/// Warns of likely mistakes.
 pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeSpec, warnings: &mut Vec<Warning>) {
     let path = &environment.path;
     let fraction = Varied::of_fraction(lattice, environment.points);
@@ -105,12 +105,12 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
             [] => "it is in one piece at no fraction".to_string(),
             some => format!("it is in one piece at fractions {}", ranges(some)),
         };
-        let environment = if broken == [[fraction.min, fraction.max]] {
+        let subject = if broken == [[fraction.min, fraction.max]] {
             format!("at solid fraction {fraction}")
         } else {
             format!("the solid fraction is {fraction} over the region, and at {}", ranges(&broken))
         };
-        let message = format!("{environment} the periodic solid is not one piece in space; {limit}");
+        let message = format!("{subject} the periodic solid is not one piece in space; {limit}");
         warnings.push(Warning { path: format!("{}.level.{}", path, spec.level.amount.key()), message });
     }
     if let Some(share) = lattice.cell.truncation().filter(|s| *s > TRUNCATED) {
@@ -166,7 +166,7 @@ pub(super) fn warn(lattice: &Lattice, environment: &Environment, spec: &LatticeS
     }
 }
 
-/// Warns of a map that is far from what was asked for.
+/// Warns of a map that deviates far from its target.
 pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mut Vec<Warning>) {
     let Some(phase) = map.solved() else { return };
     let d = phase.distortion();

@@ -67,14 +67,14 @@ impl Tiling {
 
     /// ∂f/∂λ of the first three coordinates at points where f = t on the face on which the fourth is zero.
     fn trace(&self, t: f64) -> Vec<[f64; 3]> {
-        let stencil = &self.cells[0].stencil;
+        let cell = &self.cells[0].cell;
         let n = STEPS;
-        let place = |a: usize, b: usize| -> Bary {
+        let bary = |a: usize, b: usize| -> Bary {
             let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
             [k[0], k[1], k[2], 0.0]
         };
-        let at: Vec<Bary> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
-        let v = stencil.values(&at);
+        let at: Vec<Bary> = (0..=n).flat_map(|a| (0..=a).map(move |b| bary(a, b))).collect();
+        let v = cell.values(&at);
         let mut found: Vec<Bary> = Vec::new();
         Subdivision { n }.each_triangle(|c, up| {
             let c = c.map(|[a, b]| a * (a + 1) / 2 + b);
@@ -88,7 +88,7 @@ impl Tiling {
             }
         });
         let (mut v, mut g) = (vec![0.0; found.len()], vec![[0.0; 4]; found.len()]);
-        stencil.gradients(&found, &mut v, &mut g);
+        cell.gradients(&found, &mut v, &mut g);
         g.into_iter().map(|g| [g[0], g[1], g[2]]).collect()
     }
 }

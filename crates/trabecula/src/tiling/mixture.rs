@@ -1,4 +1,4 @@
-//! Tetrahedra in which cells pass into one another: how much of them is solid, and the levels at which it is as asked.
+//! Transition tetrahedra between cells: their solid fraction, and the levels at which it meets the target.
 //!
 //! Where weights vary, what is solid follows from no cell's own table. It is summed over small tetrahedra on which f − t is
 //! taken as linear, in two sizes of them, which together are of fourth order (Richardson).
@@ -12,12 +12,12 @@ use crate::map::Tets;
 
 /// Steps along the edge of the tetrahedron, coarse and fine.
 const STEPS: [usize; 2] = [16, 32];
-/// A level has settled when the fraction about every node is as near as this to the one asked for.
+/// A level has settled when the fraction about every node is within this of the target.
 const NEAR: f64 = 1e-3;
 /// The most times that levels are moved.
 const ROUNDS: usize = 12;
 /// How far apart the shares at the corners of a tetrahedron of one cell may be for the cell's own table to serve: f is not
-/// independent of the place, so the table is off by some of the square of this.
+/// independent of the position, so the table is off by some of the square of this.
 const ALIKE: f64 = 0.05;
 /// A small change of the level; values run over two.
 const NUDGE: f64 = 0.01;
@@ -42,7 +42,7 @@ impl Size {
         let mut tets = Vec::with_capacity(n.pow(3));
         grid.each_tet(|at, _| tets.push(at.map(|[i, j, k]| Subdivision::index(i, j, k) as u32)));
         let values = |c: &Share| {
-            let values = Nodes::new(&c.stencil, grid).values;
+            let values = Nodes::new(&c.cell, grid).values;
             values.into_iter().map(|v| v / c.scale).collect()
         };
         Size {
@@ -109,17 +109,17 @@ pub(super) fn only(weights: &[[f64; 4]]) -> Option<usize> {
 }
 
 impl Level {
-    /// The levels at which several cells hold fractions that are asked for at the nodes, one or one for each. A node of one
+    /// The levels at which several cells have the target fractions at the nodes, one or one for each. A node of one
     /// cell has that cell's level. Where cells meet, levels of nodes are moved until the tetrahedra about each, taken
-    /// together, are as full as asked: the mean of the cells' levels alone would lose some of it, since a sum of two
+    /// together, meet the target: the mean of the cells' levels alone would lose some of it, since a sum of two
     /// functions has other values than either.
-    pub fn mixed(map: &Tets, cells: &[Share], part: Part, asked: &[f64]) -> Level {
-        let asked = |n: u32| asked[(n as usize).min(asked.len() - 1)];
+    pub fn mixed(map: &Tets, cells: &[Share], part: Part, target: &[f64]) -> Level {
+        let target = |n: u32| target[(n as usize).min(target.len() - 1)];
         let weight = |c: &Share, n: u32| c.weights.as_ref().map_or(1.0, |w| w[n as usize]);
         let start = |n: u32| {
             let of = |c: &Share| match weight(c, n) {
                 0.0 => 0.0,
-                w => w * c.stencil.iso(part, asked(n)) / c.scale,
+                w => w * c.cell.iso(part, target(n)) / c.scale,
             };
             cells.iter().map(of).sum::<f64>()
         };
@@ -131,20 +131,20 @@ impl Level {
         let tets: Vec<usize> = (0..map.len()).filter(moves).collect();
         let mixture = Mixture::new(cells, part);
         for _ in 0..ROUNDS {
-            // For each tetrahedron what it lacks, how much a common move of its free nodes adds, and its volume, mm³; each of
+            // For each tetrahedron its deficit, how much a common move of its free nodes adds, and its volume, mm³; each of
             // these nodes has an equal part, so that nothing lacks in all when none does.
-            let look = |t: &usize| {
+            let deficit = |t: &usize| {
                 let ids = map.tet(*t);
                 let weights = weights(map, cells, *t);
                 let at = ids.map(|n| levels[n as usize]);
                 let moved = core::array::from_fn(|i| at[i] + if free[ids[i] as usize] { NUDGE } else { 0.0 });
                 let [now, then] = [at, moved].map(|l| mixture.share(&weights, l));
-                let wanted = ids.iter().map(|n| asked(*n)).sum::<f64>() / 4.0;
+                let wanted = ids.iter().map(|n| target(*n)).sum::<f64>() / 4.0;
                 let count = ids.iter().filter(|n| free[**n as usize]).count();
                 let v = map.volume(*t) / count as f64;
                 [v * (wanted - now), v * (then - now) / NUDGE, v]
             };
-            let found: Vec<[f64; 3]> = tets.par_iter().map(look).collect();
+            let found: Vec<[f64; 3]> = tets.par_iter().map(deficit).collect();
             let mut about = vec![[0.0; 3]; levels.len()];
             for (t, f) in tets.iter().zip(&found) {
                 for n in map.tet(*t) {
@@ -175,7 +175,7 @@ impl Tiling {
     /// are alike; else by small tetrahedra.
     pub fn shares(&self) -> Vec<f64> {
         if let (Level::Same(t), [c]) = (&self.level, &self.cells[..]) {
-            return vec![c.stencil.fraction(self.part, t * c.scale); self.map.len()];
+            return vec![c.cell.fraction(self.part, t * c.scale); self.map.len()];
         }
         let mixture = Mixture::new(&self.cells, self.part);
         let share = |t: usize| {
@@ -184,7 +184,7 @@ impl Tiling {
             let levels = core::array::from_fn(|i| self.level_at(t, corner(i)));
             let alike = only(&weights).and_then(|one| {
                 let c = &self.cells[one];
-                let fraction = |t: f64| c.stencil.fraction(self.part, t * c.scale);
+                let fraction = |t: f64| c.cell.fraction(self.part, t * c.scale);
                 let ends: [f64; 4] = levels.map(fraction);
                 let (lo, hi) = ends.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
                 // Corners and the middle: exact for what is quadratic in the level.

@@ -1,4 +1,4 @@
-//! The level of a lattice over a tetrahedral mesh, from what is asked for.
+//! The level of a lattice over a tetrahedral mesh, from an iso, a fraction or a wall thickness.
 
 use std::sync::Arc;
 
@@ -40,8 +40,8 @@ pub struct Spread {
 }
 
 /// Points of the mid-surface f = 0 and ∂f/∂λ there.
-fn middle(stencil: &TetCell) -> Vec<(Bary, Bary)> {
-    let nodes = Nodes::new(stencil, Subdivision { n: STEPS });
+fn middle(cell: &TetCell) -> Vec<(Bary, Bary)> {
+    let nodes = Nodes::new(cell, Subdivision { n: STEPS });
     let mut edges = Vec::new();
     nodes.grid.each_tet(|at, _| {
         let i = at.map(|[i, j, k]| Subdivision::index(i, j, k));
@@ -61,7 +61,7 @@ fn middle(stencil: &TetCell) -> Vec<(Bary, Bary)> {
     };
     let at: Vec<Bary> = edges.iter().filter_map(cross).collect();
     let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
-    stencil.gradients(&at, &mut v, &mut g);
+    cell.gradients(&at, &mut v, &mut g);
     at.into_iter().zip(g).collect()
 }
 
@@ -76,11 +76,11 @@ impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
     /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in each tetrahedron, and
     /// a node has the mean of the tetrahedra about it.
-    pub fn of(map: &Tets, stencil: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
+    pub fn of(map: &Tets, cell: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
             Amount::Iso => v,
-            Amount::Fraction => stencil.iso(part, v),
+            Amount::Fraction => cell.iso(part, v),
             Amount::Thickness => 0.5 * v,
         };
         if one && amount != Amount::Thickness {
@@ -89,7 +89,7 @@ impl Level {
         let mut values = if one { vec![values[0]; map.nodes().len()] } else { values };
         values.par_iter_mut().for_each(|v| *v = level(*v));
         if amount == Amount::Thickness {
-            let at = middle(stencil);
+            let at = middle(cell);
             let mean = |t: usize| {
                 let sum: f64 = at.iter().map(|(_, g)| steepness(map, t, g)).sum();
                 sum / at.len() as f64
@@ -115,11 +115,11 @@ impl Tiling {
     /// parts, for transitions, and where there is no mid-surface.
     pub fn thickness(&self) -> Option<Spread> {
         let [cell] = &self.cells[..] else { return None };
-        let at = middle(&cell.stencil);
+        let at = middle(&cell.cell);
         if self.part != Part::Sheet || at.is_empty() {
             return None;
         }
-        // Some hundred thousand looks are enough for a spread.
+        // Some hundred thousand samples are enough for a spread.
         let step = (self.map.len() * at.len()).div_ceil(2_000_000);
         let tets = (0..self.map.len()).into_par_iter().step_by(step);
         let mut all: Vec<f64> = tets

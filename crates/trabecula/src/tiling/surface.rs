@@ -102,7 +102,7 @@ fn steps(tets: &Tets, edge: f64) -> Result<usize, Fault> {
         let areas = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
             .map(|[i, j, k]| norm(cross(sub(c[j], c[i]), sub(c[k], c[i]))) / 2.0);
         let height = 3.0 * tets.volume(t) / areas.iter().fold(0.0f64, |m, a| m.max(*a));
-        // Half a unit in the last place along each axis, for both of two points, and as much again to be safe.
+        // Half an ulp along each axis, for both of two points, and as much again to be safe.
         let rounding = 4.0 * 3f64.sqrt() * largest * f64::from(f32::EPSILON) / 2.0;
         let apart = MARGIN * height / n as f64;
         if apart < rounding {
@@ -128,7 +128,7 @@ impl<'a> Work<'a> {
         component_links::manifold(&tiling.map)?;
         let template = Template::new(grid);
         let cells = tiling.cells.iter().map(|c| {
-            let mut nodes = Nodes::new(&c.stencil, grid);
+            let mut nodes = Nodes::new(&c.cell, grid);
             let slopes = template.edges.iter().map(|[a, b]| {
                 let (a, b) = (*a as usize, *b as usize);
                 [nodes.slope(a, b) / c.scale, -nodes.slope(b, a) / c.scale]
@@ -153,7 +153,7 @@ impl<'a> Work<'a> {
         (0..4).fold(0, |m, i| m | u8::from(across[i] == NONE) << i)
     }
 
-    fn piece(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
+    fn tet_surface(&self, t: usize, scratch: &mut Scratch) -> TetSurfaceRef<'_> {
         let mask = self.mask(t);
         let (nodes, values, slopes) = &self.cells[0];
         let cut = |core: &Core, scratch: &mut Scratch| {
@@ -214,30 +214,30 @@ impl<'a> Work<'a> {
             records: Vec::new(),
             positions: Vec::new(),
         };
-        let mut places: Vec<Vec3> = Vec::new();
+        let mut vertices: Vec<Vec3> = Vec::new();
         for t in range {
-            let piece = self.piece(t, scratch);
+            let surface = self.tet_surface(t, scratch);
             let corners = self.tiling.map.corners(t);
-            places.clear();
-            places.extend(piece.vertices.iter().map(|l| {
+            vertices.clear();
+            vertices.extend(surface.vertices.iter().map(|l| {
                 let ab = add(scale(corners[0], l[0]), scale(corners[1], l[1]));
                 add(add(ab, scale(corners[2], l[2])), scale(corners[3], l[3]))
             }));
             let first = out.totals.len();
-            out.totals.resize(first + piece.solid_of.len(), Totals::ZERO);
-            for (v, p) in places.iter().enumerate() {
-                let total = &mut out.totals[first + piece.component[v] as usize];
+            out.totals.resize(first + surface.solid_of.len(), Totals::ZERO);
+            for (v, p) in vertices.iter().enumerate() {
+                let total = &mut out.totals[first + surface.component[v] as usize];
                 total.bounds = total.bounds.with(*p);
             }
             if stl {
-                out.records.reserve(piece.triangles.len() * stl::RECORD);
+                out.records.reserve(surface.triangles.len() * stl::RECORD);
             }
             let flipped = self.tiling.map.flipped(t);
-            let mut next = piece.triangles.iter();
-            for (component, count) in piece.triangle_counts.iter().enumerate() {
+            let mut next = surface.triangles.iter();
+            for (component, count) in surface.triangle_counts.iter().enumerate() {
                 let total = &mut out.totals[first + component];
                 for (v, cap) in next.by_ref().take(*count as usize) {
-                    let [a, b, c] = turned(*v, flipped).map(|v| places[v as usize]);
+                    let [a, b, c] = turned(*v, flipped).map(|v| vertices[v as usize]);
                     let n = cross(sub(b, a), sub(c, a));
                     total.triangles += 1;
                     total.volume += dot(sub(a, self.middle), n) / 6.0;
@@ -249,9 +249,9 @@ impl<'a> Work<'a> {
                 }
             }
             if !stl {
-                out.positions.extend_from_slice(&places);
+                out.positions.extend_from_slice(&vertices);
             }
-            out.surfaces.push(piece);
+            out.surfaces.push(surface);
         }
         out
     }
@@ -312,19 +312,19 @@ impl SurfaceMaker for TilingSurface<'_> {
             (SurfaceMesh::default(), ComponentLinks::default(), SharedVertices::default());
         work.each(progress, false, |start, chunk| {
             let (mut totals, mut positions) = (&chunk.totals[..], &chunk.positions[..]);
-            for (t, piece) in (start..).zip(&chunk.surfaces) {
-                let (mine, rest) = positions.split_at(piece.vertices.len());
+            for (t, surface) in (start..).zip(&chunk.surfaces) {
+                let (mine, rest) = positions.split_at(surface.vertices.len());
                 positions = rest;
                 let ids = self.0.map.tet(t);
-                let numbers = shared.numbers(ids, piece, mine, &mut out.mesh.vertices)?;
+                let numbers = shared.numbers(ids, surface, mine, &mut out.mesh.vertices)?;
                 let flipped = self.0.map.flipped(t);
-                for (v, cap) in &piece.triangles {
+                for (v, cap) in &surface.triangles {
                     out.mesh.triangles.push(turned(*v, flipped).map(|v| numbers[v as usize]));
                     out.cut.push(*cap);
                 }
-                let (of, rest) = totals.split_at(piece.solid_of.len());
+                let (of, rest) = totals.split_at(surface.solid_of.len());
                 totals = rest;
-                links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+                links.add(&self.0.map, t, work.mask(t), surface, of).map_err(Stopped::Refused)?;
             }
             Ok(())
         })?;
@@ -344,10 +344,10 @@ impl SurfaceMaker for TilingSurface<'_> {
             triangles += (chunk.records.len() / stl::RECORD) as u64;
             surface_maker::check_count(triangles)?;
             let mut totals = &chunk.totals[..];
-            for (t, piece) in (start..).zip(&chunk.surfaces) {
-                let (of, rest) = totals.split_at(piece.solid_of.len());
+            for (t, surface) in (start..).zip(&chunk.surfaces) {
+                let (of, rest) = totals.split_at(surface.solid_of.len());
                 totals = rest;
-                links.add(&self.0.map, t, work.mask(t), piece, of).map_err(Stopped::Refused)?;
+                links.add(&self.0.map, t, work.mask(t), surface, of).map_err(Stopped::Refused)?;
             }
             stream.write(&chunk.records)
         })?;
@@ -365,7 +365,7 @@ impl SurfaceMaker for TilingSurface<'_> {
         let mut scratch = Scratch::default();
         let (mut count, mut sampled) = (0.0, 0.0);
         for t in (step / 2..total).step_by(step) {
-            count += work.piece(t, &mut scratch).triangles.len() as f64;
+            count += work.tet_surface(t, &mut scratch).triangles.len() as f64;
             sampled += 1.0;
         }
         let triangles = count * total as f64 / sampled;

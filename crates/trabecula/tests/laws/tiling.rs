@@ -85,8 +85,8 @@ fn plain(group: &str, hkl: [i32; 3], site: f64, edge: f64, dual: bool) -> Arc<Te
     let waves = Group::named(group).expect(group).orbit(hkl, Side::Re).expect(group);
     let terms = waves.into_iter().map(|(hkl, c, s)| Term { hkl, amplitude: c.hypot(s), phase: (-s).atan2(c) / TAU });
     let series = Series::new(terms.collect()).expect(group);
-    let stencil = TetCell::new(series, [site; 3], edge * 2f64.sqrt(), dual);
-    Arc::new(stencil.expect(group))
+    let cell = TetCell::new(series, [site; 3], edge * 2f64.sqrt(), dual);
+    Arc::new(cell.expect(group))
 }
 
 #[test]
@@ -308,7 +308,7 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
     let of = |zone: u32| {
         let s = cell(names[zone as usize]).0;
         let range = s.range();
-        Share { stencil: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
+        Share { cell: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
     };
     let cells = vec![of(0), of(1)];
     let level = Level::mixed(&map, &cells, part, &[fraction]);
@@ -359,7 +359,7 @@ fn zones_hold_their_fraction_and_fit() {
     let of = |name: &str, zone: u32| {
         let s = cell(name).0;
         let range = s.range();
-        Share { stencil: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
+        Share { cell: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
     };
     for (a, b, part) in
         [("diamond", "primitive", Part::Lower), ("iwp", "diamond", Part::Upper), ("frd", "iwp", Part::Sheet)]

@@ -1,6 +1,6 @@
 //! Union-find with offsets: connected components of a periodic graph, and the lattice translations of their closed paths.
 //!
-//! Each element stores the period in which it stands relative to its parent; path halving adds these offsets. An edge between two
+//! Each element stores its period relative to its parent; path halving adds these offsets. An edge between two
 //! elements of one tree closes a path whose translation is the edge's period plus the difference of their offsets: it is added to
 //! the component's sublattice. A component keeps the index of its eldest element (the elder rule of persistent homology).
 
@@ -23,14 +23,14 @@ pub(super) enum Joined {
     /// A component became connected with a translate of itself that was none of its translations.
     Loop {
         /// Its eldest element.
-        piece: u32,
+        component: u32,
         /// The translation (periods).
         shift: Int3,
     },
     /// Two components became one.
     Merged {
         /// Their eldest elements, the elder first, which stays that of the union.
-        pieces: [u32; 2],
+        components: [u32; 2],
         /// The period of the second relative to the first.
         shift: Int3,
     },
@@ -122,13 +122,13 @@ impl Forest {
         let gap = minus(plus(ga, wrap), gb);
         if ra == rb {
             let grew = self.translations[ra as usize].insert(gap);
-            let piece = self.elder[ra as usize];
-            return if grew { Joined::Loop { piece, shift: gap } } else { Joined::Same };
+            let component = self.elder[ra as usize];
+            return if grew { Joined::Loop { component, shift: gap } } else { Joined::Same };
         }
         let (ea, eb) = (self.elder[ra as usize], self.elder[rb as usize]);
         let shift = minus(plus(gap, self.find(eb).1), self.find(ea).1);
         let back = |v| minus([0; 3], v);
-        let (keep, lose, gap, pieces, shift) = if self.rank[ea as usize] < self.rank[eb as usize] {
+        let (keep, lose, gap, components, shift) = if self.rank[ea as usize] < self.rank[eb as usize] {
             (ra, rb, gap, [ea, eb], shift)
         } else {
             (rb, ra, back(gap), [eb, ea], back(shift))
@@ -137,7 +137,7 @@ impl Forest {
         self.translations[keep as usize].absorb(&translations);
         self.parent[lose as usize] = keep;
         self.shift[lose as usize] = gap;
-        Joined::Merged { pieces, shift }
+        Joined::Merged { components, shift }
     }
 }
 
@@ -151,10 +151,10 @@ mod tests {
         let mut f = Forest::new(4);
         (0..4).for_each(|i| f.insert(i));
         for i in 0..3 {
-            assert!(matches!(f.join(i, i + 1, [0; 3]), Joined::Merged { pieces: [0, _], .. }));
+            assert!(matches!(f.join(i, i + 1, [0; 3]), Joined::Merged { components: [0, _], .. }));
         }
         assert!(f.together(0, 3, [0; 3]) && !f.together(0, 3, [1, 0, 0]));
-        assert!(matches!(f.join(3, 0, [1, 0, 0]), Joined::Loop { piece: 0, shift: [1, 0, 0] }));
+        assert!(matches!(f.join(3, 0, [1, 0, 0]), Joined::Loop { component: 0, shift: [1, 0, 0] }));
         assert!(f.together(0, 3, [-5, 0, 0]) && !f.together(0, 3, [0, 1, 0]));
         assert!(matches!(f.join(2, 1, [2, 0, 0]), Joined::Same));
     }
@@ -167,8 +167,8 @@ mod tests {
         f.join(3, 2, [0, 1, 0]);
         // 1 meets 3 across z: 0 at the origin, 1 at x, 3 at x + z, 2 at x + y + z.
         match f.join(1, 3, [0, 0, 1]) {
-            Joined::Merged { pieces, shift } => assert_eq!((pieces, shift), ([2, 0], [-1, -1, -1])),
-            _ => panic!("two pieces become one"),
+            Joined::Merged { components, shift } => assert_eq!((components, shift), ([2, 0], [-1, -1, -1])),
+            _ => panic!("two components become one"),
         }
         assert!(f.together(0, 2, [1, 1, 1]) && f.together(2, 0, [-1, -1, -1]));
     }

@@ -102,7 +102,7 @@ fn thresholds_of_the_named_surfaces() {
 }
 
 #[test]
-fn sheets_are_one_piece_however_thin() {
+fn sheets_are_connected_at_any_thickness() {
     let all: [(Plain, f64); 6] =
         [(primitive, 3.0), (gyroid, 1.5), (diamond, 2f64.sqrt()), (iwp, 5.0), (neovius, 13.0), (lidinoid, 1.35)];
     for (f, top) in all {
@@ -117,8 +117,8 @@ fn sheets_are_one_piece_however_thin() {
 }
 
 #[test]
-fn a_sublattice_of_translations_is_not_one_piece() {
-    // Tubes along x alone, and two interpenetrating primitive networks (body-centred), are not one piece.
+fn a_sublattice_of_translations_is_not_connected() {
+    // Tubes along x alone, and two interpenetrating primitive networks (body-centred), are not connected.
     let tubes: Plain = |[_, y, z]| c(y) + c(z);
     let r = connected(&with_gradients(tubes), Part::Lower);
     assert!(r.len() == 1 && r[0][0].abs() < 1e-6, "{:?}", r);

@@ -110,7 +110,7 @@ impl Grid {
         [i % n, i / n % n, i / (n * n)].map(|c| c as f64 / n as f64)
     }
 
-    /// The steps from a node: the node one step on, and the period it stands in.
+    /// The steps from a node: the node one step on, and its period.
     pub(super) fn steps(&self, node: u32) -> impl Fn(Int3) -> (u32, Int3) + use<> {
         let (n, i) = (self.n as i32, node as i32);
         let from = [i % n, i / n % n, i / (n * n)];

@@ -74,8 +74,8 @@ fn at(counts: &[(f64, usize)], depth: f64) -> usize {
 }
 
 impl ComponentCounts {
-    pub fn new(stencil: &TetCell, part: Part) -> ComponentCounts {
-        let nodes = Nodes::new(stencil, Subdivision { n: STEPS });
+    pub fn new(cell: &TetCell, part: Part) -> ComponentCounts {
+        let nodes = Nodes::new(cell, Subdivision { n: STEPS });
         let v = |i: usize| nodes.values[i];
         let mut solid = Sweep::default();
         let mut open = std::collections::HashMap::new();
@@ -112,7 +112,7 @@ impl ComponentCounts {
             }
         });
         let reach = trace.nodes.iter().copied().fold(f64::INFINITY, f64::min);
-        let slack = 1e-10 * stencil.series().amplitude();
+        let slack = 1e-10 * cell.series().amplitude();
         let (solid, trace) = (solid.counts(slack), trace.counts(slack));
         let most = nodes
             .values
@@ -142,6 +142,6 @@ impl ComponentCounts {
 
     pub fn count(&self, iso: f64) -> Count {
         let depth = if self.upper { -iso } else { iso };
-        Count { pieces: at(&self.solid, depth), ports: at(&self.trace, depth) }
+        Count { components: at(&self.solid, depth), ports: at(&self.trace, depth) }
     }
 }

@@ -66,8 +66,8 @@ fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
     let (mut part, mut full) = (vec![0.0; LEVELS + 1], vec![0u32; LEVELS + 2]);
     nodes.grid.each_tet(|at, _| {
         let v = ascending(at.map(|[i, j, k]| nodes.values[Subdivision::index(i, j, k)]));
-        let place = |t: f64| ((t - range.lo) / step).clamp(0.0, LEVELS as f64);
-        let (first, last) = (place(v[0]).floor() as usize, place(v[3]).ceil() as usize);
+        let steps = |t: f64| ((t - range.lo) / step).clamp(0.0, LEVELS as f64);
+        let (first, last) = (steps(v[0]).floor() as usize, steps(v[3]).ceil() as usize);
         for (l, p) in part.iter_mut().enumerate().take(last).skip(first) {
             *p += below_in_tet(v, range.lo + l as f64 * step);
         }
@@ -83,8 +83,8 @@ fn shares(nodes: &Nodes, range: Interval) -> Vec<f64> {
 }
 
 impl Table {
-    pub fn new(stencil: &TetCell) -> Table {
-        let nodes = STEPS.map(|n| Nodes::new(stencil, Subdivision { n }));
+    pub fn new(cell: &TetCell) -> Table {
+        let nodes = STEPS.map(|n| Nodes::new(cell, Subdivision { n }));
         let fine = &nodes[1].values;
         let (lo, hi) = fine.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
         let range = Interval::new(lo, hi);
@@ -150,15 +150,15 @@ impl Table {
 }
 
 /// The solid share of a face.
-pub(super) fn of_face(stencil: &TetCell, part: Part, iso: f64) -> f64 {
+pub(super) fn of_face(cell: &TetCell, part: Part, iso: f64) -> f64 {
     let below = |t: f64| {
         let [coarse, fine] = FACE.map(|n| {
-            let place = |a: usize, b: usize| {
+            let bary = |a: usize, b: usize| {
                 let k = [n - a, a - b, b].map(|v| v as f64 / n as f64);
                 [k[0], k[1], k[2], 0.0]
             };
-            let at: Vec<_> = (0..=n).flat_map(|a| (0..=a).map(move |b| place(a, b))).collect();
-            let v = stencil.values(&at);
+            let at: Vec<_> = (0..=n).flat_map(|a| (0..=a).map(move |b| bary(a, b))).collect();
+            let v = cell.values(&at);
             let mut sum = 0.0;
             Subdivision { n }.each_triangle(|t3, _| {
                 let of = t3.map(|[a, b]| v[a * (a + 1) / 2 + b]);

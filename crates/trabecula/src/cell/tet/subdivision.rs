@@ -1,4 +1,4 @@
-//! The tetrahedron in small steps: Freudenthal's subdivision, and a stencil on it.
+//! Freudenthal's subdivision of the tetrahedron, and a tetrahedral cell sampled on it.
 //!
 //! Nodes are (k_0, k_1, k_2, k_3)/n. The small tetrahedra are those of cubes cut along their diagonals; on each of the four
 //! faces they leave the plain triangular grid, whatever the order of the corners. So two tetrahedra of a mesh that number
@@ -92,7 +92,7 @@ impl Subdivision {
     }
 }
 
-/// A stencil on a subdivision: values at the nodes, and slopes along the edges at both their ends. The same in all bits at
+/// A cell on a subdivision: values at the nodes, and slopes along the edges at both their ends. The same in all bits at
 /// points that differ in the order of their coordinates.
 pub struct Nodes {
     /// The subdivision.
@@ -109,13 +109,13 @@ pub struct Nodes {
 
 impl Nodes {
     /// Evaluates f where coordinates descend, and copies it to the rest.
-    pub fn new(stencil: &TetCell, grid: Subdivision) -> Nodes {
+    pub fn new(cell: &TetCell, grid: Subdivision) -> Nodes {
         let whole = grid.whole();
         let descends = |k: &Whole| k.windows(2).all(|p| p[0] >= p[1]);
         let main: Vec<usize> = (0..whole.len()).filter(|i| descends(&whole[*i])).collect();
         let at: Vec<Bary> = main.iter().map(|i| grid.bary(whole[*i])).collect();
         let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
-        stencil.gradients(&at, &mut v, &mut g);
+        cell.gradients(&at, &mut v, &mut g);
         let sorted: Vec<u32> = whole
             .iter()
             .map(|k| {

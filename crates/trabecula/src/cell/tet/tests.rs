@@ -15,8 +15,8 @@ type Known = (
     Option<[f64; 2]>,
 );
 
-/// Worked cells, computed apart from this program on other subdivisions: group, waves, site, edge/√2, dual, level, pieces and
-/// ports, fractions of volume (2e-5) and face, and the range of the level in which it is one piece (in steps of 0.05).
+/// Worked cells, computed apart from this program on other subdivisions: group, waves, site, edge/√2, dual, level, components and
+/// ports, fractions of volume (2e-5) and face, and the range of the level in which it is connected (in steps of 0.05).
 pub(crate) const KNOWN: [Known; 17] = [
     (
         "T1",
@@ -166,13 +166,13 @@ fn worked_cells_are_met() {
     for k in &KNOWN {
         let s = known(k);
         let (id, part, t) = (k.0, k.4, k.5);
-        let (pieces, ports, volume, face) = k.6;
+        let (components, ports, volume, face) = k.6;
         let (v, f) = (s.fraction(part, t), s.face_fraction(part, t));
         println!("{id} {v:.5} {volume} {f:.5} {face} {:?} {:?}", s.count(part, t), s.connected(part));
         // What is promised of a fraction, and what is known of the figures.
         assert!((v - volume).abs() < 1e-4 + 2e-5, "{id}: volume {v}");
         assert!((f - face).abs() < 1e-4 + 2e-5, "{id}: face {f}");
-        assert_eq!(s.count(part, t), Count { pieces, ports }, "{id}");
+        assert_eq!(s.count(part, t), Count { components, ports }, "{id}");
         let holds = s.connected(part).iter().find(|i| i[0] < t && t <= i[1]);
         match k.7 {
             None => assert!(holds.is_none(), "{id}: {holds:?}"),

@@ -357,7 +357,7 @@ mod tests {
             let holds = |i: &[f64; 2]| i[0] + 0.02 < r.fraction && r.fraction < i[1] - 0.02;
             assert!(whole.iter().any(holds), "{}: {whole:?}", r.name);
             let count = s.count(r.part, s.iso(r.part, r.fraction));
-            assert!(count.pieces == 1 && count.ports > 0, "{}: {count:?}", r.name);
+            assert!(count.components == 1 && count.ports > 0, "{}: {count:?}", r.name);
             groups.insert(Group::named(r.group).expect(r.name).number);
             kinds[usize::from(r.part == Part::Sheet)] += 1;
             assert_eq!(tet_catalogue().iter().filter(|o| o.name == r.name).count(), 1);

@@ -1,4 +1,4 @@
-//! What is to be said of beams: warnings and figures.
+//! Warnings and figures of beams.
 
 use super::whole;
 use crate::design::data::*;
@@ -56,12 +56,12 @@ pub(super) fn warn(
         _ => (truss.quadors.shortfalls().iter()).filter(|s| inside(s.hub)).map(|s| (s.hub, s.radius)).collect(),
     };
     if let Some((hub, radius)) = short.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-        let asked = match spec.fillet {
+        let target = match spec.fillet {
             FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
             _ => "the fillet asked for".into(),
         };
         say(format!(
-            "{} cannot have {asked}, only the largest that fits; the tightest has {radius:.3} mm, at {}",
+            "{} cannot have {target}, only the largest that fits; the tightest has {radius:.3} mm, at {}",
             counted(short.len(), "hub"),
             at(truss.quadors.center(*hub))
         ));
@@ -108,7 +108,7 @@ pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
     }
 }
 
-/// The same of a pattern.
+/// As `held`, for a pattern.
 pub(in crate::design) fn inside(laid: &PatternField, built: &Built) -> bool {
     let region = &*built.solid.region;
     let each = || laid.expand().is_ok_and(|expanded| whole(&expanded, region));
@@ -128,7 +128,7 @@ pub(in crate::design) fn share(
     }
 }
 
-/// The figures of beams; `sampled` is the solid share of the region, by looks at points.
+/// The figures of beams; `sampled` is the solid share of the region, by sampling at points.
 pub(in crate::design) fn report(
     beams: &Beams,
     built: &Built,
@@ -141,7 +141,7 @@ pub(in crate::design) fn report(
     let (frame, graph, quadors) = (&truss.report, &truss.graph, &truss.quadors);
     let radii = graph.hubs.iter().map(|h| h.radius);
     let thin = (0..graph.beams.len()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
-    // Of a part that the region cuts, or whose beams run into each other, there is no closed form.
+    // Of a part that the region cuts, or whose beams intersect, there is no closed form.
     let sum = truss.whole && truss.collisions.is_empty();
     let mass = sum.then(|| quadors.mass().ok()).flatten();
     let volume = mass.map(|m| m.volume);

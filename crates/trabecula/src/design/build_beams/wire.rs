@@ -12,7 +12,7 @@ use ::beams::quador::Pencil;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
 
-/// Refuses beams that no quadric makes, with the place of the first and how many there are.
+/// Refuses beams that have no quadric, with the position of the first and their number.
 pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> {
     let wrong: Vec<(usize, Fault)> = (graph.beams.par_iter().enumerate())
         .filter_map(|(i, b)| {
@@ -30,7 +30,7 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
         1 => String::new(),
         n => format!(" ({} in all)", counted(n, "such beam")),
     };
-    // What stands in the design is the profile, or else the radii.
+    // The design gives the profile, or else the radii.
     let key = match (spec.profile, &spec.hub) {
         (Some(_), _) if fault.at == "profile" => "profile",
         (_, Some(_)) => "hub",
@@ -43,8 +43,8 @@ pub(super) fn check_beams(graph: &Graph, spec: &BeamsSpec) -> Result<(), Fault> 
 
 pub(super) fn radii(spec: &BeamsSpec, environment: &Environment) -> Result<Radii<Grade>, DesignError> {
     let varied = |spec: &Option<GradeSpec>, key: &str| {
-        let asked = Quantity::new(format!("{}.{key}", environment.path), environment, key_of::<BeamsSpec>(key));
-        spec.as_ref().map(|spec| spec.build(&asked)).transpose()
+        let quantity = Quantity::new(format!("{}.{key}", environment.path), environment, key_of::<BeamsSpec>(key));
+        spec.as_ref().map(|spec| spec.build(&quantity)).transpose()
     };
     let profile = spec.profile.map(|p| match p {
         ProfileSpec::Cone => Profile::Cone,
@@ -77,7 +77,7 @@ pub(super) fn mean_length(wire: &Wireframe) -> f64 {
     total / wire.struts.len().max(1) as f64
 }
 
-/// Refuses a frame of which nothing is left.
+/// Refuses an empty frame.
 pub(super) fn check_left(wire: &Wireframe, key: &str, environment: &Environment) -> Result<(), DesignError> {
     if !wire.struts.is_empty() {
         return Ok(());
@@ -96,7 +96,7 @@ pub(super) fn check_left(wire: &Wireframe, key: &str, environment: &Environment)
     Err(DesignError::new(format!("{}.{key}", environment.path), message))
 }
 
-/// Nodes and struts of the user's own.
+/// Explicit nodes and struts.
 pub(super) fn tables(
     graph: &NodeGraph,
     spec: &BeamsSpec,
@@ -140,7 +140,7 @@ pub(super) fn tables(
     Ok((wire, nodes.radii))
 }
 
-/// Nodes that stand in the design.
+/// Nodes listed in the design.
 pub(in crate::design) fn given(rows: &Rows) -> Nodes {
     let mut nodes = Nodes::default();
     for (i, row) in rows.0.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Where tetrahedral meshes come from that are not made here: files, and another mesher.
+//! External sources of tetrahedral meshes: files, and the mesher fTetWild.
 
 use crate::design::Loader;
 use crate::design::data::*;
@@ -18,8 +18,8 @@ const ZONES: [&str; 7] = ["zone", "gmsh:physical", "medit:ref", "cell_tags", "Ma
 
 /// The surface for a mesher that works from triangles: the file's own where the region is one, which may be a soup; else
 /// the region's.
-pub(super) fn surface(space: &RegionKind, environment: &Environment, size: f64) -> Result<Mesh, DesignError> {
-    if let RegionKind::Mesh(file) = space {
+pub(super) fn surface(region: &RegionKind, environment: &Environment, size: f64) -> Result<Mesh, DesignError> {
+    if let RegionKind::Mesh(file) = region {
         return triangles(file, environment.loader);
     }
     let solid = Solid::new(environment.region.clone(), None, size);
@@ -42,7 +42,7 @@ pub(super) fn triangles(file: &MeshFile, loader: &dyn Loader) -> Result<Mesh, De
     Ok(mesh)
 }
 
-/// What fTetWild makes of a surface.
+/// The tetrahedral mesh that fTetWild makes of a surface.
 pub(super) fn wild(
     made: &MadeTetsSpec,
     surface: &Mesh,

@@ -27,12 +27,19 @@ pub(super) struct ComponentLinks {
 
 impl ComponentLinks {
     /// Adds the next tetrahedron with the totals of its surface components.
-    pub fn add(&mut self, map: &Tets, t: usize, mask: u8, piece: &TetSurface, totals: &[Totals]) -> Result<(), Fault> {
-        let components = piece.solid_of.len();
-        let base = self.graph.add(totals, piece.solids as usize)? as usize;
+    pub fn add(
+        &mut self,
+        map: &Tets,
+        t: usize,
+        mask: u8,
+        tet_surface: &TetSurface,
+        totals: &[Totals],
+    ) -> Result<(), Fault> {
+        let components = tet_surface.solid_of.len();
+        let base = self.graph.add(totals, tet_surface.solids as usize)? as usize;
         let surface = |s: u32| if s == NOBODY { s } else { base as u32 + s };
         let inner = |s: u32| (base + components) as u32 + s;
-        for (b, solid) in piece.solid_of.iter().enumerate() {
+        for (b, solid) in tet_surface.solid_of.iter().enumerate() {
             unite(&mut self.graph.solid, (base + b) as u32, inner(*solid));
         }
         let named = |runs: &[Run]| -> Vec<Run> {
@@ -44,7 +51,7 @@ impl ComponentLinks {
             if other == NONE {
                 continue;
             }
-            let runs = named(&piece.faces[face]);
+            let runs = named(&tet_surface.faces[face]);
             match self.faces.remove(&(t as u32, face as u8)) {
                 Some(theirs) => self.join(&runs, &theirs),
                 None => {
@@ -62,7 +69,7 @@ impl ComponentLinks {
                 0 => {}
                 // The edge's other face on the boundary is another tetrahedron's.
                 1 => {
-                    let runs = named(&piece.boundary_edges[e]);
+                    let runs = named(&tet_surface.boundary_edges[e]);
                     let key = [ids[*a], ids[*b]];
                     match self.boundary_edges.remove(&key) {
                         Some(theirs) => self.join(&runs, &theirs),
@@ -77,8 +84,8 @@ impl ComponentLinks {
         }
         // Each vertex is counted in one tetrahedron.
         let mut counts = [None; 16];
-        for (v, zero) in piece.zero.iter().enumerate() {
-            let corner = v < piece.crossings;
+        for (v, zero) in tet_surface.zero.iter().enumerate() {
+            let corner = v < tet_surface.crossings;
             let on = |i: &usize| zero >> i & 1 == 0;
             let mine = match zero.count_ones() {
                 0 => true,
@@ -98,7 +105,7 @@ impl ComponentLinks {
                 _ => (0..4).find(on).is_some_and(|i| self.nodes.insert(ids[i])),
             };
             if mine {
-                self.graph.totals[base + piece.component[v] as usize].vertices += 1;
+                self.graph.totals[base + tet_surface.component[v] as usize].vertices += 1;
             }
         }
         Ok(())

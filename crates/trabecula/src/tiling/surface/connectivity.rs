@@ -59,24 +59,24 @@ pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
             return None;
         }
     }
-    let piece = |scratch: &mut Scratch, t: &usize| {
-        let made = match work.piece(*t, scratch) {
-            TetSurfaceRef::Own(piece) => *piece,
-            TetSurfaceRef::Shared(piece) => piece.clone(),
+    let surface = |scratch: &mut Scratch, t: &usize| {
+        let made = match work.tet_surface(*t, scratch) {
+            TetSurfaceRef::Own(surface) => *surface,
+            TetSurfaceRef::Shared(surface) => surface.clone(),
         };
         // Without positions.
         TetSurface { vertices: Vec::new(), triangles: Vec::new(), ..made }
     };
-    let pieces: Vec<TetSurface> = firsts.par_iter().map_init(Scratch::default, piece).collect();
+    let surfaces: Vec<TetSurface> = firsts.par_iter().map_init(Scratch::default, surface).collect();
     let mut links = ComponentLinks::default();
-    // For each piece of solid in a tetrahedron, the tetrahedron and the number in `links`.
+    // For each component of the solid in a tetrahedron, the tetrahedron and the number in `links`.
     let (mut of, mut solids) = (Vec::new(), Vec::new());
     for (t, kind) in kinds.iter().enumerate() {
-        let piece = &pieces[*kind];
-        let first = links.next(piece.solid_of.len());
-        let totals = vec![Totals::ZERO; piece.solid_of.len()];
-        links.add(map, t, work.mask(t), piece, &totals).ok()?;
-        for s in 0..piece.solids {
+        let surface = &surfaces[*kind];
+        let first = links.next(surface.solid_of.len());
+        let totals = vec![Totals::ZERO; surface.solid_of.len()];
+        links.add(map, t, work.mask(t), surface, &totals).ok()?;
+        for s in 0..surface.solids {
             of.push(t);
             solids.push(first + s);
         }
@@ -85,7 +85,7 @@ pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
     let mut names = roots.clone();
     names.sort_unstable();
     names.dedup();
-    // For each zone, in how many of its tetrahedra each piece is.
+    // For each zone, the number of its tetrahedra in which each component is.
     let mut about: BTreeMap<u32, HashMap<u32, usize>> = BTreeMap::new();
     for (t, root) in of.iter().zip(&roots) {
         *about.entry(map.zone(*t)).or_default().entry(*root).or_default() += 1;
@@ -112,7 +112,7 @@ pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
                 joined: main(a).is_some() && main(a) == main(b),
             });
             pair.faces += 1;
-            pair.open += usize::from(!pieces[kinds[t]].faces[face].is_empty());
+            pair.open += usize::from(!surfaces[kinds[t]].faces[face].is_empty());
         }
     }
     Some(Connectivity { components: names.len(), pairs: pairs.into_values().collect() })

@@ -1,8 +1,8 @@
-//! Where a cubic first rises through zero.
+//! The first root of a cubic in [0, 1] that it crosses upwards.
 
 use geometry::math::root;
 
-/// The first place in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
+/// The first position in [0, 1] where the cubic of these ends (a ≤ 0 ≤ b) and end slopes is no longer negative.
 pub(super) fn first_root(a: f64, b: f64, slope_a: f64, slope_b: f64) -> f64 {
     // a + s (c1 + s (c2 + s c3)).
     let c1 = slope_a;

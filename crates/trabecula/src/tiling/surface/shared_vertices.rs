@@ -59,11 +59,11 @@ impl SharedVertices {
                 next[zero] = (first, first == new);
             }
         }
-        let name = |(v, (place, zero)): (usize, (&Vec3, &u8))| {
+        let name = |(v, (position, zero)): (usize, (&Vec3, &u8))| {
             let next = &mut next[usize::from(v >= surface.crossings)][usize::from(*zero)];
             let name = next.0;
             if next.1 {
-                vertices[name as usize] = *place;
+                vertices[name as usize] = *position;
             }
             next.0 += 1;
             name

@@ -16,7 +16,7 @@ use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes};
 use geometry::union_find::{find, unite};
 
-/// How near a node a corner of the surface may come, in steps: what rounding must not reach.
+/// Least distance of a corner of the surface from a node, in steps: a margin above rounding.
 pub(super) const MARGIN: f64 = 0.01;
 
 /// No component.
@@ -62,7 +62,7 @@ pub(super) struct TetSurface {
     pub boundary_edges: [Vec<Run>; 6],
 }
 
-/// What is to be cut: f and the level at the nodes, and the change of f along the edges by its slope at both ends.
+/// Input of the cut: f and the level at the nodes, and the change of f along the edges by its slope at both ends.
 pub(super) struct Core<'a> {
     pub values: &'a [f64],
     pub slopes: &'a [[f64; 2]],
@@ -368,8 +368,8 @@ impl TetSurface {
     }
 }
 
-/// One or two triangles, their corners on the edges between pairs of the small tetrahedron's nodes, seen from outside the
-/// nodes of `inside` counter-clockwise.
+/// One or two triangles, their corners on the edges between pairs of the small tetrahedron's nodes, counter-clockwise
+/// viewed from outside the nodes of `inside`.
 fn crossing(inside: u8, even: bool) -> ([[[usize; 2]; 3]; 2], bool) {
     let within = |i: usize| inside >> i & 1 == 1;
     let alone = |of: bool| (0..4).find(|i| within(*i) == of).unwrap_or(0);
