@@ -154,6 +154,7 @@ struct Tally {
     worst: f64,
 }
 
+/// 400 cases in `make campaign`.
 #[test]
 fn combined_meshes_keep_every_guarantee_and_their_edges() {
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
@@ -211,11 +212,12 @@ fn combined_meshes_keep_every_guarantee_and_their_edges() {
     assert!(share < 0.004, "{share} of the edges are off");
 }
 
-/// A finer grid, over several tiles along each axis: what they have in common they must find alike.
+/// A finer grid, over several tiles along each axis: what they have in common they must find alike. 400 cases in
+/// `make campaign`.
 #[test]
 fn tiles_agree_on_combined_meshes() {
     let mut all = 0;
-    for case in 0..cases(6) {
+    for case in 0..cases(3) {
         let Some(d) = design(case) else {
             continue;
         };
@@ -227,6 +229,7 @@ fn tiles_agree_on_combined_meshes() {
         assert!(streamed == stl(&s), "case {case}: {}, {edge}", d.name());
         all += 1;
     }
+    assert!(all > 0);
     println!("{all} parts, streamed as they are held in memory");
 }
 

@@ -170,10 +170,18 @@ pub fn stl(s: &SurfaceMesh) -> Vec<u8> {
     bytes
 }
 
-/// Random designs in one run: `make campaign` asks for more.
+/// Random designs in one run: `few`, or as many as TRABECULA_CASES names, which `make campaign` sets.
 pub fn cases(few: u64) -> u64 {
-    let asked = std::env::var("TRABECULA_CASES").ok();
-    asked.and_then(|n| n.parse().ok()).unwrap_or(few)
+    asked().unwrap_or(few)
+}
+
+/// Whether all combinations of a fixed list are run, as in `make campaign`, or a selection that has every entry once.
+pub fn campaign() -> bool {
+    asked().is_some()
+}
+
+fn asked() -> Option<u64> {
+    std::env::var("TRABECULA_CASES").ok()?.parse().ok()
 }
 
 /// Random numbers, the same for the same seed (splitmix64).

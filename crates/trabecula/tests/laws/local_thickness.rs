@@ -44,12 +44,12 @@ fn ball(center: Vec3, radius: f64) -> Sphere {
 }
 
 /// A cube of gyroid, cells of 4 mm.
-fn gyroid(part: Part, fraction: f64, edge: f64) -> (SurfaceMesh, Region) {
+fn gyroid(side: f64, part: Part, fraction: f64, edge: f64) -> (SurfaceMesh, Region) {
     let cell = Cell::new(Series::new(named("gyroid").expect("gyroid").terms()).expect("series"));
     let map = Affine::rigid([4.0; 3], [0.0; 3], [0.0; 3], &[]).expect("map");
     let level = Level::Fraction(Grade::Constant(fraction));
     let field = Arc::new(Lattice::new(Arc::new(cell), Arc::new(map), part, level));
-    let region: Region = Arc::new(Cuboid::new([0.0; 3], [8.0; 3]).expect("box"));
+    let region: Region = Arc::new(Cuboid::new([0.0; 3], [side; 3]).expect("box"));
     let solid = Solid::new(region.clone(), Some(field), 4.0);
     (surface(&solid, edge, &Silent).expect("surface"), region)
 }
@@ -121,7 +121,7 @@ fn a_shell_and_the_ball_in_it() {
 
 #[test]
 fn turning_and_moving_change_nothing() {
-    let (made, _) = gyroid(Part::Sheet, 0.3, 0.1);
+    let (made, _) = gyroid(8.0, Part::Sheet, 0.3, 0.1);
     let still = wall(made.mesh.clone(), 0.08);
     let mut moved = turned(made.mesh, [15.0, 40.0, 65.0]);
     moved.vertices.iter_mut().flatten().for_each(|x| *x += 0.0317);
@@ -133,7 +133,7 @@ fn turning_and_moving_change_nothing() {
 
 #[test]
 fn errors_fall_with_the_step() {
-    let (made, region) = gyroid(Part::Sheet, 0.3, 4.0 / 48.0);
+    let (made, region) = gyroid(4.0, Part::Sheet, 0.3, 4.0 / 48.0);
     let mean = |step| {
         let t = thickness(&made, Some(&region), step, &Silent).expect("thickness");
         [t.wall.mean, t.pore.expect("pores").mean]
@@ -149,7 +149,7 @@ fn errors_fall_with_the_step() {
 
 #[test]
 fn a_thin_sheet_is_as_thick_as_its_volume_over_half_its_area() {
-    let (made, region) = gyroid(Part::Sheet, 0.1, 4.0 / 48.0);
+    let (made, region) = gyroid(4.0, Part::Sheet, 0.1, 4.0 / 48.0);
     let t = thickness(&made, Some(&region), 0.04, &Silent).expect("thickness");
     let cut = made.cut.iter().enumerate().filter(|c| *c.1);
     let area = made.mesh.area() - cut.map(|(i, _)| triangle(&made.mesh, i)).sum::<f64>();
@@ -164,7 +164,7 @@ fn triangle(mesh: &Mesh, i: usize) -> f64 {
 
 #[test]
 fn the_same_for_any_number_of_threads() {
-    let (made, region) = gyroid(Part::Upper, 0.3, 0.2);
+    let (made, region) = gyroid(8.0, Part::Upper, 0.3, 0.2);
     let on = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("pool");
         pool.install(|| thickness(&made, Some(&region), 0.15, &Silent).expect("thickness"))

@@ -388,7 +388,7 @@ fn zones_hold_their_fraction_and_fit() {
         assert!(worst < 2e-3 && mean < 1e-3, "{a} {b}: {worst} {mean}");
         // The sum over small tetrahedra, whose error is of fourth order in a sixteenth of an edge, is what the surface
         // encloses, whose error is of second order in its steps: that much of it is taken out.
-        let [coarse, fine] = [16.0, 32.0].map(|steps| {
+        let [coarse, fine] = [12.0, 24.0].map(|steps| {
             let (surface, _) = made(tiling.clone(), steps, true);
             let found = size(&surface.mesh);
             assert!(found.closed, "{a} {b}");
