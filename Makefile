@@ -7,13 +7,16 @@
 #   make tidy    formatters and linters
 #   make docs    remakes the generated pages and figures under docs/
 #
-# PYTHON names the interpreter that .venv is made from (3.10 or newer).
+# PYTHON names the interpreter that .venv is made from (3.10 or newer). PROFILE names the build that the Python tests run
+# on: `checked`, which has the core in common with the core's tests, or `release`, the wheel that is handed out.
 
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check --quiet
 EDGE   ?= 0.18
+PROFILE ?= checked
+PYTEST := $(BIN)/python -m pytest -q -n auto
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 
@@ -24,7 +27,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard schema/*.json) \
 .PHONY: all demo test campaign core-test python-test docs-test bench smoke tidy docs clean
 .DELETE_ON_ERROR:
 
-all: $(VENV)/.installed
+all: $(VENV)/.release
 
 # --- set-up -----------------------------------------------------------------------------------------------------------
 
@@ -41,19 +44,25 @@ $(VENV)/.made:
 	@$(PIP) install 'maturin>=1.9,<2' 'numpy>=1.24'
 	@touch $@
 
-build/.wheel: $(VENV)/.made $(SOURCES)
-	@echo "building the package"
-	@rm -rf build/wheels && mkdir -p build
-	@$(BIN)/maturin build --quiet --release --interpreter $(BIN)/python --out build/wheels
+build/.wheel-release build/.wheel-checked: build/.wheel-%: $(VENV)/.made $(SOURCES)
+	@echo "building the package ($*)"
+	@rm -rf build/wheels-$* && mkdir -p build
+	@$(BIN)/maturin build --quiet --profile $* --interpreter $(BIN)/python --out build/wheels-$*
 	@touch $@
 
-$(VENV)/.installed: build/.wheel
-	@$(PIP) install --force-reinstall --no-deps build/wheels/trabecula-*.whl
-	@$(PIP) install build/wheels/trabecula-*.whl
+# One of the two is installed at a time.
+$(VENV)/.release $(VENV)/.checked: $(VENV)/.%: build/.wheel-%
+	@rm -f $(VENV)/.release $(VENV)/.checked
+	@$(PIP) install --force-reinstall --no-deps build/wheels-$*/trabecula-*.whl
+	@$(PIP) install build/wheels-$*/trabecula-*.whl
 	@touch $@
 
-$(VENV)/.test-tools: $(VENV)/.installed pyproject.toml
-	@$(PIP) install "$$(echo build/wheels/trabecula-*.whl)[test]" 'ruff>=0.8'
+$(VENV)/.test-tools: $(VENV)/.$(PROFILE) pyproject.toml
+	@$(PIP) install "$$(echo build/wheels-$(PROFILE)/trabecula-*.whl)[test]"
+	@touch $@
+
+$(VENV)/.ruff: $(VENV)/.made
+	@$(PIP) install 'ruff>=0.8'
 	@touch $@
 
 # --- the demo ---------------------------------------------------------------------------------------------------------
@@ -64,7 +73,7 @@ PART := examples/parts/hip_stem.stl
 demo: demo/hip_stem.png
 	@cat demo/summary.txt
 
-demo/hip_stem.png: $(VENV)/.installed $(DEMO) $(PART) scripts/demo_summary.py
+demo/hip_stem.png: $(VENV)/.release $(DEMO) $(PART) scripts/demo_summary.py
 	@mkdir -p demo
 	$(BIN)/trabecula check $(DEMO)
 	$(BIN)/trabecula mesh $(DEMO) -o demo/hip_stem.3mf --edge $(EDGE)
@@ -86,15 +95,18 @@ campaign: $(VENV)/.test-tools
 	TRABECULA_CASES=$(CASES) cargo test --profile checked --locked -p trabecula --test laws surface::random
 	TRABECULA_CASES=$(CASES) cargo test --profile checked --locked -p trabecula --test laws -- damage flush --nocapture
 	TRABECULA_CASES=$$(($(CASES) / 5)) cargo test --profile checked --locked -p trabecula --test laws -- combined --nocapture
-	TRABECULA_CAMPAIGN=1 $(BIN)/python -m pytest -q tests/test_parts.py
+	TRABECULA_CASES=$$(($(CASES) / 10)) cargo test --profile checked --locked -p trabecula --test laws -- skin:: islands::
+	TRABECULA_CASES=$$(($(CASES) / 50)) cargo test --profile checked --locked -p trabecula --test laws -- \
+	  crease:: simplify:: tets:: thickness:: tiling::
+	TRABECULA_CAMPAIGN=1 $(PYTEST) tests/test_parts.py tests/test_laws.py tests/test_corpus.py
 
 python-test: $(VENV)/.test-tools
-	$(BIN)/python -m pytest -q tests --ignore tests/test_docs.py
+	$(PYTEST) tests --ignore tests/test_docs.py
 
 docs-test: $(VENV)/.test-tools
-	$(BIN)/python -m pytest -q tests/test_docs.py
+	$(PYTEST) tests/test_docs.py
 
-tidy: $(VENV)/.test-tools
+tidy: $(VENV)/.ruff
 	@if cargo fmt --version >/dev/null 2>&1; then echo "cargo fmt"; cargo fmt --all --check; \
 	  else echo "NOT CHECKED: rustfmt is not installed (rustup component add rustfmt)"; fi
 	@if cargo clippy --version >/dev/null 2>&1; then echo "cargo clippy"; \
@@ -103,15 +115,15 @@ tidy: $(VENV)/.test-tools
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 
-smoke: $(VENV)/.installed
+smoke: $(VENV)/.release
 	$(BIN)/python bench/smoke.py --trabecula $(BIN)/trabecula
 
-bench: $(VENV)/.installed
+bench: $(VENV)/.release
 	$(BIN)/python bench/peers.py --trabecula $(BIN)/trabecula --record
 	$(BIN)/python bench/beams.py --trabecula $(BIN)/trabecula
 	$(BIN)/python bench/tets.py --trabecula $(BIN)/trabecula
 
-docs: $(VENV)/.installed
+docs: $(VENV)/.release
 	$(BIN)/python scripts/figure_porosity.py
 	$(BIN)/python scripts/cell_tables.py
 	$(BIN)/python scripts/tetcell_tables.py
