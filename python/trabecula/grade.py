@@ -63,13 +63,13 @@ def grid(
     """Numbers on a grid, from a file; linear between them.
 
     path: Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png,
-        tif), where a * in the last part stands for anything: "scan/*.png". Columns run along x, rows along y, pictures
+        tif), where a * in the last part matches any text: "scan/*.png". Columns run along x, rows along y, pictures
         along z.
     origin: Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it. [mm,
         optional]
     step: Distance between numbers, one or three. VTI and VTK files contain it. [mm, optional]
     array: Name of the array, where a file has several. [optional]
-    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
+    remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
     return {"grid": settings(path=os.fspath(path), origin=origin, step=step, array=array, remap=pairs(remap))}
 
@@ -80,7 +80,7 @@ def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: S
 
     path: Path of a table (csv) of x, y, z (mm), value, relative to the design file.
     neighbours: Number of nearest points that count. [from 1 to 64, default 8]
-    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
+    remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
     return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
 
@@ -91,7 +91,7 @@ def field(path: str | os.PathLike[str], array: str, component: int | None = None
     path: Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
     array: Name of the array, of points or cells.
     component: Which of its components, from 0, where it has several. [optional]
-    remap: What the numbers stand for: pairs [number, value], number rising, linear between. [optional]
+    remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
     return {"field": settings(path=os.fspath(path), array=array, component=component, remap=pairs(remap))}
 
@@ -145,6 +145,6 @@ def rbf(
     values: The values taken at the points: 1 at all unless given here or as a fourth column of the file. [optional]
     delta: δ; one and a half times the mean distance of a point from its nearest neighbour unless given. [mm, above 0,
         optional]
-    axis: Direction of projection, so that a point stands for a line. [optional]
+    axis: Direction of projection: each point becomes a line along it. [optional]
     """
     return {"rbf": settings(**control(points), values=values, delta=delta, axis=axis)}

@@ -59,8 +59,8 @@ def phase(
     frame: dict | None = None,
     stress: Sequence[float | dict] | dict | None = None,
 ) -> dict:
-    """Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares. At most one
-    of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
+    """Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At
+    most one of rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 
     wavelength: Cell edge, one number or three; each may vary. [mm, above 0]
     rotate: Angles about x, y, z: z is turned first, then y, then x. Each may vary. [degrees, optional]

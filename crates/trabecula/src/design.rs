@@ -74,7 +74,7 @@ pub struct Design {
     /// Regions kept fully solid within the region, such as bolt bosses, under names of your own.
     #[kind(default)]
     pub keep: Keeps,
-    /// Where each key stands in the file it was read from.
+    /// Line of each key in the file it was read from.
     #[kind(skip)]
     pub lines: Lines,
 }
@@ -165,7 +165,7 @@ impl Design {
         Ok(design)
     }
 
-    /// The error with its line, if its path stands in the file.
+    /// The error with its line, if its path is in the file.
     fn located(&self, mut e: DesignError) -> DesignError {
         e.line = e.line.or_else(|| self.lines.line(&e.path));
         e

@@ -13,7 +13,7 @@ use geometry::formats::{self, Shape};
 #[kind(name = "Grid", noun = "a grade on a grid")]
 pub struct GridKind {
     /// Path of the file (npy, vti, vtk), relative to the design file; or of grey pictures one above the other (png, tif), where
-    /// a * in the last part stands for anything: "scan/*.png". Columns run along x, rows along y, pictures along z.
+    /// a * in the last part matches any text: "scan/*.png". Columns run along x, rows along y, pictures along z.
     path: String,
     /// Position of the first number, of pictures the middle of the first pixel. VTI and VTK files contain it.
     #[kind(unit = "mm")]
@@ -23,7 +23,7 @@ pub struct GridKind {
     step: Option<OneOrThree>,
     /// Name of the array, where a file has several.
     array: Option<String>,
-    /// What the numbers stand for: pairs [number, value], number rising, linear between.
+    /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
 }
 

@@ -28,7 +28,7 @@ pub struct RbfKind {
     /// δ; one and a half times the mean distance of a point from its nearest neighbour unless given.
     #[kind(unit = "mm", above = 0.0)]
     delta: Option<f64>,
-    /// Direction of projection, so that a point stands for a line.
+    /// Direction of projection: each point becomes a line along it.
     axis: Option<[f64; 3]>,
 }
 

@@ -21,7 +21,7 @@ pub struct FieldKind {
     array: String,
     /// Which of its components, from 0, where it has several.
     component: Option<u32>,
-    /// What the numbers stand for: pairs [number, value], number rising, linear between.
+    /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
 }
 

@@ -16,7 +16,7 @@ pub struct PointsKind {
     /// Number of nearest points that count.
     #[kind(default = 8, min = 1.0, max = 64.0)]
     neighbours: u32,
-    /// What the numbers stand for: pairs [number, value], number rising, linear between.
+    /// The values that the numbers map to: pairs [number, value], number rising, linear between.
     remap: Option<Stops>,
 }
 

@@ -6,7 +6,7 @@ use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, several};
 use crate::kind::{DesignError, Key, Kind};
 
-/// Solved so that cells turn and stretch as asked for without tearing: ∇Φᵢ = R eᵢ / λᵢ in least squares. At most one of
+/// Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At most one of
 /// rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Phase", noun = "a phase map")]

@@ -68,7 +68,7 @@ fn slopes_places_and_bounds_agree() {
                     assert!((d[i] / 2e-5 - j[i][a]).abs() < 2e-4, "{closed} {p:?} {i}{a}");
                 }
             }
-            let back = map.position(map.phase(*p), *p).expect("place");
+            let back = map.position(map.phase(*p), *p).expect("position");
             assert!(norm(sub(back, *p)) < 1e-7, "{closed} {p:?} {back:?}");
             let b = Aabb { min: *p, max: p.map(|x| x + 0.2) };
             let steep = geometry::math::spectral_norm(&map.jacobian(p.map(|x| x + 0.13)));
@@ -108,7 +108,7 @@ fn folds_tears_and_slips_are_refused() {
     // The centre of a ring.
     let (at, words) = fault(ring(12, 6.0), true, 8.0, [0.0; 3]).expect("refused");
     assert!(at == "points" && (words.contains("folds") || words.contains("tears")), "{words}");
-    // Half-way between two legs.
+    // In the middle between two legs.
     let legs = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 20.0], [6.0, 0.0, 26.0], [12.0, 0.0, 20.0], [12.0, 0.0, 0.0]];
     let (_, words) = fault(legs.clone(), false, 5.0, [6.0, 0.0, 2.0]).expect("refused");
     assert!(words.contains("tears"), "{words}");
