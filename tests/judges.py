@@ -135,29 +135,48 @@ def of_stl(path):
 
 
 def distance(vertices, triangles, points):
-    """Signed distances of points from a closed mesh, negative inside: every triangle is asked."""
+    """Signed distances of points from a closed mesh, negative inside, by the solid angle of all triangles."""
     out = np.empty(len(points))
-    corners = [vertices[triangles[:, k]] for k in range(3)]
-    for part in np.array_split(np.arange(len(points)), len(points) * len(triangles) // 1_000_000 + 1):
-        p = points[part][:, None, :]
-        a, b, c = (x[None] - p for x in corners)
-        la, lb, lc = (np.sqrt(np.einsum("ijk,ijk->ij", x, x)) for x in (a, b, c))
-        ab, bc, ca = (np.einsum("ijk,ijk->ij", x, y) for x, y in ((a, b), (b, c), (c, a)))
-        turn = 2 * np.arctan2(np.einsum("ijk,ijk->ij", a, np.cross(b, c)), la * lb * lc + ab * lc + bc * la + ca * lb)
+    x, y, z = corners = np.moveaxis(vertices[triangles], 1, 0)
+    middles = corners.mean(axis=0)
+    reach = np.linalg.norm(corners - middles, axis=2).max(axis=0)
+    normals = np.cross(x, y) + np.cross(y, z) + np.cross(z, x)
+    levels = dots(x, np.cross(y, z))
+    for part in np.array_split(np.arange(len(points)), len(points) * len(triangles) // 200_000 + 1):
+        p = points[part]
+        square = dots(p, p)[:, None]
+        off = np.linalg.norm(vertices[None] - p[:, None], axis=2)
+        la, lb, lc = (off[:, triangles[:, k]] for k in range(3))
+        # Products of corners seen from each point, (x − p)·(y − p) = x·y − p·(x + y) + p², and so the volume of all three.
+        ab, bc, ca = (dots(u, v) - p @ (u + v).T + square for u, v in ((x, y), (y, z), (z, x)))
+        turn = 2 * np.arctan2(levels - p @ normals.T, la * lb * lc + ab * lc + bc * la + ca * lb)
         inside = turn.sum(axis=1) > 2 * np.pi
-        square = np.minimum.reduce([to_segment(x, y) for x, y in ((a, b), (b, c), (c, a))])
-        n = np.cross(b - a, c - a)
-        above = [np.einsum("ijk,ijk->ij", np.cross(x, y), n) > 0 for x, y in ((a, b), (b, c), (c, a))]
-        over = above[0] & above[1] & above[2]
-        height = np.einsum("ijk,ijk->ij", a, n) ** 2 / np.maximum(np.einsum("ijk,ijk->ij", n, n), 1e-300)
-        square = np.where(over, np.minimum(square, height), square)
-        out[part] = np.sqrt(square.min(axis=1)) * np.where(inside, -1, 1)
+        # A triangle has its middle in it: none whose middle is farther than the nearest by more than its reach is nearest.
+        far = np.linalg.norm(middles[None] - p[:, None], axis=2)
+        of, which = np.nonzero(far - reach <= far.min(axis=1)[:, None] * (1 + 1e-9))
+        nearest = np.full(len(p), np.inf)
+        np.minimum.at(nearest, of, to_triangle(*(corners[:, which] - p[of])))
+        out[part] = np.sqrt(nearest) * np.where(inside, -1, 1)
     return out
+
+
+def dots(x, y):
+    """Products of vectors along the last axis."""
+    return np.einsum("...k,...k->...", x, y)
+
+
+def to_triangle(a, b, c):
+    """Squared distance of the origin from triangles abc."""
+    square = np.minimum.reduce([to_segment(x, y) for x, y in ((a, b), (b, c), (c, a))])
+    n = np.cross(b - a, c - a)
+    over = np.logical_and.reduce([dots(np.cross(x, y), n) > 0 for x, y in ((a, b), (b, c), (c, a))])
+    height = dots(a, n) ** 2 / np.maximum(dots(n, n), 1e-300)
+    return np.where(over, np.minimum(square, height), square)
 
 
 def to_segment(a, b):
     """Squared distance of the origin from segments ab."""
     d = b - a
-    t = -np.einsum("ijk,ijk->ij", a, d) / np.maximum(np.einsum("ijk,ijk->ij", d, d), 1e-300)
+    t = -dots(a, d) / np.maximum(dots(d, d), 1e-300)
     x = a + np.clip(t, 0, 1)[..., None] * d
-    return np.einsum("ijk,ijk->ij", x, x)
+    return dots(x, x)
