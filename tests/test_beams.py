@@ -315,7 +315,7 @@ CASES = [
     (but(OWN, nodes=[[0, 0, math.inf]]), "nodes[0][2]", ["finite", "inf"]),
     (but(OWN, nodes=[[1, 1, 5, 0], *SQUARE[1:]]), "nodes[0]", ["radius is 0"]),
     (but(OWN, radius=None), "", ["no node has a radius"]),
-    (but(OWN, map=GOOD["map"]), "nodes", ["map and nodes at once"]),
+    (but(OWN, map=GOOD["map"]), "map", ["nodes and map at once"]),
     (but(OWN, nodes="missing.csv"), "nodes", ["missing.csv"]),
     (
         but(OWN, nodes=[[1, 1, 5, 4], [2, 1, 5, 0.5], *SQUARE[2:]], radius=0.4),
@@ -324,7 +324,7 @@ CASES = [
     ),
     (but(OWN, profile="cylinder", hub={"formula": "0.5 + x/20"}), "profile", ["cylinder needs hubs of equal radius"]),
     (but(OWN, nodes=[[x + 50, y, z] for x, y, z in SQUARE]), "trim", ["no beam lies in the region"]),
-    (but(PATTERN, trim="drop"), "pattern", ["trim and pattern at once"]),
+    (but(PATTERN, trim="drop"), "trim", ["pattern and trim at once"]),
     (but(PATTERN, radius={"formula": "1 + x"}), "radius", ["one number"]),
     (but(PATTERN, pattern=SWIRL | {"struts": [[0, 1, 0, 0, 0]]}), "pattern.struts[0]", ["unknown node 1"]),
     (but(PATTERN, pattern=SWIRL | {"struts": [[0, 0, 40]]}), "pattern.struts", ["no strut has both ends"]),

@@ -50,7 +50,7 @@ CASES = [
     ("fraction = 0.3", "thickness = 0", f"{LEVEL}.thickness", ["thickness is 0 mm", "greater than 0"]),
     ("fraction = 0.3", "thickness = -0.5", f"{LEVEL}.thickness", ["thickness is -0.5 mm", "greater than 0"]),
     ("fraction = 0.3", "thickness = nan", f"{LEVEL}.thickness", ["thickness is NaN", "greater than 0"]),
-    ("fraction = 0.3", "thickness = 5", f"{LEVEL}.thickness", ["at most the wavelength, 4 mm"]),
+    ("fraction = 0.3", "thickness = 5", f"{LEVEL}.thickness", ["at most 4 mm, the wavelength"]),
     ("fraction = 0.3", "thickness = 3", f"{LEVEL}.thickness", ["solid everywhere", "half the thickness is 1.5"]),
     ("fraction = 0.3", "thickness = 1\nfraction = 0.3", LEVEL, ["thickness and fraction at once", "exactly one"]),
     ("fraction = 0.3", 'thickness = 1\nof = "part"', f"{LEVEL}.of", ["fraction or porosity", "found thickness"]),

@@ -90,7 +90,7 @@ def field(path: str | os.PathLike[str], array: str, component: int | None = None
 
     path: Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
     array: Name of the array, of points or cells.
-    component: Which of its components, from 0, where it has several. [optional]
+    component: Which of its components, from 0, where it has several. [from 0, optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
     return {"field": settings(path=os.fspath(path), array=array, component=component, remap=pairs(remap))}

@@ -23,7 +23,7 @@ def affine(
     wavelength: Cell edge, one number or three. [mm, above 0]
     rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
-    skew: Shears. [default {}]
+    skew: Shears by name, in degrees: xz = 20 moves x by tan(20°) · z. [default {}]
     """
     return {"affine": settings(wavelength=wavelength, rotate=rotate, offset=offset, skew=skew)}
 
@@ -77,8 +77,9 @@ def phase(
     rotate_y: The angle about y alone. [degrees, optional]
     rotate_z: The angle about z alone. [degrees, optional]
     direction: Direction of the cell's z axis; its sign and length do not matter. [optional]
-    frame: The directions of the cell's x and z axes. [optional]
-    stress: A stress tensor whose principal directions the cell's axes take. [optional]
+    frame: The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }. [optional]
+    stress: A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, or
+        the field of a result. [optional]
     """
     given = settings(
         wavelength=wavelength,

@@ -162,6 +162,10 @@ pub fn untagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<To
             fn read(at: &At) -> Result<Self, DesignError> {
                 #(#before(at)?;)*
                 let best = Self::fits(at.node);
+                if let (Value::List(items), 1) = (&at.node.value, best) {
+                    let found = geometry::fault::counted(items.len(), "value");
+                    return Err(at.error(format!("expected {}, found {found}", Self::expected())));
+                }
                 #(if best > 0 && <#types as Kind>::fits(at.node) == best {
                     return Kind::read(at).map(#ident::#names);
                 })*

@@ -176,7 +176,7 @@ pub fn transparent(ident: &Ident, outer: &Outer, field: &Field) -> syn::Result<T
                 Kind::write(&self.0)
             }
             fn check(&self, key: &Key) -> Result<(), Fault> {
-                Kind::check(&self.0, key)?;
+                Kind::check(&self.0, &Key { #(least: #least,)* ..*key })?;
                 #(#check(self, key)?;)*
                 Ok(())
             }

@@ -81,11 +81,20 @@ pub struct Design {
 
 /// The unit of length of a design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
-#[kind(noun = "unit of length of a design")]
+#[kind(noun = "unit of length of a design", before = in_mm)]
 pub enum Units {
     /// Millimetre.
     #[default]
     Mm,
+}
+
+fn in_mm(at: &At) -> Result<(), DesignError> {
+    match &at.node.value {
+        Value::Text(word) if word != "mm" => {
+            Err(at.error(format!("lengths in a design are mm, found \"{word}\"; a mesh file may have its own unit")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A lattice over a tetrahedral mesh.
@@ -125,22 +134,6 @@ pub struct Built {
 }
 
 impl Design {
-    /// A design of one lattice in a region.
-    pub fn new(region: RegionKind, name: &str, lattice: LatticeSpec) -> Design {
-        let lattice = Lattices::from([(name.to_string(), lattice)]);
-        Design {
-            schema: 1,
-            units: Units::Mm,
-            region,
-            lattice,
-            beams: BeamsSpecs::default(),
-            blend: None,
-            skin: None,
-            keep: Keeps::default(),
-            lines: Lines::default(),
-        }
-    }
-
     /// Reads a design from TOML.
     ///
     /// ```

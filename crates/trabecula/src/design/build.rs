@@ -182,6 +182,7 @@ fn only(
         ([(_, one)], [], []) => Ok(one.clone()),
         ([], [one], []) => Ok(one.tiling.clone()),
         ([], [], [(_, one)]) => Ok(one.field()),
+        ([], [], []) => Err(DesignError::new("lattice", "no lattice given; give one")),
         _ => Err(DesignError::new("blend", "several lattices need a blend to say where each is")),
     }
 }

@@ -7,7 +7,7 @@ use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::Grade;
 use crate::grade::{Quantity, key_of};
-use crate::kind::DesignError;
+use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
 use geometry::fault::{Fault, number};
@@ -79,7 +79,7 @@ pub(super) fn level(
         return Ok(Level::Iso(amount));
     }
     if key == "thickness" {
-        within_wavelength(&amount, &quantity, map.longest())?;
+        within_wavelength(value, &amount, &quantity, map.longest())?;
         let range = cell.range();
         if range.lo >= 0.0 || range.hi <= 0.0 {
             let message = format!(
@@ -145,20 +145,17 @@ impl AmountSpec {
     }
 }
 
-/// Refuses a wall thicker than the greatest wavelength, mm.
-pub(super) fn within_wavelength(thickness: &Grade, quantity: &Quantity, most: f64) -> Result<(), DesignError> {
-    quantity.check(thickness, |v, position| {
-        if v <= most {
-            return Ok(());
-        }
-        let position = if thickness.constant().is_some() { "" } else { position };
-        let message = format!(
-            "thickness is {} mm{position}; it must be greater than 0 and at most the wavelength, {} mm",
-            number(v),
-            number(most)
-        );
-        Err(Fault::new("", message).found(number(v)))
-    })
+/// Refuses a wall thicker than the greatest wavelength, `most` mm: declared numbers, and all that are sampled in the region.
+pub(super) fn within_wavelength(
+    spec: &GradeSpec,
+    thickness: &Grade,
+    quantity: &Quantity,
+    most: f64,
+) -> Result<(), DesignError> {
+    let limit = Key { max: most, ..quantity.key };
+    let wrong = |f: Fault| Fault { message: format!("{} mm, the wavelength", f.message), ..f };
+    spec.check(&limit).map_err(|f| DesignError::fault(&quantity.path, wrong(f)))?;
+    quantity.check(thickness, |v, position| limit.admit_at(v, position).map_err(wrong))
 }
 
 /// Refuses a part that has no mid-surface.

@@ -177,7 +177,7 @@ pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environme
     let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**environment.region, &inside));
     let todo = match spec {
         TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
-        TetsSpec::File(_) => "is it a mesh of this region, in the right environment and unit?",
+        TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
     };
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
     made.warnings.extend(notes.warnings);

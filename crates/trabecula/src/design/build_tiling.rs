@@ -231,10 +231,12 @@ pub(super) fn lattice(
         }
         AmountSpec::Thickness(_) => Amount::Thickness,
     };
-    let quantity = spec.amount.quantity(path.clone(), environment);
+    let mut quantity = spec.amount.quantity(path.clone(), environment);
     let grade = spec.amount.grade().build(&quantity)?;
     if amount == Amount::Thickness {
-        within_wavelength(&grade, &quantity, domain.map.mean_edge())?;
+        let most = domain.map.mean_edge();
+        within_wavelength(spec.amount.grade(), &grade, &quantity, most)?;
+        quantity.key.max = most;
     }
     let values = at_nodes(&grade, &quantity, &domain.map)?;
     if amount == Amount::Thickness && cell.iso(Part::Sheet, 0.5) <= 0.0 {

@@ -188,7 +188,7 @@ fn values_of_the_wrong_type_say_what_was_found() {
         ("[4, 4, 5]", "\"four\"", "found \"four\""),
         ("[4, 4, 5]", "{ linear = { along = [1,0,0], stops = [] } }", "map.phase takes a wavelength"),
         ("[0, 30, 0]", "[0, true, 0]", "found true"),
-        ("units = \"mm\"", "units = \"inch\"", "unknown unit of length"),
+        ("units = \"mm\"", "units = \"inch\"", "lengths in a design are mm"),
         ("[[0, 0.5], [9, 0.8]]", "[[0, 0.5, 1]]", "found 3 values"),
     ] {
         let e = with(line, instead);

@@ -23,7 +23,7 @@ pub struct DistanceKind {
     /// Direction of projection: the distance is that from a wall through the line along it. Inside a closed line it is negative.
     axis: Option<[f64; 3]>,
     /// The smooth form instead of the exact distance: off by at most 0.2785/sharpness of the longest segment, without a sign.
-    #[kind(min = 10.0)]
+    #[kind(min = LEAST_SHARPNESS)]
     sharpness: Option<f64>,
 }
 

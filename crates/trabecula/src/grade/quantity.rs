@@ -16,7 +16,9 @@ pub(crate) struct Quantity<'a> {
 
 /// The declaration of a key of a table.
 pub(crate) fn key_of<T: Table>(name: &str) -> Key {
-    T::keys().into_iter().find(|k| k.name == name).unwrap_or(Key::NONE)
+    let found = T::keys().into_iter().find(|k| k.name == name);
+    debug_assert!(found.is_some(), "{name} is a key");
+    found.unwrap_or(Key::NONE)
 }
 
 impl<'a> Quantity<'a> {

@@ -7,7 +7,7 @@ use geometry::math::Interval;
 /// Pairs `[s, value]`, at least one, finite, s ascending. Between them a function is linear ([`Stops::at`]) or constant
 /// ([`Stops::step`]); before the first and after the last it is constant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stops(pub Vec<[f64; 2]>);
+pub struct Stops(pub(crate) Vec<[f64; 2]>);
 
 impl Kind for Stops {
     const DOC: &'static str = "Positions and the values taken there.";

@@ -200,7 +200,7 @@ impl<'a> At<'a> {
     }
 
     pub fn is_number(&self) -> bool {
-        matches!(self.node.value, Value::Number(_))
+        matches!(self.node.value, Value::Number(_) | Value::Whole(_))
     }
 }
 
@@ -254,7 +254,14 @@ impl<'a> Fields<'a> {
         let shared = |name: &str| sets.iter().all(|s| has(s, name));
         let given = |set: &[Key]| self.entries.iter().find(|(name, _)| has(set, name) && !shared(name)).map(|e| e.0);
         let own = |set: &[Key]| set.iter().map(|k| k.name).filter(|n| !shared(n)).collect::<Vec<_>>().join(", ");
-        let Some(first) = sets.iter().position(|s| given(s).is_some()) else {
+        // The set of which most required keys are given, or else of which any key is.
+        let needed = |set: &[Key]| {
+            let own = |k: &&Key| k.required && !shared(k.name) && self.get(k.name).is_some();
+            set.iter().filter(own).count()
+        };
+        let most = sets.iter().map(|s| needed(s)).max().unwrap_or(0);
+        let first = sets.iter().position(|s| given(s).is_some() && needed(s) == most);
+        let Some(first) = first.or(sets.iter().position(|s| given(s).is_some())) else {
             // None is: that of which no key is required, or else the first required key is missing.
             if let Some(free) = sets.iter().position(|s| !s.iter().any(|k| k.required && !shared(k.name))) {
                 return Ok(free);

@@ -74,9 +74,7 @@ impl Open {
             node = node.with("required", self.required.into());
         }
         if !self.choices.is_empty() {
-            // An alternative without a required key is fulfilled whenever another is.
-            let free = self.choices.iter().any(|c| !c.entries().any(|e| e.0 == "required"));
-            node = node.with(if free { "anyOf" } else { "oneOf" }, self.choices.into());
+            node = node.with("oneOf", exclusive(self.choices).into());
         }
         node
     }
@@ -98,6 +96,17 @@ impl Node {
     pub(crate) fn described(self, doc: &str) -> Node {
         if doc.is_empty() { self } else { self.with("description", doc.into()) }
     }
+}
+
+/// The alternatives, of which one without required keys is fulfilled only if no other is.
+fn exclusive(mut choices: Vec<Node>) -> Vec<Node> {
+    let required = |c: &Node| c.entries().find(|e| e.0 == "required").map(|e| e.1.clone());
+    let others: Vec<Node> = choices.iter().filter_map(required).map(|keys| Node::table([("required", keys)])).collect();
+    for free in choices.iter_mut().filter(|c| required(c).is_none()) {
+        let any = Node::table([("anyOf", others.clone().into())]);
+        *free = std::mem::replace(free, Value::Table(Vec::new()).into()).with("not", any);
+    }
+    choices
 }
 
 /// One word of a choice.

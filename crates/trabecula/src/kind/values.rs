@@ -67,7 +67,8 @@ macro_rules! whole {
             }
 
             fn schema(key: &Key, defs: &mut Defs) -> Node {
-                f64::schema(key, defs).with("type", "integer".into())
+                let min = if <$type>::MIN == 0 { key.min.max(0.0) } else { key.min };
+                f64::schema(&Key { min, ..*key }, defs).with("type", "integer".into())
             }
         }
     )*};
@@ -169,7 +170,7 @@ impl<T: Kind> Kind for Vec<T> {
     }
 
     fn fits(node: &Node) -> u8 {
-        u8::from(matches!(node.value, Value::List(_)))
+        2 * u8::from(matches!(node.value, Value::List(_)))
     }
 
     fn read(at: &At) -> Result<Self, DesignError> {

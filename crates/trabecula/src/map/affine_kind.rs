@@ -17,7 +17,7 @@ pub struct AffineKind {
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
-    /// Shears.
+    /// Shears by name, in degrees: xz = 20 moves x by tan(20°) · z.
     #[kind(default)]
     skew: SkewKind,
 }
@@ -25,8 +25,14 @@ pub struct AffineKind {
 /// Explains that numbers of this map are constant.
 fn uniform(at: &At) -> Result<(), DesignError> {
     let message = "this map is the same everywhere; map.phase takes a wavelength and an orientation that vary";
-    let keys = ["wavelength", "rotate", "offset"];
-    at.entries("a map").iter().flatten().filter(|e| keys.contains(&e.0)).try_for_each(|(_, at)| constant(at, message))
+    for (key, at) in at.entries("a map").unwrap_or_default() {
+        match key {
+            "wavelength" | "rotate" | "offset" => constant(&at, message)?,
+            "skew" => at.entries("shears").iter().flatten().try_for_each(|(_, at)| constant(at, message))?,
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Shears: `xz = 20` moves x by tan(20°) · z.

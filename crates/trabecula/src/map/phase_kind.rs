@@ -94,7 +94,7 @@ pub struct AlongDirection {
 /// Turned to two directions.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct AlongFrame {
-    /// The directions of the cell's x and z axes.
+    /// The directions of the cell's x and z axes: { x = [x, y, z], z = [x, y, z] }.
     #[kind(keyword)]
     frame: FrameKind,
 }
@@ -102,7 +102,8 @@ pub struct AlongFrame {
 /// Turned to the principal directions of a tensor.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct AlongStress {
-    /// A stress tensor whose principal directions the cell's axes take.
+    /// A stress tensor whose principal directions the cell's axes take: its components 11, 22, 33, 23, 13, 12, or the field of a
+    /// result.
     #[kind(keyword)]
     stress: TensorKind,
 }
@@ -191,7 +192,8 @@ pub enum Domain {
 impl BuildMap for PhaseKind {
     fn build(&self, path: &str, environment: &Environment) -> Result<Map, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
-        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));
+        let weight_key = key_of::<PhaseKind>("weight");
+        let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, weight_key));
         let length = key_of::<PhaseKind>("wavelength");
         let length = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, length));
         let wavelength = match &self.wavelength {

@@ -227,15 +227,20 @@ fn bad_files_are_refused_with_what_is_wrong() {
     says(
         "fraction = 0.3",
         "phase = { wavelength = 2, rotate_z = 3, direction = [0, 0, 1] }",
-        "map.phase.direction",
+        "map.phase.rotate_z",
         &["at once"],
     );
-    says("fraction = 0.3", "phase = { wavelength = 2, rotate = [1, 2] }", "map.phase.rotate", &["three angles"]);
+    says(
+        "fraction = 0.3",
+        "phase = { wavelength = 2, rotate = [1, 2] }",
+        "map.phase.rotate",
+        &["a list of three", "found 2 values"],
+    );
     says(
         "fraction = 0.3",
         "phase = { wavelength = { formula = \"4 - x\" } }",
-        "map.phase.wavelength",
-        &["(4.0000, 0.0000, 0.0000)"],
+        "map.phase.wavelength.formula",
+        &["(8.0000,"],
     );
     says(
         "fraction = 0.3",

@@ -16,7 +16,7 @@ const NARROW: f64 = 15.0;
 
 pub(super) fn warn_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>) {
     let parts: Vec<String> = [
-        (c.merged, "node", "merged into another at the same environment"),
+        (c.merged, "node", "merged into another at the same position"),
         (c.short, "strut", "of no length left out"),
         (c.duplicates, "strut", "left out because another joins the same nodes"),
         (c.isolated, "node", "left out because no strut ends there"),

@@ -219,7 +219,10 @@ impl Kind for PatternStrut {
         }
         let mut row = [0; 5];
         for (i, (r, item)) in row.iter_mut().zip(&items).enumerate() {
-            *r = if i < 2 { u32::read(item)? as i32 } else { i32::read(item)? };
+            *r = i32::read(item)?;
+            if i < 2 && *r < 0 {
+                return Err(item.error(format!("ids of nodes are whole numbers from 0, found {r}")));
+            }
         }
         Ok(PatternStrut(row))
     }
