@@ -69,9 +69,14 @@ pub struct Bvh {
 impl Bvh {
     /// The tree over `items`, which index `boxes`. The same for any number of threads.
     pub fn new(boxes: &[Aabb], mut items: Vec<u32>, split: Split) -> Bvh {
-        let mut nodes = Vec::with_capacity(items.len());
-        if !items.is_empty() {
-            build(boxes, &mut items, [0, 0], split, &mut nodes);
+        let mut nodes = Vec::new();
+        match split {
+            _ if items.is_empty() => {}
+            Split::Median => {
+                nodes = vec![Node { bounds: Aabb::EMPTY, at: 0, count: 0 }; nodes_of_halves(items.len())];
+                build_halves(boxes, &mut items, 0, &mut nodes);
+            }
+            Split::SurfaceArea => build(boxes, &mut items, [0, 0], &mut nodes),
         }
         Bvh { nodes, order: items }
     }
@@ -169,33 +174,69 @@ fn longest(b: &Aabb) -> usize {
     (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m })
 }
 
-/// Appends the subtree of the items `order`, which stand from `first` on in the tree's order.
-fn build(boxes: &[Aabb], order: &mut [u32], [first, depth]: [usize; 2], split: Split, nodes: &mut Vec<Node>) {
+/// Number of nodes of a tree of halves over `n` items: on each level there are parts of `size` and of one more.
+fn nodes_of_halves(n: usize) -> usize {
+    let leaf = Split::Median.leaf();
+    let (mut size, mut parts, mut larger) = (n, 1, 0);
+    let mut nodes = 1;
+    while size > leaf || (size == leaf && larger > 0) {
+        if size == leaf {
+            return nodes + 2 * larger;
+        }
+        nodes += 2 * (parts + larger);
+        (parts, larger) = if size % 2 == 0 { (2 * parts + larger, larger) } else { (parts, parts + 2 * larger) };
+        size /= 2;
+    }
+    nodes
+}
+
+/// Builds a tree of halves in place: `nodes` are as many as it has. `first` is the position of the first item.
+fn build_halves(boxes: &[Aabb], order: &mut [u32], first: usize, nodes: &mut [Node]) {
+    let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
+    let n = order.len();
+    let Some((node, rest)) = nodes.split_first_mut() else { return };
+    if n <= Split::Median.leaf() {
+        *node = Node { bounds, at: first as u32, count: n as u32 };
+        return;
+    }
+    let middle = halve(boxes, order, longest(&bounds));
+    let of_left = nodes_of_halves(middle);
+    *node = Node { bounds, at: 1 + of_left as u32, count: 0 };
+    let (left, right) = order.split_at_mut(middle);
+    let (left_nodes, right_nodes) = rest.split_at_mut(of_left);
+    let mut make_left = || build_halves(boxes, left, first, left_nodes);
+    let mut make_right = || build_halves(boxes, right, first + middle, right_nodes);
+    if n > PARALLEL {
+        rayon::join(make_left, make_right);
+    } else {
+        make_left();
+        make_right();
+    }
+}
+
+/// Builds a tree by the surface-area heuristic: appends its nodes. `first` is the position of the first item.
+fn build(boxes: &[Aabb], order: &mut [u32], [first, depth]: [usize; 2], nodes: &mut Vec<Node>) {
     let bounds = order.iter().fold(Aabb::EMPTY, |b, i| b.union(boxes[*i as usize]));
     let here = nodes.len();
     nodes.push(Node { bounds, at: first as u32, count: order.len() as u32 });
-    if order.len() <= split.leaf() {
+    if order.len() <= Split::SurfaceArea.leaf() {
         return;
     }
-    let middle = match split {
-        Split::Median => Some(halve(boxes, order, longest(&bounds))),
-        Split::SurfaceArea if depth < DEEP => divide(boxes, order),
-        Split::SurfaceArea => None,
-    }
-    .unwrap_or(order.len() / 2);
+    let divided = if depth < DEEP { divide(boxes, order) } else { None };
+    let middle = divided.unwrap_or(order.len() / 2);
     let parallel = order.len() > PARALLEL;
     let (left, right) = order.split_at_mut(middle);
     let [of_left, of_right] = [[first, depth + 1], [first + middle, depth + 1]];
     if parallel {
         let mut rest = Vec::new();
-        let make_left = || build(boxes, left, of_left, split, nodes);
-        rayon::join(make_left, || build(boxes, right, of_right, split, &mut rest));
+        let make_left = || build(boxes, left, of_left, nodes);
+        rayon::join(make_left, || build(boxes, right, of_right, &mut rest));
         nodes[here].at = (nodes.len() - here) as u32;
         nodes.append(&mut rest);
     } else {
-        build(boxes, left, of_left, split, nodes);
+        build(boxes, left, of_left, nodes);
         nodes[here].at = (nodes.len() - here) as u32;
-        build(boxes, right, of_right, split, nodes);
+        build(boxes, right, of_right, nodes);
     }
     nodes[here].count = 0;
 }
@@ -245,6 +286,16 @@ fn divide(boxes: &[Aabb], order: &mut [u32]) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::random::random;
+
+    #[test]
+    fn the_nodes_of_halves_are_counted() {
+        fn counted(n: usize) -> usize {
+            if n <= Split::Median.leaf() { 1 } else { 1 + counted(n / 2) + counted(n - n / 2) }
+        }
+        for n in 1..3000 {
+            assert_eq!(nodes_of_halves(n), counted(n), "{n}");
+        }
+    }
 
     fn boxes(n: usize) -> Vec<Aabb> {
         let mut seed = 5;
