@@ -35,8 +35,8 @@ def spartan(
 ) -> dict:
     """The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
 
-    wavelength: Wavelength, one number or three. [mm, above 0]
-    rotate: Angles about x, y, z. [degrees, default [0.0, 0.0, 0.0]]
+    wavelength: Cell edge, one number or three. [mm, above 0]
+    rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     """
     return {"spartan": settings(wavelength=wavelength, rotate=rotate, offset=offset)}

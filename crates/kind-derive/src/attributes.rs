@@ -16,6 +16,7 @@ pub struct Outer {
     pub untagged: bool,
     pub alternatives: bool,
     pub inherit: bool,
+    pub keyed: bool,
 }
 
 impl Outer {
@@ -32,6 +33,8 @@ impl Outer {
                 out.before = Some(meta.value()?.parse()?);
             } else if meta.path.is_ident("family") {
                 out.family = Some(meta.value()?.parse()?);
+            } else if meta.path.is_ident("keyed") {
+                out.keyed = true;
             } else if meta.path.is_ident("untagged") {
                 out.untagged = true;
             } else if meta.path.is_ident("alternatives") {

@@ -68,15 +68,17 @@ pub fn tagged(ident: &Ident, outer: &Outer, data: &DataEnum) -> syn::Result<Toke
             }
         }
     });
-    let family = quote! {
-        #[allow(dead_code)]
-        impl #ident {
+    let key = (outer.keyed || outer.family.is_some()).then(|| {
+        quote! {
             /// The key of the kind.
             pub fn key(&self) -> &'static str {
                 match self { #(#keys),* }
             }
-            #(#family)*
         }
+    });
+    let family = match &key {
+        Some(key) => quote! { impl #ident { #key #(#family)* } },
+        None => quote! {},
     };
     let table = if from.is_empty() {
         quote! {}

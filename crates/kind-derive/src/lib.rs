@@ -14,7 +14,8 @@
 //! | type | `check = function` | `fn(&Self, &Key) -> Result<(), Fault>`: what fields must keep together, checked after each |
 //! | enum | `untagged`, `alternatives` | see above |
 //! | enum | `inherit` | limits of the place where it stands hold for its numbers, instead of the variant's |
-//! | enum | `family = Trait` | gives `family(&self) -> &dyn Trait`; every such enum has `key(&self) -> &'static str` |
+//! | enum | `keyed` | gives `key(&self) -> &'static str` |
+//! | enum | `family = Trait` | gives `family(&self) -> &dyn Trait`, and `key` |
 //! | field | `unit = "mm"` | unit |
 //! | field | `above`, `below`, `min`, `max` | limits of each number, exclusive and inclusive |
 //! | field | `least = n` | least number of items of a list or map |

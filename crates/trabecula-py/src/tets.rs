@@ -7,7 +7,7 @@ use geometry::formats;
 use geometry::surface_mesh::SurfaceMesh;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use trabecula::design::{DesignError, Joined, Node, TetFileSpec, Tets, Unit};
+use trabecula::design::{DesignError, Joined, Node, TetFileKind, Tets, Unit};
 
 use crate::error;
 use crate::file;
@@ -67,7 +67,7 @@ impl TetMesh {
     fn read(py: Python<'_>, path: String, folder: PathBuf, unit: Option<&str>, split: bool) -> PyResult<TetMesh> {
         let unit = unit.map(str::parse::<Unit>).transpose();
         let unit = unit.map_err(|e| pyo3::exceptions::PyValueError::new_err(format!("unit: {}", e.message)))?;
-        let spec = TetFileSpec { path, unit, split, joined: Joined::default() };
+        let spec = TetFileKind { path, unit, split, joined: Joined::default() };
         let made = run(py, None, None, |_| Tets::in_file(&spec, &Folder(folder)))?;
         of(py, made)
     }

@@ -25,7 +25,7 @@ pub use phase::{Phase, Settings, Wanted};
 pub use round::Round;
 pub use sweep::{Path, Sweep};
 pub use tet_map::Tets;
-pub use tets_kind::{Joined, MadeTetsSpec, MesherSpec, Method, TetFileSpec, TetsSpec};
+pub use tets_kind::{Joined, MadeTetsKind, MesherKind, Method, TetFileKind, TetsKind};
 
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ pub enum MapKind {
     Cylinder(round_kind::CylinderMapKind),
     Sphere(round_kind::SphereMapKind),
     Sweep(sweep_kind::SweepKind),
-    Tets(TetsSpec),
+    Tets(TetsKind),
 }
 
 /// A kind of map, as it is declared.

@@ -11,6 +11,7 @@ use crate::kind::{DesignError, Key, Kind};
 use crate::lattice::{Lattice, Level};
 use crate::map::Map;
 use geometry::fault::{Fault, number};
+use geometry::math::Interval;
 use std::sync::Arc;
 
 /// Coefficients of p⁹ … p⁰ for the level of the diamond (f ≤ t) at porosity p, as published in the SPARTAN note (its
@@ -177,17 +178,22 @@ pub(super) fn about_mid(cell: Cell, spec: &LevelSpec, part: PartSpec, path: &str
     if mid == 0.0 {
         return Ok(cell);
     }
-    check_sheet(part, "mid", &path)?;
-    let range = cell.range();
-    if !(range.lo < mid && mid < range.hi) {
-        let message = format!(
-            "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
-            range.lo, range.hi
-        );
-        return Err(DesignError::new(path, message).found(mid.to_string()));
-    }
+    check_mid(mid, cell.range(), part, &path)?;
     let series = cell.series().about(mid);
     Ok(Cell::new(series.map_err(|f| DesignError::fault(&path, f))?))
+}
+
+/// Refuses a mid-surface f = mid of a part that has none, or outside the values that the cell takes.
+pub(super) fn check_mid(mid: f64, range: Interval, part: PartSpec, path: &str) -> Result<(), DesignError> {
+    check_sheet(part, "mid", path)?;
+    if range.lo < mid && mid < range.hi {
+        return Ok(());
+    }
+    let message = format!(
+        "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
+        range.lo, range.hi
+    );
+    Err(DesignError::new(path, message).found(mid.to_string()))
 }
 
 /// The constant level at which the lattice fills the share `target` of the region: the quantile of the lattice's

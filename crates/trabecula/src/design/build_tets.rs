@@ -90,7 +90,7 @@ impl Tets {
     }
 
     /// The tetrahedral mesh in a file, of no region.
-    pub fn in_file(file: &TetFileSpec, loader: &dyn Loader) -> Result<Tets, DesignError> {
+    pub fn in_file(file: &TetFileKind, loader: &dyn Loader) -> Result<Tets, DesignError> {
         let (mesh, checked) = from_file(file, "", loader)?;
         checked_mesh(mesh, &checked, file.path.clone(), None, "", "")
     }
@@ -119,7 +119,7 @@ fn entry<'a>(at: &At<'a>, key: &str) -> Result<Option<At<'a>>, DesignError> {
 
 /// The tetrahedral mesh in a design, whose other keys are left alone, and the path of its table; the name of its lattice if
 /// it is to be that of one.
-fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), DesignError> {
+fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsKind), DesignError> {
     let lattices = match entry(&At::root(node), "lattice")? {
         Some(of) => of.entries("lattices by name, such as [lattice.core]")?,
         None => Vec::new(),
@@ -128,7 +128,7 @@ fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), De
         if let Some(map) = entry(at, "map")?
             && let Some(tets) = entry(&map, "tets")?
         {
-            return Ok((tets.path.clone(), TetsSpec::read(&tets)?));
+            return Ok((tets.path.clone(), TetsKind::read(&tets)?));
         }
     }
     let message =
@@ -137,7 +137,7 @@ fn declared(node: &Node, lattice: Option<&str>) -> Result<(String, TetsSpec), De
 }
 
 /// The tetrahedral mesh of `spec`; `environment.path` is that of its table.
-pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
+pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environment) -> Result<Tets, DesignError> {
     let wrong = |f: Fault| DesignError::fault(&environment.path, f);
     // Points on the surface are no evidence of lost volume.
     let inside: Vec<Vec3> = {
@@ -148,10 +148,10 @@ pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environme
     };
     let bounds = environment.region.bounds();
     let (mut mesh, fit, checked, mesher) = match spec {
-        TetsSpec::Made(made) => {
+        TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
-            let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsSpec>("size")))?;
-            if made.mesher == MesherSpec::Background {
+            let size = made.size.build(&Quantity::new(below("size"), environment, key_of::<MadeTetsKind>("size")))?;
+            if made.mesher == MesherKind::Background {
                 let (mesh, fit) = background(&**environment.region, &bounds, &size, &inside).map_err(wrong)?;
                 (mesh, Some(fit), Checked::default(), "background".to_string())
             } else {
@@ -165,19 +165,19 @@ pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environme
                 (mesh, None, checked, "ftetwild".to_string())
             }
         }
-        TetsSpec::File(file) => {
+        TetsKind::File(file) => {
             let (mesh, checked) = from_file(file, &environment.path, environment.loader)?;
             (mesh, None, checked, file.path.clone())
         }
     };
     let mut notes = crate::region::Notes::default();
-    if let TetsSpec::Made(made) = spec {
+    if let TetsKind::Made(made) = spec {
         mesh.zones = zones(&mesh, made, &environment.path, environment.loader, &mut notes)?;
     }
     let fit = fit.unwrap_or_else(|| mesher::fit(&mesh, &**environment.region, &inside));
     let todo = match spec {
-        TetsSpec::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
-        TetsSpec::File(_) => "is it a mesh of this region, in the right place and unit?",
+        TetsKind::Made(_) => "walls are thin, or edges sharp, for tetrahedra of this size: use a smaller one",
+        TetsKind::File(_) => "is it a mesh of this region, in the right place and unit?",
     };
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
     made.warnings.extend(notes.warnings);
@@ -187,7 +187,7 @@ pub(super) fn tets(spec: &TetsSpec, region: &RegionKind, environment: &Environme
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
 fn zones(
     mesh: &TetMesh,
-    made: &MadeTetsSpec,
+    made: &MadeTetsKind,
     path: &str,
     loader: &dyn Loader,
     notes: &mut crate::region::Notes,
@@ -240,19 +240,19 @@ fn checked_mesh(
 /// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the
 /// region then.
 pub(super) fn of_soup(
-    spec: &TetsSpec,
+    spec: &TetsKind,
     region: &RegionKind,
     path: &str,
     loader: &dyn Loader,
     why: DesignError,
 ) -> Result<Tets, DesignError> {
-    let (TetsSpec::Made(made), RegionKind::Mesh(file)) = (spec, region) else {
+    let (TetsKind::Made(made), RegionKind::Mesh(file)) = (spec, region) else {
         return Err(why);
     };
     let Ok(surface) = triangles(file, loader) else {
         return Err(why);
     };
-    if made.mesher == MesherSpec::Background {
+    if made.mesher == MesherKind::Background {
         let message = format!(
             "{}; {path}.mesher = \"ftetwild\" takes such triangles too, and the boundary of its mesh is the region then",
             why.message

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::build_cell::orbit_terms;
-use super::build_level::within_wavelength;
+use super::build_level::{check_mid, within_wavelength};
 use super::build_tets::{self, TetReport};
 use super::built_report::Varied;
 use super::data::*;
@@ -49,7 +49,7 @@ impl Domain<'_> {
 }
 
 /// The lattice over tetrahedra of a design, by name, and their mesh.
-fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsSpec)> {
+fn over_tets(d: &Design) -> Option<(&String, &LatticeSpec, &TetsKind)> {
     d.lattice.iter().find_map(|(name, spec)| match &spec.map {
         MapKind::Tets(t) => Some((name, spec, t)),
         _ => None,
@@ -116,8 +116,8 @@ pub(super) fn domain<'a>(
     }
     let path = format!("{path}.map.tets");
     let joined = match spec_of_mesh {
-        TetsSpec::Made(m) => m.joined,
-        TetsSpec::File(f) => f.joined,
+        TetsKind::Made(m) => m.joined,
+        TetsKind::File(f) => f.joined,
     };
     let (made, filled) = match soup {
         Some(made) => (made, Some(region.clone())),
@@ -218,7 +218,9 @@ pub(super) fn lattice(
     }
     let mid = spec.mid;
     if mid != 0.0 {
-        cell = about(cell, mid, part, &format!("{path}.mid"))?;
+        let at = format!("{path}.mid");
+        check_mid(mid, cell.range(), domain.spec.part, &at)?;
+        cell = cell.about(mid).map_err(|f| DesignError::fault(&at, f))?;
     }
     let key = spec.amount.key();
     let path = format!("{path}.{key}");
@@ -309,22 +311,6 @@ fn zoned(
         joins.warn(&domain.zones(), &at, warnings);
     }
     Ok(Made { tiling: Arc::new(tiling), explicit, joins })
-}
-
-/// The cell about another mid-surface.
-fn about(cell: TetCell, mid: f64, part: Part, path: &str) -> Result<TetCell, DesignError> {
-    if part != Part::Sheet {
-        return Err(DesignError::new(path, "mid goes with part = \"sheet\""));
-    }
-    let range = cell.range();
-    if !(range.lo < mid && mid < range.hi) {
-        let message = format!(
-            "mid is {mid}; the cell's values run from {:.4} to {:.4}, and the mid-surface f = mid is there only between",
-            range.lo, range.hi
-        );
-        return Err(DesignError::new(path, message).found(mid.to_string()));
-    }
-    cell.about(mid).map_err(|f| DesignError::fault(path, f))
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.

@@ -7,7 +7,7 @@ use crate::cell::{catalogue, named};
 pub use crate::grade::{ControlPoints, FieldKind, GradeKind, GradeSpec};
 pub use crate::kind::Unit;
 use crate::kind::{At, Defs, DesignError, Fault, Key, Kind, Node, Table};
-pub use crate::map::{Joined, MadeTetsSpec, MapKind, MesherSpec, Method, TetFileSpec, TetsSpec};
+pub use crate::map::{Joined, MadeTetsKind, MapKind, MesherKind, Method, TetFileKind, TetsKind};
 pub use crate::region::{HalfSpaceKind, MeshFile, RegionKind};
 use geometry::symmetry::Group;
 
@@ -312,7 +312,7 @@ pub struct LevelSpec {
 
 /// An amount of solid.
 #[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(noun = "amount")]
+#[kind(noun = "amount", keyed)]
 pub enum AmountSpec {
     /// The field value t; for a sheet the half-level.
     Iso(GradeSpec),

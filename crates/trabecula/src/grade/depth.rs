@@ -19,7 +19,7 @@ pub struct DepthKind {
 
 impl BuildGrade for DepthKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(Depth { region: of.environment.region.clone(), stops: of.stops(&self.stops) }.into())
+        Ok(Depth { region: of.environment.region.clone(), stops: of.stops(self.stops.clone()) }.into())
     }
 }
 

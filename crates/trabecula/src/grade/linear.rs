@@ -72,7 +72,7 @@ impl Linear {
 
 impl BuildGrade for Linear {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(Linear { along: self.along, stops: of.stops(&self.stops) }.into())
+        Ok(Linear { along: self.along, stops: of.stops(self.stops.clone()) }.into())
     }
 }
 

@@ -37,8 +37,8 @@ impl<'a> Quantity<'a> {
     }
 
     /// The stops of the values that are meant.
-    pub fn stops(&self, stops: &Stops) -> Stops {
-        if self.complement { stops.clone().complement() } else { stops.clone() }
+    pub fn stops(&self, stops: Stops) -> Stops {
+        if self.complement { stops.complement() } else { stops }
     }
 
     /// A function whose values cannot be checked where they are declared: they are sampled in the region.

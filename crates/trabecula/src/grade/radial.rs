@@ -32,7 +32,7 @@ impl RadialKind {
 
 impl BuildGrade for RadialKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(RadialKind { stops: of.stops(&self.stops), ..*self }.made().into())
+        Ok(RadialKind { stops: of.stops(self.stops.clone()), ..*self }.made().into())
     }
 }
 

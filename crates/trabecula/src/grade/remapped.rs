@@ -29,7 +29,7 @@ pub(super) fn sampled(samples: Samples, remap: &Option<Stops>, of: &Quantity) ->
         }
         (Some(stops), _) => stops.clone(),
     };
-    of.checked(Remapped::new(samples, of.stops(&stops)))
+    of.checked(Remapped::new(samples, of.stops(stops)))
 }
 
 impl Field for Remapped {

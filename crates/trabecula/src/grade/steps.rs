@@ -33,7 +33,7 @@ impl Steps {
 
 impl BuildGrade for Steps {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(Steps { along: self.along, stops: of.stops(&self.stops) }.into())
+        Ok(Steps { along: self.along, stops: of.stops(self.stops.clone()) }.into())
     }
 }
 

@@ -8,6 +8,17 @@ use crate::kind::{At, DesignError, Kind, OneOrThree, Value};
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
 #[kind(name = "Affine", noun = "an affine map", before = uniform)]
 pub struct AffineKind {
+    /// Edges, angles and offset.
+    #[kind(flatten)]
+    cells: Cells,
+    /// Shears by name, in degrees: xz = 20 moves x by tan(20°) · z.
+    #[kind(default)]
+    skew: SkewKind,
+}
+
+/// Edges, angles and offset of the cells.
+#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+pub struct Cells {
     /// Cell edge, one number or three.
     #[kind(unit = "mm", above = 0.0)]
     wavelength: OneOrThree,
@@ -17,9 +28,6 @@ pub struct AffineKind {
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
-    /// Shears by name, in degrees: xz = 20 moves x by tan(20°) · z.
-    #[kind(default)]
-    skew: SkewKind,
 }
 
 /// Explains that numbers of this map are constant.
@@ -72,27 +80,22 @@ impl SkewKind {
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
 #[kind(name = "Spartan", noun = "a spartan map", before = uniform)]
 pub struct SpartanKind {
-    /// Wavelength, one number or three.
-    #[kind(unit = "mm", above = 0.0)]
-    wavelength: OneOrThree,
-    /// Angles about x, y, z.
-    #[kind(unit = "degrees", default = [0.0; 3])]
-    rotate: [f64; 3],
-    /// Moves the lattice.
-    #[kind(unit = "mm", default = [0.0; 3])]
-    offset: [f64; 3],
+    /// Edges, angles and offset.
+    #[kind(flatten)]
+    cells: Cells,
 }
 
 impl BuildMap for AffineKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
-        let made = Affine::rigid(self.wavelength.three(), self.rotate, self.offset, &self.skew.shears());
+        let made =
+            Affine::rigid(self.cells.wavelength.three(), self.cells.rotate, self.cells.offset, &self.skew.shears());
         shared(made, path)
     }
 }
 
 impl BuildMap for SpartanKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
-        let made = Affine::spartan(self.wavelength.three(), self.rotate, self.offset);
+        let made = Affine::spartan(self.cells.wavelength.three(), self.cells.rotate, self.cells.offset);
         shared(made, path)
     }
 }

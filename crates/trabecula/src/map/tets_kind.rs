@@ -11,22 +11,22 @@ use crate::region::RegionKind;
 /// Piecewise affine over a tetrahedral mesh of the region, made or from a file: a cell in each tetrahedron.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Tets", noun = "a map over tetrahedra", alternatives)]
-pub enum TetsSpec {
+pub enum TetsKind {
     /// Made to a size.
-    Made(MadeTetsSpec),
+    Made(MadeTetsKind),
     /// From a file.
-    File(TetFileSpec),
+    File(TetFileKind),
 }
 
 /// A tetrahedral mesh that is made.
 #[derive(Clone, Debug, PartialEq, Kind)]
-pub struct MadeTetsSpec {
+pub struct MadeTetsKind {
     /// Edge of a regular tetrahedron of the volume that tetrahedra are to have, a number or a grade.
     #[kind(unit = "mm", above = 0.0)]
     pub size: GradeSpec,
     /// The program that makes it.
     #[kind(default)]
-    pub mesher: MesherSpec,
+    pub mesher: MesherKind,
     /// Time that another mesher than the background one may take.
     #[kind(unit = "s", above = 0.0, default = 600.0)]
     pub limit: f64,
@@ -42,7 +42,7 @@ pub struct MadeTetsSpec {
 /// The program that makes a tetrahedral mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Kind)]
 #[kind(name = "Mesher", noun = "mesher")]
-pub enum MesherSpec {
+pub enum MesherKind {
     /// A body-centred cubic lattice fitted to the region: nodes moved onto its surface, the rest cut. Takes any region.
     #[default]
     #[kind(hints("stuffing"))]
@@ -54,7 +54,7 @@ pub enum MesherSpec {
 
 /// A tetrahedral mesh in a file.
 #[derive(Clone, Debug, PartialEq, Kind)]
-pub struct TetFileSpec {
+pub struct TetFileKind {
     /// Path of the file, relative to the design file: vtu, vtk; with the extra "fe" of the Python package also msh, inp, med,
     /// mesh and others.
     #[kind(keyword)]
@@ -92,7 +92,7 @@ pub enum Method {
     Implicit,
 }
 
-impl BuildMap for TetsSpec {
+impl BuildMap for TetsKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
         let message = "a map over tetrahedra goes with a tetrahedral cell ([lattice.NAME.cell.tet]); other cells do not fit \
                        face to face";

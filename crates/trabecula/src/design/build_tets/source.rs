@@ -44,7 +44,7 @@ pub(super) fn triangles(file: &MeshFile, loader: &dyn Loader) -> Result<Mesh, De
 
 /// The tetrahedral mesh that fTetWild makes of a surface.
 pub(super) fn wild(
-    made: &MadeTetsSpec,
+    made: &MadeTetsKind,
     surface: &Mesh,
     size: f64,
     path: &str,
@@ -59,7 +59,7 @@ pub(super) fn wild(
 
 /// The tetrahedra of a file.
 pub(super) fn from_file(
-    file: &TetFileSpec,
+    file: &TetFileKind,
     path: &str,
     loader: &dyn Loader,
 ) -> Result<(TetMesh, Checked), DesignError> {
