@@ -13,10 +13,9 @@
 //! | ρ² = A z² + B z + C | squared radius of a beam at z on its axis | `Pencil::meridian`, `HalfBeam::meridian` |
 //! | S = x·x − r² | quadratic form of a ball | `Hub::value` |
 //! | G = √λ (n·x − d) | affine function of a half-beam, which is S ≤ G² | `HalfBeam::g` |
-//! | N(G) | smooth union of the G²; a hub is S ≤ N | `Hub::smooth_union` |
-//! | τ | fillet parameter of a pair of half-beams, (β − α)/(β + α) | `Fillet::Tau` |
+//! | N(G) | smooth union of the G²; a hub is S ≤ N | `Hub::smooth_union_value` |
+//! | τ | fillet parameter of a pair of half-beams, (β − α)/(β + α) | `Fillet::Tau`, `Hub::tau` |
 //! | α, β | fillet parameters of the note, αβ = ¼ | `Fillet::Alpha`, `Fillet::Beta` |
-//! | t | blend parameter of a half-beam, τᵢⱼ = tᵢ tⱼ | `HalfBeam::blend` |
 //!
 //! Planes of a half-beam along its axis, from the centre: the *contact plane* with the circle where it touches the
 //! ball, the *split plane* between the parts of the two hubs, with the *end circle*, and the *cut plane* up to which
@@ -27,7 +26,7 @@ use rayon::prelude::*;
 
 use crate::graph::Graph;
 use geometry::fault::{Fault, counted, number};
-use geometry::math::{Aabb, Vec3, norm, scale, sub};
+use geometry::math::{Aabb, Vec3, add, norm, scale, sub};
 
 mod bezier;
 mod boundary_form;
@@ -37,6 +36,7 @@ mod collisions;
 pub mod complex;
 mod conic;
 mod facets;
+mod fillet_sizes;
 mod foot;
 mod gauss;
 mod hub;
@@ -49,6 +49,7 @@ mod quador_field;
 mod rational_patch;
 mod rays;
 pub mod slice;
+mod smooth_union;
 mod tessellation;
 
 pub use bezier::Bezier;
@@ -63,6 +64,7 @@ pub use rays::Hit;
 pub use tessellation::{Measures, Tessellation};
 
 use box_index::BoxIndex;
+use fillet_sizes::{FilletSizes, fillet_sizes, min_fillet_radius};
 use hub::AffineFunction;
 
 /// Size of the fillets.
@@ -109,11 +111,6 @@ impl Fillet {
     }
 }
 
-/// Maximum t² of fillets: a fillet above it cannot be distinguished from a crease.
-const MAX_TAU: f64 = 0.999;
-/// Fraction of the distance from contact plane to split plane that fillets may occupy.
-const FILLET_REACH: f64 = 0.95;
-
 /// A hub ball with its range of half-beams.
 #[derive(Clone, Debug)]
 struct Ball {
@@ -121,8 +118,12 @@ struct Ball {
     radius: f64,
     first: usize,
     last: usize,
+    /// Start of its matrix of τ, which equal hubs share.
+    taus: usize,
     /// Bounds of its part with half-beams up to their cut planes, mm.
     bounds: Aabb,
+    /// Bounds of its part of the solid, mm.
+    part: Aabb,
     /// Upper bound of half the second derivative of N.
     curvature: f64,
 }
@@ -134,7 +135,7 @@ pub struct Shortfall {
     pub hub: usize,
     /// Fillet radius achieved in the tightest crotch, mm (0 in creases).
     pub radius: f64,
-    /// Maximum τ of its pairs.
+    /// Maximum τ of its crotches.
     pub tau: f64,
 }
 
@@ -152,14 +153,20 @@ pub struct Overlap {
 pub struct Quadors {
     balls: Vec<Ball>,
     half_beams: Vec<HalfBeam>,
+    /// G of each, close together in memory.
+    g: Vec<AffineFunction>,
+    /// τ of the pairs of half-beams of each kind of hub, row by row; empty without fillets.
+    taus: Vec<f64>,
     pencils: Vec<Pencil>,
     ends: Vec<[u32; 2]>,
-    sharp: bool,
     /// Typical radius by which squared values are converted to lengths, mm.
     scale: f64,
     /// Upper limit of field values, mm.
     cap: f64,
+    /// By bounds of hubs, grown by the limit of field values.
     index: BoxIndex,
+    /// By bounds of the parts of the solid.
+    parts: BoxIndex,
     shortfalls: Vec<Shortfall>,
     overlaps: Vec<Overlap>,
 }
@@ -215,11 +222,13 @@ impl Quadors {
             scale: median(pencils.iter().map(|p| p.radius_squared(p.length / 2.0).max(0.0).sqrt()))
                 .unwrap_or_else(|| median(graph.hubs.iter().map(|h| h.radius)).unwrap_or(1.0)),
             cap: 0.0,
-            sharp: fillet == Fillet::None,
+            g: half_beams.iter().map(|s| s.g).collect(),
             half_beams,
+            taus: Vec::new(),
             pencils,
             ends,
             index: BoxIndex::default(),
+            parts: BoxIndex::default(),
             shortfalls: Vec::new(),
             overlaps: Vec::new(),
         };
@@ -228,41 +237,52 @@ impl Quadors {
             None => 2.0 * out.scale,
         };
         firsts.push(out.half_beams.len());
-        let mut rest = &mut out.half_beams[..];
-        let mut of = Vec::with_capacity(graph.hubs.len());
-        for w in firsts.windows(2) {
-            let (here, after) = rest.split_at_mut(w[1] - w[0]);
-            rest = after;
-            of.push(here);
-        }
-        let sharp = out.sharp;
-        let made: Vec<(Ball, Option<Shortfall>, Vec<Overlap>)> = of
-            .into_par_iter()
-            .enumerate()
-            .map(|(i, half_beams)| {
-                let h = &graph.hubs[i];
-                let (shortfall, overlaps) = solve_blends(i, h.radius, half_beams, fillet);
-                let hub = Hub { radius: h.radius, half_beams, sharp };
-                let local = hub.bounds();
-                let bounds = Aabb {
-                    min: geometry::math::add(h.center, local.min),
-                    max: geometry::math::add(h.center, local.max),
-                };
-                let (first, last) = (firsts[i], firsts[i + 1]);
-                (
-                    Ball { center: h.center, radius: h.radius, first, last, bounds, curvature: hub.curvature_bound() },
-                    shortfall,
-                    overlaps,
-                )
+        out.balls = firsts
+            .windows(2)
+            .zip(&graph.hubs)
+            .map(|(range, h)| Ball {
+                center: h.center,
+                radius: h.radius,
+                first: range[0],
+                last: range[1],
+                taus: 0,
+                bounds: Aabb::EMPTY,
+                part: Aabb::EMPTY,
+                curvature: 0.0,
             })
             .collect();
-        for (ball, shortfall, overlaps) in made {
-            out.balls.push(ball);
-            out.shortfalls.extend(shortfall);
-            out.overlaps.extend(overlaps);
-        }
+        out.set_fillets(fillet);
         out.index = BoxIndex::new(out.balls.iter().map(|b| b.bounds.grown(out.cap)));
+        out.parts = BoxIndex::new(out.balls.iter().map(|b| b.part));
         Ok(out)
+    }
+
+    /// Sets the fillets, once for equal hubs, and the bounds that depend on them.
+    fn set_fillets(&mut self, fillet: Fillet) {
+        let classes = self.classes();
+        let sizes: Vec<FilletSizes> =
+            classes.sample.par_iter().map(|hub| fillet_sizes(self.hub(*hub), fillet)).collect();
+        let mut starts = Vec::with_capacity(sizes.len());
+        for of in &sizes {
+            starts.push(self.taus.len());
+            self.taus.extend(&of.taus);
+        }
+        for (hub, class) in classes.of.iter().enumerate() {
+            let of = &sizes[*class as usize];
+            self.balls[hub].taus = starts[*class as usize];
+            self.shortfalls.extend(of.shortfall.map(|[radius, tau]| Shortfall { hub, radius, tau }));
+            let first = self.balls[hub].first;
+            let beams = |of: &[usize; 2]| of.map(|i| self.half_beams[first + i].beam);
+            self.overlaps.extend(of.overlaps.iter().map(|pair| Overlap { hub, beams: beams(pair) }));
+        }
+        let curvature: Vec<f64> = classes.sample.par_iter().map(|hub| self.hub(*hub).curvature_bound()).collect();
+        for (hub, class) in classes.of.iter().enumerate() {
+            let (of, center) = (self.hub(hub), self.balls[hub].center);
+            let placed = |b: Aabb| Aabb { min: add(center, b.min), max: add(center, b.max) };
+            let (bounds, part) = (placed(of.bounds()), placed(of.part_bounds().grown(1e-6 * of.radius)));
+            let ball = &mut self.balls[hub];
+            (ball.bounds, ball.part, ball.curvature) = (bounds, part, curvature[*class as usize]);
+        }
     }
 
     /// Number of hubs.
@@ -278,7 +298,10 @@ impl Quadors {
     /// A hub, in its own frame.
     pub fn hub(&self, i: usize) -> Hub<'_> {
         let b = &self.balls[i];
-        Hub { radius: b.radius, half_beams: &self.half_beams[b.first..b.last], sharp: self.sharp }
+        let n = b.last - b.first;
+        let taus = if self.taus.is_empty() { &[][..] } else { &self.taus[b.taus..b.taus + n * n] };
+        let (half_beams, g) = (&self.half_beams[b.first..b.last], &self.g[b.first..b.last]);
+        Hub { radius: b.radius, half_beams, g, taus }
     }
 
     /// Centre of a hub, mm.
@@ -383,110 +406,10 @@ fn half_beams(graph: &Graph, pencils: &[Pencil]) -> (Vec<usize>, Vec<HalfBeam>) 
                 meridian: p.meridian(end),
                 split,
                 cut: cut.max(split),
-                blend: 0.0,
-                weight: 1.0,
             }
         })
         .collect();
     (firsts, half_beams)
-}
-
-/// Sets the blend parameters t of the half-beams of a hub.
-///
-/// For fillets to end before the split planes, t_i t_j must be at least the minimum τ of each pair. `t_i = √(max_j
-/// τ_ij)` always satisfies this. The remaining slack is removed from all half-beams simultaneously, half of the minimum
-/// slack of each per iteration, so that the order of beams has no effect.
-fn solve_blends(
-    index: usize,
-    radius: f64,
-    half_beams: &mut [HalfBeam],
-    fillet: Fillet,
-) -> (Option<Shortfall>, Vec<Overlap>) {
-    let n = half_beams.len();
-    let hub = Hub { radius, half_beams, sharp: fillet == Fillet::None };
-    let mut least = vec![0.0f64; n * n];
-    let mut overlaps = Vec::new();
-    for i in 0..n {
-        for j in 0..n {
-            if i == j {
-                continue;
-            }
-            let s = &hub.half_beams[i];
-            let tau_early = hub.min_tau(i, j, s.contact + FILLET_REACH * (s.split - s.contact));
-            let tau = if tau_early < MAX_TAU { tau_early } else { hub.min_tau(i, j, s.split).max(MAX_TAU) };
-            if tau >= 1.0 || s.split <= s.contact {
-                overlaps.push(Overlap { hub: index, beams: [s.beam, hub.half_beams[j].beam] });
-            }
-            let tau = if tau.is_nan() { 1.0 } else { tau.clamp(0.0, MAX_TAU) };
-            least[i * n + j] = least[i * n + j].max(tau);
-            least[j * n + i] = least[j * n + i].max(tau);
-        }
-    }
-    if fillet == Fillet::None {
-        half_beams.iter_mut().for_each(|s| s.blend = 1.0);
-        return (None, overlaps);
-    }
-    let mut t: Vec<f64> = (0..n).map(|i| (0..n).map(|j| least[i * n + j]).fold(0.0, f64::max).sqrt()).collect();
-    for _ in 0..8 {
-        let slack: Vec<f64> = (0..n)
-            .map(|i| {
-                let each = (0..n).filter(|&j| j != i && least[i * n + j] > 0.0);
-                each.map(|j| least[i * n + j] / (t[i] * t[j])).fold(0.0, f64::max)
-            })
-            .collect();
-        for i in 0..n {
-            t[i] *= if slack[i] > 0.0 { slack[i].sqrt() } else { 0.0 };
-        }
-    }
-    let requested = match fillet {
-        Fillet::Radius(r) => {
-            let pairs = hub.adjacent_pairs();
-            pairs.iter().map(|&(i, j)| tau_for_radius(&hub, i, j, r)).fold(MAX_TAU, f64::min)
-        }
-        _ => fillet.tau().unwrap_or(0.0),
-    };
-    let short = fillet != Fillet::Auto && t.iter().any(|t| t * t > requested * (1.0 + 1e-12) + 1e-15);
-    for (s, t) in half_beams.iter_mut().zip(&t) {
-        s.set_blend(t.max(requested.min(MAX_TAU).sqrt()));
-    }
-    let hub = Hub { radius, half_beams, sharp: false };
-    let shortfall = short.then(|| {
-        let blends = || half_beams.iter().map(|s| s.blend);
-        let most = blends().fold(0.0, f64::max);
-        Shortfall { hub: index, radius: min_fillet_radius(&hub), tau: most * most }
-    });
-    let shortfall = match fillet {
-        // Slack elsewhere in the hub may still leave every crotch as wide as requested.
-        Fillet::Radius(r) => shortfall.filter(|s| s.radius < r * (1.0 - 1e-9)),
-        _ => shortfall,
-    };
-    (shortfall, overlaps)
-}
-
-/// τ at which the crotch of two half-beams has radius r; the radius decreases as τ increases.
-fn tau_for_radius(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
-    let at = |tau: f64| hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1);
-    let (mut lo, mut hi) = (0.0, MAX_TAU);
-    if at(hi) >= r {
-        return hi;
-    }
-    for _ in 0..48 {
-        let mid = (lo + hi) / 2.0;
-        if at(mid) >= r { lo = mid } else { hi = mid }
-    }
-    lo
-}
-
-/// Fillet radius in the tightest crotch of a hub, mm.
-fn min_fillet_radius(hub: &Hub) -> f64 {
-    if hub.sharp {
-        return if hub.adjacent_pairs().is_empty() { f64::INFINITY } else { 0.0 };
-    }
-    let of = |(i, j): (usize, usize)| {
-        let tau = hub.half_beams[i].blend * hub.half_beams[j].blend;
-        hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1)
-    };
-    hub.adjacent_pairs().into_iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

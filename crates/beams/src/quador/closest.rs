@@ -101,7 +101,7 @@ impl Quadors {
         let near = if q < 0.0 {
             // N is convex: S − N lies below its tangent plus |δ|².
             distance_bound(q, norm(g), 1.0)
-        } else if of.sharp {
+        } else if of.sharp() {
             let s = dot(x, x) - of.radius * of.radius;
             of.half_beams.iter().fold(distance_bound(s.max(0.0), 2.0 * norm(x), 0.0), |least, half_beam| {
                 let v = half_beam.g.at(x);
@@ -137,7 +137,7 @@ impl ClosestPoints<'_> {
                     });
                 }
             }
-            let creases = if hub.sharp {
+            let creases = if hub.sharp() {
                 complex
                     .arcs
                     .iter()

@@ -9,7 +9,7 @@ use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
 use super::Quadors;
 use super::box_index::BoxIndex;
 
-/// Two beams without a common hub that intersect.
+/// Two beams without a common hub that intersect or touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
     /// Indices of the beams.
@@ -19,7 +19,7 @@ pub struct Collision {
 }
 
 impl Quadors {
-    /// Pairs of beams without a common hub whose axes come closer than the sum of their radii there, hubs included;
+    /// Pairs of beams without a common hub whose axes come as close as the sum of their radii there, hubs included;
     /// sorted by the first beam. Each pair is tested where the axes are closest.
     pub fn collisions(&self) -> Vec<Collision> {
         let axis = |b: usize| self.ends[b].map(|h| self.center(h as usize));
@@ -49,7 +49,7 @@ impl Quadors {
                     let position_text = |[p, q]: [Vec3; 2], s: f64| add(p, scale(sub(q, p), s));
                     let (x, y) = (position_text(axis(a), s), position_text(axis(b), t));
                     let radius_at = self.radius_at(a, s) + self.radius_at(b, t);
-                    (norm(sub(x, y)) < radius_at * (1.0 - 1e-9))
+                    (norm(sub(x, y)) <= radius_at * (1.0 + 1e-9))
                         .then_some(Collision { beams: [a as u32, b as u32], at: scale(add(x, y), 0.5) })
                 })
                 .collect::<Vec<_>>()
@@ -135,6 +135,8 @@ mod tests {
         let at = [0.0, 0.0, 0.45];
         let want = Collision { beams: [0, 1], at };
         assert_eq!(found, [want]);
+        assert_eq!(lone(&[x, over(1.0)]).collisions().len(), 1, "they touch");
+        assert_eq!(lone(&[x, over(1.0 + 1e-6)]).collisions(), []);
         // Parallel, and end to end.
         let beside = |y: f64| [[-5.0, y, 0.0], [5.0, y, 0.0]];
         assert_eq!(lone(&[x, beside(0.99)]).collisions().len(), 1);

@@ -7,11 +7,12 @@
 //! square of the largest G. Two half-beams give the fillet S − (a² − 2τab + b²)/(1 − τ²) of the note with τ = (β −
 //! α)/(β + α).
 //!
-//! τ of a pair is the product of the blend parameters t of its half-beams. Then R is always positive definite, and the
-//! active half-beams at a point are those with g > tσ, where σ = Σ t (g − tσ)/(1 − t²) over them: one equation for one
-//! number.
+//! Each pair has its own τ; R must be positive definite.
 
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale, sub};
+
+use super::fillet_sizes::MAX_TAU;
+use super::smooth_union::{Factor, largest};
 
 /// An affine function of the position x in a hub's frame: a·x + b.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,10 +56,6 @@ pub struct HalfBeam {
     pub split: f64,
     /// Position of the cut plane along the axis, mm; at least `split`.
     pub cut: f64,
-    /// Blend parameter t, in [0, 1].
-    pub blend: f64,
-    /// 1/(1 − t²).
-    pub weight: f64,
 }
 
 impl HalfBeam {
@@ -67,11 +64,6 @@ impl HalfBeam {
     pub fn radius_squared(&self, z: f64) -> f64 {
         let [a, b, c] = self.meridian;
         (a * z + b) * z + c
-    }
-
-    /// Sets the blend parameter t.
-    pub fn set_blend(&mut self, t: f64) {
-        (self.blend, self.weight) = (t, 1.0 / ((1.0 - t) * (1.0 + t)));
     }
 
     /// Maximum radius between the centre and the cut plane, mm.
@@ -90,115 +82,35 @@ pub struct Hub<'a> {
     pub radius: f64,
     /// Its half-beams.
     pub half_beams: &'a [HalfBeam],
-    /// Whether half-beams meet in creases (τ = 1).
-    pub sharp: bool,
-}
-
-/// The smooth union N at one position, its gradient, and the active half-beams.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct SmoothUnion {
-    /// N, mm².
-    pub value: f64,
-    /// Its gradient, mm.
-    pub gradient: Vec3,
-    /// Label: a bit for each of the first 64 half-beams that are active.
-    pub active: u64,
+    /// G of each, close together in memory.
+    pub(crate) g: &'a [AffineFunction],
+    /// R: τ of each pair of half-beams and 1 on the diagonal, row by row; empty if they meet in creases.
+    pub(crate) taus: &'a [f64],
 }
 
 impl Hub<'_> {
-    /// N at x, with gradient and label.
-    #[inline]
-    pub(crate) fn smooth_union(&self, x: Vec3) -> SmoothUnion {
-        if self.sharp {
-            let mut best = SmoothUnion::default();
-            let mut most = 0.0;
-            for (i, s) in self.half_beams.iter().enumerate() {
-                let g = s.g.at(x);
-                if g > most {
-                    most = g;
-                    best = SmoothUnion { value: g * g, gradient: scale(s.g.a, 2.0 * g), active: 1 << (i & 63) };
-                }
-            }
-            return best;
-        }
-        let sigma = self.sigma(x);
-        let mut out = SmoothUnion::default();
-        for (i, s) in self.half_beams.iter().enumerate() {
-            let g = s.g.at(x);
-            let f = g - s.blend * sigma;
-            if f > 0.0 {
-                let y = f * s.weight;
-                out.value += y * g;
-                out.gradient = add(out.gradient, scale(s.g.a, 2.0 * y));
-                out.active |= 1 << (i & 63);
-            }
-        }
-        out
+    /// Whether half-beams meet in creases (τ = 1).
+    pub fn sharp(&self) -> bool {
+        self.taus.is_empty()
     }
 
-    /// N at x, mm².
-    #[inline]
-    pub fn smooth_union_value(&self, x: Vec3) -> f64 {
-        if self.sharp {
-            let g = self.half_beams.iter().fold(0.0, |m: f64, s| m.max(s.g.at(x)));
-            return g * g;
-        }
-        let sigma = self.sigma(x);
-        let mut n = 0.0;
-        for s in self.half_beams {
-            let g = s.g.at(x);
-            n += (g - s.blend * sigma).max(0.0) * s.weight * g;
-        }
-        n
-    }
-
-    /// σ at x: the root of a convex, decreasing, piecewise linear function, by Newton's method from zero. The iterates
-    /// increase, and end when the set of half-beams above t σ no longer changes.
-    #[inline]
-    fn sigma(&self, x: Vec3) -> f64 {
-        let (mut sigma, mut count) = (0.0, usize::MAX);
-        loop {
-            let (mut top, mut bottom, mut n) = (0.0, 1.0, 0);
-            for s in self.half_beams {
-                let g = s.g.at(x);
-                if g > s.blend * sigma {
-                    let w = s.blend * s.weight;
-                    top += w * g;
-                    bottom += w * s.blend;
-                    n += 1;
-                }
-            }
-            if n >= count || n == 0 {
-                return sigma;
-            }
-            (sigma, count) = (top / bottom, n);
-            if n == 1 {
-                // A single half-beam stays active: g > t σ, since t² < 1.
-                return sigma;
-            }
-        }
-    }
-
-    /// S − N at x, mm²: negative inside.
-    #[inline]
-    pub fn value(&self, x: Vec3) -> f64 {
-        dot(x, x) - self.radius * self.radius - self.smooth_union_value(x)
-    }
-
-    /// S − N at x and its gradient.
-    #[inline]
-    pub fn gradient(&self, x: Vec3) -> (f64, Vec3) {
-        let n = self.smooth_union(x);
-        (dot(x, x) - self.radius * self.radius - n.value, sub(scale(x, 2.0), n.gradient))
+    /// τ of two half-beams.
+    pub fn tau(&self, i: usize, j: usize) -> f64 {
+        if self.sharp() { 1.0 } else { self.taus[i * self.half_beams.len() + j] }
     }
 
     /// How far x lies outside the range of the hub's formula (mm; positive outside), and the gradient: the distance
     /// past the cut plane of the half-beam with the largest G, limited by the difference of G to the second largest.
     #[inline]
     pub fn past_cut(&self, x: Vec3) -> (f64, Vec3) {
+        self.with_g(x, |g| self.past_cut_of(x, g))
+    }
+
+    /// As `past_cut`, for given G at x.
+    #[inline]
+    pub(super) fn past_cut_of(&self, x: Vec3, g: &[f64]) -> (f64, Vec3) {
         let (mut first, mut second) = (0.0, 0.0);
-        for s in self.half_beams {
-            let g = s.g.at(x);
+        for &g in g {
             if g > first {
                 (second, first) = (first, g);
             } else if g > second {
@@ -206,11 +118,13 @@ impl Hub<'_> {
             }
         }
         let mut most = (f64::NEG_INFINITY, [0.0; 3]);
-        for s in self.half_beams {
-            let (g, along) = (s.g.at(x), dot(s.axis, x) - s.cut);
+        for (s, &g) in self.half_beams.iter().zip(g) {
             let lead = g - if g == first { second } else { first };
-            if along.min(lead) > most.0 {
-                most = if along < lead { (along, s.axis) } else { (lead, s.g.a) };
+            if lead > most.0 {
+                let along = dot(s.axis, x) - s.cut;
+                if along.min(lead) > most.0 {
+                    most = if along < lead { (along, s.axis) } else { (lead, s.g.a) };
+                }
             }
         }
         most
@@ -219,31 +133,49 @@ impl Hub<'_> {
     /// Whether x is in the hub's part of the solid: inside, and before the split plane of the half-beam with the
     /// largest G.
     pub fn contains(&self, x: Vec3) -> bool {
-        self.value(x) < 0.0 && self.is_before_split(x)
+        let square = dot(x, x) - self.radius * self.radius;
+        self.with_g(x, |g| {
+            let leader = largest(g);
+            self.is_before_split_of(x, leader) && square < self.union_of(g, leader, [square; 2])
+        })
     }
 
     /// Whether x lies before the split plane of the half-beam with the largest G.
     pub fn is_before_split(&self, x: Vec3) -> bool {
-        let mut first = (0.0, None);
-        for s in self.half_beams {
-            let g = s.g.at(x);
-            if g > first.0 {
-                first = (g, Some(s));
-            }
-        }
-        first.1.is_none_or(|s| dot(s.axis, x) <= s.split)
+        self.with_g(x, |g| self.is_before_split_of(x, largest(g)))
+    }
+
+    /// As `is_before_split`, where the largest G is known.
+    #[inline]
+    fn is_before_split_of(&self, x: Vec3, (first, most): (usize, f64)) -> bool {
+        most <= 0.0 || dot(self.half_beams[first].axis, x) <= self.half_beams[first].split
     }
 
     /// Bounds of the hub's part with half-beams up to their cut planes: fillets lie in the convex hull of the ball and
     /// these.
     pub fn bounds(&self) -> Aabb {
+        self.bounds_to(|i| self.half_beams[i].cut)
+    }
+
+    /// Bounds of the hub's part of the solid, up to the split planes. Fillets that may not end before have the maximum τ; there
+    /// half-beams count up to their cut planes.
+    pub(super) fn part_bounds(&self) -> Aabb {
+        self.bounds_to(|i| {
+            let s = &self.half_beams[i];
+            let ends = self.sharp() || (0..self.half_beams.len()).all(|j| j == i || self.tau(i, j) < MAX_TAU);
+            if ends { s.split } else { s.cut }
+        })
+    }
+
+    /// Bounds of the ball and of half-beams up to these positions along them.
+    fn bounds_to(&self, end: impl Fn(usize) -> f64) -> Aabb {
         let r = self.radius;
         let mut b = Aabb { min: [-r; 3], max: [r; 3] };
-        for s in self.half_beams {
-            let thick = s.max_radius();
+        for (i, s) in self.half_beams.iter().enumerate() {
+            let (thick, end) = (s.max_radius(), end(i));
             for a in 0..3 {
                 let side = thick * (1.0 - s.axis[a] * s.axis[a]).max(0.0).sqrt();
-                let end = s.axis[a] * s.cut;
+                let end = s.axis[a] * end;
                 b.min[a] = b.min[a].min(end.min(0.0) - side);
                 b.max[a] = b.max[a].max(end.max(0.0) + side);
             }
@@ -253,24 +185,19 @@ impl Hub<'_> {
 
     /// Upper bound of half the second derivative of N along any unit vector.
     pub fn curvature_bound(&self) -> f64 {
-        if self.sharp {
+        if self.sharp() {
             return self.half_beams.iter().map(|s| dot(s.g.a, s.g.a)).fold(0.0, f64::max);
         }
+        // N over all half-beams is at least N over any of them, and a sum of squares.
+        let all: Vec<usize> = (0..self.half_beams.len()).collect();
         let mut m = [[0.0; 3]; 3];
-        let (mut sum, mut t) = ([0.0; 3], 1.0);
-        let mut tensor = |v: Vec3, w: f64| {
+        for h in Factor::new(self, &all).squares(&|i| self.half_beams[i].g) {
             for i in 0..3 {
                 for j in 0..3 {
-                    m[i][j] += w * v[i] * v[j];
+                    m[i][j] += h.a[i] * h.a[j];
                 }
             }
-        };
-        for s in self.half_beams {
-            tensor(s.g.a, s.weight);
-            sum = add(sum, scale(s.g.a, s.blend * s.weight));
-            t += s.blend * s.blend * s.weight;
         }
-        tensor(sum, -1.0 / t);
         geometry::math::spectral_norm(&m)
     }
 

@@ -33,9 +33,10 @@ impl Quadors {
                 for s in hub.half_beams {
                     key.extend(s.axis.map(number));
                     key.extend([s.contact, s.split].map(length));
-                    key.extend([s.meridian[0], s.blend].map(number));
+                    key.push(number(s.meridian[0]));
                     key.push(s.end as i64);
                 }
+                key.extend(hub.taus.iter().map(|tau| number(*tau)));
                 *known.entry(key).or_insert_with(|| {
                     sample.push(i);
                     count.push(0);

@@ -3,6 +3,7 @@
 use geometry::math::{Mat3, Vec3, add, apply, determinant, dot, inverse, scale};
 
 use super::hub::{AffineFunction, Hub};
+use super::smooth_union::Factor;
 
 /// The quadratic function x ↦ xᵀMx + 2 b·x + c.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,25 +80,67 @@ impl Quadric {
     }
 }
 
-/// The quadric of a hub where exactly the half-beams of `label` are active, and σ.
-pub(super) fn piece_quadric(hub: &Hub, label: u64) -> (Quadric, AffineFunction) {
+/// The part of space in which exactly certain half-beams of a hub are active.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    /// The quadric.
+    pub quadric: Quadric,
+    /// For each half-beam of a hub with fillets the function that vanishes where it becomes active, and is positive where it is.
+    pub toggles: Vec<AffineFunction>,
+}
+
+/// The quadric of a hub where exactly the half-beams of `label` are active.
+pub(super) fn piece_quadric(hub: &Hub, label: u64) -> Quadric {
+    let (active, g) = (active(hub, label), |i: usize| hub.half_beams[i].g);
+    if hub.sharp() {
+        return quadric(hub, &active.iter().map(|i| g(*i)).collect::<Vec<_>>());
+    }
+    quadric(hub, &Factor::new(hub, &active).squares(&g))
+}
+
+/// S less squares.
+fn quadric(hub: &Hub, squares: &[AffineFunction]) -> Quadric {
     let mut q = Quadric { m: geometry::math::IDENTITY, b: [0.0; 3], c: -hub.radius * hub.radius };
-    let (mut sigma, mut t) = (AffineFunction::default(), 1.0);
-    for (i, s) in hub.half_beams.iter().enumerate() {
-        if label >> i & 1 == 0 {
-            continue;
-        }
-        if hub.sharp {
-            q.add_square(-1.0, &s.g);
-        } else {
-            q.add_square(-s.weight, &s.g);
-            sigma = sigma.plus(s.blend * s.weight, &s.g);
-            t += s.blend * s.blend * s.weight;
-        }
+    squares.iter().for_each(|h| q.add_square(-1.0, h));
+    q
+}
+
+/// As `piece_quadric`, with the planes around it for given G, which may be perturbed.
+pub(super) fn piece(hub: &Hub, label: u64, g: &dyn Fn(usize) -> AffineFunction) -> Piece {
+    if hub.sharp() {
+        return Piece { quadric: piece_quadric(hub, label), toggles: Vec::new() };
     }
-    if !hub.sharp {
-        q.add_square(1.0 / t, &sigma);
-        sigma = AffineFunction::default().plus(1.0 / t, &sigma);
+    if label.count_ones() < 2 {
+        let mut toggles: Vec<AffineFunction> = (0..hub.half_beams.len()).map(g).collect();
+        let first = label.trailing_zeros() as usize;
+        let quadric = match hub.half_beams.get(first) {
+            None => quadric(hub, &[]),
+            Some(s) => {
+                let own = toggles[first];
+                for (m, toggle) in toggles.iter_mut().enumerate().filter(|t| t.0 != first) {
+                    *toggle = toggle.plus(-hub.tau(m, first), &own);
+                }
+                quadric(hub, &[s.g])
+            }
+        };
+        return Piece { quadric, toggles };
     }
-    (q, sigma)
+    let active = active(hub, label);
+    let factor = Factor::new(hub, &active);
+    let quadric = quadric(hub, &factor.squares(&|i| hub.half_beams[i].g));
+    let y = factor.solved(factor.squares(g));
+    let mut toggles: Vec<AffineFunction> = (0..hub.half_beams.len())
+        .map(|m| active.iter().zip(&y).fold(g(m), |sum, (i, y)| sum.plus(-hub.tau(m, *i), y)))
+        .collect();
+    for (k, i) in active.iter().enumerate() {
+        // G above Ry of the others, as seen from the piece without it.
+        toggles[*i] = AffineFunction::default().plus(1.0 / factor.inverse_diagonal(k), &y[k]);
+    }
+    Piece { quadric, toggles }
+}
+
+fn active(hub: &Hub, label: u64) -> Vec<usize> {
+    let mut of = Vec::with_capacity(label.count_ones() as usize);
+    of.extend((0..hub.half_beams.len().min(64)).filter(|i| label >> i & 1 == 1));
+    of
 }

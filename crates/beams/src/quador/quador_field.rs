@@ -5,6 +5,8 @@
 //! the distance past them.
 
 use super::Quadors;
+use super::hub::Hub;
+use super::smooth_union::largest;
 use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Maximum number of hubs examined for the bound over a box.
@@ -28,17 +30,21 @@ impl Quadors {
             if outside > 0.0 && outside >= least {
                 continue;
             }
-            let hub = self.hub(i as usize);
-            let x = sub(p, ball.center);
-            let mut v = self.length(hub.value(x));
-            if outside > 0.0 {
-                v = v.max(outside);
-            }
-            if v < least {
-                least = least.min(v.max(hub.past_cut(x).0));
-            }
+            let v = self.below(&self.hub(i as usize), sub(p, ball.center), least);
+            least = least.min(if outside > 0.0 { v.max(outside) } else { v });
         }
         least
+    }
+
+    /// The value of a hub at x in its frame, if less than `least`; else that or more.
+    #[inline]
+    fn below(&self, hub: &Hub, x: Vec3, least: f64) -> f64 {
+        hub.with_g(x, |g| {
+            let square = dot(x, x) - hub.radius * hub.radius;
+            let level = if least < 0.0 { 2.0 * self.scale * least } else { least * (least + 2.0 * self.scale) };
+            let v = self.length(square - hub.union_of(g, largest(g), [f64::INFINITY, square - level]));
+            if v < least { v.max(hub.past_cut_of(x, g).0) } else { v }
+        })
     }
 
     fn value_and_gradient(&self, p: Vec3) -> (f64, Vec3) {
@@ -72,17 +78,16 @@ impl Quadors {
 
     /// Whether a point (mm) is in the solid.
     pub fn contains(&self, p: Vec3) -> bool {
-        self.index.near(p).iter().any(|&i| {
+        self.parts.near(p).iter().any(|&i| {
             let ball = &self.balls[i as usize];
-            ball.bounds.distance(p) == 0.0 && self.hub(i as usize).contains(sub(p, ball.center))
+            ball.part.distance(p) == 0.0 && self.hub(i as usize).contains(sub(p, ball.center))
         })
     }
 
     /// The value of one hub at a point; the field is the minimum over hubs and the cap.
     pub(crate) fn hub_value(&self, i: usize, p: Vec3) -> f64 {
         let ball = &self.balls[i];
-        let (hub, x) = (self.hub(i), sub(p, ball.center));
-        let v = self.length(hub.value(x)).max(hub.past_cut(x).0);
+        let v = self.below(&self.hub(i), sub(p, ball.center), f64::INFINITY);
         match ball.bounds.distance(p) {
             outside if outside > 0.0 => v.max(outside),
             _ => v,
@@ -106,7 +111,7 @@ impl Quadors {
         // N is convex: S − N lies below its tangent plus |δ|². Its second derivative is at most twice the curvature
         // bound.
         let hi = q + reach(g) + h2;
-        let lo = if hub.sharp {
+        let lo = if hub.sharp() {
             let s = dot(x, x) - ball.radius * ball.radius;
             let ball_lo = s - reach(scale(x, 2.0));
             hub.half_beams.iter().fold(ball_lo, |lo, half_beam| {
@@ -169,7 +174,7 @@ impl Quadors {
 
     /// Whether the zero set may have creases: only without fillets.
     pub fn has_creases(&self) -> bool {
-        self.sharp
+        self.taus.is_empty() && !self.half_beams.is_empty()
     }
 
     /// A Lipschitz bound of the field.

@@ -7,7 +7,7 @@ use geometry::math::{Aabb, Vec3, add, dot, scale, sub, unit};
 
 use super::Quadors;
 use super::hub::Hub;
-use super::hub_quadric::piece_quadric;
+use super::smooth_union::{EXACT, largest, solve};
 
 /// Intersection of a ray with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,49 +22,92 @@ pub struct Hit {
     pub hub: usize,
 }
 
-/// The first parameter in [from, to] at which a line enters a hub's part, and the outward normal.
-fn first_entry(hub: &Hub, o: Vec3, v: Vec3, from: f64, to: f64) -> Option<(f64, Vec3)> {
-    let (mut t, size) = (from, to - from);
+/// A line through a hub.
+#[derive(Default)]
+struct Line {
+    /// G of each half-beam at the origin, and its slope.
+    g: Vec<[f64; 2]>,
+    /// G of each half-beam at one place.
+    at: Vec<f64>,
+    /// The active half-beams there.
+    active: Vec<usize>,
+    /// Their y, as G.
+    y: Vec<[f64; 2]>,
+    /// Cholesky's factor of R of these.
+    l: Vec<f64>,
+}
+
+impl Line {
+    /// Sets the line from o along v.
+    fn set(&mut self, hub: &Hub, o: Vec3, v: Vec3) {
+        self.g.clear();
+        self.g.extend(hub.g.iter().map(|g| [g.at(o), dot(g.a, v)]));
+    }
+
+    /// Finds the active half-beams at t, and y = R⁻¹g of these.
+    fn activate(&mut self, hub: &Hub, t: f64) {
+        self.at.clear();
+        self.at.extend(self.g.iter().map(|[none, one]| none + one * t));
+        self.active.clear();
+        let active = &mut self.active;
+        hub.each_active(&self.at, largest(&self.at), EXACT, &mut |i, _| active.push(i));
+        self.y.clear();
+        self.y.extend(self.active.iter().map(|i| self.g[*i]));
+        solve(self.active.len(), |i, j| hub.tau(self.active[i], self.active[j]), &mut self.y, &mut self.l);
+    }
+
+    /// The first parameter after t and before `end` at which a half-beam becomes active or inactive; else `end`.
+    fn next_change(&self, hub: &Hub, t: f64, end: f64) -> f64 {
+        let mut next = end;
+        let mut look = |[none, one]: [f64; 2]| {
+            let root = -none / one;
+            if root > t && root < next {
+                next = root;
+            }
+        };
+        self.y.iter().for_each(|y| look(*y));
+        for (i, g) in self.g.iter().enumerate() {
+            if !self.active.contains(&i) {
+                let less = |sum: [f64; 2], (k, y): (&usize, &[f64; 2])| {
+                    let tau = hub.tau(i, *k);
+                    [sum[0] - tau * y[0], sum[1] - tau * y[1]]
+                };
+                look(self.active.iter().zip(&self.y).fold(*g, less));
+            }
+        }
+        next
+    }
+}
+
+/// The first parameter in [0, size] at which a line enters a hub's part, and the outward normal.
+fn first_entry(hub: &Hub, o: Vec3, v: Vec3, size: f64, line: &mut Line) -> Option<(f64, Vec3)> {
+    line.set(hub, o, v);
+    let square = [dot(o, o) - hub.radius * hub.radius, dot(o, v), dot(v, v)];
+    let mut t = 0.0;
     // Each half-beam becomes active or inactive at most twice along a line.
     for _ in 0..4 * hub.half_beams.len() + 4 {
-        if t >= to {
+        if t >= size {
             return None;
         }
-        // Slightly ahead, for the label of the interval that begins here.
-        let label = hub.smooth_union(add(o, scale(v, t + 1e-9 * size))).active;
-        let (q, sigma) = piece_quadric(hub, label);
-        let mut end = to;
-        for (i, s) in hub.half_beams.iter().enumerate() {
-            let f = if hub.sharp {
-                let lead =
-                    if label == 0 { Default::default() } else { hub.half_beams[label.trailing_zeros() as usize].g };
-                s.g.plus(-1.0, &lead)
-            } else {
-                s.g.plus(-s.blend, &sigma)
-            };
-            let root = -f.at(o) / dot(f.a, v);
-            if (!hub.sharp || label >> i & 1 == 0) && root > t + 1e-9 * size && root < end {
-                end = root;
-            }
+        // Slightly ahead, for the half-beams of the interval that begins here.
+        let ahead = t + 1e-9 * size;
+        line.activate(hub, ahead);
+        let end = line.next_change(hub, ahead, size);
+        let [mut none, mut one, mut two] = square;
+        for (i, y) in line.active.iter().zip(&line.y) {
+            let g = line.g[*i];
+            (none, one, two) = (none - y[0] * g[0], one - y[0] * g[1], two - y[1] * g[1]);
         }
-        if hub.sharp && label != 0 {
-            let g = hub.half_beams[label.trailing_zeros() as usize].g;
-            let root = -g.at(o) / dot(g.a, v);
-            if root > t + 1e-9 * size && root < end {
-                end = root;
-            }
-        }
-        let (none, one, two) = (q.at(o), dot(q.half_gradient(o), v), q.form(v, v));
-        let square = one * one - two * none;
-        if square >= 0.0 {
-            let w = -(one + square.sqrt().copysign(one));
+        let root = one * one - two * none;
+        if root >= 0.0 {
+            let w = -(one + root.sqrt().copysign(one));
             let mut roots = [w / two, none / w];
             roots.sort_by(f64::total_cmp);
             for r in roots {
                 let x = add(o, scale(v, r));
-                let slope = q.half_gradient(x);
-                if r >= t && r <= end && dot(slope, v) < 0.0 && hub.is_before_split(x) {
-                    return Some((r, unit(slope)));
+                if r >= t && r <= end && one + two * r < 0.0 && hub.is_before_split(x) {
+                    let inner = |sum, (i, y): (&usize, &[f64; 2])| add(sum, scale(hub.g[*i].a, -y[0] - y[1] * r));
+                    return Some((r, unit(line.active.iter().zip(&line.y).fold(x, inner))));
                 }
             }
         }
@@ -95,21 +138,27 @@ impl Quadors {
     /// is none. A ray that starts inside has to leave first.
     pub fn ray(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        let mut seen = Vec::new();
-        self.index.along(origin, direction, &mut |items, until| {
+        let (mut seen, mut line) = (Vec::new(), Line::default());
+        self.parts.along(origin, direction, &mut |items, until| {
             for &i in items {
                 if seen.contains(&i) {
                     continue;
                 }
                 seen.push(i);
                 let ball = &self.balls[i as usize];
-                let Some((from, to)) = clip_line(&ball.bounds, origin, direction) else {
+                let Some((from, to)) = clip_line(&ball.part, origin, direction) else {
                     continue;
                 };
                 let hub = self.hub(i as usize);
-                if let Some((t, normal)) = first_entry(&hub, sub(origin, ball.center), direction, from.max(0.0), to)
-                    && best.is_none_or(|b| t < b.distance)
+                let from = from.max(0.0);
+                if best.is_some_and(|b| b.distance <= from) {
+                    continue;
+                }
+                let start = add(sub(origin, ball.center), scale(direction, from));
+                if let Some((t, normal)) = first_entry(&hub, start, direction, to - from, &mut line)
+                    && best.is_none_or(|b| from + t < b.distance)
                 {
+                    let t = from + t;
                     best = Some(Hit { distance: t, at: add(origin, scale(direction, t)), normal, hub: i as usize });
                 }
             }

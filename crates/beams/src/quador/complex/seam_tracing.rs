@@ -5,11 +5,13 @@
 //! for the planes alone, by its own multiple of 1e-12 of the radius, which separates events; arcs shorter than that are
 //! collapsed afterwards. Pieces are tangent along a seam, so a seam displaced by δ is off the surface by O(δ²).
 
+use std::rc::Rc;
+
 use geometry::math::{Vec3, add, apply, cross, dot, inverse, norm, scale, sub, unit};
 
 use super::super::conic::Conic;
 use super::super::hub::{AffineFunction, HalfBeam, Hub};
-use super::super::hub_quadric::{Quadric, piece_quadric};
+use super::super::hub_quadric::{Piece, Quadric, piece};
 use super::{Arc, COLLAPSE_LENGTH, Complex, Face, Key, NONE, Vertex};
 
 /// Size of the perturbation, in hub radii.
@@ -33,7 +35,7 @@ pub(super) struct SeamTracer<'a> {
     arcs: Vec<Arc>,
     /// Arcs incident to each vertex.
     at: Vec<[u32; 4]>,
-    pieces: Vec<(u64, Quadric, AffineFunction)>,
+    pieces: Vec<(u64, Rc<Piece>)>,
 }
 
 impl<'a> SeamTracer<'a> {
@@ -52,28 +54,18 @@ impl<'a> SeamTracer<'a> {
         }
     }
 
-    /// The quadric of a label, and σ of the perturbed G.
-    fn piece_quadric(&mut self, label: u64) -> (Quadric, AffineFunction) {
-        if let Some(&(_, q, s)) = self.pieces.iter().find(|p| p.0 == label) {
-            return (q, s);
+    /// The piece of a label, with the planes of the perturbed G.
+    fn piece(&mut self, label: u64) -> Rc<Piece> {
+        if let Some((_, known)) = self.pieces.iter().find(|p| p.0 == label) {
+            return known.clone();
         }
-        let (q, mut sigma) = piece_quadric(self.hub, label);
-        if !self.hub.sharp {
-            // σ is linear in G, and so is its perturbation.
-            let (mut perturbation, mut t) = (0.0, 1.0);
-            for (i, s) in self.hub.half_beams.iter().enumerate().filter(|(i, _)| label >> i & 1 == 1) {
-                perturbation += s.blend * s.weight * (self.g[i].b - s.g.b);
-                t += s.blend * s.blend * s.weight;
-            }
-            sigma.b += perturbation / t;
-        }
-        self.pieces.push((label, q, sigma));
-        (q, sigma)
+        let made = Rc::new(piece(self.hub, label, &|i| self.g[i]));
+        self.pieces.push((label, made.clone()));
+        made
     }
 
-    /// The function that vanishes where half-beam m becomes active for a label.
-    fn toggle(&self, m: usize, sigma: &AffineFunction) -> AffineFunction {
-        self.g[m].plus(-self.hub.half_beams[m].blend, sigma)
+    fn quadric(&mut self, label: u64) -> Quadric {
+        self.piece(label).quadric
     }
 
     fn sharp_g(&self, label: u64) -> AffineFunction {
@@ -82,18 +74,17 @@ impl<'a> SeamTracer<'a> {
 
     /// The plane between two labels, positive on the side of the larger.
     fn plane(&mut self, [a, b]: [u64; 2]) -> AffineFunction {
-        if self.hub.sharp {
+        if self.hub.sharp() {
             return self.sharp_g(b).plus(-1.0, &self.sharp_g(a));
         }
-        let sigma = self.piece_quadric(a).1;
-        self.toggle((a ^ b).trailing_zeros() as usize, &sigma)
+        self.piece(a).toggles[(a ^ b).trailing_zeros() as usize]
     }
 
     /// Calls `f` with every event that can end the seam between labels a < b, and the function that is negative before
     /// it.
     fn guards(&mut self, [a, b]: [u64; 2], f: &mut impl FnMut(u64, AffineFunction)) {
         let n = self.hub.half_beams.len();
-        if self.hub.sharp {
+        if self.hub.sharp() {
             let own = self.sharp_g(b);
             for m in (0..n).map(|i| 1 << i).chain([0]) {
                 if m != a && m != b {
@@ -102,10 +93,8 @@ impl<'a> SeamTracer<'a> {
             }
             return;
         }
-        let sigma = self.piece_quadric(a).1;
-        for m in 0..n {
+        for (m, &toggle) in self.piece(a).toggles.iter().enumerate() {
             let bit = 1u64 << m;
-            let toggle = self.toggle(m, &sigma);
             if a & bit != 0 {
                 f(bit, AffineFunction::default().plus(-1.0, &toggle));
             } else if b & bit == 0 {
@@ -116,7 +105,7 @@ impl<'a> SeamTracer<'a> {
 
     /// The labels around the end of seam [a, b] at event m.
     fn labels_around(&self, [a, b]: [u64; 2], m: u64) -> [u64; 4] {
-        if self.hub.sharp {
+        if self.hub.sharp() {
             let mut l = [a, b, m];
             l.sort_unstable();
             return [l[0], l[1], l[2], u64::MAX];
@@ -130,14 +119,14 @@ impl<'a> SeamTracer<'a> {
     fn seams(&self, labels_around: [u64; 4]) -> impl Iterator<Item = ([u64; 2], u64)> + use<> {
         let [p, q, r, s] = labels_around;
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
-        let all = if self.hub.sharp {
+        let all = if self.hub.sharp() {
             [(order(p, q), r), (order(q, r), p), (order(p, r), q), ([0, 0], 0)]
         } else {
             [(order(p, q), p ^ s), (order(q, r), p ^ q), (order(s, r), p ^ q), (order(p, s), p ^ q)]
         };
         // At a vertex with fillets, seams across which j changes end by m and conversely.
         let (j, m) = (p ^ q, p ^ s);
-        let sharp = self.hub.sharp;
+        let sharp = self.hub.sharp();
         all.into_iter()
             .filter(|(l, _)| l[0] != l[1])
             .map(move |(l, e)| if sharp { (l, e) } else { (l, if l[0] ^ l[1] == j { m } else { j }) })
@@ -152,7 +141,7 @@ impl<'a> SeamTracer<'a> {
         tangent: Vec3,
         born: Option<u64>,
     ) -> Option<(Conic, Option<u64>)> {
-        let quadric = self.piece_quadric(labels[0]).0;
+        let quadric = self.quadric(labels[0]);
         let plane = self.plane(labels);
         let mut conic = Conic::new(&quadric, unit(plane.a), from, tangent)?;
         let mut event = None;
@@ -177,9 +166,9 @@ impl<'a> SeamTracer<'a> {
     /// The vertex with these labels nearest to a position; created if new.
     fn vertex(&mut self, labels_around: [u64; 4], near: Vec3) -> Option<u32> {
         let (j, m) =
-            if self.hub.sharp { (labels_around[1], labels_around[2]) } else { (labels_around[1], labels_around[3]) };
+            if self.hub.sharp() { (labels_around[1], labels_around[2]) } else { (labels_around[1], labels_around[3]) };
         let base = labels_around[0];
-        let quadric = self.piece_quadric(base).0;
+        let quadric = self.quadric(base);
         let order = |a: u64, b: u64| [a.min(b), a.max(b)];
         let planes = [self.plane(order(base, j)), self.plane(order(base, m))];
         let mut at = near;
@@ -211,7 +200,7 @@ impl<'a> SeamTracer<'a> {
 
     fn push(&mut self, ends: [u32; 2], labels: [u64; 2], conic: Conic) {
         let plane = self.plane(labels);
-        let outward = self.piece_quadric(labels[0]).0.half_gradient(conic.v);
+        let outward = self.quadric(labels[0]).half_gradient(conic.v);
         let left = dot(plane.a, cross(outward, conic.e[0]));
         let labels = if left > 0.0 { [labels[1], labels[0]] } else { labels };
         let id = self.arcs.len() as u32;
@@ -229,7 +218,7 @@ impl<'a> SeamTracer<'a> {
     fn seed_point(&mut self, i: usize) -> Option<([u64; 2], Vec3)> {
         let s = self.hub.half_beams[i];
         let own = 1u64 << i;
-        let (_, sigma) = self.piece_quadric(own);
+        let piece = self.piece(own);
         let side = unit(cross(s.axis, if s.axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
         // An arbitrary azimuth that avoids the symmetry planes of symmetric hubs.
         let (sin, cos) = 0.737_f64.sin_cos();
@@ -241,7 +230,7 @@ impl<'a> SeamTracer<'a> {
             if m == i {
                 continue;
             }
-            let f = if self.hub.sharp { self.g[m].plus(-1.0, &self.g[i]) } else { self.toggle(m, &sigma) };
+            let f = if self.hub.sharp() { self.g[m].plus(-1.0, &self.g[i]) } else { piece.toggles[m] };
             // p z + f₀ + r ρ(z) = 0.
             let (p, r) = (dot(f.a, s.axis), dot(f.a, side));
             let (two, one, none) = (p * p - r * r * a, 2.0 * p * f.b - r * r * b, f.b * f.b - r * r * c);
@@ -251,13 +240,13 @@ impl<'a> SeamTracer<'a> {
                 let good = z > best.0 && z < s.split && f.at(place(z)).abs() < 1e-7 * self.hub.radius;
                 if good {
                     let other = 1u64 << m;
-                    best = (z, if self.hub.sharp { [own.min(other), own.max(other)] } else { [own, own | other] });
+                    best = (z, if self.hub.sharp() { [own.min(other), own.max(other)] } else { [own, own | other] });
                 }
             }
         }
         let (z, labels) = best;
         // Onto the perturbed plane and the quadric.
-        let (quadric, plane) = (self.piece_quadric(labels[0]).0, self.plane(labels));
+        let (quadric, plane) = (self.quadric(labels[0]), self.plane(labels));
         let mut x = place(z);
         for _ in 0..3 {
             let slope = scale(quadric.half_gradient(x), 2.0);
@@ -275,7 +264,7 @@ impl<'a> SeamTracer<'a> {
                 continue;
             }
             let (labels, from) = self.seed_point(i)?;
-            let quadric = self.piece_quadric(labels[0]).0;
+            let quadric = self.quadric(labels[0]);
             let tangent = unit(cross(self.plane(labels).a, quadric.half_gradient(from)));
             let (conic, event) = self.trace(labels, from, tangent, None)?;
             match event {
@@ -314,7 +303,7 @@ impl<'a> SeamTracer<'a> {
             if self.at[v as usize].iter().any(is) {
                 continue;
             }
-            let quadric = self.piece_quadric(labels[0]).0;
+            let quadric = self.quadric(labels[0]);
             let mut tangent = unit(cross(self.plane(labels).a, quadric.half_gradient(at)));
             let mut rise = 0.0;
             self.guards(labels, &mut |m, f| {
@@ -379,12 +368,12 @@ impl<'a> SeamTracer<'a> {
                     continue;
                 }
                 let end_circle = (label.count_ones() == 1).then(|| label.trailing_zeros());
-                let quadric = self.piece_quadric(label).0;
+                let quadric = self.quadric(label);
                 faces.push(Face { label, quadric, loops: vec![loops], end_circle });
             }
         }
         if self.hub.half_beams.is_empty() {
-            let quadric = self.piece_quadric(0).0;
+            let quadric = self.quadric(0);
             faces.push(Face { label: 0, quadric, loops: Vec::new(), end_circle: None });
         }
         // Each half-beam has exactly one face of its own.

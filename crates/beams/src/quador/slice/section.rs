@@ -11,7 +11,7 @@ use geometry::math::{Vec3, add, dot, norm, scale, sub};
 use super::super::bezier::{Bezier, Path, section_tangent};
 use super::super::complex::perturbation;
 use super::super::hub::{AffineFunction, HalfBeam, Hub};
-use super::super::hub_quadric::{Quadric, piece_quadric};
+use super::super::hub_quadric::{Piece, Quadric, piece};
 use super::{Arc, Plane};
 
 /// Intersection of the plane with the disc in the split plane of a half-beam.
@@ -170,20 +170,15 @@ impl<'a> Section<'a> {
         scale(self.plane.normal, self.height)
     }
 
-    fn active(&self, label: u64) -> impl Iterator<Item = (&HalfBeam, &AffineFunction)> {
-        let all = self.hub.half_beams.iter().zip(&self.g).enumerate();
-        all.filter(move |(i, _)| label >> i & 1 == 1).map(|(_, both)| both)
-    }
-
     /// The index of the region of a label; created if new.
     fn region(&mut self, label: u64) -> usize {
         if let Some(i) = self.regions.iter().position(|c| c.label == label) {
             return i;
         }
-        let (quadric, mut sigma) = piece_quadric(self.hub, label);
+        let Piece { quadric, toggles } = piece(self.hub, label, &|i| self.g[i]);
         let none = AffineFunction::default();
         let mut guards = Vec::with_capacity(self.g.len() + 1);
-        if self.hub.sharp {
+        if self.hub.sharp() {
             let own = match label {
                 0 => none,
                 _ => self.g[label.trailing_zeros() as usize],
@@ -197,15 +192,7 @@ impl<'a> Section<'a> {
                 guards.push((0, none.plus(-1.0, &own)));
             }
         } else {
-            // σ is linear in G, and so is its perturbation.
-            let (mut perturbation, mut t) = (0.0, 1.0);
-            for (s, g) in self.active(label) {
-                perturbation += s.blend * s.weight * (g.b - s.g.b);
-                t += s.blend * s.blend * s.weight;
-            }
-            sigma.b += perturbation / t;
-            for (m, (s, g)) in self.hub.half_beams.iter().zip(&self.g).enumerate() {
-                let joins = g.plus(-s.blend, &sigma);
+            for (m, joins) in toggles.into_iter().enumerate() {
                 let stays = label >> m & 1 == 1;
                 guards.push((label ^ 1 << m, if stays { none.plus(-1.0, &joins) } else { joins }));
             }
@@ -220,9 +207,7 @@ impl<'a> Section<'a> {
         // From an arbitrary point that avoids the symmetry planes of symmetric hubs.
         let (sin, cos) = 0.737_f64.sin_cos();
         let direction = scale(add(scale(u, cos), scale(v, sin)), 0.137 * self.hub.radius);
-        let mut half_beams = self.hub.half_beams.to_vec();
-        half_beams.iter_mut().zip(&self.g).for_each(|(s, g)| s.g = *g);
-        let shifted = Hub { half_beams: &half_beams, ..*self.hub };
+        let shifted = Hub { g: &self.g, ..*self.hub };
         let first = shifted.smooth_union(add(self.nearest_to_center(), direction)).active;
         self.region(first);
         let mut done = 0;
@@ -279,7 +264,7 @@ impl<'a> Section<'a> {
         for _ in 0..16 * self.hub.half_beams.len() + 16 {
             let region = self.region(label);
             let (path, event) = self.trace(region, from, Some(born))?;
-            let mut arc = self.arc(label, &path);
+            let mut arc = self.arc(region, &path);
             match event? {
                 Event::EndCircle => {
                     let half_beam = label.trailing_zeros();
@@ -368,8 +353,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn arc(&self, label: u64, path: &Path) -> SectionArc {
-        SectionArc { label, quadric: piece_quadric(self.hub, label).0, height: self.height, curves: path.curves() }
+    fn arc(&self, region: usize, path: &Path) -> SectionArc {
+        let Region { label, quadric, .. } = self.regions[region];
+        SectionArc { label, quadric, height: self.height, curves: path.curves() }
     }
 
     /// The whole ellipse of a region, if it lies inside.
@@ -391,7 +377,7 @@ impl<'a> Section<'a> {
             return Some(None);
         }
         let (path, event) = self.trace(i, x, None)?;
-        Some(event.is_none().then(|| self.arc(region.label, &path)))
+        Some(event.is_none().then(|| self.arc(i, &path)))
     }
 }
 

@@ -1,0 +1,245 @@
+//! Sizes of the fillets of a hub: what is asked for, and what fits.
+
+use geometry::math::dot;
+
+use super::Fillet;
+use super::hub::Hub;
+use super::smooth_union::{inverse, is_positive_definite};
+
+/// Maximum τ of fillets: a fillet above it cannot be distinguished from a crease.
+pub(super) const MAX_TAU: f64 = 0.999;
+/// Fraction of the distance from contact plane to split plane that fillets may occupy.
+const FILLET_REACH: f64 = 0.999;
+/// Least eigenvalue of R, or half of 1 − τ of the narrowest pair: seams of an R closer to singular lose digits.
+const MIN_EIGENVALUE: f64 = 0.01;
+/// Equal fillets that are tried, from the largest, in radii of the beams.
+const LEVELS: [f64; 3] = [4.0, 0.8, 0.01];
+/// Number of halvings of an interval of sizes.
+const HALVINGS: usize = 16;
+/// Number of times that all pairs are moved on.
+const ROUNDS: usize = 4;
+
+/// R of a hub: a symmetric matrix with τ of each pair, and 1 on the diagonal.
+#[derive(Clone, Debug, PartialEq)]
+struct Pairs {
+    n: usize,
+    tau: Vec<f64>,
+}
+
+impl Pairs {
+    /// From τ of each pair.
+    fn new(n: usize, tau: impl Fn(usize, usize) -> f64) -> Pairs {
+        let mut out = Pairs { n, tau: vec![1.0; n * n] };
+        for i in 0..n {
+            for j in 0..i {
+                out.set(i, j, tau(i, j));
+            }
+        }
+        out
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.tau[i * self.n + j]
+    }
+
+    fn set(&mut self, i: usize, j: usize, tau: f64) {
+        (self.tau[i * self.n + j], self.tau[j * self.n + i]) = (tau, tau);
+    }
+
+    /// The maximum τ.
+    fn narrowest(&self) -> f64 {
+        (0..self.n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| self.at(i, j)).fold(0.0, f64::max)
+    }
+
+    /// Whether all eigenvalues are above a minimum.
+    fn allowed(&self, floor: f64) -> bool {
+        is_positive_definite(self.n, &self.tau, 1.0 - floor)
+    }
+
+    /// Moves pairs towards another matrix while all eigenvalues stay above a minimum. Where the way ends, pairs that lower
+    /// the least eigenvalue stay and the others go on, which makes room for the next round.
+    fn advance(&mut self, pairs: &[(usize, usize)], to: &Pairs, floor: f64) {
+        let mut moving = pairs.to_vec();
+        moving.retain(|&(i, j)| self.at(i, j) != to.at(i, j));
+        while !moving.is_empty() {
+            let from: Vec<f64> = moving.iter().map(|&(i, j)| self.at(i, j)).collect();
+            let mut step = |s: f64| {
+                for (&(i, j), from) in moving.iter().zip(&from) {
+                    let end = to.at(i, j);
+                    self.set(i, j, if s == 1.0 { end } else { from + s * (end - from) });
+                }
+                self.allowed(floor)
+            };
+            if step(1.0) {
+                return;
+            }
+            let last = last_allowed([0.0, 1.0], &mut step);
+            step(last);
+            // The gradient of the logarithm of the determinant, large along the least eigenvector.
+            let inverse = inverse(self.n, &self.tau, 1.0 - floor);
+            let most = inverse.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+            let before = moving.len();
+            moving.retain(|&(i, j)| {
+                let way = (to.at(i, j) - self.at(i, j)).signum();
+                way * inverse[i * self.n + j] >= -1e-3 * most
+            });
+            if moving.len() == before {
+                return;
+            }
+        }
+    }
+
+    /// As `advance`, in several rounds.
+    fn toward(&mut self, pairs: &[(usize, usize)], to: &Pairs, floor: f64) {
+        (0..ROUNDS).for_each(|_| self.advance(pairs, to, floor));
+    }
+}
+
+/// The last allowed place of an interval whose start is.
+fn last_allowed([mut lo, mut hi]: [f64; 2], allowed: &mut dyn FnMut(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let mid = (lo + hi) / 2.0;
+        if allowed(mid) { lo = mid } else { hi = mid }
+    }
+    lo
+}
+
+/// The minimum τ of each pair: fillets above it end before the split planes. And the pairs that overlap there.
+fn min_taus(hub: &Hub) -> (Pairs, Vec<[usize; 2]>) {
+    let n = hub.half_beams.len();
+    let (mut least, mut overlaps) = (Pairs::new(n, |_, _| 0.0), Vec::new());
+    for i in 0..n {
+        for j in (0..n).filter(|j| *j != i) {
+            let s = &hub.half_beams[i];
+            let tau_early = hub.min_tau(i, j, s.contact + FILLET_REACH * (s.split - s.contact));
+            let tau = if tau_early < MAX_TAU { tau_early } else { hub.min_tau(i, j, s.split).max(MAX_TAU) };
+            if tau >= 1.0 || s.split <= s.contact {
+                overlaps.push([i, j]);
+            }
+            let tau = if tau.is_nan() { 1.0 } else { tau.clamp(0.0, MAX_TAU) };
+            least.set(i, j, tau.max(least.at(i, j)));
+        }
+    }
+    (least, overlaps)
+}
+
+/// Sizes of the fillets of a hub.
+pub(super) struct FilletSizes {
+    /// R, row by row; empty without fillets.
+    pub taus: Vec<f64>,
+    /// The least radius (mm) and the maximum τ, if less than what is asked for.
+    pub shortfall: Option<[f64; 2]>,
+    /// Pairs of half-beams that overlap at the split plane of the first.
+    pub overlaps: Vec<[usize; 2]>,
+}
+
+/// The fillets of a hub: those asked for, or the largest that fit.
+///
+/// Each fillet must end before the split planes, and R be positive definite. The largest fillets have the minimum τ of each pair if that
+/// is. Otherwise they are first equal ones, as large as possible, which leaves the narrowest pairs their largest; from there pairs
+/// go on towards their minimum. From the largest fillets pairs in turn go towards what is asked for, so no crotch gets less
+/// than both.
+pub(super) fn fillet_sizes(hub: Hub, fillet: Fillet) -> FilletSizes {
+    let (least, overlaps) = min_taus(&hub);
+    if fillet == Fillet::None {
+        return FilletSizes { taus: Vec::new(), shortfall: None, overlaps };
+    }
+    let floor = MIN_EIGENVALUE.min((1.0 - least.narrowest()) / 2.0);
+    let mut known = None;
+    let wanted = match (fillet, fillet.tau()) {
+        (Fillet::Radius(r), _) => {
+            // Pairs that do not meet have a τ for corners alone, as if they were equal cylinders.
+            let mut wanted = equal_cylinders(&hub, &least, r / hub.radius);
+            for &(i, j) in known.insert(hub.adjacent_pairs()).iter() {
+                wanted.set(i, j, tau_for_radius(&hub, i, j, r).max(least.at(i, j)));
+            }
+            wanted
+        }
+        (_, Some(tau)) => Pairs::new(least.n, |i, j| tau.min(MAX_TAU).max(least.at(i, j))),
+        _ => least.clone(),
+    };
+    let mut pairs = wanted;
+    if !pairs.allowed(floor) {
+        let adjacent = known.get_or_insert_with(|| hub.adjacent_pairs());
+        let most = if least.allowed(floor) {
+            least.clone()
+        } else {
+            let mut most = largest(&hub, &least, floor);
+            most.toward(adjacent, &least, floor);
+            most
+        };
+        pairs = if fillet == Fillet::Auto {
+            most
+        } else {
+            let mut reduced = most;
+            reduced.toward(adjacent, &pairs, floor);
+            reduced
+        };
+    }
+    let may_be_short = fillet != Fillet::Auto && fillet.tau().is_none_or(|tau| pairs.narrowest() > tau.min(MAX_TAU));
+    let shortfall = may_be_short.then(|| {
+        let adjacent = known.unwrap_or_else(|| hub.adjacent_pairs());
+        let asked = |i, j| match fillet {
+            Fillet::Radius(r) => tau_for_radius(&hub, i, j, r),
+            _ => fillet.tau().map_or(1.0, |tau| tau.min(MAX_TAU)),
+        };
+        let less = |&(i, j): &(usize, usize)| pairs.at(i, j) > asked(i, j) * (1.0 + 1e-12) + 1e-15;
+        adjacent.iter().any(less).then(|| {
+            let tau = adjacent.iter().map(|&(i, j)| pairs.at(i, j)).fold(0.0, f64::max);
+            [min_fillet_radius(&Hub { taus: &pairs.tau, ..hub }), tau]
+        })
+    });
+    let shortfall = shortfall.flatten();
+    FilletSizes { taus: pairs.tau, shortfall, overlaps }
+}
+
+/// τ of fillets of one radius between equal cylinders of unit radius in these directions, but none below the minimum.
+fn equal_cylinders(hub: &Hub, least: &Pairs, radius: f64) -> Pairs {
+    let square = radius * radius;
+    Pairs::new(least.n, |i, j| {
+        // ρ² = (1 − τ)²/((1 + τ)(τ − cos θ)), solved for τ.
+        let cos = dot(hub.half_beams[i].axis, hub.half_beams[j].axis);
+        let (two, one, none) = (1.0 - square, 2.0 + square * (1.0 - cos), 1.0 + square * cos);
+        let tau = 2.0 * none / (one + (one * one - 4.0 * two * none).max(0.0).sqrt());
+        tau.max(least.at(i, j)).min(MAX_TAU)
+    })
+}
+
+/// The largest equal fillets with all eigenvalues above a minimum, as of equal cylinders.
+fn largest(hub: &Hub, least: &Pairs, floor: f64) -> Pairs {
+    let allowed = |radius: f64| equal_cylinders(hub, least, radius).allowed(floor);
+    let [first, factor, last] = LEVELS;
+    let mut radius = first;
+    while !allowed(radius) {
+        radius *= factor;
+        if radius < last {
+            // One τ for all pairs: 1 − τ is the least eigenvalue.
+            let tau = least.narrowest();
+            return Pairs::new(least.n, |_, _| tau);
+        }
+    }
+    equal_cylinders(hub, least, last_allowed([radius, radius / factor], &mut |r| allowed(r)))
+}
+
+/// τ at which the crotch of two half-beams has radius r; the radius decreases as τ increases.
+fn tau_for_radius(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
+    let at = |tau: f64| hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1);
+    let (mut lo, mut hi) = (0.0, MAX_TAU);
+    if at(hi) >= r {
+        return hi;
+    }
+    for _ in 0..48 {
+        let mid = (lo + hi) / 2.0;
+        if at(mid) >= r { lo = mid } else { hi = mid }
+    }
+    lo
+}
+
+/// Fillet radius in the tightest crotch of a hub, mm.
+pub(super) fn min_fillet_radius(hub: &Hub) -> f64 {
+    if hub.sharp() {
+        return if hub.adjacent_pairs().is_empty() { f64::INFINITY } else { 0.0 };
+    }
+    let of = |(i, j): (usize, usize)| hub.crotch(i, j, hub.tau(i, j)).map_or(f64::INFINITY, |c| c.1);
+    hub.adjacent_pairs().into_iter().map(of).fold(f64::INFINITY, f64::min)
+}
