@@ -50,6 +50,27 @@ pub fn number(v: f64) -> String {
     if (1e-5..1e15).contains(&v.abs()) { v.to_string() } else { format!("{v:e}") }
 }
 
+/// A message with what it quotes shortened: no word is longer than 80 characters, or 240 if it is a path, and no stretch between double
+/// quotes than 1200, the length of the longest list of allowed words.
+pub fn brief(message: &str) -> std::borrow::Cow<'_, str> {
+    const WORD: usize = 80;
+    const PATH: usize = 240;
+    const STRETCH: usize = 1200;
+    let cut = |s: &str, most: usize| match s.chars().count() > most {
+        true => s.chars().take(most - 1).chain(['…']).collect(),
+        false => s.to_string(),
+    };
+    if message.len() <= WORD {
+        return message.into();
+    }
+    let stretch = |part: &str| {
+        let words = part.split(' ').map(|word| cut(word, if word.contains(['/', '\\']) { PATH } else { WORD }));
+        words.collect::<Vec<_>>().join(" ")
+    };
+    let each = message.split('"').map(|part| cut(&stretch(part), STRETCH));
+    each.collect::<Vec<_>>().join("\"").into()
+}
+
 /// "1 value", "2 values".
 pub fn counted(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
@@ -70,7 +91,8 @@ pub fn nearest<'a>(word: &str, allowed: impl IntoIterator<Item = &'a str>) -> Op
 
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        if self.at.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.at, self.message) }
+        let (at, message) = (brief(&self.at), brief(&self.message));
+        if at.is_empty() { f.write_str(&message) } else { write!(f, "{at}: {message}") }
     }
 }
 
@@ -79,6 +101,19 @@ impl std::error::Error for Fault {}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_found_is_shortened() {
+        let long = "x".repeat(40_000);
+        let said = Fault::new("cell", format!("unknown cell \"{long}\"; allowed: gyroid, \"{long}")).to_string();
+        assert!(said.starts_with("cell: unknown cell \"xxx") && said.contains("x…\"; allowed: gyroid, \"x"), "{said}");
+        assert!(said.chars().count() < 80 + 80 + 60, "{said}");
+        let short =
+            "a \"word\", and a path as long as they come: /some/where/else/that/is/not/too/long/for/a/line/of/text.stl";
+        assert_eq!(brief(short), short);
+        let allowed = format!("no cell \"x\"; use one of {}", "diamond_sheet, ".repeat(60));
+        assert_eq!(brief(&allowed), allowed);
+    }
 
     #[test]
     fn numbers_are_short() {

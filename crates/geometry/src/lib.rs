@@ -6,6 +6,7 @@
 //! - **Read and write**: [`read_mesh`], [`write_mesh`] and [`formats`] (STL, 3MF, PLY, OBJ, OFF; VTK; pictures and arrays).
 //! - **Meshes**: [`Mesh`] is positions and triangles, [`SurfaceMesh`] marks triangles that lie on a cut, [`TetMesh`] is
 //!   made of tetrahedra. [`measure`] gives volume, area, topology, defects, triangle quality and closed voids.
+//! - **Transforms**: [`Transform`] moves, scales and rotates meshes; orientation is kept where it mirrors.
 //! - **Repair**: [`repair`] merges seams, removes degenerate and duplicate triangles, caps holes, orients connected
 //!   components and cuts along self-intersections, by exact predicates.
 //! - **Signed distance**: [`MeshDistance`] repairs a mesh and gives its exact signed distance, negative inside; the sign is
@@ -64,6 +65,7 @@ pub mod simplify;
 pub mod surface_mesh;
 pub mod symmetry;
 pub mod tetmesh;
+pub mod transform;
 pub mod union_find;
 pub mod voxels;
 pub mod weld;
@@ -79,3 +81,4 @@ pub use repair::{Repair, Repaired};
 pub use simplify::{Goal, simplify};
 pub use surface_mesh::SurfaceMesh;
 pub use tetmesh::TetMesh;
+pub use transform::Transform;

@@ -14,7 +14,7 @@ pub(crate) mod validity;
 
 use validity::Pairs;
 
-/// Caps may make up this share of the repaired surface. A cap is a guess: at a tenth of the surface, over a hole a
+/// Caps may make up this share of the repaired surface, unless more is asked for ([`Repair::Caps`]). A cap is a guess: at a tenth of the surface, over a hole a
 /// fifth of the part wide, it can be wrong by a tenth of that width, which is the size of a cell of most lattices.
 pub const CAPPED: f64 = 0.1;
 /// A surface with a larger gap than this share of its area is refused.
@@ -23,11 +23,13 @@ const UNCLOSED: f64 = 1e-9;
 const MANY: usize = 1000;
 
 /// Whether a broken mesh is repaired.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Repair {
-    /// It is, and the repairs are reported.
+    /// It is, and the repairs are reported; caps may make up [`CAPPED`] of the surface.
     #[default]
     Auto,
+    /// The same, with caps up to this share of the surface.
+    Caps(f64),
     /// It is refused, with its defects in numbers.
     Refuse,
 }
@@ -171,14 +173,16 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
                 found.unwrap_or_default()
             )));
         }
-        if done.hole_share > CAPPED {
+        let most = if let Repair::Caps(share) = repair { share } else { CAPPED };
+        if done.hole_share > most {
             return Err(refuse(format!(
-                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from; found {}",
+                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from, or allow more with caps = {}; found {}",
                 counted(caps.holes, "hole", "holes"),
                 short(caps.length),
                 short(caps.area),
                 short(100.0 * done.hole_share),
-                100.0 * CAPPED,
+                (1000.0 * most).round() / 10.0,
+                ((20.0 * done.hole_share).ceil() / 20.0).min(1.0),
                 found.unwrap_or_default()
             )));
         }

@@ -7,6 +7,7 @@
 mod hall;
 mod orbit;
 mod site;
+mod spelling;
 
 pub use orbit::Side;
 
@@ -67,13 +68,15 @@ pub struct Group {
     pub operations: Vec<Operation>,
 }
 
-/// A row of the table: number, setting, short and full Hermann–Mauguin symbol, Hall symbol.
+/// A row of the table: number, setting, short and full Hermann–Mauguin symbol, Hall symbol, and the short symbol before 1992
+/// where the e-glide has changed it.
 struct Row {
     number: u16,
     setting: &'static str,
     short: &'static str,
     full: &'static str,
     hall: &'static str,
+    former: Option<&'static str>,
 }
 
 /// All settings, in the order of the International Tables; underscores and spaces left out of Hermann–Mauguin symbols.
@@ -86,37 +89,37 @@ fn rows() -> impl Iterator<Item = Row> {
             short: fields.next()?,
             full: fields.next()?,
             hall: fields.next()?,
+            former: fields.next(),
         })
     })
 }
 
 impl Group {
     /// A group by its number (`"227"`), its Hermann–Mauguin symbol, short or full (`"Fd-3m"`, `"P 1 21/c 1"`), either with
-    /// a setting (`"227:2"`), or its Hall symbol (`"-F 4vw 2vw 3"`; `"hall: P 2"` where it could be the other). Without a
-    /// setting it is origin choice 2 where there are two, hexagonal axes, or the first of the tables.
+    /// a setting (`"227:2"`), or its Hall symbol (`"-F 4vw 2vw 3"`; `"hall: P 2"` where it could be the other). Usual
+    /// spellings of Hermann–Mauguin symbols are read too: cubic ones without the bar (`"Fd3m"`), those before 1992
+    /// (`"Cmca"`), and monoclinic ones without ones (`"P21/n"`, unique axis b first). Without a setting it is origin choice 2
+    /// where there are two, hexagonal axes, or the first of the tables.
     ///
     /// # Errors
-    /// A symbol or setting that does not exist; a Hall symbol that makes no group.
+    /// A symbol or setting that does not exist; a Hall symbol that makes no group, or that has the form of a Hermann–Mauguin
+    /// symbol.
     pub fn named(text: &str) -> Result<Group, Fault> {
         if let Some(symbol) = text.trim().strip_prefix("hall:") {
             return Group::of_hall(symbol);
         }
         let (symbol, setting) = match text.split_once(':') {
-            Some((symbol, setting)) => (symbol, Some(setting.trim())),
+            Some((symbol, setting)) => (symbol.trim(), Some(setting.trim())),
             None => (text, None),
         };
         let bare: String = symbol.chars().filter(|c| !c.is_whitespace() && *c != '_').collect();
-        let known: Vec<Row> = rows()
-            .filter(|r| {
-                bare.parse() == Ok(r.number) || bare.eq_ignore_ascii_case(r.short) || bare.eq_ignore_ascii_case(r.full)
-            })
-            .collect();
+        let known = spelling::rows_of(&bare);
         if known.is_empty() {
-            return unknown(text, &bare);
+            return spelling::other(text, &bare);
         }
         let found = match setting {
-            Some(s) => known.iter().find(|r| r.setting == s),
-            None => known.iter().find(|r| r.setting == "2").or(known.first()),
+            Some(s) => known.iter().find(|r| r.setting.eq_ignore_ascii_case(s)),
+            None => known.iter().find(|r| r.setting.starts_with('2')).or(known.first()),
         };
         let Some(row) = found else {
             let settings: Vec<&str> = known.iter().map(|r| r.setting).collect();
@@ -157,22 +160,6 @@ impl Group {
 
 fn operations(hall: &str) -> Result<Vec<Operation>, Fault> {
     hall::operations(hall).map_err(|why| Fault::new("", format!("\"{hall}\" is no Hall symbol: {why}")))
-}
-
-/// A symbol that is none of Hermann and Mauguin's: perhaps Hall's.
-fn unknown(text: &str, bare: &str) -> Result<Group, Fault> {
-    if bare.chars().all(|c| c.is_ascii_digit()) && !bare.is_empty() {
-        let message = format!("there is no space group {bare}; they are numbered from 1 to 230");
-        return Err(Fault::new("", message));
-    }
-    Group::of_hall(text).map_err(|f| {
-        let message = format!(
-            "\"{text}\" is no space group: neither a number from 1 to 230 nor a Hermann–Mauguin symbol (such as Fd-3m or \
-             227:2), and {}",
-            f.message
-        );
-        Fault::new("", message)
-    })
 }
 
 #[cfg(test)]

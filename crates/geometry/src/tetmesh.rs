@@ -21,7 +21,7 @@ pub struct TetMesh {
     /// The four nodes of each tetrahedron; (b − a) × (c − a) · (d − a) > 0 in a checked mesh.
     pub tets: Vec<[u32; 4]>,
     /// The zone of each tetrahedron, a number of the mesher's own; empty where there are none.
-    pub zones: Vec<u32>,
+    pub zones: Vec<i64>,
 }
 
 /// The faces of a tetrahedron by corner indices, counter-clockwise seen from outside; face i lies opposite to node i.

@@ -48,14 +48,15 @@ pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|b| b.is_ascii_whitespace() || *b == b'\\').filter(|w| !w.is_empty())
 }
 
-/// What was found, for a message: at most 24 characters of it.
+/// What was found, for a message, where it is a short word or number: what else stands in a file may be nobody's business, if it is
+/// another file than was meant.
 pub fn shown(word: &[u8]) -> String {
-    let text = String::from_utf8_lossy(word);
-    let mut short: String = text.chars().take(24).flat_map(char::escape_debug).collect();
-    if short.len() < text.len() {
-        short.push('…');
+    const SHORT: usize = 16;
+    let plain = |b: &u8| b.is_ascii_alphanumeric() || b"_.+-#*%/,".contains(b);
+    match core::str::from_utf8(word) {
+        Ok(text) if text.len() <= SHORT && word.iter().all(plain) => format!("\"{text}\""),
+        _ => "some text".to_string(),
     }
-    format!("\"{short}\"")
 }
 
 /// A fault at a line.

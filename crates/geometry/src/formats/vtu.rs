@@ -33,7 +33,7 @@ pub fn write_vtu<W: Write>(mesh: &TetMesh, arrays: &[(&str, Vec<f64>)], out: &mu
         head += &header("Float64", name, 1, 8 * tets);
     }
     if zones.is_some() {
-        head += &header("UInt32", "zone", 1, 4 * tets);
+        head += &header("Int64", "zone", 1, 8 * tets);
     }
     head += "</CellData>\n<Points>\n";
     head += &header("Float64", "Points", 3, 24 * nodes);
