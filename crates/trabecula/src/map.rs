@@ -5,6 +5,7 @@ mod affine_kind;
 mod distortion;
 mod frame;
 mod inverse;
+mod pace;
 mod phase;
 mod phase_grid;
 mod phase_kind;
@@ -94,6 +95,11 @@ pub trait Mapping: Send + Sync {
 
     /// The solved map that this is, if it is one: it is defined in a box, and may deviate from the target.
     fn solved(&self) -> Option<&Phase> {
+        None
+    }
+
+    /// The wrapped map that this is, if it is one: cells shrink towards its axis or centre.
+    fn round(&self) -> Option<&Round> {
         None
     }
 

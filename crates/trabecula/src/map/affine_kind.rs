@@ -1,6 +1,6 @@
 //! Affine maps, as they are declared.
 
-use super::{Affine, BuildMap, Map, shared};
+use super::{Affine, BuildMap, Map, MapKind, shared};
 use crate::environment::Environment;
 use crate::kind::{At, DesignError, Kind, OneOrThree, Value};
 
@@ -19,15 +19,57 @@ pub struct AffineKind {
 /// Edges, angles and offset of the cells.
 #[derive(Clone, Copy, Debug, PartialEq, Kind)]
 pub struct Cells {
-    /// Cell edge, one number or three.
-    #[kind(unit = "mm", above = 0.0)]
-    wavelength: OneOrThree,
+    /// Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it follows; three
+    /// numbers are ratios then.
+    #[kind(unit = "mm", above = 0.0, hints("cell_size", "unit_cell", "period", "size"))]
+    wavelength: Option<OneOrThree>,
     /// Angles about x, y, z: z is turned first, then y, then x.
     #[kind(unit = "degrees", default = [0.0; 3])]
     rotate: [f64; 3],
     /// Moves the lattice.
     #[kind(unit = "mm", default = [0.0; 3])]
     offset: [f64; 3],
+}
+
+impl Cells {
+    fn wavelengths(&self, path: &str) -> Result<[f64; 3], DesignError> {
+        let message =
+            "\"wavelength\" is missing: cell edge, mm; only a level with both fraction and thickness goes without";
+        self.wavelength.map(OneOrThree::three).ok_or_else(|| DesignError::new(path, message))
+    }
+
+    /// Cells of `scale` mm, or of `scale` times the ratios.
+    fn scaled(&self, scale: f64, path: &str) -> Result<Cells, DesignError> {
+        let wavelength = match self.wavelength {
+            None => OneOrThree::One(scale),
+            Some(OneOrThree::Three(ratios)) => OneOrThree::Three(ratios.map(|r| r * scale)),
+            Some(OneOrThree::One(found)) => {
+                let message =
+                    "fraction and thickness give the wavelength; leave it out, or give one of the two amounts only";
+                let path = format!("{path}.wavelength");
+                return Err(DesignError::new(path, message).found(found.to_string()));
+            }
+        };
+        Ok(Cells { wavelength: Some(wavelength), ..*self })
+    }
+}
+
+impl MapKind {
+    /// The map at `path` with cells of `scale` mm, where their size is not given, or `scale` times as large as their ratios.
+    pub(crate) fn scaled(&self, scale: f64, path: &str) -> Result<MapKind, DesignError> {
+        let path = format!("{path}.{}", self.key());
+        match self {
+            MapKind::Affine(map) => {
+                Ok(MapKind::Affine(AffineKind { cells: map.cells.scaled(scale, &path)?, skew: map.skew }))
+            }
+            MapKind::Spartan(map) => Ok(MapKind::Spartan(SpartanKind { cells: map.cells.scaled(scale, &path)? })),
+            _ => {
+                let message = "fraction and thickness together give the wavelength of map.affine and map.spartan; with this \
+                               map give one of the two amounts";
+                Err(DesignError::new(path, message))
+            }
+        }
+    }
 }
 
 /// Explains that numbers of this map are constant.
@@ -87,16 +129,14 @@ pub struct SpartanKind {
 
 impl BuildMap for AffineKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
-        let made =
-            Affine::rigid(self.cells.wavelength.three(), self.cells.rotate, self.cells.offset, &self.skew.shears());
-        shared(made, path)
+        let wavelength = self.cells.wavelengths(path)?;
+        shared(Affine::rigid(wavelength, self.cells.rotate, self.cells.offset, &self.skew.shears()), path)
     }
 }
 
 impl BuildMap for SpartanKind {
     fn build(&self, path: &str, _: &Environment) -> Result<Map, DesignError> {
-        let made = Affine::spartan(self.cells.wavelength.three(), self.cells.rotate, self.cells.offset);
-        shared(made, path)
+        shared(Affine::spartan(self.cells.wavelengths(path)?, self.cells.rotate, self.cells.offset), path)
     }
 }
 

@@ -19,18 +19,22 @@ pub struct Spread {
 }
 
 impl Spread {
-    fn of(mut values: Vec<f64>) -> Spread {
-        if values.is_empty() {
+    /// The mean and the 95th percentile of `values` from index `from` on, the greatest of all.
+    fn of(values: &[f64], from: usize) -> Spread {
+        let mut evenly = values[from..].to_vec();
+        if evenly.is_empty() {
             return Spread::default();
         }
-        let n = values.len();
-        let mean = values.iter().sum::<f64>() / n as f64;
-        values.sort_by(f64::total_cmp);
-        Spread { mean, p95: values[(95 * (n - 1)).div_ceil(100)], max: values[n - 1] }
+        let n = evenly.len();
+        let mean = evenly.iter().sum::<f64>() / n as f64;
+        evenly.sort_by(f64::total_cmp);
+        let max = values.iter().copied().fold(evenly[n - 1], f64::max);
+        Spread { mean, p95: evenly[(95 * (n - 1)).div_ceil(100)], max }
     }
 }
 
-/// Deviation of the gradients ∇Φᵢ from the targets Kᵢ, over the nodes of the solution's grid that lie in the region.
+/// Deviation of the gradients ∇Φᵢ from the targets Kᵢ in the region: means and percentiles over points between nodes of the
+/// solution's grid, as many in each of its cells, extremes over the nodes as well.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Angle between ∇Φᵢ and Kᵢ, degrees, for each axis.
@@ -38,7 +42,7 @@ pub struct Distortion {
     /// |∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than the target. `max` and `p95` are of the ratio or its
     /// inverse, whichever is greater.
     pub spacing: [Spread; 3],
-    /// Fraction of the nodes and axes where the spacing ratio is outside 1/1.5 to 1.5.
+    /// Fraction of the points and axes where the spacing ratio is outside 1/1.5 to 1.5.
     pub outside: f64,
     /// The greatest deviation from a right angle between two gradients, degrees.
     pub shear: Spread,
@@ -50,7 +54,7 @@ pub struct Distortion {
     pub least_at: Vec3,
     /// |curl Kᵢ| λᵢ² before solving: what no map can follow; zero where K is a gradient.
     pub curl: Spread,
-    /// The greatest rotation of the target orientation within a cell, degrees.
+    /// The greatest rotation of the target orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
     /// Where that is, mm.
     pub turn_at: Vec3,
@@ -105,23 +109,35 @@ pub(super) fn compare(j: &Mat3, k: &Mat3) -> Misfit {
 }
 
 impl Distortion {
-    /// All but the density. |curl Kᵢ| λᵢ² is separate.
-    pub(super) fn of(found: &[Misfit], curl: Vec<f64>, (turn, turn_at): (f64, Vec3)) -> Distortion {
-        let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(found.iter().map(f).collect());
-        let outside = found.iter().flat_map(|f| f.spacing).filter(|s| s.max(1.0 / s) > 1.5).count();
+    /// All but the density. What was found from index `from` on is spread evenly; |curl Kᵢ| λᵢ² is separate.
+    pub(super) fn of(found: &[Misfit], from: usize, curl: &[f64], (turn, turn_at): (f64, Vec3)) -> Distortion {
+        let from = if from < found.len() { from } else { 0 };
+        let axis = |f: &dyn Fn(&Misfit) -> f64| Spread::of(&found.iter().map(f).collect::<Vec<f64>>(), from);
+        let even = &found[from..];
+        let outside = even.iter().flat_map(|f| f.spacing).filter(|s| s.max(1.0 / s) > 1.5).count();
         Distortion {
             angle: [0, 1, 2].map(|i| axis(&|f| f.angle[i])),
             spacing: [0, 1, 2].map(|i| Spread {
                 mean: axis(&|f| f.spacing[i]).mean,
                 ..axis(&|f| f.spacing[i].max(1.0 / f.spacing[i]))
             }),
-            outside: outside as f64 / (3 * found.len()).max(1) as f64,
+            outside: outside as f64 / (3 * even.len()).max(1) as f64,
             shear: axis(&|f| f.shear),
             anisotropy: axis(&|f| f.anisotropy),
-            curl: Spread::of(curl),
+            curl: Spread::of(curl, 0),
             turn,
             turn_at,
             ..Distortion::default()
+        }
+    }
+
+    /// Takes the density at other points into its range.
+    pub(super) fn widen_density(&mut self, found: &[Misfit], at: &[Vec3]) {
+        for (f, p) in found.iter().zip(at) {
+            self.density[1] = self.density[1].max(f.density);
+            if f.density < self.density[0] {
+                (self.density[0], self.least_at) = (f.density, *p);
+            }
         }
     }
 }
@@ -144,35 +160,42 @@ pub(super) fn curl(grid: &Grid, k: &[Vec<Vec3>; 3], n: usize) -> f64 {
     most
 }
 
-/// The most that frames turn within one cell of edge `length`, and where.
+/// The most that frames turn within one cell of edge `length`, or twice what they turn within half of one or less, and where.
 pub(super) fn turning(grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64) -> (f64, Vec3) {
-    let strides = grid.strides();
     let mut most = (0.0, grid.origin);
-    for a in 0..3 {
-        // Nodes nearly one cell apart; where a cell has less than a step, what a step turns is shared out.
-        let apart = ((length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
-        let share = (length / (apart as f64 * grid.step[a])).min(1.0);
-        let angle = |n: usize| {
-            let m = n + apart * strides[a];
-            if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
-                return (0.0, n);
-            }
-            let pairs = frames[n].as_flattened().iter().zip(frames[m].as_flattened());
-            let trace: f64 = pairs.map(|(a, b)| a * b).sum();
-            let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
-            (angle * share, n)
-        };
-        // Of equals the first, whatever the threads do.
-        let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
-            Ordering::Less => b,
-            Ordering::Equal if b.1 < a.1 => b,
-            _ => a,
-        };
-        let found = (0..grid.len()).into_par_iter().map(angle).reduce(|| (0.0, usize::MAX), greater);
-        if found.0 > most.0 {
-            let (p, q) = (grid.node(found.1), grid.node(found.1 + apart * strides[a]));
-            most = (found.0, Aabb::EMPTY.with(p).with(q).center());
-        }
+    for cells in [1.0, 0.5, 0.25, 0.125] {
+        let found = (0..3).map(|a| turning_along(a, cells, grid, frames, inside, length));
+        most = found.fold(most, |m, f| if f.0 > m.0 { f } else { m });
     }
     most
+}
+
+/// The same along an axis between nodes `cells` cells apart.
+fn turning_along(a: usize, cells: f64, grid: &Grid, frames: &[Mat3], inside: &[bool], length: f64) -> (f64, Vec3) {
+    let strides = grid.strides();
+    // Nodes nearly that far apart; where that is less than a step, what a step turns is shared out.
+    let apart = ((cells * length / grid.step[a]).round() as usize).clamp(1, grid.shape[a] - 1);
+    let share = (length / (apart as f64 * grid.step[a])).min(1.0 / cells).min(2.0);
+    let angle = |n: usize| {
+        let m = n + apart * strides[a];
+        if !(inside[n] && grid.index(n)[a] + apart < grid.shape[a] && inside[m]) {
+            return (0.0, n);
+        }
+        let pairs = frames[n].as_flattened().iter().zip(frames[m].as_flattened());
+        let trace: f64 = pairs.map(|(a, b)| a * b).sum();
+        let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+        (angle * share, n)
+    };
+    // Of equals the first, whatever the threads do.
+    let greater = |a: (f64, usize), b: (f64, usize)| match a.0.total_cmp(&b.0) {
+        Ordering::Less => b,
+        Ordering::Equal if b.1 < a.1 => b,
+        _ => a,
+    };
+    let (turn, n) = (0..grid.len()).into_par_iter().map(angle).reduce(|| (0.0, usize::MAX), greater);
+    if turn == 0.0 {
+        return (0.0, grid.origin);
+    }
+    let (p, q) = (grid.node(n), grid.node(n + apart * strides[a]));
+    (turn, Aabb::EMPTY.with(p).with(q).center())
 }

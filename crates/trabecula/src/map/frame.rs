@@ -68,6 +68,31 @@ impl Orientation {
         }
     }
 
+    /// Whether it is the same everywhere.
+    pub(super) fn is_constant(&self) -> bool {
+        let all = |of: &[Grade]| of.iter().all(|g| g.constant().is_some());
+        match self {
+            Orientation::Angles(of) | Orientation::Direction(of) => all(of),
+            Orientation::Frame { x, z } => all(x) && all(z),
+            Orientation::Stress(of) => all(of),
+        }
+    }
+
+    /// Whether signs or axes are chosen so that neighbours agree.
+    pub(super) fn is_combed(&self) -> bool {
+        matches!(self, Orientation::Direction(_) | Orientation::Stress(_))
+    }
+
+    /// The key that it is given by.
+    pub(super) fn key(&self) -> &'static str {
+        match self {
+            Orientation::Angles(_) => "rotate",
+            Orientation::Direction(_) => "direction",
+            Orientation::Frame { .. } => "frame",
+            Orientation::Stress(_) => "stress",
+        }
+    }
+
     /// The frames at points; where signs and axes are not given, those nearest to `like`.
     pub(super) fn frames_near(&self, points: &[Vec3], like: &[Mat3]) -> Result<Vec<Mat3>, Fault> {
         match self {
@@ -91,6 +116,34 @@ impl Orientation {
             }
         }
     }
+}
+
+/// The frame between those at the nodes about a point: their mean, made orthonormal; of the nearest node where they are too far
+/// apart for a mean.
+pub(super) fn interpolated(grid: &Grid, frames: &[Mat3], p: Vec3) -> Mat3 {
+    let along = |a: usize| ((p[a] - grid.origin[a]) / grid.step[a]).clamp(0.0, (grid.shape[a] - 1) as f64);
+    let first: [usize; 3] = core::array::from_fn(|a| (along(a) as usize).min(grid.shape[a] - 2));
+    let strides = grid.strides();
+    let (mut mean, mut nearest) = ([[0.0; 3]; 3], (0.0, IDENTITY));
+    for corner in 0..8 {
+        let (mut n, mut weight) = (0, 1.0);
+        for a in 0..3 {
+            let (t, up) = (along(a) - first[a] as f64, corner >> a & 1);
+            n += (first[a] + up) * strides[a];
+            weight *= if up == 1 { t } else { 1.0 - t };
+        }
+        if weight > nearest.0 {
+            nearest = (weight, frames[n]);
+        }
+        mean = core::array::from_fn(|i| core::array::from_fn(|j| mean[i][j] + weight * frames[n][i][j]));
+    }
+    if determinant(&mean) < 0.25 {
+        return nearest.1;
+    }
+    let [x, _, z] = transpose(&mean);
+    let z = unit(z);
+    let x = unit(sub(x, scale(z, dot(x, z))));
+    transpose(&[x, cross(z, x), z])
 }
 
 /// The frames of first and third axes.

@@ -3,10 +3,13 @@
 //! Where orientation and wavelength vary there is mostly no phase with ∇Φᵢ = Kᵢ, Kᵢ = R eᵢ / λᵢ: least squares. The
 //! phases are solved on a coarse grid over the region's bounds and carried between its nodes by splines.
 
+use std::sync::{Arc, OnceLock};
+
 use rayon::prelude::*;
 
 use super::distortion::{self, Distortion, Misfit};
-use super::frame::{Orientation, in_mm};
+use super::frame::{self, Orientation, in_mm};
+use super::pace;
 use super::phase_grid::Grid;
 use super::poisson::Poisson;
 use super::spline::{self, Spline};
@@ -15,20 +18,14 @@ use super::{Mapping, Rows, inverse};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
-use geometry::math::{
-    Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose, unit,
-};
+use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
 
-/// Most nodes of a grid that is chosen, and of one that the design requests.
-const NODES: [f64; 2] = [2.2e6, 4e7];
-/// Nodes on a wavelength.
-const FINE: f64 = 4.0;
-/// The greatest ratio of wavelengths at adjacent nodes.
-const ABRUPT: f64 = 1.5;
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
 /// Most nodes at which a solution is compared with the target.
 const COMPARED: usize = 60_000;
+/// And most points between nodes.
+const BETWEEN: usize = 30_000;
 /// Least ratio of what angle and spacing count, and the inverse of the greatest: conjugate gradients take its root of steps.
 const LEAST_RATIO: f64 = 0.001;
 /// Least root of a weight.
@@ -75,6 +72,8 @@ pub struct Phase {
     distortion: Distortion,
     extremes: [Mat3; 2],
     steps: usize,
+    hasty: Option<String>,
+    frames: OnceLock<Arc<[Mat3]>>,
 }
 
 impl Phase {
@@ -84,7 +83,8 @@ impl Phase {
     /// Numbers that are not finite, wavelengths that are not positive or that change faster than the grid can carry, a
     /// grid that is too coarse or too large; a map that folds.
     pub fn solve(bounds: &Aabb, wanted: &Wanted, settings: &Settings) -> Result<Phase, Fault> {
-        let grid = grid(bounds, wanted, settings.step)?;
+        let chosen = pace::choose(bounds, wanted, settings.step, settings.region)?;
+        let grid = chosen.grid;
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
         let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
         let frames = wanted.orientation.frames(&grid, &nodes)?;
@@ -95,7 +95,8 @@ impl Phase {
         }
         let reach = 1e-9 * norm(bounds.size());
         let inside: Vec<bool> = depth.iter().map(|d| *d <= reach).collect();
-        check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
+        pace::check_pace(&grid, &wanted.wavelength, &wavelength, &inside)?;
+        chosen.refuse()?;
         let k: [Vec<Vec3>; 3] = core::array::from_fn(|i| {
             let of = frames.iter().zip(&wavelength);
             of.map(|(f, w)| scale([f[0][i], f[1][i], f[2][i]], 1.0 / w[i])).collect()
@@ -121,28 +122,26 @@ impl Phase {
                 cells * wavelength[n].iter().product::<f64>()
             })
             .collect();
-        let keep = COMPARED as f64 / within.len().max(1) as f64;
-        let compared: Vec<usize> =
-            (within.iter().copied()).filter(|n| (*n as f64 * 0.618_033_988_749_895).fract() < keep).collect();
-        let jacobians: Vec<Mat3> = compared.par_iter().map(|&n| spline.jacobian(nodes[n]).1).collect();
-        let found: Vec<_> = (compared.par_iter().zip(&jacobians))
-            .map(|(&n, j)| {
-                let wanted = [k[0][n], k[1][n], k[2][n]];
-                distortion::compare(j, &wanted)
-            })
-            .collect();
-        let curl = (compared.par_iter()).map(|&n| distortion::curl(&grid, &k, n));
+        let (compared, between) = compared(&grid, &inside, settings.region);
+        let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
+        let jacobians: Vec<Mat3> = positions.par_iter().map(|p| spline.jacobian(*p).1).collect();
+        let off_nodes = targets(wanted, &grid, &frames, &between)?;
+        let at_nodes = compared.iter().map(|&n| [k[0][n], k[1][n], k[2][n]]);
+        let asked: Vec<Mat3> = at_nodes.chain(off_nodes).collect();
+        let found: Vec<_> = jacobians.par_iter().zip(&asked).map(|(j, k)| distortion::compare(j, k)).collect();
+        let curl: Vec<f64> = (compared.par_iter()).map(|&n| distortion::curl(&grid, &k, n)).collect();
         let range =
             wavelength.iter().flatten().fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], w| [a.min(*w), b.max(*w)]);
         let turn = distortion::turning(&grid, &frames, &inside, range[1]);
         let order = |a: &usize, b: &usize| density[*a].total_cmp(&density[*b]);
         let least = (0..density.len()).min_by(order);
         let most = (0..density.len()).max_by(order);
-        let distortion = Distortion {
+        let mut distortion = Distortion {
             density: [least, most].map(|n| n.map_or(1.0, |n| density[n])),
             least_at: least.map_or(bounds.center(), |n| nodes[within[n]]),
-            ..Distortion::of(&found, curl.collect(), turn)
+            ..Distortion::of(&found, compared.len(), &curl, turn)
         };
+        distortion.widen_density(&found, &positions);
         if !settings.folds {
             refuse_folds(&grid, &spline, &distortion, &inside)?;
         }
@@ -163,6 +162,8 @@ impl Phase {
             distortion,
             extremes: extremes.map(|n| n.map_or(typical, |n| jacobians[n])),
             steps,
+            hasty: chosen.hasty,
+            frames: OnceLock::new(),
         })
     }
 
@@ -172,23 +173,33 @@ impl Phase {
     }
 
     /// Deviation of the map from the target at points (mm) within the box. The target is evaluated at the points,
-    /// with the signs and axes that are nearest to the map's.
+    /// with the signs and axes of the nodes about them.
     ///
     /// # Errors
     /// Numbers that are not finite, vectors without a direction.
     pub fn misfits(&self, points: &[Vec3]) -> Result<Vec<Misfit>, Fault> {
         let jacobians: Vec<Mat3> = points.par_iter().map(|p| self.jacobian(*p)).collect();
-        let own = |j: &Mat3| transpose(&j.map(unit));
-        let like: Vec<Mat3> = jacobians.iter().map(own).collect();
-        let frames = self.wanted.orientation.frames_near(points, &like)?;
-        let wavelength = wavelengths(&self.wanted.wavelength, points)?;
-        let of = jacobians.iter().zip(frames.iter().zip(&wavelength));
-        Ok(of
-            .map(|(j, (f, w))| {
-                let k = transpose(f);
-                distortion::compare(j, &[0, 1, 2].map(|i| scale(k[i], 1.0 / w[i])))
-            })
-            .collect())
+        let targets = targets(&self.wanted, self.spline.grid(), &self.combed()?, points)?;
+        Ok(jacobians.iter().zip(&targets).map(|(j, k)| distortion::compare(j, k)).collect())
+    }
+
+    /// The frames at the nodes, made again where points need them for their signs and axes.
+    fn combed(&self) -> Result<Arc<[Mat3]>, Fault> {
+        if !self.wanted.orientation.is_combed() {
+            return Ok(Arc::default());
+        }
+        if let Some(frames) = self.frames.get() {
+            return Ok(frames.clone());
+        }
+        let grid = self.spline.grid();
+        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
+        let made: Arc<[Mat3]> = self.wanted.orientation.frames(grid, &nodes)?.into();
+        Ok(self.frames.get_or_init(|| made).clone())
+    }
+
+    /// A target that varies faster than cells of its size can, in words; `None` where the solution's grid carries it.
+    pub fn hasty(&self) -> Option<&str> {
+        self.hasty.as_deref()
     }
 
     /// Nodes of the grid along each axis, and the steps of conjugate gradients that were taken.
@@ -269,51 +280,46 @@ impl Rows for SplineRows<'_> {
     }
 }
 
-/// The grid that resolves the least wavelength, or has the requested spacing `step` (mm).
-fn grid(bounds: &Aabb, wanted: &Wanted, step: Option<f64>) -> Result<Grid, Fault> {
-    let size = bounds.size();
-    let coarse: Vec<Vec3> = {
-        let g = Grid::over(bounds, [13; 3]);
-        (0..g.len()).map(|n| g.node(n)).collect()
+/// Where a solution is compared with its target: nodes in the region, and points in the region, one in a cell of the grid.
+fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<usize>, Vec<Vec3>) {
+    let within = inside.iter().filter(|i| **i).count().max(1) as f64;
+    let some = |most: usize| {
+        let keep = most as f64 / within;
+        (0..grid.len()).filter(move |n| (*n as f64 * 0.618_033_988_749_895).fract() < keep)
     };
-    let all = wavelengths(&wanted.wavelength, &coarse)?;
-    let least = all.iter().flatten().fold(f64::INFINITY, |m: f64, w| m.min(*w));
-    let shape = |h: f64| size.map(|s| Grid::handy(((s / h - 1e-6).ceil().max(0.0) as usize + 1).max(spline::LEAST)));
-    let count = |shape: [usize; 3]| shape.map(|n| n as f64).iter().product::<f64>();
-    match step {
-        Some(h) => {
-            if !(h > 0.0 && h.is_finite()) {
-                return Err(Fault::new(
-                    "step",
-                    format!("{} mm; the spacing of the grid is a positive, finite length", number(h)),
-                ));
-            }
-            let rough = size.iter().map(|s| s / h).product::<f64>();
-            if rough > NODES[1] || count(shape(h)) > NODES[1] {
-                let enough = (size.iter().product::<f64>() / NODES[1]).cbrt();
-                return Err(Fault::new(
-                    "step",
-                    format!(
-                        "{} mm makes a grid of {rough:.1e} nodes; at most {:.0e} are possible: use a step above {enough:.3} mm, or leave it out",
-                        number(h),
-                        NODES[1]
-                    ),
-                ));
-            }
-            Ok(Grid::over(bounds, shape(h)))
-        }
-        None => {
-            let mut h = (least / FINE).max((size.iter().product::<f64>() / NODES[0]).cbrt());
-            while count(shape(h)) > 1.3 * NODES[0] {
-                h *= 1.05;
-            }
-            Ok(Grid::over(bounds, shape(h)))
-        }
+    let far: usize = grid.strides().iter().sum();
+    let cell = |n: &usize| (0..3).all(|a| grid.index(*n)[a] + 1 < grid.shape[a]) && (inside[*n] || inside[n + far]);
+    let off = |n: usize| -> Vec3 {
+        let s = pace::scattered(n);
+        core::array::from_fn(|a| grid.node(n)[a] + s[a] * grid.step[a])
+    };
+    let mut between: Vec<Vec3> = some(BETWEEN).filter(cell).map(off).collect();
+    if let Some(region) = region {
+        let mut depth = vec![0.0; between.len()];
+        region.values(&between, &mut depth);
+        let mut depth = depth.into_iter();
+        between.retain(|_| depth.next().is_some_and(|d| d <= 0.0));
     }
+    (some(COMPARED).filter(|n| inside[*n]).collect(), between)
+}
+
+/// The target gradients at points; `frames` are those of the nodes, from which points have their signs and axes.
+fn targets(wanted: &Wanted, grid: &Grid, frames: &[Mat3], points: &[Vec3]) -> Result<Vec<Mat3>, Fault> {
+    let like: Vec<Mat3> = match wanted.orientation.is_combed() {
+        true => points.par_iter().map(|p| frame::interpolated(grid, frames, *p)).collect(),
+        false => Vec::new(),
+    };
+    let frames = wanted.orientation.frames_near(points, &like)?;
+    let wavelength = wavelengths(&wanted.wavelength, points)?;
+    let each = frames.iter().zip(&wavelength).map(|(f, w)| {
+        let k = transpose(f);
+        [0, 1, 2].map(|i| scale(k[i], 1.0 / w[i]))
+    });
+    Ok(each.collect())
 }
 
 /// The three wavelengths at points.
-fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
+pub(super) fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
     let mut out = vec![[0.0; 3]; points.len()];
     let mut values = vec![0.0; points.len()];
     for (i, grade) in of.iter().enumerate() {
@@ -333,52 +339,6 @@ fn wavelengths(of: &[Grade; 3], points: &[Vec3]) -> Result<Vec<Vec3>, Fault> {
         }
     }
     Ok(out)
-}
-
-/// Refuses wavelengths that jump between nodes, or whose variation the nodes do not resolve.
-fn check_pace(grid: &Grid, of: &[Grade; 3], at: &[Vec3], inside: &[bool]) -> Result<(), Fault> {
-    if of.iter().all(|g| g.constant().is_some()) {
-        return Ok(());
-    }
-    let refuse = |a: f64, b: f64, p: Vec3, apart: f64| {
-        let message = format!(
-            "the wavelength goes from {} to {} mm within {} mm at {}: faster than the grid can carry; let it change over several cells, or give a smaller step",
-            number(a),
-            number(b),
-            number(apart),
-            in_mm(p)
-        );
-        Err(Fault::new("wavelength", message))
-    };
-    let strides = grid.strides();
-    let mut middles = Vec::new();
-    for n in (0..grid.len()).filter(|&n| inside[n]) {
-        let index = grid.index(n);
-        for a in (0..3).filter(|&a| index[a] + 1 < grid.shape[a]) {
-            let m = n + strides[a];
-            for i in 0..3 {
-                let (v, w) = (at[n][i], at[m][i]);
-                if inside[m] && v.max(w) > ABRUPT * v.min(w) {
-                    return refuse(v, w, grid.node(n), grid.step[a]);
-                }
-            }
-        }
-        if (0..3).all(|a| index[a] + 1 < grid.shape[a]) {
-            middles.push(n);
-        }
-    }
-    let points: Vec<Vec3> = middles.iter().map(|&n| add(grid.node(n), scale(grid.step, 0.5))).collect();
-    let between = wavelengths(of, &points)?;
-    for ((n, w), p) in middles.iter().zip(&between).zip(&points) {
-        let far = n + strides.iter().sum::<usize>();
-        for i in 0..3 {
-            let (lo, hi) = (at[*n][i].min(at[far][i]), at[*n][i].max(at[far][i]));
-            if inside[far] && (w[i] > ABRUPT * hi || w[i] < lo / ABRUPT) {
-                return refuse(at[*n][i], w[i], *p, 0.5 * norm(grid.step));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The roots of the weights of nodes: closeness to the region times the target's weight. `None` if all are one.

@@ -4,7 +4,7 @@ use super::{BuildMap, Map, Orientation, Phase, Settings, Wanted, shared};
 use crate::environment::Environment;
 use crate::field::Field;
 use crate::grade::{FieldKind, Grade, GradeSpec, Quantity, key_of, several};
-use crate::kind::{DesignError, Key, Kind};
+use crate::kind::{DesignError, Fault, Key, Kind};
 
 /// Three phases of given orientation R and wavelengths λᵢ, by least squares: ∇Φᵢ = R eᵢ / λᵢ, without tearing. At most one of
 /// rotate (or rotate_x, rotate_y, rotate_z), direction, frame, stress; without, cells are not turned.
@@ -215,11 +215,24 @@ impl BuildMap for PhaseKind {
         let settings =
             Settings { step: self.step, region: (self.domain == Domain::Region).then_some(region), folds: self.folds };
         let made = Phase::solve(&environment.region.bounds(), &wanted, &settings);
-        shared(made, path)
+        shared(made.map_err(|f| self.orientation.fault(f)), path)
     }
 }
 
 impl OrientationKind {
+    /// A fault of the orientation at the key that was given.
+    fn fault(&self, f: Fault) -> Fault {
+        match self {
+            OrientationKind::Axes(AxisAngles { rotate_x, rotate_y, rotate_z }) if f.at == "rotate" => {
+                let given = [("rotate_x", rotate_x), ("rotate_y", rotate_y), ("rotate_z", rotate_z)];
+                let varies = |of: &Option<GradeSpec>| matches!(of, Some(GradeSpec::Kind(_)));
+                let at = given.into_iter().find(|(_, of)| varies(of)).map_or("rotate", |(key, _)| key);
+                Fault { at: at.into(), ..f }
+            }
+            _ => f,
+        }
+    }
+
     fn build(&self, path: &str, environment: &Environment) -> Result<Orientation, DesignError> {
         let below = |key: &str| format!("{path}.{key}");
         let any = |of: &GradeSpec, path: String| of.build(&Quantity::new(path, environment, Key::NONE));

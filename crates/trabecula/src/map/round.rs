@@ -123,6 +123,24 @@ impl Round {
         along.max(self.around / (core::f64::consts::TAU * radius))
     }
 
+    /// Where cells shrink to nothing: the word for it, and positions on it within the box (mm).
+    pub fn core(&self, b: &Aabb) -> (&'static str, Vec<Vec3>) {
+        const STEPS: i32 = 500;
+        if self.sphere {
+            return ("centre", vec![self.center]);
+        }
+        let n = self.frame[2];
+        let middle = add(self.center, scale(n, dot(n, sub(b.center(), self.center))));
+        let step = norm(b.size()) / f64::from(STEPS);
+        ("axis", (-STEPS..=STEPS).map(|i| add(middle, scale(n, 0.5 * step * f64::from(i)))).collect())
+    }
+
+    /// The edge of a cell round the axis at a position (mm), of a sphere that on the equator as far from the centre, mm.
+    pub fn edge_at(&self, p: Vec3) -> f64 {
+        let (l, r) = self.local(p);
+        self.arc(if self.sphere { r.hypot(l[2]) } else { r })
+    }
+
     /// The edge of a cell round the axis at a distance from it, mm.
     fn arc(&self, radius: f64) -> f64 {
         core::f64::consts::TAU * radius / self.around
@@ -157,6 +175,10 @@ impl Mapping for Round {
             [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
         };
         product(&local, &self.frame)
+    }
+
+    fn round(&self) -> Option<&Round> {
+        Some(self)
     }
 
     fn typical(&self) -> Mat3 {

@@ -23,7 +23,7 @@ pub struct Tets {
     tets: Vec<[u32; 4]>,
     /// Whether ascending order is negative.
     flipped: Vec<bool>,
-    zones: Vec<u32>,
+    zones: Vec<i64>,
     /// The tetrahedron across the face opposite each corner.
     across: Vec<[u32; 4]>,
     /// The gradients (per mm) of the first three barycentric coordinates.
@@ -233,12 +233,12 @@ impl Tets {
     }
 
     /// The zone of a tetrahedron; 0 where there are none.
-    pub fn zone(&self, t: usize) -> u32 {
+    pub fn zone(&self, t: usize) -> i64 {
         self.zones.get(t).copied().unwrap_or(0)
     }
 
     /// For each node, the fraction of the volume of its tetrahedra that belongs to some zones.
-    pub fn shares(&self, wanted: impl Fn(u32) -> bool) -> Vec<f64> {
+    pub fn shares(&self, wanted: impl Fn(i64) -> bool) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.nodes.len()];
         for t in 0..self.len() {
             let v = self.volume(t);

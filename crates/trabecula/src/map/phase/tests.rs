@@ -353,30 +353,100 @@ fn angles_are_bought_with_spacings() {
     }
 }
 
-/// At the nodes, a misfit is what the solution was judged by; between them, stresses find their own signs and axes.
+/// What the report says is what is found at the points where the solution was compared with the target, nodes and others;
+/// stresses have the signs and axes of the nodes there too, also where two principal values agree and one axis alone is given.
 #[test]
-fn misfits_at_nodes_are_those_of_the_report() {
+fn misfits_are_those_of_the_report() {
     let b = bounds([0.0; 3], [24.0, 24.0, 6.0]);
     // A tensor whose first direction is turned as the angles are: s cos 2a etc., with a third value apart.
     let stress = ["cos(0.1*x)", "-cos(0.1*x)", "3", "0", "0", "sin(0.1*x)"].map(formula);
+    // Tension along a direction that turns, the same in all directions across it.
+    let bar = ["cos(0.07*x)^2", "sin(0.07*x)^2", "0", "0", "0", "cos(0.07*x)*sin(0.07*x)"].map(formula);
     let turned = about_z("0.05*x*180/pi", Grade::Constant(3.0));
-    let laid = Wanted { orientation: Orientation::Stress(stress), ..turned.clone() };
-    for wanted in [turned, laid] {
+    let laid = |stress| Wanted { orientation: Orientation::Stress(stress), ..turned.clone() };
+    for wanted in [turned.clone(), laid(stress), laid(bar)] {
         let map = Phase::solve(&b, &wanted, &Settings::default()).expect("solved");
         let grid = *map.spline.grid();
-        let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
-        let found = map.misfits(&nodes).expect("misfits");
+        let (nodes, between) = compared(&grid, &vec![true; grid.len()], None);
+        // Every node of a grid as small as this, and a point in every cell.
+        assert_eq!(nodes.len(), grid.len());
+        assert_eq!(between.len(), grid.shape.map(|n| n - 1).iter().product::<usize>());
+        let points: Vec<Vec3> = nodes.iter().map(|n| grid.node(*n)).chain(between).collect();
+        let found = map.misfits(&points).expect("misfits");
         let most = |f: &dyn Fn(&Misfit) -> f64| found.iter().map(f).fold(0.0, f64::max);
         let d = map.distortion();
-        // The report evaluates every node of a grid as small as this; angles are good to √ε.
-        assert!(grid.len() < COMPARED);
+        // Angles are good to √ε.
         let shear = most(&|m| m.shear);
         assert!((shear - d.shear.max).abs() < 1e-5, "{shear} {}", d.shear.max);
         for i in 0..3 {
             let angle = most(&|m| m.angle[i]);
-            let any = (0..3).any(|k| (angle - d.angle[k].max).abs() < 1e-5);
-            assert!(any, "{angle} {:?}", d.angle);
+            assert!((angle - d.angle[i].max).abs() < 1e-5, "{angle} {:?}", d.angle);
         }
         assert!((most(&|m| m.density) - d.density[1]).abs() < 1e-9);
     }
+}
+
+/// A target whose period is the step of the grid looks constant at the nodes: it is refused where the step is given, and else the
+/// grid is made finer along that axis, which is reported, and the report is what is found at random points.
+#[test]
+fn what_hides_between_the_nodes_is_refused_or_resolved() {
+    let b = bounds([0.0; 3], [40.0, 6.0, 6.0]);
+    let swinging = about_z("30*sin(2*pi*x)", Grade::Constant(4.0));
+    let pulsing = about_z("0*x", formula("4 + 0.7*sin(2*pi*x)"));
+    for (wanted, key, words) in
+        [(&swinging, "rotate", "turns by"), (&pulsing, "wavelength", "the wavelength goes from")]
+    {
+        let given = Settings { step: Some(1.0), ..Settings::default() };
+        let fault = Phase::solve(&b, wanted, &given).err().expect("refused");
+        assert_eq!(fault.at, key);
+        assert!(
+            [words, "within 0.5 mm", "1 mm apart", "step = 0."].iter().all(|w| fault.message.contains(w)),
+            "{fault}"
+        );
+
+        let map = Phase::solve(&b, wanted, &Settings::default()).expect("solved");
+        assert!(map.hasty().expect("reported").contains(words));
+        // 60 degrees within half a period, an eighth of a cell.
+        assert!(key != "rotate" || map.distortion().turn > 110.0, "{}", map.distortion().turn);
+        let [nx, ny, nz] = map.effort().0;
+        assert!(nx > 160 && ny < 13 && nz < 13, "{nx} {ny} {nz}");
+        let (mut angle, mut spacing, mut ratio) = (0.0, 0.0f64, 0.0);
+        const COUNT: usize = 20_000;
+        for i in 0..COUNT {
+            let s = [0.371_23, 0.713_71, 0.193_37].map(|s| (s * i as f64).fract());
+            let p: Vec3 = [0, 1, 2].map(|a| s[a] * b.max[a]);
+            let wave = (TAU * p[0]).sin();
+            let (turn, length) = if key == "rotate" { (30.0 * wave, 4.0) } else { (0.0, 4.0 + 0.7 * wave) };
+            let (sin, cos) = f64::to_radians(turn).sin_cos();
+            let j = map.jacobian(p)[1];
+            angle += (dot(j, [-sin, cos, 0.0]) / norm(j)).clamp(-1.0, 1.0).acos().to_degrees() / COUNT as f64;
+            ratio += norm(j) * length / COUNT as f64;
+            spacing = spacing.max((norm(j) * length).max(1.0 / norm(j) / length));
+        }
+        let d = map.distortion();
+        // Means over some ten thousand points each, of figures whose spread is twice their mean; extremes are those of a smooth
+        // function.
+        assert!((d.angle[1].mean - angle).abs() < 0.05 * angle + 1e-3, "{angle} {:?}", d.angle[1]);
+        assert!((d.spacing[1].mean - ratio).abs() < 0.01 * ratio, "{ratio} {:?}", d.spacing[1]);
+        assert!((d.spacing[1].max - spacing).abs() < 0.05 * spacing, "{spacing} {:?}", d.spacing[1]);
+    }
+    // A period of several cells is carried by the usual grid.
+    let slow = Phase::solve(&b, &about_z("30*sin(2*pi*x/12)", Grade::Constant(4.0)), &Settings::default());
+    let slow = slow.expect("solved");
+    assert!(slow.hasty().is_none() && slow.effort().0[0] < 50, "{:?}", slow.effort());
+}
+
+/// A ramp shorter than a cell is as steep as half a cell sees it; a long one is so on any length.
+#[test]
+fn a_short_ramp_turns_as_steeply_as_half_a_cell_sees() {
+    let b = bounds([0.0; 3], [24.0, 6.0, 6.0]);
+    let turn = |stops: Vec<[f64; 2]>| {
+        let ramp = Grade::from(Linear::new([1.0, 0.0, 0.0], stops).expect("grade"));
+        let mut wanted = about_z("0*x", Grade::Constant(4.0));
+        wanted.orientation = Orientation::Angles([Grade::Constant(0.0), Grade::Constant(0.0), ramp]);
+        Phase::solve(&b, &wanted, &Settings::default()).expect("solved").distortion().turn
+    };
+    // 40 degrees within 2 mm of a 4 mm cell; the angle between frames is good to √ε.
+    assert!((turn(vec![[11.0, 0.0], [13.0, 40.0]]) - 80.0).abs() < 1e-4);
+    assert!((turn(vec![[0.0, 0.0], [24.0, 60.0]]) - 10.0).abs() < 1e-4);
 }
