@@ -209,6 +209,37 @@ def test_a_transition_finer_than_the_grid_is_refused_and_a_narrow_one_told(tmp_p
         solid.mesh(edge=0.25)
 
 
+def test_check_warns_where_no_solid_leads_across(tmp_path):
+    """Half a diagonal away primitive cells are their own negative: both are warned of, the cancelling and the gap."""
+    second = 'cell = "gyroid"\npart = "upper"\nlevel = { fraction = 0.30 }\nmap = { affine = { wavelength = 4.0 } }'
+    opposite = second.replace("gyroid", "primitive").replace("4.0", "4.0, offset = [2, 2, 2]")
+    file = bar(tmp_path, (second, opposite))
+    run = [sys.executable, "-m", "trabecula", "check", str(file)]
+    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert "cancel at (0, " in done.stderr and 'no solid leads from "a" to "b"' in done.stderr
+    report = json.loads(subprocess.run([*run, "--json"], capture_output=True, text=True, check=True).stdout)
+    (told,) = report["blend"]["transitions"]
+    assert [w["path"] for w in report["warnings"]] == ["blend", "blend"]
+    # A lattice's solid ends within a cell of where the other takes over.
+    assert told["neck"] is None and abs(told["gap"][0]) < 4
+
+
+@pytest.mark.parametrize(
+    "weight, path, words",
+    [
+        ('{ formula = "x/3" }', "blend.weight", "the weight is -4 to 4, "),
+        ("{ distance = { points = [[-9, -3, 0], [9, 3, 0], [9, -3, 0], [-9, 3, 0]], closed = true, axis = [0, 0, 1] } }",
+         "blend.weight.distance", "crosses itself at (0, 0, 0) mm, where its segments 0 and 2"),
+    ],
+)  # fmt: skip
+def test_weights_that_may_not_be_meant_are_warned_of(tmp_path, weight, path, words):
+    ramp = "{ linear = { along = [1, 0, 0], stops = [[-6, 0], [6, 1]] } }"
+    told = lt.load(bar(tmp_path, (ramp, weight))).build().warnings
+    assert any(w["path"] == path and words in w["message"] for w in told), told
+    sound = lt.load(bar(tmp_path, (ramp, '{ formula = "0.5 + x/24" }'))).build()
+    assert sound.warnings == []
+
+
 def test_check_tells_and_draws_the_transitions(tmp_path):
     file = bar(tmp_path)
     run = [sys.executable, "-m", "trabecula", "check", str(file)]

@@ -33,6 +33,11 @@ class Transitions(Sequence):
     def __repr__(self) -> str:
         return f"<trabecula.Transitions {', '.join(' to '.join(t.between) for t in self) or 'none'}>"
 
+    @property
+    def warnings(self) -> list[dict[str, str]]:
+        """The transitions that no solid leads across, each with ``path`` and ``message``, like ``Solid.warnings``."""
+        return [{"path": "blend", "message": _torn(it)} for it in self if it.gap]
+
     def svg(self) -> str:
         """The fraction found along each transition as bars, what was asked for as a line across each: an SVG file's text."""
         from .chart import Chart, svg
@@ -48,6 +53,15 @@ class Transitions(Sequence):
         if not self._found:
             raise ValueError("there is no transition: the design has no blend, or one lattice alone counts everywhere")
         write_svg(path, self.svg)
+
+
+def _torn(it: TransitionReport) -> str:
+    first, second = it.between
+    place = ", ".join(f"{x:.4g}" for x in it.gap)
+    return (
+        f'no solid leads from "{first}" to "{second}" on a grid of {it.step:.3g} mm: that of "{first}" ends at ({place}) mm; '
+        f"give one of them another `offset` in its map, widen the transition, or raise the fraction"
+    )
 
 
 def _chart(it: TransitionReport) -> dict:

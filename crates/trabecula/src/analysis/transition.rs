@@ -24,6 +24,8 @@ const BINS: usize = 10;
 /// shares, if that range is not narrower than `LEAST_RANGE`.
 const END: f32 = 0.1;
 const LEAST_RANGE: f32 = 0.05;
+/// A side counts as whole where its greatest component has this part of its solid, and at least so much of a cubic wavelength.
+const WHOLE: [f64; 2] = [0.25, 0.1];
 /// Components attached by a neck thinner than this multiple of the widest path's neck are dangling.
 const THIN: f64 = 0.5;
 
@@ -44,6 +46,9 @@ pub struct Transition {
     /// The narrowest neck of the widest path from one lattice to the other: its diameter (mm, to within a step) and position;
     /// `None` where no path leads across.
     pub neck: Option<(f64, Vec3)>,
+    /// Where the first lattice's solid ends, if no path leads from it to the second's, be it outside the transition; `None`
+    /// where one does, and where the grid is too coarse to tell.
+    pub gap: Option<Vec3>,
     /// For tenths of the second lattice's share from 0 to 1: the middle of the tenth, the solid fraction asked for and found, both
     /// means over windows of two of the largest cells about the points (raised cosines, at half their height), and the number
     /// of points.
@@ -96,7 +101,8 @@ pub fn transitions(solid: &Solid, blend: &Blend) -> Vec<Transition> {
     }
     pairs.sort_unstable();
     let means = windows(&points, 2.0 * blend.longest() / step);
-    let grid = Grid { points: &points, depth: &depth, step, at: &at };
+    let least = (WHOLE[1] * (solid.wavelength / step).powi(3)).ceil() as usize;
+    let grid = Grid { points: &points, depth: &depth, step, at: &at, least };
     pairs.into_iter().map(|pair| grid.transition(&Pair::new(&points, pair), &means)).collect()
 }
 
@@ -327,6 +333,8 @@ struct Grid<'a> {
     step: f64,
     /// Position of a point, mm.
     at: &'a dyn Fn(usize) -> Vec3,
+    /// Number of solid points from which a side may count as whole.
+    least: usize,
 }
 
 impl Grid<'_> {
@@ -342,6 +350,35 @@ impl Grid<'_> {
     /// Thickness of the solid at a point. (A point's half step stands for its extent.)
     fn thickness(&self, i: u32) -> f64 {
         2.0 * f64::from(self.depth[i as usize])
+    }
+
+    /// `Transition::gap` of a pair no component of which touches both sides.
+    fn gap(&self, pair: &Pair) -> Option<Vec3> {
+        let all = || self.points.of.iter().enumerate().filter_map(|(i, p)| Some((i, p.as_ref().filter(|p| p.solid)?)));
+        let mut components = Components::new(self.points, pair);
+        all().for_each(|(i, _)| _ = components.add(i as u32));
+        // Another lattice may lead across.
+        if components.roots().any(|i| components.marks[i] & SIDES == SIDES) {
+            return None;
+        }
+        // Walls thinner than a step fall apart on either side too, and tell nothing.
+        let main = [FIRST, SECOND].map(|side| {
+            let mut counts = vec![0usize; self.points.of.len()];
+            let mut sum = 0u32;
+            for (i, _) in all().filter(|(_, p)| pair.marks(p) & side > 0) {
+                counts[find(&mut components.root, i as u32) as usize] += 1;
+                sum += 1;
+            }
+            let (root, most) = (0..counts.len()).map(|i| (i, counts[i])).max_by_key(|c| (c.1, usize::MAX - c.0))?;
+            (most >= self.least && most as f64 >= WHOLE[0] * f64::from(sum)).then_some(root)
+        });
+        let [Some(first), Some(_)] = main else { return None };
+        let ends = all().filter(|(i, p)| pair.marks(p) > 0 && find(&mut components.root, *i as u32) as usize == first);
+        let last = ends.max_by(|(i, p), (j, q)| {
+            let [a, b] = [p, q].map(|p| pair.share_of_second(p));
+            a.total_cmp(&b).then(j.cmp(i))
+        });
+        last.map(|(i, _)| (self.at)(i))
     }
 
     fn transition(&self, pair: &Pair, means: &[[f32; 2]]) -> Transition {
@@ -373,6 +410,7 @@ impl Grid<'_> {
             loose: (loose, loose_points as f64 * volume),
             dangling: (dangling.0, dangling.1 as f64 * volume),
             neck,
+            gap: if neck.is_none() { self.gap(pair) } else { None },
             fractions,
             step: self.step,
         }

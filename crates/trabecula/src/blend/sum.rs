@@ -48,6 +48,8 @@ pub struct Blend {
     pub(super) side: Option<Side>,
     /// A Lipschitz bound, per mm.
     pub(super) lipschitz: f64,
+    /// The covariance of each pair of summands, where one distribution serves everywhere.
+    pub(super) covariance: Option<Arc<[f64]>>,
 }
 
 impl Blend {
@@ -67,7 +69,8 @@ impl Blend {
         }
         let windows = Windows::new(&of, bounds);
         let normalise = by == By::Fraction;
-        let summands: Arc<[Summand]> = summands(of, normalise, &windows, bounds).into();
+        let (summands, covariance) = summands(of, normalise, &windows, bounds);
+        let summands: Arc<[Summand]> = summands.into();
         let levels = normalise.then(|| Arc::new(Levels::new(&summands, windows, &weights)));
         // Half as much again for the gradients of the shares: transitions are longer than cells.
         let lipschitz = summands.iter().map(Summand::lipschitz).fold(0.0, f64::max) * 1.5;
@@ -78,6 +81,7 @@ impl Blend {
             levels,
             side: None,
             lipschitz,
+            covariance: covariance.map(Arc::from),
         })
     }
 
@@ -89,6 +93,19 @@ impl Blend {
     /// The greatest length of a cell, mm.
     pub fn longest(&self) -> f64 {
         self.summands.iter().map(Summand::longest).fold(0.0, f64::max)
+    }
+
+    /// The root mean square of F with these shares, over that of independent lattices, √(wᵀCw / Σ wᵢ² Cᵢᵢ); near 0 they cancel.
+    /// `None` where phases drift, and between two sheets: the negative of a sheet is the same sheet.
+    pub fn kept(&self, w: &[f64]) -> Option<f64> {
+        let n = self.summands.len();
+        let c = self.covariance.as_ref()?;
+        let (all, alone) = (0..n).fold((0.0, 0.0), |(all, alone), i| {
+            let row: f64 = (0..n).map(|j| w[j] * c[n * i + j]).sum();
+            (all + w[i] * row, alone + w[i] * w[i] * c[n * i + i])
+        });
+        let sheets = (0..n).filter(|i| w[*i] > 0.0).all(|i| self.summands[i].is_sheet());
+        (alone > 0.0 && !sheets).then(|| (all.max(0.0) / alone).sqrt())
     }
 
     /// Which phases meet, where the fraction is kept.
@@ -168,8 +185,14 @@ impl Blend {
     }
 }
 
-/// The summands; if `normalise`, with their cores divided by their root mean square deviation from the mean.
-fn summands(of: Vec<Constituent>, normalise: bool, windows: &Windows, bounds: &Aabb) -> Vec<Summand> {
+/// The summands; if `normalise`, with their cores divided by their root mean square deviation from the mean. And their covariance,
+/// where one window serves everywhere.
+fn summands(
+    of: Vec<Constituent>,
+    normalise: bool,
+    windows: &Windows,
+    bounds: &Aabb,
+) -> (Vec<Summand>, Option<Vec<f64>>) {
     let mut points = match windows.phases {
         Phases::Drifting => Vec::new(),
         Phases::Locked | Phases::Independent => windows.samples(0),
@@ -184,14 +207,21 @@ fn summands(of: Vec<Constituent>, normalise: bool, windows: &Windows, bounds: &A
     } else {
         points.truncate(SAMPLES);
     }
-    let mut values = vec![0.0; points.len()];
+    let mut centred = Vec::new();
     let each = of.into_iter().map(|c| {
+        let mut values = vec![0.0; points.len()];
         c.cores(&points, &mut values);
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
         let scale = if normalise && square > 0.0 { square.sqrt() } else { 1.0 };
-        Summand::new(c, scale, &values, bounds)
+        let made = Summand::new(c, scale, &values, bounds);
+        centred.push(values.into_iter().map(|v| made.scaled_value(v - mean)).collect::<Vec<f64>>());
+        made
     });
-    each.collect()
+    let made: Vec<Summand> = each.collect();
+    let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
+    let covariance = || centred.iter().flat_map(|a| centred.iter().map(|b| product(a, b))).collect();
+    let covariance = (windows.phases != Phases::Drifting).then(covariance);
+    (made, covariance)
 }

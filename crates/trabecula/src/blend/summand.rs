@@ -160,6 +160,11 @@ impl Summand {
     }
 
     /// Core to g.
+    pub fn scaled_value(&self, core: f64) -> f64 {
+        self.factor * core
+    }
+
+    /// Core to g.
     fn scaled(&self, r: Interval) -> Interval {
         let ends = [self.factor * r.lo, self.factor * r.hi];
         Interval::new(ends[0].min(ends[1]), ends[0].max(ends[1]))

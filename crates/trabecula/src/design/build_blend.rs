@@ -74,15 +74,30 @@ pub struct Functions {
     pub condition: f64,
 }
 
-/// The radial basis functions in a weight, itself or under a step.
+/// The radial basis functions in a weight, itself or under a step. Warns of lines there that cross themselves.
 fn functions(
     spec: &GradeSpec,
     path: &str,
     environment: &Environment,
     out: &mut Vec<Functions>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<(), DesignError> {
     match spec {
-        GradeSpec::Kind(GradeKind::Sigmoid(s)) => functions(&s.of, &format!("{path}.sigmoid.of"), environment, out),
+        GradeSpec::Kind(GradeKind::Sigmoid(s)) => {
+            functions(&s.of, &format!("{path}.sigmoid.of"), environment, out, warnings)
+        }
+        GradeSpec::Kind(GradeKind::Distance(d)) => {
+            let path = format!("{path}.distance");
+            if let Some(([i, j], p)) = d.line(&path, environment)?.crossing() {
+                let message = format!(
+                    "the line crosses itself at ({}) mm, where its segments {i} and {j} meet, counted from 0: inside and outside \
+                     change places there; put its points in order",
+                    p.map(figure).join(", ")
+                );
+                warnings.push(Warning { path, message });
+            }
+            Ok(())
+        }
         GradeSpec::Kind(GradeKind::Rbf(r)) => {
             let path = format!("{path}.rbf");
             let made = r.functions(&path, environment)?;
@@ -114,7 +129,7 @@ pub(super) fn blend(
     }
     let (mut grades, mut rbf) = (Vec::new(), Vec::new());
     for (path, spec) in spec.weights() {
-        functions(spec, &path, environment, &mut rbf)?;
+        functions(spec, &path, environment, &mut rbf, warnings)?;
         let here = Environment { path: path.clone(), ..*environment };
         grades.push(spec.build(&Quantity::new(path, &here, Key::NONE))?);
     }
@@ -122,16 +137,18 @@ pub(super) fn blend(
         (BlendKind::Between(_), Some(weight)) => Weights::between(weight),
         (_, last) => Weights::shares(grades.into_iter().chain(last).collect()),
     };
-    check_weights(&weights, spec, environment)?;
+    check_weights(&weights, spec, environment, warnings)?;
     let by = match spec.by {
         BySpec::Fraction => By::Fraction,
         BySpec::Value => By::Value,
     };
     let bounds = environment.region.bounds();
-    let width = narrowest(&weights, environment.points);
+    let equal = equal(&weights, environment.points);
+    let width = narrowest(&weights, &equal);
     let longest = members.iter().map(|m| m.of.longest()).fold(0.0, f64::max);
     let blend = Blend::new(of, weights, by, &bounds).map_err(|f| DesignError::fault("blend", f))?;
     unused(&blend, &names, members, environment, warnings);
+    cancelling(&blend, &names, &equal, environment, warnings);
     if let Some(width) = width.filter(|w| *w < 2.0 * longest) {
         let message = format!(
             "a transition is {} mm wide where it is steepest, less than two cells of {} mm: lattices meet there without \
@@ -144,8 +161,16 @@ pub(super) fn blend(
     Ok(Blended { blend: Arc::new(blend), names: names.into_iter().map(String::from).collect(), functions: rbf, width })
 }
 
-/// Refuses weights that are not finite, or none of which is positive, at any sample position.
-fn check_weights(weights: &Weights, spec: &BlendSpec, environment: &Environment) -> Result<(), DesignError> {
+/// How far a weight may leave 0 to 1 unwarned: functions through control points overshoot between them.
+const BEYOND: f64 = 0.1;
+
+/// Refuses weights that are not finite, or none of which is positive, at any sample position; warns of a share that is none.
+fn check_weights(
+    weights: &Weights,
+    spec: &BlendSpec,
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) -> Result<(), DesignError> {
     let paths = spec.weights();
     let (points, _) = sample::inside(environment.region, 60_000);
     let points: Vec<Vec3> = points.into_iter().chain(environment.points.iter().copied()).collect();
@@ -159,6 +184,20 @@ fn check_weights(weights: &Weights, spec: &BlendSpec, environment: &Environment)
             return Err(DesignError::new(path, message).found(number(values[i])));
         }
         most.iter_mut().zip(&values).for_each(|(m, v)| *m = m.max(*v));
+        let beyond = |i: usize| (values[i] - 1.0).max(-values[i]);
+        let farthest = (0..points.len()).max_by(|i, j| beyond(*i).total_cmp(&beyond(*j)).then(j.cmp(i)));
+        if let (BlendKind::Between(_), Some(i)) = (&spec.lattices, farthest.filter(|i| beyond(*i) > BEYOND)) {
+            let (least, greatest) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
+            let message = format!(
+                "the weight is {} to {}, {} at ({}) mm; it is cut off at 0 and 1: give a share from 0 to 1",
+                figure(least),
+                figure(greatest),
+                figure(values[i]),
+                at(i)
+            );
+            warnings.push(Warning { path: path.clone(), message });
+        }
     }
     if let (BlendKind::Of(_), Some(i)) = (&spec.lattices, most.iter().position(|m| *m <= 0.0)) {
         let message = format!(
@@ -184,44 +223,83 @@ fn unused(blend: &Blend, names: &[&str], members: &[Member], environment: &Envir
     }
 }
 
-/// The width of the narrowest transition (mm): 1/|∇w| where two lattices have the same weight, found by bisection between
-/// points at which different ones have the greatest weight.
-fn narrowest(weights: &Weights, points: &[Vec3]) -> Option<f64> {
+/// Warns of lattices whose functions cancel where they are mixed: of the place where least is left of them.
+fn cancelling(
+    blend: &Blend,
+    names: &[&str],
+    equal: &[[Vec3; 2]],
+    environment: &Environment,
+    warnings: &mut Vec<Warning>,
+) {
+    /// A mixture of a tenth of the size is one of shares within 0.036 of equal ones, where two functions are opposite.
+    const LEFT: f64 = 0.1;
+    let n = names.len();
+    let points: Vec<Vec3> = equal.as_flattened().iter().chain(environment.points).copied().collect();
+    let mut w = vec![0.0; n * points.len()];
+    blend.weights().values(&points, &mut w);
+    let each = w.chunks_exact(n).zip(&points).filter_map(|(w, p)| Some((blend.kept(w)?, w, p)));
+    let Some((left, w, p)) = each.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|m| m.0 < LEFT) else {
+        return;
+    };
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| w[*b].total_cmp(&w[*a]));
+    let [a, b] = [order[0], order[1]];
+    let message = format!(
+        "the functions of \"{}\" and \"{}\" cancel at ({}) mm, where the shares are {:.2} and {:.2}: only {left:.3} is left of \
+         their root mean square, so that the solid is torn there; give one of them another `offset` in its map",
+        names[a],
+        names[b],
+        p.map(figure).join(", "),
+        w[a],
+        w[b]
+    );
+    warnings.push(Warning { path: "blend".into(), message });
+}
+
+/// Positions at which two lattices have the same weight, one to either side, found by bisection between points at which
+/// different ones have the greatest.
+fn equal(weights: &Weights, points: &[Vec3]) -> Vec<[Vec3; 2]> {
     const PAIRS: usize = 400;
     let n = weights.len();
     let mut w = vec![0.0; n * points.len()];
     weights.values(points, &mut w);
     let first = |w: &[f64]| (0..n).fold(0, |m, i| if w[i] > w[m] { i } else { m });
     let owner: Vec<usize> = w.chunks_exact(n).map(first).collect();
-    let mut least: Option<f64> = None;
     let stride = (points.len() / PAIRS).max(1);
     let mut own = vec![0.0; n];
-    for i in (0..points.len()).step_by(stride) {
+    let each = (0..points.len()).step_by(stride).filter_map(|i| {
         // The nearest of some points at which another has the greatest weight.
         let near = (1..200).map(|k| (i + k * 7) % points.len()).filter(|j| owner[*j] != owner[i]);
         let distance = |j: &usize| norm(sub(points[*j], points[i]));
-        let Some(j) = near.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
-            continue;
-        };
+        let j = near.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         let (mut a, mut b) = (points[i], points[j]);
         for _ in 0..50 {
             let middle = scale(add(a, b), 0.5);
             weights.values(&[middle], &mut own);
             if first(&own) == owner[i] { a = middle } else { b = middle }
         }
+        Some([a, b])
+    });
+    each.collect()
+}
+
+/// The width of the narrowest transition (mm): 1/|∇w| where two lattices have the same weight, to either side of it.
+fn narrowest(weights: &Weights, equal: &[[Vec3; 2]]) -> Option<f64> {
+    let n = weights.len();
+    let each = equal.iter().map(|[a, b]| {
         let (mut v, mut g) = (vec![0.0; n], vec![[0.0; 3]; n]);
-        weights.gradients(&[a], &mut v, &mut g);
+        weights.gradients(&[*a], &mut v, &mut g);
         let (mut u, mut h) = (vec![0.0; n], vec![[0.0; 3]; n]);
-        weights.gradients(&[b], &mut u, &mut h);
+        weights.gradients(&[*b], &mut u, &mut h);
         let steep = g.iter().chain(&h).map(|g| norm(*g)).fold(0.0, f64::max);
         // A jump has no slope on either side of it.
         let jump = v.iter().zip(&u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) > 0.1;
-        let width = if jump { 0.0 } else { 1.0 / steep };
-        least = Some(least.map_or(width, |l| l.min(width)));
-    }
-    least
+        if jump { 0.0 } else { 1.0 / steep }
+    });
+    each.reduce(f64::min)
 }
 
 fn figure(v: f64) -> String {
-    number((v * 1000.0).round() / 1000.0)
+    // Adding zero takes the sign off a negative one.
+    number((v * 1000.0).round() / 1000.0 + 0.0)
 }

@@ -2,6 +2,7 @@
 
 use super::control_points::ControlPoints;
 use super::{BuildGrade, Grade, Quantity, Varying, directed};
+use crate::environment::Environment;
 use crate::field::Field;
 use crate::kind::{DesignError, Key, Kind};
 use geometry::fault::{Fault, counted};
@@ -33,11 +34,18 @@ impl DistanceKind {
     }
 }
 
+impl DistanceKind {
+    /// The line; `path` is that of the table with the key.
+    pub(crate) fn line(&self, path: &str, environment: &Environment) -> Result<Polyline, DesignError> {
+        let (points, _) = self.points.read(path, environment)?;
+        let line = Polyline::new(points, self.closed, self.axis, self.sharpness);
+        line.map_err(|f| self.points.fault(path, f))
+    }
+}
+
 impl BuildGrade for DistanceKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        let (points, _) = self.points.read(&of.path, of.environment)?;
-        let line = Polyline::new(points, self.closed, self.axis, self.sharpness);
-        of.function(Ok(line.map_err(|f| self.points.fault(&of.path, f))?))
+        of.function(Ok(self.line(&of.path, of.environment)?))
     }
 }
 
@@ -105,6 +113,30 @@ impl Polyline {
         self.sharpness.map_or(0.0, |k| 0.2785 * self.longest / k)
     }
 
+    /// Two segments that cross or touch, but for those that follow each other: their numbers, and where (mm, projected along
+    /// the axis).
+    pub fn crossing(&self) -> Option<([usize; 2], Vec3)> {
+        let segments: Vec<[Vec3; 2]> = self.points.windows(2).map(|w| [w[0], w[1]]).collect();
+        let boxes: Vec<Aabb> = segments.iter().map(|[a, b]| Aabb::EMPTY.with(*a).with(*b)).collect();
+        let last = segments.len() - 1;
+        let closed = self.points[0] == self.points[last + 1];
+        let near = 1e-9 * self.longest;
+        for i in 0..=last {
+            for j in i + 2..=last {
+                let apart =
+                    |a: usize| boxes[i].min[a] > boxes[j].max[a] + near || boxes[j].min[a] > boxes[i].max[a] + near;
+                if (closed && i == 0 && j == last) || (0..3).any(apart) {
+                    continue;
+                }
+                let (p, q) = nearest_points(segments[i], segments[j]);
+                if norm(sub(p, q)) <= near {
+                    return Some(([i, j], p));
+                }
+            }
+        }
+        None
+    }
+
     /// The unsigned distance to the nearest segment (mm), and the nearest point.
     fn nearest(&self, p: Vec3) -> (f64, Vec3) {
         let mut best = (f64::INFINITY, self.points[0]);
@@ -160,6 +192,22 @@ impl Polyline {
             None => self.nearest(p).0,
         }
     }
+}
+
+/// The points of two segments that are nearest to each other.
+fn nearest_points([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> (Vec3, Vec3) {
+    let (u, v, r) = (sub(b, a), sub(d, c), sub(a, c));
+    let (uu, vv, uv) = (dot(u, u), dot(v, v), dot(u, v));
+    let (ur, vr) = (dot(u, r), dot(v, r));
+    let square = uu * vv - uv * uv;
+    let s = if square > 1e-14 * uu * vv { ((uv * vr - ur * vv) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let t = (uv * s + vr) / vv;
+    let (s, t) = match t {
+        t if t < 0.0 => ((-ur / uu).clamp(0.0, 1.0), 0.0),
+        t if t > 1.0 => (((uv - ur) / uu).clamp(0.0, 1.0), 1.0),
+        t => (s, t),
+    };
+    (add(a, scale(u, s)), add(c, scale(v, t)))
 }
 
 impl Field for Polyline {
@@ -275,6 +323,24 @@ mod tests {
         for (p, d) in [([0.0, 0.0, 9.0], -1.0), ([0.5, 0.0, 0.0], -0.5), ([3.0, 0.0, 1.0], 2.0)] {
             assert!((line.at(p) - d).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn lines_that_cross_themselves_are_found() {
+        let z = Some([0.0, 0.0, 1.0]);
+        let bow = vec![[0.0, 0.0, 1.0], [2.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 3.0]];
+        let crossing = |of: &[Vec3], closed, axis| Polyline::new(of.to_vec(), closed, axis, None).unwrap().crossing();
+        for closed in [true, false] {
+            let (segments, p) = crossing(&bow, closed, z).unwrap();
+            assert!(segments == [0, 2] && norm(sub(p, [1.0, 1.0, 0.0])) < 1e-12, "{segments:?} {p:?}");
+            // Not seen along an axis they pass each other.
+            assert_eq!(crossing(&bow, closed, None), None);
+        }
+        assert_eq!(crossing(&chain(), true, z), None);
+        assert_eq!(crossing(&chain(), false, None), None);
+        // Back over an earlier segment.
+        let back = [[0.0; 3], [4.0, 0.0, 0.0], [4.0, 1.0, 0.0], [5.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        assert_eq!(crossing(&back, false, None).map(|c| c.0), Some([0, 3]));
     }
 
     #[test]

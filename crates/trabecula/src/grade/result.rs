@@ -3,10 +3,10 @@
 use super::remapped::sampled;
 use super::{BuildGrade, Grade, Quantity, Samples, Stops};
 use crate::environment::{Environment, extension};
-use crate::kind::{DesignError, Kind};
+use crate::kind::{DesignError, Kind, Unit};
 use geometry::fault::{Fault, counted};
 use geometry::formats::{self, Shape};
-use geometry::math::Aabb;
+use geometry::math::{Aabb, Vec3, scale};
 
 /// The share of the region that a result's mesh may leave uncovered: curved faces are cut short by flat elements.
 const UNCOVERED: f64 = 0.01;
@@ -15,10 +15,12 @@ const UNCOVERED: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Field", noun = "a field of a result")]
 pub struct FieldKind {
-    /// Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
+    /// Path of the file (vtu, vtk, vti), relative to the design file.
     path: String,
     /// Name of the array, of points or cells.
     array: String,
+    /// Unit of the file's coordinates (mm unless given).
+    unit: Option<Unit>,
     /// Which of its components, from 0, where it has several.
     component: Option<u32>,
     /// The values that the numbers map to: pairs [number, value], number rising, linear between.
@@ -131,14 +133,16 @@ fn components(
         );
         return Err(DesignError::new(format!("{path}.array"), message));
     }
+    let unit = spec.unit.map_or(1.0, Unit::in_mm);
     let chosen = choose(array)?;
     let column = |c: usize| array.values.chunks_exact(array.components).map(move |t| t[c]);
-    let (points, tets, of) = match data.shape {
+    let (points, tets, of): (Vec<Vec3>, _, _) = match data.shape {
         Shape::Mesh(elements) => {
             let (tets, of) = elements.tets();
-            (elements.points, tets, of)
+            (elements.points.into_iter().map(|p| scale(p, unit)).collect(), tets, of)
         }
         Shape::Image { origin, step, nodes } => {
+            let (origin, step) = (scale(origin, unit), scale(step, unit));
             let (origin, shape) = if array.of_cells {
                 (core::array::from_fn(|a| origin[a] + 0.5 * step[a]), nodes.map(|n| n.saturating_sub(1).max(1)))
             } else {
@@ -174,11 +178,12 @@ fn components(
     if share > UNCOVERED {
         let b = points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
         let message = format!(
-            "{}: the mesh does not cover {} of the region; it reaches from {:?} to {:?} mm",
+            "{}: the mesh does not cover {} of the region; it reaches from {:?} to {:?} mm{}",
             spec.path,
             percent(share),
             b.min,
-            b.max
+            b.max,
+            if spec.unit.is_none() { "; is that its unit? give another as unit, such as \"m\"" } else { "" }
         );
         return Err(DesignError::new(at, message).found(&spec.path));
     }
