@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import tempfile
 from typing import TYPE_CHECKING
+
+from . import children
 
 if TYPE_CHECKING:
     from typing import Any
@@ -46,7 +47,7 @@ def tetrahedra(name: str, points: Any, triangles: Any, size: float, limit: float
         # The envelope in which the surface is kept: a twentieth of the edge, as a share of the diagonal.
         diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
         np.savez(given, points=points, triangles=triangles, edge=size, epsilon=min(1e-3, 0.05 * size / diagonal))
-        outcome = run([sys.executable, "-c", CHILD, given, made], folder, limit)
+        outcome = children.run([sys.executable, "-c", CHILD, given, made], folder, limit)
         if outcome is not None:
             raise ValueError(
                 f'the mesher ftetwild {outcome}; try a greater size, repair the surface, or use mesher = "background"'
@@ -64,27 +65,6 @@ def installed() -> str | None:
 
     missing = [p for p in ("pytetwild", "pyvista") if find_spec(p) is None]
     return " and ".join(missing) or None
-
-
-def run(command: list[str], folder: str, limit: float) -> str | None:
-    """Runs a child at most ``limit`` seconds; what went wrong, if anything. Its words go to a file: a pipe may fill."""
-    with open(os.path.join(folder, "said"), "w+b") as said:
-        child = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
-        try:
-            status = child.wait(limit)
-        except subprocess.TimeoutExpired:
-            return f"did not finish within {limit:g} s and was stopped"
-        finally:
-            if child.poll() is None:
-                child.kill()
-                child.wait()
-        if status == 0:
-            return None
-        if status < 0:
-            return f"was ended by signal {-status}"
-        said.seek(0)
-        lines = said.read().decode("utf-8", "replace").strip().splitlines()
-        return f"failed: {lines[-1] if lines else f'exit status {status}'}"
 
 
 def mended(nodes: Any, tets: Any) -> Any:

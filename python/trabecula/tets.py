@@ -12,8 +12,9 @@ from .design import Design
 from .errors import DesignError, DesignWarning
 from .files import extension, read_text, whole_file
 from .formats import TET_READS, TET_WRITES
-from .given import whole
+from .given import fixed, whole
 from .mesh import Mesh, Picture
+from .transforms import Transformed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,10 +25,11 @@ if TYPE_CHECKING:
 __all__ = ["TetMesh"]
 
 
-class TetMesh(Picture):
+class TetMesh(Picture, Transformed):
     """A tetrahedral mesh, checked: conforming, every tetrahedron of positive volume.
 
-    Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``.
+    Made by ``TetMesh.of`` a design, or read from a file by ``TetMesh.read``. It never changes, and its arrays are read-only:
+    ``moved``, ``scaled`` and ``rotated`` give another.
     """
 
     def __init__(self, core: _core.TetMesh):
@@ -81,27 +83,37 @@ class TetMesh(Picture):
     @cached_property
     def nodes(self) -> NDArray[np.float64]:
         """Nodes, (n, 3), mm."""
-        return self._core.nodes
+        return fixed(self._core.nodes)
 
     @cached_property
     def tets(self) -> NDArray[np.uint32]:
         """The nodes of each tetrahedron, (m, 4), of positive volume: (b − a) × (c − a) · (d − a) > 0."""
-        return self._core.tets
+        return fixed(self._core.tets)
 
     @cached_property
-    def zones(self) -> NDArray[np.uint32]:
+    def zones(self) -> NDArray[np.int64]:
         """The zone of each tetrahedron, a number of the mesher's own; empty where there are none."""
-        return self._core.zones
+        return fixed(self._core.zones)
+
+    @property
+    def zone_names(self) -> dict[str, list[int]]:
+        """Numbers of the zones of each name in the file: groups, families, element sets. Elements of one group that are of
+        other groups too have a number of their own, so a name may have several numbers and a number several names.
+        """
+        names: dict[str, list[int]] = {}
+        for number, name in self._core.zone_names:
+            names.setdefault(name, []).append(number)
+        return names
 
     @cached_property
     def least_dihedral(self) -> NDArray[np.float64]:
         """The least dihedral angle of each tetrahedron, degrees; 70.5 in a regular one."""
-        return self._core.shapes()[0]
+        return fixed(self._core.shapes()[0])
 
     @cached_property
     def sizes(self) -> NDArray[np.float64]:
         """The size of each tetrahedron: the edge (mm) of a regular one of its volume."""
-        return self._core.shapes()[1]
+        return fixed(self._core.shapes()[1])
 
     @property
     def warnings(self) -> list[dict[str, str]]:
@@ -116,6 +128,9 @@ class TetMesh(Picture):
     def volume(self) -> float:
         """Volume, mm³."""
         return self.report().quality.volume
+
+    def _transformed(self, matrix: list[list[float]], center: list[float], shift: list[float]) -> TetMesh:
+        return TetMesh(self._core.transformed(matrix, center, shift))
 
     def boundary(self) -> Mesh:
         """The boundary as a triangle mesh."""
@@ -144,5 +159,5 @@ def made_of(core: _core.TetMesh) -> TetMesh:
     """The mesh; its warnings are raised."""
     made = TetMesh(core)
     for path, message in core.warnings:
-        warnings.warn(f"{path}: {message}" if path else message, DesignWarning, stacklevel=3)
+        warnings.warn(DesignWarning(message, path), stacklevel=3)
     return made

@@ -7,6 +7,7 @@
 //! mirrors of no group. With an overlap, tetrahedra reach a little beyond themselves and their functions are mixed there,
 //! which leaves no crease; the surface then moves by some of the overlap, but not where it meets the faces themselves.
 
+mod blended_share;
 mod crease;
 mod mixture;
 mod node_levels;
@@ -14,7 +15,7 @@ mod surface;
 
 use std::sync::Arc;
 
-use crate::cell::tet::{Bary, TetCell};
+use crate::cell::tet::{Bary, FractionTable, TetCell};
 use crate::cell::{Cut, Part};
 use crate::field::Field;
 use crate::implicit::Implicit;
@@ -23,7 +24,7 @@ use geometry::math::{Aabb, Interval, Vec3, add, norm, scale, spectral_norm};
 
 pub use crease::Creases;
 pub use node_levels::{Amount, Spread};
-pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity};
+pub use surface::{Connectivity, TilingSurface, ZonePair, cell_surface, connectivity, steps_enough};
 
 /// A cell of a tiling, with its scale and weights.
 #[derive(Clone)]
@@ -60,6 +61,10 @@ pub struct Tiling {
     lipschitz: Arc<Vec<f64>>,
     /// The part, or one side of it alone.
     cut: Cut,
+    /// Shares of the blended function in the whole mesh, where tetrahedra of one cell overlap.
+    blended: Option<Arc<FractionTable>>,
+    /// By how much levels were moved because tetrahedra of several cells overlap.
+    moved: f64,
 }
 
 /// f, the level t, and their gradients (per mm) at a point.
@@ -110,7 +115,16 @@ impl Tiling {
             own * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
-        Tiling { map, cells, part, level, lipschitz: Arc::new(lipschitz), cut: Cut::new(part) }
+        Tiling {
+            map,
+            cells,
+            part,
+            level,
+            lipschitz: Arc::new(lipschitz),
+            cut: Cut::new(part),
+            blended: None,
+            moved: 0.0,
+        }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.
@@ -239,6 +253,14 @@ impl Tiling {
     pub fn cores(&self, points: &[Vec3], f: &mut [f64], t: &mut [f64]) {
         for ((f, t), k) in f.iter_mut().zip(t).zip(self.known(points)) {
             (*f, *t) = (k.f, k.t);
+        }
+    }
+
+    /// The solid fraction of the only cell at a level; of the blended function in the whole mesh where tetrahedra overlap.
+    pub fn fraction(&self, t: f64) -> f64 {
+        match &self.blended {
+            Some(table) => table.fraction(self.part, t),
+            None => self.cells[0].cell.fraction(self.part, t * self.cells[0].scale),
         }
     }
 

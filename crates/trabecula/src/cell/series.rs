@@ -195,6 +195,22 @@ impl Series {
         self.top
     }
 
+    /// The frequency of the finest waves that matter (cycles a cell): the greatest |(h, k, l)| such that waves at and above
+    /// it carry at least a twentieth of the variance.
+    pub fn frequency(&self) -> f64 {
+        let norm = |t: &Term| t.hkl.iter().map(|&k| f64::from(k * k)).sum::<f64>().sqrt();
+        let mut waves: Vec<(f64, f64)> = self.terms.iter().map(|t| (norm(t), t.amplitude.powi(2))).collect();
+        waves.retain(|w| w.0 > 0.0);
+        waves.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let enough = waves.iter().map(|w| w.1).sum::<f64>() / 20.0;
+        let mut carried = 0.0;
+        let found = waves.iter().find(|(_, power)| {
+            carried += power;
+            carried >= enough
+        });
+        found.map_or(1.0, |w| w.0)
+    }
+
     /// The series with the greatest common factor of its indices taken out along each axis, and the factors. The
     /// function repeats that often within the cell, so what does not depend on lengths is the same for both.
     pub fn reduced(&self) -> (Series, [i32; 3]) {

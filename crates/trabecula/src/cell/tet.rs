@@ -10,7 +10,7 @@ mod fraction;
 mod subdivision;
 mod tet_catalogue;
 
-pub(crate) use fraction::share_below;
+pub(crate) use fraction::{Table as FractionTable, share_below};
 pub use subdivision::{Nodes, Subdivision};
 pub use tet_catalogue::{NamedTetCell, named_tet_cell, tet_catalogue};
 

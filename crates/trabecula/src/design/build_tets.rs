@@ -3,7 +3,7 @@
 mod source;
 
 use super::data::*;
-use super::{Design, Loader, Node, Warning, sample};
+use super::{Design, Loader, Node, Warning, ZoneNames, sample};
 use crate::environment::{self, Environment};
 use crate::grade::{Quantity, key_of};
 use crate::kind::{At, DesignError, Key, Kind};
@@ -12,6 +12,7 @@ use crate::report::{FitReport, TetMeshReport};
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Vec3, add, scale};
 use geometry::tetmesh::{Checked, Quality, SLIVER, TetMesh};
+use geometry::transform::Transform;
 use source::{from_file, surface, triangles, wild};
 
 /// The share of the region that a mesh may leave out before it is warned of, if some of that is deep: curved faces are cut
@@ -21,12 +22,16 @@ const LOST: f64 = 0.02;
 const DEEP: f64 = 0.17;
 /// The share that is warned of at any depth.
 const MUCH: f64 = 0.1;
+/// The share of the region's volume by which that of the tetrahedra may differ before it is warned of.
+const OFF: f64 = 0.01;
 
 /// A tetrahedral mesh of a region, and its report.
 #[derive(Clone, Debug)]
 pub struct Tets {
     /// The mesh, checked.
     pub mesh: TetMesh,
+    /// Numbers of zones with names, from its file.
+    pub names: ZoneNames,
     /// Its figures.
     pub report: TetReport,
     /// Warnings of likely mistakes.
@@ -42,6 +47,8 @@ pub struct TetReport {
     pub quality: Quality,
     /// How it fits the region, if it is of one.
     pub fit: Option<Fit>,
+    /// Volume of that region, mm³.
+    pub region_volume: Option<f64>,
 }
 
 impl From<&TetReport> for TetMeshReport {
@@ -50,6 +57,7 @@ impl From<&TetReport> for TetMeshReport {
             mesher: r.mesher.clone(),
             quality: (&r.quality).into(),
             fit: r.fit.as_ref().map(FitReport::from),
+            region_volume: r.region_volume,
             warnings: None,
         }
     }
@@ -91,8 +99,15 @@ impl Tets {
 
     /// The tetrahedral mesh in a file, of no region.
     pub fn in_file(file: &TetFileKind, loader: &dyn Loader) -> Result<Tets, DesignError> {
-        let (mesh, checked) = from_file(file, "", loader)?;
-        checked_mesh(mesh, &checked, file.path.clone(), None, "", "")
+        let (mesh, checked, names) = from_file(file, "", loader)?;
+        Ok(Tets { names, ..checked_mesh(mesh, &checked, file.path.clone(), None, "", "")? })
+    }
+
+    /// The image of the mesh, of no region.
+    pub fn transformed(&self, by: &Transform) -> Result<Tets, DesignError> {
+        let mesh = self.mesh.transformed(by).map_err(|f| DesignError::fault("", f))?;
+        let made = checked_mesh(mesh, &Checked::default(), self.report.mesher.clone(), None, "", "")?;
+        Ok(Tets { names: self.names.clone(), ..made })
     }
 
     /// The figures and the warnings.
@@ -147,6 +162,7 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
         deep.map(|(p, _)| *p).collect()
     };
     let bounds = environment.region.bounds();
+    let mut names = Vec::new();
     let (mut mesh, fit, checked, mesher) = match spec {
         TetsKind::Made(made) => {
             let below = |key: &str| format!("{}.{key}", environment.path);
@@ -166,7 +182,8 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
             }
         }
         TetsKind::File(file) => {
-            let (mesh, checked) = from_file(file, &environment.path, environment.loader)?;
+            let (mesh, checked, named) = from_file(file, &environment.path, environment.loader)?;
+            names = named;
             (mesh, None, checked, file.path.clone())
         }
     };
@@ -181,7 +198,37 @@ pub(super) fn tets(spec: &TetsKind, region: &RegionKind, environment: &Environme
     };
     let mut made = checked_mesh(mesh, &checked, mesher, Some(fit), &environment.path, todo)?;
     made.warnings.extend(notes.warnings);
+    let own = environment.region.volume().unwrap_or_else(|| {
+        let (_, share) = sample::inside(environment.region, 25 * sample::COUNT);
+        share * bounds.size().iter().product::<f64>()
+    });
+    made.report.region_volume = Some(own);
+    made.names = names;
+    made.warnings.extend(other_volume(&made.report, own, spec, &environment.path));
     Ok(made)
+}
+
+/// A warning where the tetrahedra have not the region's volume `own` (mm³): the lattice fills them, not the region.
+fn other_volume(report: &TetReport, own: f64, spec: &TetsKind, path: &str) -> Option<Warning> {
+    let volume = report.quality.volume;
+    let off = volume / own - 1.0;
+    let lost = report.fit.as_ref().map_or(0.0, |f| f.lost);
+    // Five digits.
+    let [tets, region] = [volume, own].map(|v| number(format!("{v:.4e}").parse().unwrap_or(v)));
+    let message = match spec {
+        TetsKind::Made(_) if off.abs() > OFF => format!(
+            "the tetrahedra fill {tets} mm³, {:+.1} % of the region's {region} mm³: lattice, skin and cuts end at their flat \
+             faces; use a smaller size",
+            100.0 * off
+        ),
+        TetsKind::File(file) if off.abs() > OFF || lost > OFF => format!(
+            "the lattice fills the tetrahedra of {}, {tets} mm³, and not the region, {region} mm³, which is not cut out of them, only \
+             compared; give the region that they are a mesh of, or size to have this one meshed",
+            file.path
+        ),
+        _ => return None,
+    };
+    Some(Warning { path: path.to_string(), message })
 }
 
 /// The zone of each tetrahedron, if there are any: that of the first region that has its middle, else 0.
@@ -191,7 +238,7 @@ fn zones(
     path: &str,
     loader: &dyn Loader,
     notes: &mut crate::region::Notes,
-) -> Result<Vec<u32>, DesignError> {
+) -> Result<Vec<i64>, DesignError> {
     if made.zones.is_empty() {
         return Ok(Vec::new());
     }
@@ -200,7 +247,7 @@ fn zones(
         scale(sum, 0.25)
     };
     let middles: Vec<Vec3> = mesh.tets.iter().map(middle).collect();
-    let mut of: Vec<Option<u32>> = vec![None; middles.len()];
+    let mut of: Vec<Option<i64>> = vec![None; middles.len()];
     for (&zone, spec) in &made.zones {
         let path = format!("{path}.zones.{zone}");
         let region = environment::region(spec, &path, loader, notes)?;
@@ -208,7 +255,7 @@ fn zones(
         region.values(&middles, &mut values);
         let mut count = 0;
         for (of, _) in of.iter_mut().zip(&values).filter(|(of, v)| of.is_none() && **v < 0.0) {
-            *of = Some(zone);
+            *of = Some(i64::from(zone));
             count += 1;
         }
         if count == 0 {
@@ -232,9 +279,9 @@ fn checked_mesh(
     let Some(quality) = mesh.quality() else {
         return Err(DesignError::new(path, "the mesh has no tetrahedron"));
     };
-    let report = TetReport { mesher, quality, fit };
+    let report = TetReport { mesher, quality, fit, region_volume: None };
     let warnings = warnings(&report, checked, path, todo);
-    Ok(Tets { mesh, report, warnings })
+    Ok(Tets { mesh, names: Vec::new(), report, warnings })
 }
 
 /// The mesh of triangles that are no region, for the reason `why`, if the mesher can do without one: its boundary is the
@@ -373,6 +420,44 @@ mod tests {
         assert!(it.warnings.iter().any(|w| w.message.contains("off the region")), "{:?}", it.warnings);
         let graded = "size = { linear = { along = [1, 0, 0], stops = [[0, 0.1], [1, 0.3]] } }";
         assert!(made(graded).unwrap().report.quality.tets > 500);
+    }
+
+    /// A ball of radius 1 has 4π/3 mm³; its chords leave out some per cent, and what the lattice fills is what is reported.
+    #[test]
+    fn the_volume_of_tetrahedra_is_told_from_that_of_the_region() {
+        let ball = |map: &str| {
+            let text = format!(
+                "schema = 1\n[region.sphere]\nradius = 1\n[lattice.core]\ncell.tet.name = \"primitive\"\npart = \"lower\"\n\
+                 level.fraction = 0.5\n[lattice.core.map.tets]\n{map}\n"
+            );
+            Design::from_toml(&text).unwrap().build(&Files).unwrap().report()
+        };
+        let own = 4.0 / 3.0 * core::f64::consts::PI;
+        let coarse = ball("size = 0.5");
+        let (region, tets) = (&coarse.region, coarse.lattices["core"].tets.as_ref().unwrap());
+        assert!(!region.volume_exact && (region.volume / tets.volume - 1.0).abs() < 1e-9, "{region:?}");
+        assert!((region.described_volume.unwrap() / own - 1.0).abs() < 1e-12);
+        let off = 100.0 * (region.volume / own - 1.0);
+        let warned =
+            |r: &crate::report::DesignReport, words: &str| r.warnings.iter().any(|w| w.message.contains(words));
+        assert!(
+            off < -1.0 && warned(&coarse, &format!("{off:+.1} % of the region's 4.1888 mm³")),
+            "{:?}",
+            coarse.warnings
+        );
+        let cube = ball("path = \"tets.vtk\"");
+        assert!(
+            warned(&cube, "fills the tetrahedra of tets.vtk, 1 mm³, and not the region, 4.1888 mm³"),
+            "{:?}",
+            cube.warnings
+        );
+        let fine = ball("size = 0.15");
+        assert!(!fine.region.volume_exact && !warned(&fine, "% of the region's"), "{:?}", fine.warnings);
+        let of_box = made("size = 0.3").unwrap();
+        assert!((of_box.report.region_volume.unwrap() - of_box.mesh.volume()).abs() < 1e-9);
+        let file = TetFileKind { path: "hex.vtk".into(), unit: None, split: false, joined: Joined::default() };
+        let wrong = Tets::in_file(&file, &Files).unwrap_err();
+        assert!(wrong.to_string().starts_with("hex.vtk: the mesh has 1 hexahedron"), "{wrong}");
     }
 
     #[test]

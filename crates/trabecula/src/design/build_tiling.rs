@@ -10,7 +10,7 @@ use super::built_report::Varied;
 use super::data::*;
 use super::joins::{Joins, joins};
 use super::warn::gaps;
-use super::{Design, Loader, Warning, sample};
+use super::{CellZone, Design, Loader, Warning, ZoneNames, cell_zones, sample};
 use crate::cell::tet::{TetCell, named_tet_cell};
 use crate::cell::{Part, Series, named};
 use crate::environment::Environment;
@@ -32,20 +32,12 @@ pub(super) struct Domain<'a> {
     cell: &'a TetCellSpec,
     joined: Joined,
     map: Arc<Tets>,
+    /// Numbers of zones with names.
+    names: ZoneNames,
     /// The report on the mesh.
     pub report: TetReport,
     /// The mesh's own boundary.
     pub region: Region,
-}
-
-impl Domain<'_> {
-    /// The cell of each zone, where zones have cells of their own.
-    pub fn zones(&self) -> BTreeMap<u32, String> {
-        match self.cell {
-            TetCellSpec::Zones(of) => of.zones.iter().map(|(zone, cell)| (*zone, cell.0.clone())).collect(),
-            _ => BTreeMap::new(),
-        }
-    }
 }
 
 /// The lattice over tetrahedra of a design, by name, and their mesh.
@@ -134,7 +126,8 @@ pub(super) fn domain<'a>(
         Some(region) => region,
         None => enclosed(map.boundary(), &path)?,
     };
-    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), report: made.report, region }))
+    let (names, report) = (made.names, made.report);
+    Ok(Some(Domain { name, spec, cell, joined, map: Arc::new(map), names, report, region }))
 }
 
 /// A ready cell.
@@ -187,12 +180,14 @@ pub(super) struct Made {
     pub tiling: Arc<Tiling>,
     /// Whether its surface is made without a grid.
     pub explicit: bool,
+    /// The zones, if they have cells of their own.
+    pub zones: Vec<CellZone>,
     /// Which zones join, if there are any and it can be predicted.
     pub joins: Option<Joins>,
 }
 
 /// The cell of each zone.
-pub(super) type Zoned = BTreeMap<u32, Arc<TetCell>>;
+pub(super) type Zoned = BTreeMap<i64, Arc<TetCell>>;
 
 /// The lattice.
 pub(super) fn lattice(
@@ -222,6 +217,11 @@ pub(super) fn lattice(
         check_mid(mid, cell.range(), domain.spec.part, &at)?;
         cell = cell.about(mid).map_err(|f| DesignError::fault(&at, f))?;
     }
+    if spec.amount.wall().is_some() {
+        let message =
+            "fraction and thickness together give the wavelength of map.affine and map.spartan; give one of the two";
+        return Err(DesignError::new(format!("{path}.thickness"), message));
+    }
     let key = spec.amount.key();
     let path = format!("{path}.{key}");
     let amount = match spec.amount {
@@ -244,11 +244,12 @@ pub(super) fn lattice(
     if amount == Amount::Thickness && cell.iso(Part::Sheet, 0.5) <= 0.0 {
         return Err(DesignError::new(path, "the cell has no mid-surface f = 0"));
     }
+    let fractions = (amount == Amount::Fraction).then(|| values.clone());
     let level = Level::of(&domain.map, &cell, part, amount, values);
-    let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level);
+    let tiling = Tiling::new(domain.map.clone(), Arc::new(cell), part, level).meeting(fractions.as_deref());
     check(&tiling, &path)?;
     warn(&tiling, &path, warnings);
-    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, environment), joins: None })
+    Ok(Made { tiling: Arc::new(tiling), explicit: explicit(domain, environment), zones: Vec::new(), joins: None })
 }
 
 /// Whether the surface is made without a grid.
@@ -261,7 +262,7 @@ fn explicit(domain: &Domain, environment: &Environment) -> bool {
 /// zone, so that one passes into the other in the tetrahedra between.
 fn zoned(
     domain: &Domain,
-    zones: &BTreeMap<u32, TetCellName>,
+    names_of_cells: &BTreeMap<String, TetCellName>,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Made, DesignError> {
@@ -271,46 +272,38 @@ fn zoned(
     let part: Part = domain.spec.part.into();
     let amount = &domain.spec.level.amount;
     let path = below(&format!("level.{}", amount.key()));
-    let (AmountSpec::Fraction(value) | AmountSpec::Porosity(value)) = amount else {
+    let (AmountSpec::Fraction(_) | AmountSpec::Porosity(_)) = amount else {
         let message = "cells of different zones have no level in common; give their fraction";
         return Err(DesignError::new(path, message));
     };
     if domain.spec.level.mid != 0.0 {
         return Err(DesignError::new(below("level.mid"), "cells of zones are taken about f = 0"));
     }
-    let found: BTreeSet<u32> = (0..map.len()).map(|t| map.zone(t)).collect();
-    if let Some(zone) = found.iter().find(|z| !zones.contains_key(z)) {
-        let message = format!("the mesh has a zone {zone}, which has no cell; give it one");
-        return Err(DesignError::new(at, message));
-    }
-    if let Some(zone) = zones.keys().find(|z| !found.contains(z)) {
-        let listed: Vec<String> = found.iter().map(u32::to_string).collect();
-        let message = format!("no tetrahedron of the mesh is of zone {zone}; its zones are {}", listed.join(", "));
-        return Err(DesignError::new(format!("{at}.{zone}"), message));
-    }
+    let given = cell_zones::resolved(names_of_cells, map, &domain.names, &at)?;
+    let cell_of = |zone: i64| given.iter().find(|g| g.numbers.contains(&zone)).map(|g| g.cell.as_str());
     let quantity = amount.quantity(path.clone(), environment);
-    let values = at_nodes(&value.build(&quantity)?, &quantity, map)?;
-    let names: BTreeSet<&TetCellName> = zones.values().collect();
+    let values = at_nodes(&amount.grade().build(&quantity)?, &quantity, map)?;
+    let names: BTreeSet<&TetCellName> = names_of_cells.values().collect();
     let (lo, hi) = values.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let (mut cells, mut zoned) = (Vec::new(), Zoned::new());
     for name in names {
         let cell = Arc::new(ready_cell(name, &at)?);
         let range = cell.range();
-        let of = found.iter().filter(|z| zones[z] == *name);
-        zoned.extend(of.map(|z| (*z, cell.clone())));
+        let of = given.iter().filter(|g| g.cell == name.0);
+        zoned.extend(of.flat_map(|g| g.numbers.iter().map(|z| (*z, cell.clone()))));
         apart(&cell, part, [lo, hi], &path, warnings);
-        let weights = map.shares(|zone| zones[&zone] == *name);
+        let weights = map.shares(|zone| cell_of(zone) == Some(&name.0));
         cells.push(Share { cell, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(weights)) });
     }
     let level = Level::mixed(map, &cells, part, &values);
-    let tiling = Tiling::of(map.clone(), cells, part, level);
+    let tiling = Tiling::of(map.clone(), cells, part, level).meeting(Some(&values));
     let explicit = explicit(domain, environment);
     let joins = explicit.then(|| joins(&tiling, &zoned, 0.5 * (lo + hi)));
     let joins = joins.flatten();
     if let Some(joins) = &joins {
-        joins.warn(&domain.zones(), &at, warnings);
+        joins.warn(&given, &at, warnings);
     }
-    Ok(Made { tiling: Arc::new(tiling), explicit, joins })
+    Ok(Made { tiling: Arc::new(tiling), explicit, zones: given, joins })
 }
 
 /// A number at the nodes of the mesh; one number, if it does not vary.

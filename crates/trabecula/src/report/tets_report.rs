@@ -19,6 +19,8 @@ pub struct TetMeshReport {
     pub quality: TetQualityReport,
     /// How it fits its region; None without one.
     pub fit: Option<FitReport>,
+    /// Volume of its region as described, mm³; None without one.
+    pub region_volume: Option<f64>,
     /// Possible mistakes; None within the report of a design, which has them itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warnings: Option<Vec<Warning>>,
@@ -171,9 +173,10 @@ pub struct TilingReport {
     pub volume: f64,
     /// Volume of solid over volume of the mesh.
     pub solid_fraction: f64,
-    /// The zones by number, where zones have cells of their own.
+    /// The zones by the number or the name in the design, where zones have cells of their own.
     pub zones: Option<BTreeMap<String, ZoneReport>>,
-    /// Number of connected components, predicted from the ports; None where that is not known.
+    /// Number of connected components, predicted from the ports; None where that is not known, as with an overlap: the mesh tells it
+    /// then.
     pub pieces: Option<usize>,
     /// Which zones join, where zones have cells of their own.
     pub joins: Option<Vec<ZoneJoin>>,
@@ -194,6 +197,8 @@ pub struct TilingReport {
 pub struct ZoneReport {
     /// Name of its cell.
     pub cell: String,
+    /// Numbers of its tetrahedra in the mesh: several, where elements of a group are of other groups too.
+    pub numbers: Vec<i64>,
     /// Number of tetrahedra.
     pub count: usize,
     /// Volume, mm³.
@@ -206,7 +211,7 @@ pub struct ZoneReport {
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct ZoneJoin {
     /// Numbers of the zones.
-    pub zones: [u32; 2],
+    pub zones: [i64; 2],
     /// Number of faces between them.
     pub faces: usize,
     /// Number of those that solid passes through.
@@ -239,4 +244,6 @@ pub struct Creases {
     pub mean: f64,
     /// Maximum.
     pub max: f64,
+    /// Maximum after smoothing, at sampled points of the faces; None without overlap.
+    pub smoothed: Option<f64>,
 }

@@ -172,25 +172,28 @@ impl Level {
 
 impl Tiling {
     /// The solid share of each tetrahedron: exact where there is one cell at one level, and from the cell's table where levels
-    /// are alike; else by small tetrahedra.
+    /// are alike; else by small tetrahedra. Where tetrahedra overlap, those of the blended function in the whole mesh.
     pub fn shares(&self) -> Vec<f64> {
-        if let (Level::Same(t), [c]) = (&self.level, &self.cells[..]) {
-            return vec![c.cell.fraction(self.part, t * c.scale); self.map.len()];
+        if let (Level::Same(t), [_]) = (&self.level, &self.cells[..]) {
+            return vec![self.fraction(*t); self.map.len()];
         }
         let mixture = Mixture::new(&self.cells, self.part);
         let share = |t: usize| {
             let weights = weights(&self.map, &self.cells, t);
             let corner = |i: usize| core::array::from_fn(|k| f64::from(u8::from(k == i)));
-            let levels = core::array::from_fn(|i| self.level_at(t, corner(i)));
+            let levels = core::array::from_fn(|i| self.level_at(t, corner(i)) - self.moved);
             let alike = only(&weights).and_then(|one| {
                 let c = &self.cells[one];
-                let fraction = |t: f64| c.cell.fraction(self.part, t * c.scale);
+                let fraction = |t: f64| match &self.blended {
+                    Some(table) => table.fraction(self.part, t),
+                    None => c.cell.fraction(self.part, t * c.scale),
+                };
                 let ends: [f64; 4] = levels.map(fraction);
                 let (lo, hi) = ends.iter().fold((1.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
                 // Corners and the middle: exact for what is quadratic in the level.
                 let middle = fraction(levels.iter().sum::<f64>() / 4.0);
                 let mean = (ends.iter().sum::<f64>() + 16.0 * middle) / 20.0;
-                (hi - lo < ALIKE).then_some(mean)
+                (hi - lo < ALIKE || self.blended.is_some()).then_some(mean)
             });
             alike.unwrap_or_else(|| mixture.share(&weights, levels))
         };

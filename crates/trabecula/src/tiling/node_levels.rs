@@ -8,10 +8,10 @@ use super::{Level, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, Nodes, Subdivision, TetCell};
 use crate::map::Tets;
-use geometry::math::{Vec3, add, norm, scale};
+use geometry::math::{Vec3, add, cross, norm, scale};
 
 /// Steps along the edge on which the mid-surface is sampled.
-const STEPS: usize = 6;
+const STEPS: usize = 8;
 
 /// How much of a cell is solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum Amount {
     Iso,
     /// The solid share of the tetrahedron.
     Fraction,
-    /// The mean thickness (mm) of a sheet's walls in the tetrahedra about a node.
+    /// The mean thickness (mm) of a sheet's walls, weighted by the area of its mid-surface.
     Thickness,
 }
 
@@ -31,7 +31,7 @@ pub struct Spread {
     pub min: f64,
     /// A twentieth is below it.
     pub low: f64,
-    /// The mean.
+    /// The mean, weighted by area.
     pub mean: f64,
     /// A twentieth is above it.
     pub high: f64,
@@ -39,30 +39,49 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// Points of the mid-surface f = 0 and ∂f/∂λ there.
-fn middle(cell: &TetCell) -> Vec<(Bary, Bary)> {
+/// A piece of the mid-surface f = 0, about a point.
+struct Piece {
+    at: Bary,
+    /// ∂f/∂λ there.
+    slope: Bary,
+    /// ∫ dA/|∂f/∂λ| over the piece. Volumes scale alike in all directions, so by the coarea formula the piece's area in a
+    /// tetrahedron of volume V is in proportion to V |∇f| times this, whatever the tetrahedron's shape.
+    weight: f64,
+}
+
+/// The mid-surface of a cell in small pieces.
+fn middle(cell: &TetCell) -> Vec<Piece> {
     let nodes = Nodes::new(cell, Subdivision { n: STEPS });
-    let mut edges = Vec::new();
+    let mut triangles: Vec<[Bary; 3]> = Vec::new();
     nodes.grid.each_tet(|at, _| {
         let i = at.map(|[i, j, k]| Subdivision::index(i, j, k));
-        for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-            edges.push([i[a], i[b]]);
-        }
-    });
-    edges.sort_unstable();
-    edges.dedup();
-    let cross = |[a, b]: &[usize; 2]| {
-        let (x, y) = (nodes.values[*a], nodes.values[*b]);
-        ((x < 0.0) != (y < 0.0)).then(|| {
-            let (p, q) = (nodes.grid.bary(nodes.whole[*a]), nodes.grid.bary(nodes.whole[*b]));
+        let (below, above): (Vec<usize>, Vec<usize>) = i.iter().partition(|i| nodes.values[**i] < 0.0);
+        let root = |a: usize, b: usize| -> Bary {
+            let (x, y) = (nodes.values[a], nodes.values[b]);
+            let (p, q) = (nodes.grid.bary(nodes.whole[a]), nodes.grid.bary(nodes.whole[b]));
             let s = x / (x - y);
             core::array::from_fn(|i| p[i] + s * (q[i] - p[i]))
-        })
-    };
-    let at: Vec<Bary> = edges.iter().filter_map(cross).collect();
+        };
+        match (&below[..], &above[..]) {
+            ([a], [b, c, d]) | ([b, c, d], [a]) => triangles.push([root(*a, *b), root(*a, *c), root(*a, *d)]),
+            ([a, b], [c, d]) => {
+                let [p, q, r, s] = [root(*a, *c), root(*a, *d), root(*b, *d), root(*b, *c)];
+                triangles.extend([[p, q, r], [p, r, s]]);
+            }
+            _ => {}
+        }
+    });
+    let centre = |t: &[Bary; 3]| -> Bary { core::array::from_fn(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0) };
+    let at: Vec<Bary> = triangles.iter().map(centre).collect();
     let (mut v, mut g) = (vec![0.0; at.len()], vec![[0.0; 4]; at.len()]);
     cell.gradients(&at, &mut v, &mut g);
-    at.into_iter().zip(g).collect()
+    let piece = |((t, at), slope): ((&[Bary; 3], Bary), Bary)| {
+        let side = |k: usize| -> Vec3 { core::array::from_fn(|i| t[k][i] - t[0][i]) };
+        let area = 0.5 * norm(cross(side(1), side(2)));
+        let steep = norm([slope[0], slope[1], slope[2]]);
+        (area > 0.0 && steep > 0.0).then(|| Piece { at, slope, weight: area / steep })
+    };
+    triangles.iter().zip(at).zip(g).filter_map(piece).collect()
 }
 
 /// |∇f| (per mm) in a tetrahedron where ∂f/∂λ is `g`.
@@ -74,8 +93,8 @@ fn steepness(map: &Tets, t: usize, g: &Bary) -> f64 {
 
 impl Level {
     /// The level that gives an amount: one number, or one for each node. A wall of half-level t is about 2t/|∇f| thick, f
-    /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in each tetrahedron, and
-    /// a node has the mean of the tetrahedra about it.
+    /// being steeper where tetrahedra are smaller: t follows the mean of |∇f| over the mid-surface in the tetrahedra about a
+    /// node, and all are scaled so that the mean wall over the whole mid-surface is as thick as asked.
     pub fn of(map: &Tets, cell: &TetCell, part: Part, amount: Amount, values: Vec<f64>) -> Level {
         let one = values.len() == 1;
         let level = |v: f64| match amount {
@@ -89,54 +108,84 @@ impl Level {
         let mut values = if one { vec![values[0]; map.nodes().len()] } else { values };
         values.par_iter_mut().for_each(|v| *v = level(*v));
         if amount == Amount::Thickness {
-            let at = middle(cell);
-            let mean = |t: usize| {
-                let sum: f64 = at.iter().map(|(_, g)| steepness(map, t, g)).sum();
-                sum / at.len() as f64
-            };
-            let means: Vec<f64> = (0..map.len()).into_par_iter().map(mean).collect();
-            let mut about = vec![(0.0, 0u32); map.nodes().len()];
-            for (t, mean) in means.iter().enumerate() {
-                for n in map.tet(t) {
-                    let a = &mut about[n as usize];
-                    *a = (a.0 + mean, a.1 + 1);
-                }
-            }
-            for (v, (sum, count)) in values.iter_mut().zip(about) {
-                *v *= if count > 0 { sum / f64::from(count) } else { 1.0 };
-            }
+            values = of_thickness(map, &middle(cell), &values);
         }
         Level::Nodes(Arc::new(values))
     }
 }
 
+/// The level at each node that gives half-walls of these thicknesses (mm).
+fn of_thickness(map: &Tets, pieces: &[Piece], half: &[f64]) -> Vec<f64> {
+    // The mean of |∇f| over a mid-surface weighs pieces by what makes 2t/|∇f|, weighted by area, its inverse.
+    let weight: f64 = pieces.iter().map(|p| p.weight).sum();
+    let area = |t: usize| {
+        let sum: f64 = pieces.iter().map(|p| p.weight * steepness(map, t, &p.slope)).sum();
+        map.volume(t) * sum
+    };
+    let areas: Vec<f64> = (0..map.len()).into_par_iter().map(area).collect();
+    let mut about = vec![(0.0, 0.0); map.nodes().len()];
+    for (t, area) in areas.iter().enumerate() {
+        for n in map.tet(t) {
+            let a = &mut about[n as usize];
+            *a = (a.0 + area, a.1 + map.volume(t) * weight);
+        }
+    }
+    let mut levels: Vec<f64> =
+        half.iter().zip(about).map(|(h, (area, all))| if all > 0.0 { h * area / all } else { *h }).collect();
+    // Half the walls asked for and found, integrated over the mid-surface; both are linear in what nodes have.
+    let sums = |t: usize| {
+        let at = |of: &[f64], l: &Bary| (0..4).map(|i| l[i] * of[map.tet(t)[i] as usize]).sum::<f64>();
+        let one = |p: &Piece| {
+            [at(half, &p.at) * p.weight * steepness(map, t, &p.slope), at(&levels, &p.at) * p.weight]
+                .map(|v| map.volume(t) * v)
+        };
+        pieces.iter().map(one).fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+    };
+    let sums: Vec<[f64; 2]> = (0..map.len()).into_par_iter().map(sums).collect();
+    let [asked, found] = sums.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+    if found > 0.0 {
+        levels.iter_mut().for_each(|v| *v *= asked / found);
+    }
+    levels
+}
+
 impl Tiling {
-    /// How thick the walls of a sheet are over all tetrahedra, to first order: 2t/|∇f| on the mid-surface. `None` for other
-    /// parts, for transitions, and where there is no mid-surface.
+    /// How thick the walls of a sheet are over the mid-surface in all tetrahedra, each piece by its area, to first order:
+    /// 2t/|∇f|. `None` for other parts, for transitions, and where there is no mid-surface.
     pub fn thickness(&self) -> Option<Spread> {
         let [cell] = &self.cells[..] else { return None };
-        let at = middle(&cell.cell);
-        if self.part != Part::Sheet || at.is_empty() {
+        if self.part != Part::Sheet {
             return None;
         }
+        let pieces = middle(&cell.cell);
         // Some hundred thousand samples are enough for a spread.
-        let step = (self.map.len() * at.len()).div_ceil(2_000_000);
+        let step = (self.map.len() * pieces.len()).div_ceil(2_000_000).max(1);
         let tets = (0..self.map.len()).into_par_iter().step_by(step);
-        let mut all: Vec<f64> = tets
+        let mut all: Vec<[f64; 2]> = tets
             .flat_map_iter(|t| {
-                let one =
-                    move |(l, g): &(Bary, Bary)| 2.0 * self.level_at(t, *l) / (steepness(&self.map, t, g) / cell.scale);
-                at.iter().map(one).collect::<Vec<f64>>()
+                let one = move |p: &Piece| {
+                    let steep = steepness(&self.map, t, &p.slope) / cell.scale;
+                    [2.0 * self.level_at(t, p.at) / steep, self.map.volume(t) * p.weight * steep]
+                };
+                pieces.iter().map(one).collect::<Vec<[f64; 2]>>()
             })
             .collect();
-        all.sort_unstable_by(f64::total_cmp);
-        let share = |s: f64| all[((all.len() - 1) as f64 * s) as usize];
+        all.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        let area: f64 = all.iter().map(|v| v[1]).sum();
+        let share = |s: f64| {
+            let mut below = 0.0;
+            let at = all.iter().find(|v| {
+                below += v[1];
+                below >= s * area
+            });
+            at.map(|v| v[0])
+        };
         Some(Spread {
-            min: share(0.0),
-            low: share(0.05),
-            mean: all.iter().sum::<f64>() / all.len() as f64,
-            high: share(0.95),
-            max: share(1.0),
+            min: all.first()?[0],
+            low: share(0.05)?,
+            mean: all.iter().map(|v| v[0] * v[1]).sum::<f64>() / area,
+            high: share(0.95)?,
+            max: all.last()?[0],
         })
     }
 }

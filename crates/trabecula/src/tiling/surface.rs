@@ -29,7 +29,7 @@ use crate::map::Tets;
 use crate::map::tet_map::NONE;
 use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, Totals, not_empty};
 use component_links::ComponentLinks;
-pub use connectivity::{Connectivity, ZonePair, connectivity};
+pub use connectivity::{Connectivity, ZonePair, connectivity, steps_enough};
 use geometry::fault::{Fault, number};
 use geometry::formats::stl;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
@@ -329,7 +329,7 @@ impl SurfaceMaker for TilingSurface<'_> {
             Ok(())
         })?;
         not_empty(out.mesh.triangles.len() as u64, options.resolution)?;
-        let found = links.graph().resolve(options.islands).map_err(Stopped::Refused)?;
+        let found = links.graph().resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         Ok(Made { surface: surface_maker::kept(out, &found), components: found.components, error: None })
     }
 
@@ -352,7 +352,7 @@ impl SurfaceMaker for TilingSurface<'_> {
             stream.write(&chunk.records)
         })?;
         not_empty(triangles, options.resolution)?;
-        let found = links.graph().resolve(options.islands).map_err(Stopped::Refused)?;
+        let found = links.graph().resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         stream.finish(found, triangles)
     }
 

@@ -12,7 +12,7 @@ const LEVELS: usize = 1024;
 const FACE: [usize; 2] = [160, 320];
 
 /// Share of the tetrahedron where f < t, at equally spaced levels.
-pub(super) struct Table {
+pub(crate) struct Table {
     range: Interval,
     below: Vec<f64>,
 }
@@ -101,6 +101,27 @@ impl Table {
             .collect();
         below[LEVELS] = 1.0;
         Table { range, below }
+    }
+
+    /// The table of a sample of values, each with its weight.
+    pub fn sampled(sample: &[(f64, Vec<f64>)]) -> Table {
+        let values = sample.iter().flat_map(|s| &s.1);
+        let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(*v), r.1.max(*v)));
+        let mut below = vec![0.0; LEVELS + 1];
+        for (weight, values) in sample {
+            for v in values {
+                // Counted from the next level on.
+                let at = (v - lo) / (hi - lo) * LEVELS as f64;
+                below[(at as usize + 1).min(LEVELS)] += weight;
+            }
+        }
+        let mut sum = 0.0;
+        for b in &mut below {
+            sum += *b;
+            *b = sum;
+        }
+        below.iter_mut().for_each(|b| *b /= sum);
+        Table { range: Interval::new(lo, hi), below }
     }
 
     pub fn range(&self) -> Interval {

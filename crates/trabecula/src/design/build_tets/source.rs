@@ -1,13 +1,13 @@
 //! External sources of tetrahedral meshes: files, and the mesher fTetWild.
 
-use crate::design::Loader;
 use crate::design::data::*;
+use crate::design::{Loader, ZoneNames, ZonedElements};
 use crate::environment::Environment;
 use crate::extract;
 use crate::kind::DesignError;
 use crate::solid::Solid;
 use geometry::fault::Fault;
-use geometry::formats::{self, Elements, Shape};
+use geometry::formats::{self, Shape};
 use geometry::math::scale;
 use geometry::mesh::Mesh;
 use geometry::progress::{Silent, Stopped};
@@ -57,21 +57,23 @@ pub(super) fn wild(
         .map_err(|f| DesignError::fault(path, f))
 }
 
-/// The tetrahedra of a file.
+/// The tetrahedra of a file, and numbers of zones with their names.
 pub(super) fn from_file(
     file: &TetFileKind,
     path: &str,
     loader: &dyn Loader,
-) -> Result<(TetMesh, Checked), DesignError> {
+) -> Result<(TetMesh, Checked, ZoneNames), DesignError> {
     let at = if path.is_empty() { String::new() } else { format!("{path}.path") };
     let wrong = |f: Fault| {
-        if f.at == "split" {
-            return DesignError::fault(path, f);
+        let message = format!("{}: {}", file.path, f.message);
+        // A file alone has no key to point at.
+        if f.at == "split" && !path.is_empty() {
+            return DesignError::new(format!("{path}.split"), message);
         }
-        DesignError::new(&at, format!("{}: {}", file.path, f.message)).found(&file.path)
+        DesignError::new(&at, message).found(&file.path)
     };
     let kind = file.path.rsplit_once('.').map_or("", |(_, e)| e).to_lowercase();
-    let (elements, zones): (Elements, Vec<u32>) = if kind == "vtu" || kind == "vtk" {
+    let ZonedElements { elements, zones, names } = if kind == "vtu" || kind == "vtk" {
         let bytes = loader.load(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?;
         let data = formats::read_vtk(&bytes).map_err(wrong)?;
         let Shape::Mesh(elements) = data.shape else {
@@ -79,8 +81,8 @@ pub(super) fn from_file(
             return Err(DesignError::new(at, message).found(&file.path));
         };
         let named = |name: &&str| data.arrays.iter().find(|a| a.of_cells && a.components == 1 && a.name == **name);
-        let zones = ZONES.iter().find_map(named).map(|a| a.values.iter().map(|v| *v as u32).collect());
-        (elements, zones.unwrap_or_default())
+        let zones = ZONES.iter().find_map(named).map(|a| a.values.iter().map(|v| *v as i64).collect());
+        ZonedElements { elements, zones: zones.unwrap_or_default(), names: Vec::new() }
     } else {
         loader.elements(&file.path).map_err(|m| DesignError::new(&at, m).found(&file.path))?
     };
@@ -93,5 +95,6 @@ pub(super) fn from_file(
     if unit != 1.0 {
         mesh.nodes.iter_mut().for_each(|p| *p = scale(*p, unit));
     }
-    mesh.checked().map_err(wrong)
+    let (mesh, checked) = mesh.checked().map_err(wrong)?;
+    Ok((mesh, checked, names))
 }

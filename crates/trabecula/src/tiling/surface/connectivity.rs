@@ -33,7 +33,7 @@ pub struct Connectivity {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZonePair {
     /// The zones, the lower first.
-    pub zones: [u32; 2],
+    pub zones: [i64; 2],
     /// Faces between a tetrahedron of one and a tetrahedron of the other.
     pub faces: usize,
     /// How many of them the solid passes through.
@@ -45,7 +45,21 @@ pub struct ZonePair {
 /// The connectivity of a lattice on a subdivision of 16 steps; `None` if more than 20 000 tetrahedra differ in their levels
 /// or cells, or the mesh is one that no surface is made for.
 pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
-    let work = Work::in_steps(tiling, STEPS).ok()?;
+    in_steps(tiling, STEPS)
+}
+
+/// The fewest steps along the edge of a tetrahedron, from `least` on, such that the surface has as many components as
+/// [`connectivity`] predicts in them and in all finer ones up to 16; `None` where that predicts nothing.
+pub fn steps_enough(tiling: &Tiling, least: usize) -> Option<usize> {
+    let wanted = connectivity(tiling)?.components;
+    let mut finer = (least..STEPS).rev();
+    let broken = finer.find(|n| in_steps(tiling, *n).is_none_or(|c| c.components != wanted));
+    Some(broken.map_or(least.min(STEPS), |n| n + 1))
+}
+
+/// The connectivity on a subdivision of `n` steps.
+fn in_steps(tiling: &Tiling, n: usize) -> Option<Connectivity> {
+    let work = Work::in_steps(tiling, n).ok()?;
     let map = &tiling.map;
     // The first tetrahedron of each kind, and the kind of each.
     let (mut firsts, mut kinds, mut known) = (Vec::new(), Vec::new(), HashMap::new());
@@ -86,15 +100,15 @@ pub fn connectivity(tiling: &Tiling) -> Option<Connectivity> {
     names.sort_unstable();
     names.dedup();
     // For each zone, the number of its tetrahedra in which each component is.
-    let mut about: BTreeMap<u32, HashMap<u32, usize>> = BTreeMap::new();
+    let mut about: BTreeMap<i64, HashMap<u32, usize>> = BTreeMap::new();
     for (t, root) in of.iter().zip(&roots) {
         *about.entry(map.zone(*t)).or_default().entry(*root).or_default() += 1;
     }
-    let main = |zone: u32| {
+    let main = |zone: i64| {
         let of = about.get(&zone)?;
         of.iter().max_by_key(|(name, count)| (**count, u32::MAX - **name)).map(|(name, _)| *name)
     };
-    let mut pairs: BTreeMap<[u32; 2], ZonePair> = BTreeMap::new();
+    let mut pairs: BTreeMap<[i64; 2], ZonePair> = BTreeMap::new();
     for t in 0..map.len() {
         for (face, other) in map.across(t).into_iter().enumerate() {
             if other == NONE || other as usize <= t {

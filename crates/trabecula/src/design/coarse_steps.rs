@@ -1,0 +1,49 @@
+//! Steps that are too coarse for the surface of a lattice over tetrahedra, where what it should be is known exactly.
+
+use super::Built;
+use crate::tiling::{connectivity, steps_enough};
+use geometry::fault::{counted, number};
+
+/// Share of the solid's volume by which a surface may be off.
+const OFF: f64 = 0.05;
+/// Fewest steps along the edge of a tetrahedron.
+const LEAST: f64 = 4.0;
+
+impl Built {
+    /// What is wrong with the surface of a lattice over tetrahedra that was made in steps of `edge` (mm), encloses `volume`
+    /// (mm³) and has this number of `pieces`, and the step that suffices; `None` if nothing is, and for other solids.
+    pub fn coarse_steps(&self, edge: f64, volume: f64, pieces: usize) -> Option<String> {
+        let [only] = &self.tilings[..] else { return None };
+        if !only.explicit || self.blend.is_some() {
+            return None;
+        }
+        let tiling = &only.tiling;
+        let (all, solid) = tiling.volumes();
+        let (found, share) = (volume / all, solid / all);
+        let off = found / share - 1.0;
+        let predicted = if pieces > 1 { connectivity(tiling).map(|c| c.components) } else { None };
+        let broken = predicted.filter(|p| pieces > *p);
+        if off.abs() <= OFF && broken.is_none() {
+            return None;
+        }
+        let mean = tiling.map.mean_edge();
+        let steps = (mean / edge).round().max(LEAST);
+        // The error of the volume falls with the square of the step.
+        let for_volume = (steps * (off.abs() / OFF).sqrt()).ceil();
+        let for_pieces = broken.and_then(|_| steps_enough(tiling, steps as usize + 1)).unwrap_or(0);
+        let enough = for_volume.max(for_pieces as f64);
+        if enough <= steps {
+            return None;
+        }
+        let apart = broken.map_or(String::new(), |p| {
+            format!(" and is in {}, the lattice in {}", counted(pieces, "piece"), counted(p, "piece"))
+        });
+        Some(format!(
+            "steps of {} mm are too coarse: the result has a solid fraction of {found:.4}, the lattice {share:.4} ({:+.1} %){apart}; \
+             use an edge of {} mm or less, {enough} steps along that of a tetrahedron",
+            number(edge),
+            100.0 * off,
+            number((1e3 * mean / enough).floor() / 1e3),
+        ))
+    }
+}
