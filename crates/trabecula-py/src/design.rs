@@ -8,7 +8,7 @@ use trabecula::design;
 use crate::error;
 use crate::folder::Folder;
 use crate::node::node;
-use crate::run::run;
+use crate::run::run_apart;
 use crate::solid::Solid;
 
 /// A design whose keys, kinds and words have been checked.
@@ -49,10 +49,12 @@ impl Design {
     }
 
     /// Builds the solid; `folder` is where relative paths start.
-    fn build(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Solid> {
-        let built = run(py, None, None, |_| self.design.build(&Folder(folder)))?;
-        let built = built.map_err(|e| named(py, e, &self.file))?;
-        Ok(Solid::new(built, self.design.to_toml().unwrap_or_default()))
+    fn build(slf: Py<Self>, py: Python<'_>, folder: PathBuf) -> PyResult<Solid> {
+        let own = slf.clone_ref(py);
+        let built = run_apart(py, None, move || own.get().design.build(&Folder(folder)))?;
+        let Design { design, file } = slf.get();
+        let built = built.map_err(|e| named(py, e, file))?;
+        Ok(Solid::new(built, design.to_toml().unwrap_or_default()))
     }
 }
 

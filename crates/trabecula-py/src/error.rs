@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use geometry::fault::Fault;
+use geometry::fault::{Fault, brief};
 use geometry::progress::Stopped;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use trabecula::design::DesignError;
 pub fn design(py: Python<'_>, e: &DesignError) -> PyErr {
     let make = || -> PyResult<PyErr> {
         let class = py.import("trabecula.errors")?.getattr("DesignError")?;
-        let args = (e.to_string(), &e.path, e.line, &e.message, &e.found, &e.nearest);
+        let args = (e.to_string(), &e.path, e.line, &*brief(&e.message), &e.found, &e.nearest);
         Ok(PyErr::from_value(class.call1(args)?))
     };
     make().unwrap_or_else(|_| PyValueError::new_err(e.to_string()))

@@ -7,7 +7,7 @@ use geometry::mesh::Mesh;
 use geometry::tetmesh::TetMesh;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use trabecula::design::Loader;
+use trabecula::design::{Loader, ZonedElements};
 
 /// Files below a folder.
 pub struct Folder(pub PathBuf);
@@ -32,7 +32,7 @@ impl Loader for Folder {
         Ok(found)
     }
 
-    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+    fn elements(&self, path: &str) -> Result<ZonedElements, String> {
         elements(&self.0.join(Path::new(path)).to_string_lossy())
     }
 
@@ -41,13 +41,14 @@ impl Loader for Folder {
     }
 }
 
-/// Points, connectivity, ends, kinds and zones of elements that Python read.
+/// Points, connectivity, ends, kinds and zones of elements that Python read, and numbers of zones with names.
 type Read<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray1<'py, u32>,
     PyReadonlyArray1<'py, u64>,
     PyReadonlyArray1<'py, u8>,
-    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, i64>,
+    Vec<(i64, String)>,
 );
 
 /// What an exception says.
@@ -56,18 +57,18 @@ fn words(py: Python<'_>, e: &PyErr) -> String {
 }
 
 /// The elements of a file of a format that Python reads.
-fn elements(path: &str) -> Result<(Elements, Vec<u32>), String> {
+fn elements(path: &str) -> Result<ZonedElements, String> {
     Python::attach(|py| {
-        let read = || -> PyResult<(Elements, Vec<u32>)> {
+        let read = || -> PyResult<ZonedElements> {
             let read = py.import("trabecula.elements")?.getattr("read")?.call1((path,))?;
-            let (points, connectivity, ends, kinds, zones): Read<'_> = read.extract()?;
+            let (points, connectivity, ends, kinds, zones, names): Read<'_> = read.extract()?;
             let elements = Elements {
                 points: rows(&points),
                 connectivity: connectivity.as_array().to_vec(),
                 ends: ends.as_array().iter().map(|e| *e as usize).collect(),
                 kinds: kinds.as_array().to_vec(),
             };
-            Ok((elements, zones.as_array().to_vec()))
+            Ok(ZonedElements { elements, zones: zones.as_array().to_vec(), names })
         };
         read().map_err(|e| words(py, &e))
     })

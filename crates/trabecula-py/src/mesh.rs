@@ -4,10 +4,12 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::formats;
+use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{Tint, View, png, render};
 use geometry::simplify::{Goal, simplify};
 use geometry::surface_mesh::SurfaceMesh;
+use geometry::transform::Transform;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,7 +21,7 @@ use crate::error;
 use crate::file;
 use crate::region::Region;
 use crate::report::report;
-use crate::run::run;
+use crate::run::{run, run_apart};
 
 /// A triangle mesh.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -145,6 +147,13 @@ impl Mesh {
         })
     }
 
+    /// Its image under x ↦ M (x − c) + c + t, of no design.
+    fn transformed(&self, py: Python<'_>, matrix: [Vec3; 3], center: Vec3, shift: Vec3) -> PyResult<Mesh> {
+        let by = Transform { matrix, center, shift };
+        let surface = run(py, None, None, |_| self.surface.transformed(&by))?.map_err(error::fault)?;
+        Ok(Mesh { surface, split: self.split, design: String::new() })
+    }
+
     /// Vertex positions (n, 3), mm.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -216,8 +225,8 @@ impl Mesh {
     }
 
     /// The pairs of triangles that meet elsewhere than in common corners or edges, or `limit` if there are as many.
-    fn self_intersections(&self, py: Python<'_>, limit: usize) -> PyResult<usize> {
-        run(py, None, None, |_| measure::self_intersections(&self.surface.mesh, limit))
+    fn self_intersections(slf: Py<Self>, py: Python<'_>, limit: usize) -> PyResult<usize> {
+        run_apart(py, None, move || measure::self_intersections(&slf.get().surface.mesh, limit))
     }
 
     /// How well shaped the triangles are, as `reports.QualityReport`; None without triangles.

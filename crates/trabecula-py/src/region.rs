@@ -12,7 +12,7 @@ use crate::arrays::{points, values};
 use crate::error;
 use crate::folder::Folder;
 use crate::node::node;
-use crate::run::run;
+use crate::run::{run, run_apart};
 
 /// Where a part may be: a signed distance.
 #[pyclass(frozen, module = "trabecula._core")]
@@ -24,9 +24,9 @@ pub struct Region {
 impl Region {
     /// The region of a design, or of a file with the key `region` alone, as text; `folder` is where paths start.
     #[staticmethod]
-    fn from_text(py: Python<'_>, text: &str, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
-        let region = run(py, None, None, |_| {
-            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
+    fn from_text(py: Python<'_>, text: String, json: bool, file: String, folder: PathBuf) -> PyResult<Region> {
+        let region = run_apart(py, None, move || {
+            let node = if json { Node::from_json(&text)? } else { Node::from_toml(&text)? };
             design::region(&node, &Folder(folder))
         })?;
         region.map(|region| Region { region }).map_err(|e| error::design(py, &e.in_file(&file)))
@@ -36,7 +36,7 @@ impl Region {
     #[staticmethod]
     fn from_data(py: Python<'_>, data: &Bound<'_, PyAny>, folder: PathBuf) -> PyResult<Region> {
         let node = node(data, 0)?;
-        let region = run(py, None, None, |_| design::region(&node, &Folder(folder)))?;
+        let region = run_apart(py, None, move || design::region(&node, &Folder(folder)))?;
         region.map(|region| Region { region }).map_err(|e| error::design(py, &e))
     }
 

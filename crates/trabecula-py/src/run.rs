@@ -29,6 +29,49 @@ impl Progress for Shared {
     }
 }
 
+/// Ends the processes that the work waits for: those of readers and meshers of other packages.
+fn stop_children(py: Python<'_>) {
+    let stop = || py.import("trabecula.children")?.call_method0("stop");
+    drop(stop()); // the interrupt itself is what is raised
+}
+
+/// The threads of a pool of their own, if a number is given.
+fn pool(threads: Option<usize>) -> PyResult<Option<rayon::ThreadPool>> {
+    match threads {
+        None => Ok(None),
+        Some(n @ 1..=4096) => {
+            let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+            Ok(Some(built.map_err(|e| PyValueError::new_err(format!("threads: {n} cannot be started: {e}")))?))
+        }
+        Some(n) => Err(PyValueError::new_err(format!("threads is {n}; it must be from 1 to 4096"))),
+    }
+}
+
+/// Runs `work`, which does not ask whether it is to stop, on `threads` threads (all processors if `None`). An interrupt is heard
+/// at once: the work is left to itself then, and its result dropped. (The command ends, and the work with it.)
+pub fn run_apart<T: Send + 'static>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let pool = pool(threads)?;
+    py.detach(|| {
+        let (finished, waiting) = channel::<()>();
+        let work = move || {
+            let _finished = finished; // dropped, and so signalled, even if the work panics
+            match pool {
+                Some(pool) => pool.install(work),
+                None => work(),
+            }
+        };
+        let worker = std::thread::Builder::new().spawn(work)?;
+        while let Err(RecvTimeoutError::Timeout) = waiting.recv_timeout(TICK) {
+            Python::attach(|py| py.check_signals().inspect_err(|_| stop_children(py)))?;
+        }
+        worker.join().map_err(error::internal)
+    })
+}
+
 /// Runs `work` on `threads` threads (all processors if `None`), calling `tell(done, total)` now and then.
 pub fn run<T: Send>(
     py: Python<'_>,
@@ -36,16 +79,7 @@ pub fn run<T: Send>(
     tell: Option<Py<PyAny>>,
     work: impl FnOnce(&dyn Progress) -> T + Send,
 ) -> PyResult<T> {
-    let pool = match threads {
-        None => None,
-        Some(n @ 1..=4096) => {
-            let built = rayon::ThreadPoolBuilder::new().num_threads(n).build();
-            Some(built.map_err(|e| PyValueError::new_err(format!("threads: {n} cannot be started: {e}")))?)
-        }
-        Some(n) => {
-            return Err(PyValueError::new_err(format!("threads is {n}; it must be from 1 to 4096")));
-        }
-    };
+    let pool = pool(threads)?;
     let shared = Shared::default();
     let shared = &shared;
     py.detach(|| {
@@ -66,7 +100,7 @@ pub fn run<T: Send>(
                     continue;
                 }
                 let news = Python::attach(|py| {
-                    py.check_signals()?;
+                    py.check_signals().inspect_err(|_| stop_children(py))?;
                     let (done, total) = (shared.done.load(Relaxed), shared.total.load(Relaxed));
                     if let Some(tell) = &tell
                         && total > 0

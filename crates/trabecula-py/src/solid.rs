@@ -23,7 +23,7 @@ use crate::mesh::Mesh;
 use crate::quadors::Quadors;
 use crate::region::Region;
 use crate::report::report;
-use crate::run::run;
+use crate::run::{run, run_apart};
 use crate::voxels::Voxels;
 
 /// A region and the lattice in it.
@@ -44,8 +44,9 @@ type Graph<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>,
 
 /// What is to become of the connected components other than the largest.
 fn islands_word(word: &str) -> PyResult<Islands> {
-    Islands::named(word)
-        .ok_or_else(|| PyValueError::new_err(format!(r#"islands is "{word}"; it must be "keep", "drop" or "error""#)))
+    Islands::named(word).ok_or_else(|| {
+        PyValueError::new_err(format!(r#"islands is "{word}"; it must be "keep", "drop-small", "drop" or "error""#))
+    })
 }
 
 #[pymethods]
@@ -97,8 +98,8 @@ impl Solid {
     }
 
     /// The figures of the design without meshing it, as `reports.DesignReport`.
-    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        report(py, "DesignReport", &run(py, None, None, |_| self.built.report())?)
+    fn report(slf: Py<Self>, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        report(py, "DesignReport", &run_apart(py, None, move || slf.get().built.report())?)
     }
 
     /// The transitions between the lattices of a blend, each as `reports.TransitionReport`.
@@ -124,6 +125,12 @@ impl Solid {
     /// The solid share of the region, by points inside, and the region's volume (mm³), exact where that is known.
     fn expected(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
         run(py, None, None, |_| self.built.expected())
+    }
+
+    /// What is wrong with a surface made in steps of `edge` (mm) that encloses `volume` (mm³) and has this number of `pieces`, for a lattice
+    /// over tetrahedra, and the step that suffices.
+    fn coarse_steps(&self, py: Python<'_>, edge: f64, volume: f64, pieces: usize) -> PyResult<Option<String>> {
+        run(py, None, None, |_| self.built.coarse_steps(edge, volume, pieces))
     }
 
     /// The graphs of beams: name, centres and radii of hubs, the hubs that each beam joins.
@@ -201,9 +208,10 @@ impl Solid {
 
     /// What a surface at grid spacing `edge` (mm) takes, as `reports.EstimateReport`. It is counted on a grid of at least
     /// `coarse` (mm) and scaled from there: triangles grow as the spacing to the power −2.
-    fn estimate<'py>(&self, py: Python<'py>, edge: f64, coarse: f64) -> PyResult<Bound<'py, PyAny>> {
+    fn estimate(slf: Py<Self>, py: Python<'_>, edge: f64, coarse: f64) -> PyResult<Bound<'_, PyAny>> {
         let counted = edge.max(coarse);
-        let made = run(py, None, None, |_| self.built.surface().estimate(counted))?.map_err(error::fault)?;
+        let work = move || slf.get().built.surface().estimate(counted);
+        let made = run_apart(py, None, work)?.map_err(error::fault)?;
         let (e, times) = (EstimateReport::from(made), (counted / edge).powi(2));
         let scaled =
             EstimateReport { triangles: e.triangles * times, memory: e.memory * times, stl: e.stl * times, ..e };
@@ -211,7 +219,7 @@ impl Solid {
     }
 
     /// The surface at grid spacing `edge` (mm), its other connected components as `reports.IslandsReport`, and these in words.
-    #[pyo3(signature = (edge, threads=None, progress=None, islands="keep"))]
+    #[pyo3(signature = (edge, threads=None, progress=None, islands="drop-small"))]
     fn mesh<'py>(
         &self,
         py: Python<'py>,
@@ -269,7 +277,7 @@ impl Solid {
 
     /// Streams the surface to a binary STL at `path`; memory stays bounded. Gives its `reports.SurfaceReport`, and the other
     /// connected components in words.
-    #[pyo3(signature = (path, edge, threads=None, progress=None, islands="keep"))]
+    #[pyo3(signature = (path, edge, threads=None, progress=None, islands="drop-small"))]
     fn stream_stl<'py>(
         &self,
         py: Python<'py>,

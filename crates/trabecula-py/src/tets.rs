@@ -4,8 +4,11 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::formats;
+use geometry::math::Vec3;
 use geometry::surface_mesh::SurfaceMesh;
+use geometry::transform::Transform;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use trabecula::design::{DesignError, Joined, Node, TetFileKind, Tets, Unit};
 
@@ -15,7 +18,7 @@ use crate::folder::Folder;
 use crate::mesh::Mesh;
 use crate::node::node;
 use crate::report::report;
-use crate::run::run;
+use crate::run::{run, run_apart};
 
 /// A number for each tetrahedron.
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
@@ -32,16 +35,16 @@ impl TetMesh {
     #[pyo3(signature = (text, json, file, folder, lattice=None, threads=None))]
     fn from_text(
         py: Python<'_>,
-        text: &str,
+        text: String,
         json: bool,
         file: String,
         folder: PathBuf,
-        lattice: Option<&str>,
+        lattice: Option<String>,
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
-        let made = run(py, threads, None, |_| {
-            let node = if json { Node::from_json(text)? } else { Node::from_toml(text)? };
-            Tets::in_design(&node, lattice, &Folder(folder))
+        let made = run_apart(py, threads, move || {
+            let node = if json { Node::from_json(&text)? } else { Node::from_toml(&text)? };
+            Tets::in_design(&node, lattice.as_deref(), &Folder(folder))
         })?;
         of(py, made.map_err(|e: DesignError| e.in_file(&file)))
     }
@@ -53,11 +56,11 @@ impl TetMesh {
         py: Python<'_>,
         data: &Bound<'_, PyAny>,
         folder: PathBuf,
-        lattice: Option<&str>,
+        lattice: Option<String>,
         threads: Option<usize>,
     ) -> PyResult<TetMesh> {
         let node = node(data, 0)?;
-        let made = run(py, threads, None, |_| Tets::in_design(&node, lattice, &Folder(folder)))?;
+        let made = run_apart(py, threads, move || Tets::in_design(&node, lattice.as_deref(), &Folder(folder)))?;
         of(py, made)
     }
 
@@ -66,9 +69,9 @@ impl TetMesh {
     #[pyo3(signature = (path, folder, unit=None, split=false))]
     fn read(py: Python<'_>, path: String, folder: PathBuf, unit: Option<&str>, split: bool) -> PyResult<TetMesh> {
         let unit = unit.map(str::parse::<Unit>).transpose();
-        let unit = unit.map_err(|e| pyo3::exceptions::PyValueError::new_err(format!("unit: {}", e.message)))?;
+        let unit = unit.map_err(|e| PyValueError::new_err(format!("unit: {}", e.message)))?;
         let spec = TetFileKind { path, unit, split, joined: Joined::default() };
-        let made = run(py, None, None, |_| Tets::in_file(&spec, &Folder(folder)))?;
+        let made = run_apart(py, None, move || Tets::in_file(&spec, &Folder(folder)))?;
         of(py, made)
     }
 
@@ -90,8 +93,14 @@ impl TetMesh {
 
     /// The zone of each tetrahedron; empty where there are none.
     #[getter]
-    fn zones<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+    fn zones<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         self.tets.mesh.zones.clone().into_pyarray(py)
+    }
+
+    /// Numbers of zones with names, from the file.
+    #[getter]
+    fn zone_names(&self) -> Vec<(i64, String)> {
+        self.tets.names.clone()
     }
 
     /// Numbers of nodes and tetrahedra.
@@ -117,6 +126,13 @@ impl TetMesh {
         let mesh = run(py, None, None, |_| self.tets.mesh.boundary())?;
         let cut = vec![true; mesh.triangles.len()];
         Ok(Mesh::new(SurfaceMesh { mesh, cut }, String::new()))
+    }
+
+    /// Its image under x ↦ M (x − c) + c + t.
+    fn transformed(&self, py: Python<'_>, matrix: [Vec3; 3], center: Vec3, shift: Vec3) -> PyResult<TetMesh> {
+        let by = Transform { matrix, center, shift };
+        let made = run(py, None, None, |_| self.tets.transformed(&by))?;
+        made.map(|tets| TetMesh { tets }).map_err(|e| PyValueError::new_err(e.message))
     }
 
     /// The least dihedral angle (degrees) and the size (mm) of each tetrahedron.

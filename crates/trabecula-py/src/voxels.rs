@@ -4,6 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use geometry::formats;
+use geometry::math::Vec3;
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -41,6 +42,11 @@ impl Voxels {
     fn solid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let [nx, ny, nz] = self.voxels.shape;
         self.voxels.solid.clone().into_pyarray(py).reshape([nz, ny, nx])
+    }
+
+    /// The same voxels with another origin and step, mm.
+    fn placed(&self, origin: Vec3, step: f64) -> Voxels {
+        Voxels { voxels: geometry::voxels::Voxels { origin, step, ..self.voxels.clone() } }
     }
 
     /// Writes the voxels to `path` as `npy` (indexed [x, y, z]) or `vti`.

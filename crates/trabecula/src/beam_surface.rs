@@ -15,9 +15,9 @@ use crate::surface_maker::{Components, Estimate, Islands, Made, Options, Store, 
 pub struct BeamSurface(pub Arc<Quadors>);
 
 impl BeamSurface {
-    /// Connected components are not looked for: refuses to drop any.
+    /// Connected components are not looked for: refuses to drop any. None is small and cut off by a region's boundary.
     fn check(options: &Options) -> Result<(), Stopped> {
-        if options.islands == Islands::Keep {
+        if matches!(options.islands, Islands::Keep | Islands::DropSmall) {
             return Ok(());
         }
         let message =

@@ -13,6 +13,8 @@ mod build_skin;
 mod build_tets;
 mod build_tiling;
 mod built_report;
+mod cell_zones;
+mod coarse_steps;
 mod data;
 mod design_schema;
 mod joins;
@@ -21,7 +23,6 @@ mod sample;
 mod tests;
 mod warn;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde_json::Value as Json;
@@ -41,10 +42,11 @@ use crate::truss::Beams;
 use geometry::fault::Fault;
 use geometry::repair::Repaired;
 
-pub use crate::environment::{Loader, NoFiles};
+pub use crate::environment::{Loader, NoFiles, ZoneNames, ZonedElements};
 pub use crate::kind::{DesignError, Lines, Node, OneOrThree, OneOrTwo, Unit, Value, Warning};
 pub use build_blend::Blended;
 pub use build_tets::{TetReport, Tets};
+pub use cell_zones::CellZone;
 pub use data::*;
 pub use design_schema::schema;
 pub use joins::Joins;
@@ -103,8 +105,8 @@ pub struct Tiled {
     pub name: String,
     /// The lattice.
     pub tiling: Arc<Tiling>,
-    /// The cell of each zone, where zones have cells of their own.
-    pub zones: BTreeMap<u32, String>,
+    /// The zones, where they have cells of their own.
+    pub zones: Vec<CellZone>,
     /// What is known of the mesh.
     pub mesh: TetReport,
     /// Whether its surface is made without a grid.

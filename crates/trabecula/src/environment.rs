@@ -19,9 +19,8 @@ pub trait Loader {
         Err(format!("{pattern}: folders are not looked into here"))
     }
 
-    /// The finite elements of the file at `path`, which is of none of the formats read here, and a number of a zone for
-    /// each or for none; or one sentence why not.
-    fn elements(&self, path: &str) -> Result<(Elements, Vec<u32>), String> {
+    /// The finite elements of the file at `path`, which is of none of the formats read here; or one sentence why not.
+    fn elements(&self, path: &str) -> Result<ZonedElements, String> {
         Err(format!("{path}: only vtu and vtk files are read here"))
     }
 
@@ -31,6 +30,20 @@ pub trait Loader {
         let _ = (surface, size, limit);
         Err(format!("the mesher {name} is not available here"))
     }
+}
+
+/// Numbers of zones with their names. A zone may have several names, and a name several zones.
+pub type ZoneNames = Vec<(i64, String)>;
+
+/// Finite elements with their zones.
+#[derive(Clone, Debug)]
+pub struct ZonedElements {
+    /// The elements.
+    pub elements: Elements,
+    /// The number of a zone for each, or for none.
+    pub zones: Vec<i64>,
+    /// Names of zones: groups, sets, families.
+    pub names: ZoneNames,
 }
 
 /// A loader for designs that refer to no files.

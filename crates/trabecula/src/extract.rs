@@ -13,7 +13,9 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::solid::Solid;
-use crate::surface_maker::{self, Estimate, Made, Options, StlStream, Store, Summary, SurfaceMaker, not_empty};
+use crate::surface_maker::{
+    self, Estimate, Islands, Made, Options, StlStream, Store, Summary, SurfaceMaker, not_empty,
+};
 
 mod cube_table;
 mod feature_cells;
@@ -41,7 +43,27 @@ pub struct GridSurface<'a>(pub &'a Solid);
 /// # Errors
 /// As `SurfaceMaker::mesh`.
 pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<SurfaceMesh, Stopped> {
-    Ok(GridSurface(solid).mesh(&Options::new(edge), progress)?.surface)
+    let options = Options { resolution: edge, islands: Islands::Keep };
+    Ok(GridSurface(solid).mesh(&options, progress)?.surface)
+}
+
+/// Of an estimate: most tiles that are searched, most that a surface may cross, triangles that are enough, tiles at a time.
+const LOOKED_AT: usize = 1024;
+const WORKED: usize = 24;
+const FOUND: usize = 200_000;
+const BATCH: usize = 4;
+
+/// A step through `n` things that comes to all of them and leaves them evenly filled on the way: coprime to n, near its golden
+/// section.
+fn stride(n: usize) -> usize {
+    let coprime = |s: &usize| {
+        let (mut a, mut b) = (*s, n);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a == 1
+    };
+    ((0.618_033_988_75 * n as f64) as usize..).find(coprime).unwrap_or(1)
 }
 
 impl SurfaceMaker for GridSurface<'_> {
@@ -74,7 +96,7 @@ impl SurfaceMaker for GridSurface<'_> {
             sweep.add(components).map_err(Stopped::Refused)
         })?;
         not_empty(out.mesh.triangles.len() as u64, options.resolution)?;
-        let found = sweep.resolve(options.islands).map_err(Stopped::Refused)?;
+        let found = sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         Ok(Made { surface: surface_maker::kept(out, &found), components: found.components, error: None })
     }
 
@@ -105,24 +127,30 @@ impl SurfaceMaker for GridSurface<'_> {
             Ok(())
         })?;
         not_empty(triangles, options.resolution)?;
-        let found = sweep.resolve(options.islands).map_err(Stopped::Refused)?;
+        let found = sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
         stream.finish(found, triangles)
     }
 
-    /// Estimated from a few tiles spread over the grid.
+    /// Estimated from tiles that are spread evenly over the grid, until enough of them may hold a surface or enough triangles
+    /// were found: the work is bounded, and the same on every machine. The deviation of the mean is that of the tiles over the
+    /// root of their number.
     fn estimate(&self, edge: f64) -> Result<Estimate, Fault> {
-        const SAMPLES: usize = 24;
         let grid = Grid::new(self.0, edge)?;
         let total: usize = grid.tiles().iter().product();
-        let sampled = total.min(SAMPLES);
-        let found: usize = (0..sampled)
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, i| {
-                // Odd multiples of a share of the whole: the middles of equal ranges of tiles.
-                let index = (2 * i + 1) * total / (2 * sampled);
-                tile::extract(&grid, grid.tile(index), scratch).map_or(0, |v| v.triangles().count())
-            })
-            .sum();
+        let (most, stride) = (total.min(LOOKED_AT), stride(total));
+        let (mut sampled, mut worked, mut found) = (0, 0, 0);
+        while sampled < most && worked < WORKED && found < FOUND {
+            let batch = sampled..(sampled + BATCH).min(most);
+            sampled = batch.end;
+            let each = batch.into_par_iter().map_init(Scratch::default, |scratch, i| {
+                let tile = grid.tile((total / 2 + i * stride) % total);
+                grid.local(&grid.nodes(tile), &grid.block(tile).bounds())?;
+                Some(tile::extract(&grid, tile, scratch).map_or(0, |v| v.triangles().count()))
+            });
+            let each: Vec<usize> = each.flatten_iter().collect();
+            worked += each.len();
+            found += each.iter().sum::<usize>();
+        }
         let triangles = found as f64 * total as f64 / sampled as f64;
         Ok(Estimate {
             cells: grid.cells().map(|n| n as u64),

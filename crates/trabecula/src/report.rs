@@ -34,6 +34,15 @@ pub enum Varying {
     Range([f64; 2]),
 }
 
+impl Varying {
+    /// Its least value.
+    pub fn least(self) -> f64 {
+        match self {
+            Varying::Number(v) | Varying::Range([v, _]) => v,
+        }
+    }
+}
+
 /// All reports, so that their schemas are found in one place.
 #[derive(JsonSchema)]
 #[allow(dead_code)]

@@ -14,7 +14,7 @@ mod compact;
 mod components;
 
 pub use compact::Store;
-pub use components::{Component, Components, Islands};
+pub use components::{Component, Components, Islands, SMALL};
 pub(crate) use components::{ComponentGraph, NONE, Resolved, Totals};
 
 /// A method of meshing one solid.
@@ -50,9 +50,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// This resolution (mm) with all connected components kept.
+    /// This resolution (mm), all else as it is by default.
     pub fn new(resolution: f64) -> Options {
-        Options { resolution, islands: Islands::Keep }
+        Options { resolution, islands: Islands::default() }
     }
 }
 
@@ -139,7 +139,7 @@ const COMPACTION: u64 = 16;
 impl<'a> StlStream<'a> {
     pub fn new(out: &'a mut dyn Store, islands: Islands, progress: &'a dyn Progress) -> Result<StlStream<'a>, Stopped> {
         out.write_all(&[0; stl::HEADER]).map_err(Stopped::Io)?;
-        Ok(StlStream { out, progress, compacts: islands == Islands::Drop })
+        Ok(StlStream { out, progress, compacts: matches!(islands, Islands::Drop | Islands::DropSmall) })
     }
 
     /// The progress of making the surface, which leaves a share for compaction.

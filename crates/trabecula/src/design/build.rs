@@ -149,8 +149,8 @@ fn tiled(
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Tiled, DesignError> {
-    let build_tiling::Made { tiling, explicit, joins } = build_tiling::lattice(&domain, environment, warnings)?;
-    Ok(Tiled { name: domain.name.to_string(), tiling, zones: domain.zones(), mesh: domain.report, explicit, joins })
+    let build_tiling::Made { tiling, explicit, zones, joins } = build_tiling::lattice(&domain, environment, warnings)?;
+    Ok(Tiled { name: domain.name.to_string(), tiling, zones, mesh: domain.report, explicit, joins })
 }
 
 /// A lattice, with warnings of likely mistakes.
@@ -169,6 +169,7 @@ fn checked_lattice(
     warn::check(&built, environment, spec)?;
     warn::warn(&built, environment, spec, warnings);
     warn::solved_map(&built.map, &spec.map, path, warnings);
+    warn::wrapped_map(&built, &spec.map, environment, warnings);
     Ok(built)
 }
 
@@ -224,8 +225,12 @@ fn lattice(spec: &LatticeSpec, environment: &Environment) -> Result<Lattice, Des
     }
     let cell = Arc::new(cell);
     let here = Environment { path: below("map"), ..*environment };
-    let map = spec.map.build(&here)?;
-    let here = Environment { path: below("level"), ..*environment };
+    let level = Environment { path: below("level"), ..*environment };
+    let map = match spec.level.amount.wall() {
+        None => spec.map.build(&here)?,
+        Some(wall) => build_level::solved_map(spec, wall, &cell, &here, &level)?,
+    };
+    let here = level;
     let level = build_level::level(&spec.level, spec.part, name, &cell, &map, &here)?;
     Ok(Lattice::new(cell, map, spec.part.into(), level))
 }

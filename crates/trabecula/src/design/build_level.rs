@@ -1,6 +1,6 @@
 //! Levels, which set how much is solid: data to [`Level`].
 
-use super::data::{AmountSpec, Fit, GradeSpec, LevelSpec, Of, PartSpec};
+use super::data::{AmountSpec, Fit, GradeSpec, LatticeSpec, LevelSpec, Of, PartSpec};
 use super::sample;
 use crate::cell::{Cell, Part};
 use crate::environment::Environment;
@@ -68,27 +68,24 @@ pub(super) fn level(
     }
     let quantity = spec.amount.quantity(path(key), environment);
     let amount = value.build(&quantity)?;
-    if matches!(key, "iso" | "thickness") {
+    if matches!(key, "iso" | "thickness") || spec.amount.wall().is_some() {
+        let found = if spec.amount.wall().is_some() { "a thickness, too" } else { key };
         for (option, set) in [("of", spec.of != Of::Cell), ("fit", spec.fit != Fit::Table)] {
             if set {
-                let message = format!("\"{option}\" goes with fraction or porosity, found {key}; leave it out");
+                let message = format!("\"{option}\" goes with fraction or porosity, found {found}; leave it out");
                 return Err(DesignError::new(path(option), message));
             }
         }
+    }
+    if let (Some(wall), PartSpec::Sheet) = (spec.amount.wall(), part) {
+        return Ok(Level::Thickness(Grade::Constant(wall_number(wall, environment)?)));
     }
     if key == "iso" {
         return Ok(Level::Iso(amount));
     }
     if key == "thickness" {
         within_wavelength(value, &amount, &quantity, map.longest())?;
-        let range = cell.range();
-        if range.lo >= 0.0 || range.hi <= 0.0 {
-            let message = format!(
-                "the cell has no mid-surface f = 0: its values run from {:.4} to {:.4}; give mid between them",
-                range.lo, range.hi
-            );
-            return Err(DesignError::new(path(key), message));
-        }
+        mid_surface(cell, path(key))?;
         return Ok(Level::Thickness(amount));
     }
     match (spec.of, spec.fit) {
@@ -130,11 +127,94 @@ pub(super) fn level(
     }
 }
 
+/// The thickness (mm) that is given together with a fraction.
+fn wall_number(wall: &GradeSpec, environment: &Environment) -> Result<f64, DesignError> {
+    let path = format!("{}.thickness", environment.path);
+    constant(wall, &Quantity::new(path, environment, key_of::<AmountSpec>("thickness")))
+}
+
+/// A number that is the same everywhere.
+fn constant(spec: &GradeSpec, quantity: &Quantity) -> Result<f64, DesignError> {
+    spec.build(quantity)?.constant().ok_or_else(|| {
+        let message = "fraction and thickness together give one wavelength and are constant; found one that varies";
+        DesignError::new(&quantity.path, message)
+    })
+}
+
+/// The map of a lattice whose level is a fraction and a thickness: lengths scale with the wavelength, so it is the asked
+/// thickness over the one that cells of 1 mm have at this fraction.
+pub(super) fn solved_map(
+    spec: &LatticeSpec,
+    wall: &GradeSpec,
+    cell: &Arc<Cell>,
+    at_map: &Environment,
+    at_level: &Environment,
+) -> Result<Map, DesignError> {
+    let path = |key: &str| format!("{}.{key}", at_level.path);
+    let amount = &spec.level.amount;
+    let fraction = constant(amount.grade(), &amount.quantity(path(amount.key()), at_level))?;
+    let thickness = wall_number(wall, at_level)?;
+    let unit = spec.map.scaled(1.0, &at_map.path)?.build(at_map)?;
+    let part = Part::from(spec.part);
+    let found = if part == Part::Sheet {
+        mid_surface(cell, path("thickness"))?;
+        let lattice = Lattice::new(cell.clone(), unit, part, Level::Thickness(Grade::Constant(1.0)));
+        lattice.distance().map(|d| 2.0 * d.iso(part, fraction).0)
+    } else {
+        cell.thickness(part, cell.iso(part, fraction).0, &unit.typical())
+    };
+    let Some(found) = found.filter(|w| *w > 0.0) else {
+        let whole = cell.connected_fraction(part);
+        let ranges = whole.iter().map(|[a, b]| format!("{a:.4} to {b:.4}")).collect::<Vec<_>>().join(" and ");
+        let message = format!(
+            "at solid fraction {fraction} the network is not connected and has no neck; it is in one piece at fractions {ranges}"
+        );
+        return Err(DesignError::new(path("thickness"), message));
+    };
+    spec.map.scaled(thickness / found, &at_map.path)?.build(at_map)
+}
+
+/// Refuses a cell without a mid-surface.
+fn mid_surface(cell: &Cell, path: String) -> Result<(), DesignError> {
+    let range = cell.range();
+    if range.lo < 0.0 && range.hi > 0.0 {
+        return Ok(());
+    }
+    let message = format!(
+        "the cell has no mid-surface f = 0: its values run from {:.4} to {:.4}; give mid between them",
+        range.lo, range.hi
+    );
+    Err(DesignError::new(path, message))
+}
+
 impl AmountSpec {
+    /// Its key.
+    pub(super) fn key(&self) -> &'static str {
+        match self {
+            AmountSpec::Thickness(_) => "thickness",
+            AmountSpec::Fraction(_) => "fraction",
+            AmountSpec::Porosity(_) => "porosity",
+            AmountSpec::Iso(_) => "iso",
+        }
+    }
+
     /// The number.
     pub(super) fn grade(&self) -> &GradeSpec {
-        let (AmountSpec::Iso(v) | AmountSpec::Fraction(v) | AmountSpec::Porosity(v) | AmountSpec::Thickness(v)) = self;
-        v
+        match self {
+            AmountSpec::Thickness(s) => &s.thickness,
+            AmountSpec::Fraction(s) => &s.fraction,
+            AmountSpec::Porosity(s) => &s.porosity,
+            AmountSpec::Iso(s) => &s.iso,
+        }
+    }
+
+    /// The thickness besides a fraction: the wavelength is solved for.
+    pub(super) fn wall(&self) -> Option<&GradeSpec> {
+        match self {
+            AmountSpec::Fraction(s) => s.thickness.as_ref(),
+            AmountSpec::Porosity(s) => s.thickness.as_ref(),
+            AmountSpec::Thickness(_) | AmountSpec::Iso(_) => None,
+        }
     }
 
     /// The quantity under the key `amount`; of a porosity the complement is meant.

@@ -1,6 +1,7 @@
 //! The report on a design, without meshing it.
 
 use std::cell::LazyCell;
+use std::collections::BTreeMap;
 
 use super::build_blend::Functions;
 use super::{Blended, Built, Joins, Tiled, build_beams, sample};
@@ -109,13 +110,49 @@ pub(super) fn report(built: &Built) -> DesignReport {
         let sampled = LazyCell::new(|| filling(built, made));
         (name.clone(), build_beams::report(made, built, &sampled))
     });
+    let (lattices, beams) = (lattices.chain(tilings).collect(), beams.collect());
+    let described = built.tilings.iter().find_map(|it| it.mesh.region_volume);
+    let region = RegionReport {
+        bounds: [bounds.min, bounds.max],
+        volume,
+        volume_exact: exact.is_some() && described.is_none_or(|own| (volume / own - 1.0).abs() < ROUNDING),
+        described_volume: described,
+    };
     DesignReport {
-        lattices: lattices.chain(tilings).collect(),
-        beams: beams.collect(),
-        region: RegionReport { bounds: [bounds.min, bounds.max], volume, volume_exact: exact.is_some() },
+        spacing: spacing(built, &lattices, &beams),
+        lattices,
+        beams,
+        region,
         warnings: built.warnings.clone(),
         blend: built.blend.as_ref().map(blend),
     }
+}
+
+/// Share of a volume by which sums over tetrahedra and over triangles may differ.
+const ROUNDING: f64 = 1e-9;
+/// Grid steps on the smallest wavelength, at least.
+const PER_CELL: f64 = 32.0;
+/// Grid steps on a cell's finest wave, at least.
+const PER_WAVE: f64 = 24.0;
+/// Grid steps across the thinnest wall or neck, at least.
+const PER_WALL: f64 = 2.0;
+/// Grid steps on the thinnest beam's diameter, at least.
+const PER_BEAM: f64 = 6.0;
+/// Grid steps on the smallest wavelength, at most: for waves, and for walls, necks, beams and the skin.
+const AT_MOST: [f64; 2] = [128.0, 64.0];
+
+/// The grid spacing (mm) at which a mesh is made unless another is asked for. The volume of sheets of named cells at it:
+/// `tests/laws/spacing.rs`.
+fn spacing(built: &Built, lattices: &BTreeMap<String, LatticeReport>, beams: &BTreeMap<String, BeamsReport>) -> f64 {
+    let wavelength = built.solid.wavelength;
+    let waves = built.lattices.iter().map(|(_, l)| l.map.wavelength() / (PER_WAVE * l.cell.series().frequency()));
+    // Tilings are meshed tetrahedron by tetrahedron, with steps of their own.
+    let gridded = lattices.values().filter(|l| l.tets.is_none());
+    let walls = gridded.filter_map(|l| l.thickness).map(|t| t.least() / PER_WALL);
+    let beams = beams.values().map(|b| b.thickness / PER_BEAM);
+    let waves = waves.fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[0]);
+    let walls = walls.chain(beams).chain(built.skin).fold(f64::INFINITY, f64::min).max(wavelength / AT_MOST[1]);
+    (wavelength / PER_CELL).min(waves).min(walls)
 }
 
 fn lattice(lattice: &Lattice, points: &[[f64; 3]]) -> LatticeReport {
@@ -167,8 +204,8 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let tiling = &it.tiling;
     let part = tiling.part;
     let shares = tiling.shares();
-    let sums = |zone: Option<u32>| {
-        let of = (0..tiling.map.len()).filter(|t| zone.is_none_or(|z| tiling.map.zone(*t) == z));
+    let sums = |zones: Option<&[i64]>| {
+        let of = (0..tiling.map.len()).filter(|t| zones.is_none_or(|z| z.contains(&tiling.map.zone(*t))));
         of.fold((0, 0.0, 0.0), |(n, all, solid), t| {
             let v = tiling.map.volume(t);
             (n + 1, all + v, solid + shares[t] * v)
@@ -205,9 +242,10 @@ fn tiled(it: &Tiled) -> LatticeReport {
     };
     if !it.zones.is_empty() {
         // Cells of zones have no level in common, and transitions between them no target fraction.
-        let zones = it.zones.iter().map(|(zone, cell)| {
-            let (count, volume, solid) = sums(Some(*zone));
-            (zone.to_string(), ZoneReport { cell: cell.clone(), count, volume, solid_fraction: solid / volume })
+        let zones = it.zones.iter().map(|zone| {
+            let (count, volume, solid) = sums(Some(&zone.numbers));
+            let (cell, numbers) = (zone.cell.clone(), zone.numbers.clone());
+            (zone.name.clone(), ZoneReport { cell, numbers, count, volume, solid_fraction: solid / volume })
         });
         let tets = TilingReport {
             zones: Some(zones.collect()),
@@ -220,14 +258,14 @@ fn tiled(it: &Tiled) -> LatticeReport {
     let cell = &tiling.cells[0].cell;
     let levels = tiling.levels();
     let iso = Varied { min: levels.lo, max: levels.hi };
-    let share = iso.map(|t| cell.fraction(part, t));
+    let share = iso.map(|t| tiling.fraction(t));
     let spread = tiling.thickness();
     let tets = TilingReport {
         pieces: it.explicit.then(|| crate::tiling::connectivity(tiling)).flatten().map(|c| c.components),
         thickness: spread.map(|s| WallSpread { min: s.min, low: s.low, mean: s.mean, high: s.high, max: s.max }),
         ports: Some(cell.count(part, 0.5 * (levels.lo + levels.hi)).ports),
         face_fraction: Some(iso.map(|t| cell.face_fraction(part, t)).varying()),
-        creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max }),
+        creases: tiling.creases().map(|c| Creases { mean: c.mean, max: c.max, smoothed: c.smoothed }),
         ..mesh
     };
     LatticeReport {
@@ -262,6 +300,7 @@ pub(super) fn transitions(built: &Built) -> Vec<TransitionReport> {
         loose: bodies(t.loose),
         dangling: bodies(t.dangling),
         neck: t.neck.map(|(diameter, place)| NarrowestNeck { diameter, place }),
+        gap: t.gap,
         fractions: t.fractions.iter().map(along).collect(),
         step: t.step,
     };

@@ -109,11 +109,38 @@ pub enum CellSpec {
 
 name_of! {
     /// The name of a ready periodic surface.
-    CellName, "cell", catalogue().iter().map(|n| n.name), of_beams, []
+    CellName, "cell", catalogue().iter().map(|n| n.name), elsewhere, []
 }
 
-/// Why a word is no surface, if it is another kind of cell.
-fn of_beams(word: &str) -> Option<String> {
+/// Names of surfaces in the literature and in other programs, each with what it is called here.
+const SYNONYMS: [(&str, &str); 19] = [
+    ("schwarz_p", "primitive"),
+    ("schwarz_primitive", "primitive"),
+    ("p", "primitive"),
+    ("schwarz_d", "diamond"),
+    ("schwarz_diamond", "diamond"),
+    ("d", "diamond"),
+    ("f", "diamond"),
+    ("schwarz", "primitive (P) or diamond (D)"),
+    ("schoen_gyroid", "gyroid"),
+    ("schoen_g", "gyroid"),
+    ("g", "gyroid"),
+    ("schoen_iwp", "iwp"),
+    ("i_wp", "iwp"),
+    ("schoen_frd", "frd"),
+    ("f_rd", "frd"),
+    ("fischer_koch", "fischer_koch_s"),
+    ("fks", "fischer_koch_s"),
+    ("splitp", "split_p"),
+    ("neovius_c(p)", "neovius"),
+];
+
+/// Why a word is no surface, if it is another kind of cell or has another name here.
+fn elsewhere(word: &str) -> Option<String> {
+    let plain = word.to_lowercase().replace(['-', ' '], "_");
+    if let Some((_, name)) = SYNONYMS.iter().find(|s| s.0 == plain) {
+        return Some(format!("{word} is called {name} here"));
+    }
     let cell = ::beams::graph::named(word);
     cell.map(|_| format!("{word} is a cell of beams, not a surface; write [beams.NAME] with cell = \"{word}\""))
 }
@@ -242,10 +269,10 @@ pub struct ReadyTetCell {
 /// A ready cell for each zone of the mesh.
 #[derive(Clone, Debug, PartialEq, Kind)]
 pub struct ZonedTetCells {
-    /// A ready cell for each zone of the mesh, by its number, such as `{ 1 = "diamond", 2 = "iwp" }`; in the tetrahedra between
-    /// zones they pass into each other.
+    /// A ready cell for each zone of the mesh, by its number or its name in the file, such as `{ 1 = "diamond", shell = "iwp" }`;
+    /// in the tetrahedra between zones they pass into each other.
     #[kind(least = 1, keyword)]
-    pub zones: BTreeMap<u32, TetCellName>,
+    pub zones: BTreeMap<String, TetCellName>,
 }
 
 /// What a regular tetrahedron cuts out of the series of a group.
@@ -285,14 +312,14 @@ pub enum PartSpec {
     #[kind(hints("wall", "shell", "surface", "double"))]
     Sheet,
     /// f ≤ t.
-    #[kind(hints("network", "skeletal", "skeleton", "strut", "solid", "below", "negative"))]
+    #[kind(hints("network", "skeletal", "skeleton", "strut", "below", "negative"))]
     Lower,
     /// f ≥ t.
     #[kind(hints("above", "positive", "over"))]
     Upper,
 }
 
-/// How much is solid: exactly one amount.
+/// How much is solid: one amount, or a fraction and the thickness of its walls, which together give the wavelength.
 #[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(name = "Level", noun = "a level")]
 pub struct LevelSpec {
@@ -312,19 +339,53 @@ pub struct LevelSpec {
 
 /// An amount of solid.
 #[derive(Clone, Debug, PartialEq, Kind)]
-#[kind(noun = "amount", keyed)]
+#[kind(noun = "an amount", alternatives)]
 pub enum AmountSpec {
-    /// The field value t; for a sheet the half-level.
-    Iso(GradeSpec),
-    /// Solid volume fraction.
-    #[kind(above = 0.0, below = 1.0)]
-    Fraction(GradeSpec),
-    /// One minus the solid volume fraction.
-    #[kind(above = 0.0, below = 1.0)]
-    Porosity(GradeSpec),
+    /// A wall's thickness.
+    Thickness(ThicknessSpec),
+    /// A solid volume fraction.
+    Fraction(FractionSpec),
+    /// A porosity.
+    Porosity(PorositySpec),
+    /// A field value.
+    Iso(IsoSpec),
+}
+
+/// The thickness of a sheet's wall.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct ThicknessSpec {
     /// Thickness of a sheet's wall: solid is what lies within half of it of the mid-surface.
     #[kind(unit = "mm", above = 0.0)]
-    Thickness(GradeSpec),
+    pub thickness: GradeSpec,
+}
+
+/// A solid volume fraction.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct FractionSpec {
+    /// Solid volume fraction.
+    #[kind(above = 0.0, below = 1.0, hints("relative_density", "density", "volume_fraction", "vf"))]
+    pub fraction: GradeSpec,
+    /// Thickness of a sheet's wall or narrowest neck of a network: the wavelength is solved for.
+    #[kind(unit = "mm", above = 0.0)]
+    pub thickness: Option<GradeSpec>,
+}
+
+/// A porosity.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct PorositySpec {
+    /// One minus the solid volume fraction.
+    #[kind(above = 0.0, below = 1.0, hints("void_fraction"))]
+    pub porosity: GradeSpec,
+    /// Thickness of a sheet's wall or narrowest neck of a network: the wavelength is solved for.
+    #[kind(unit = "mm", above = 0.0)]
+    pub thickness: Option<GradeSpec>,
+}
+
+/// A field value.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct IsoSpec {
+    /// The field value t; for a sheet the half-level.
+    pub iso: GradeSpec,
 }
 
 /// What a fraction is of.

@@ -1,8 +1,6 @@
 //! Connectivity of a lattice whose zones have different cells, predicted without making the surface.
 
-use std::collections::BTreeMap;
-
-use super::{Warning, build_tiling::Zoned};
+use super::{CellZone, Warning, build_tiling::Zoned};
 use crate::cell::Part;
 use crate::cell::tet::{Bary, TetCell};
 use crate::report::ZoneJoin;
@@ -21,7 +19,7 @@ pub struct Joins {
 /// The connectivity of a lattice of zones whose cells have this solid fraction.
 pub(super) fn joins(tiling: &Tiling, cells: &Zoned, fraction: f64) -> Option<Joins> {
     let connectivity = tiling::connectivity(tiling)?;
-    let share = |zones: [u32; 2]| {
+    let share = |zones: [i64; 2]| {
         let [a, b] = zones.map(|z| cells.get(&z));
         common(a?, b?, tiling.part, fraction)
     };
@@ -57,18 +55,21 @@ fn common(a: &TetCell, b: &TetCell, part: Part, fraction: f64) -> Option<f64> {
 
 impl Joins {
     /// Warns of zones that are not connected, or of a lattice that is disconnected although they are.
-    pub(super) fn warn(&self, names: &BTreeMap<u32, String>, path: &str, warnings: &mut Vec<Warning>) {
+    pub(super) fn warn(&self, of: &[CellZone], path: &str, warnings: &mut Vec<Warning>) {
         let mut say = |message: String| {
             warnings.push(Warning { path: path.to_string(), message });
         };
-        let name = |zone: u32| names.get(&zone).map_or("", String::as_str);
+        let name = |zone: i64| {
+            let of = of.iter().find(|z| z.numbers.contains(&zone));
+            of.map_or(zone.to_string(), |z| format!("{} ({})", z.name, z.cell))
+        };
         let apart = self.connectivity.pairs.iter().zip(&self.shares).filter(|(j, _)| !j.joined);
         let mut any = false;
         for (join, share) in apart {
             any = true;
             let [a, b] = join.zones;
             say(format!(
-                "zones {a} ({}) and {b} ({}) do not join: solid passes through {} of the {} faces between them, but the two stay \
+                "zones {} and {} do not join: solid passes through {} of the {} faces between them, but the two stay \
                  apart, as their ports share {:.1} % of a face; take cells with ports in the same places, or a higher fraction",
                 name(a),
                 name(b),

@@ -172,10 +172,10 @@ fn several_lattices_need_a_blend() {
 #[test]
 fn exactly_one_amount() {
     let e = refused(&(GOOD.to_string() + "fraction = 0.3\n"));
-    assert!(e.message.contains("porosity and fraction at once"), "{e}");
-    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.fraction", Some(14)));
+    assert!(e.message.contains("fraction and porosity at once"), "{e}");
+    assert_eq!((e.path.as_str(), e.line), ("lattice.core.level.porosity", Some(13)));
     let e = refused(GOOD.split("porosity").next().unwrap_or_default());
-    assert!(e.message.contains("exactly one of iso, fraction, porosity, thickness"), "{e}");
+    assert!(e.message.contains("thickness of a sheet's wall") && e.message.contains("or give fraction"), "{e}");
     assert_eq!((e.path.as_str(), e.line), ("lattice.core.level", Some(12)));
 }
 
@@ -268,4 +268,65 @@ fn the_committed_schema_is_current() {
     }
     let old = std::fs::read_to_string(path).unwrap_or_default();
     assert!(old == text, "schema/design.json is stale; renew it with TRABECULA_RENEW=1 cargo test -p trabecula schema");
+}
+
+/// Primitive cells, upper part, and a second lattice that takes over along x.
+fn blended(second: &str, weight: &str, by: &str) -> Built {
+    let text = format!(
+        r#"schema = 1
+[region.box]
+size = [24, 8, 8]
+[lattice.a]
+cell = "primitive"
+part = "upper"
+level.fraction = 0.3
+map.affine.wavelength = 4
+[lattice.b]
+{second}
+[blend]
+between = ["a", "b"]
+weight = {weight}
+by = "{by}"
+"#
+    );
+    let design = Design::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    design.build(&NoFiles).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+fn said<'a>(built: &'a Built, what: &str) -> Vec<&'a str> {
+    built.warnings.iter().map(|w| w.message.as_str()).filter(|m| m.contains(what)).collect()
+}
+
+const RAMP: &str = "{ linear = { along = [1, 0, 0], stops = [[-8, 0], [8, 1]] } }";
+
+/// The primitive function changes its sign half a diagonal away, and its two parts are each other's images: half-way between
+/// them nothing is left, and no solid leads across. So it is between both parts of one cell.
+#[test]
+fn lattices_that_cancel_are_warned_of_with_the_place() {
+    let opposite = "cell = \"primitive\"\npart = \"upper\"\nlevel.fraction = 0.3\nmap.affine = { wavelength = 4, offset = [2, 2, 2] }";
+    let lower = "cell = \"primitive\"\npart = \"lower\"\nlevel.fraction = 0.3\nmap.affine.wavelength = 4";
+    for (second, by) in [(opposite, "fraction"), (lower, "fraction"), (opposite, "value")] {
+        let built = blended(second, RAMP, by);
+        let warned = said(&built, "cancel");
+        assert!(warned.len() == 1 && warned[0].contains("shares are 0.50 and 0.50"), "{by}: {warned:?}");
+        assert!(warned[0].contains(" at (0, "), "{}", warned[0]);
+        let [one] = &built.transitions()[..] else { panic!("one transition") };
+        assert!(one.neck.is_none() && one.gap.is_some_and(|p| p[0].abs() < 4.0), "{by}: {:?}", one.gap);
+    }
+}
+
+#[test]
+fn lattices_that_grow_into_each_other_are_not_told() {
+    let same = "cell = \"primitive\"\npart = \"upper\"\nlevel.fraction = 0.3\nmap.affine.wavelength = 4";
+    let gyroid = "cell = \"gyroid\"\npart = \"upper\"\nlevel.fraction = 0.3\nmap.affine.wavelength = 4";
+    let sheet = "cell = \"gyroid\"\npart = \"sheet\"\nlevel.fraction = 0.3\nmap.affine.wavelength = 5";
+    for second in [same, gyroid, sheet] {
+        let built = blended(second, RAMP, "fraction");
+        assert!(said(&built, "cancel").is_empty(), "{:?}", built.warnings);
+        let [one] = &built.transitions()[..] else { panic!("one transition") };
+        assert!(one.neck.is_some() && one.gap.is_none());
+    }
+    // Where neither is alone and the shares are the same everywhere there is nothing to cross.
+    let [one] = &blended(gyroid, "0.5", "fraction").transitions()[..] else { panic!("one transition") };
+    assert!(one.gap.is_none());
 }

@@ -87,7 +87,47 @@ pub(super) fn gaps([min, max]: [f64; 2], of: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 /// A length in a sentence.
 fn figure(v: f64) -> String {
-    if (1e-2..1e6).contains(&v) { format!("{v:.4}") } else { format!("{v:.2e}") }
+    match v.abs() {
+        a if a < 1e-9 => "0".into(),
+        a if (1e-2..1e6).contains(&a) => format!("{v:.4}"),
+        _ => format!("{v:.2e}"),
+    }
+}
+
+/// The edge of a wrapped cell, over the map's wavelength, below which it is warned of: less than four steps of the grid are left.
+const PINCHED: f64 = 1.0 / 8.0;
+
+/// Warns of a wrapped map whose cells shrink to little or nothing in the region, but for shells, which do not vary round it.
+pub(super) fn wrapped_map(lattice: &Lattice, spec: &MapKind, environment: &Environment, warnings: &mut Vec<Warning>) {
+    let map = &lattice.map;
+    let Some(round) = map.round() else { return };
+    let key = spec.key();
+    let shrinking = if matches!(spec, MapKind::Sphere(_)) { 1..3 } else { 1..2 };
+    if lattice.cell.series().terms().iter().all(|t| t.hkl[shrinking.clone()].iter().all(|h| *h == 0)) {
+        return;
+    }
+    let (core, on_it) = round.core(&environment.region.bounds());
+    let within: Vec<_> = on_it.into_iter().filter(|p| environment.region.value(*p) < 0.0).collect();
+    let nearest = environment.points.iter().min_by(|a, b| round.edge_at(**a).total_cmp(&round.edge_at(**b)));
+    let Some(at) = within.get(within.len() / 2).or(nearest) else { return };
+    let edge = round.edge_at(*at);
+    if edge >= PINCHED * map.wavelength() {
+        return;
+    }
+    let place = at.map(figure).join(", ");
+    let message = if within.is_empty() {
+        format!(
+            "cells are only {} mm wide at ({place}) mm, near the {core}, where no grid resolves their walls; cut more round the \
+             {core} out of the region with `difference`, or give fewer cells `around`",
+            figure(edge)
+        )
+    } else {
+        format!(
+            "the {core} lies in the region: cells shrink to nothing at ({place}) mm, where no grid resolves their walls; cut a \
+             core round it out of the region with `difference`"
+        )
+    };
+    warnings.push(Warning { path: format!("{}.map.{key}.around", environment.path), message });
 }
 
 /// Warns of likely mistakes.
@@ -174,9 +214,12 @@ pub(super) fn solved_map(map: &Map, spec: &MapKind, lattice: &str, warnings: &mu
         warnings.push(Warning { path: format!("{lattice}.map.{}", spec.key()), message });
     };
     let at = |[x, y, z]: [f64; 3]| format!("({x:.3}, {y:.3}, {z:.3}) mm");
+    if let Some(hasty) = phase.hasty() {
+        say(hasty.to_string());
+    }
     if d.turn > TURN {
         say(format!(
-            "the orientation turns by {:.0} degrees within one cell at {}: above {TURN} neighbouring cells no longer fit \
+            "the orientation turns by {:.0} degrees a cell at {}: above {TURN} neighbouring cells no longer fit \
              together without being torn out of shape; let it turn more slowly, or use smaller cells",
             d.turn,
             at(d.turn_at)

@@ -18,6 +18,10 @@ pub(super) const TILE: usize = 61;
 /// Most node planes along an axis.
 const MOST: f64 = 4e6;
 
+/// Most grid cells: those of 9 million tiles. Bounds dismiss a tile in some hundredths of a millisecond to a millisecond, so what
+/// is empty takes minutes to some hours.
+const MOST_CELLS: f64 = 2e12;
+
 /// The solid on its grid.
 pub(super) struct Grid {
     /// Node planes along the three axes (mm, ascending). The outermost ones lie outside the region.
@@ -78,6 +82,7 @@ impl Grid {
             *nodes = node_planes(solid, &surfaces, fixed, edge, a)?;
         }
         let margin = margin(&axes)?;
+        count(&axes, edge)?;
         let mut grid_plane = vec![None; surfaces.len()];
         for (f, p) in planes {
             grid_plane[f] = axes[p.axis].iter().position(|&x| x == p.at);
@@ -242,6 +247,25 @@ fn check(solid: &Solid, edge: f64) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Refuses grids that no machine runs through, whether there is a surface in them or not.
+fn count(axes: &[Vec<f64>; 3], edge: f64) -> Result<(), Fault> {
+    let cells: f64 = axes.iter().map(|n| (n.len() - 1) as f64).product();
+    if cells <= MOST_CELLS {
+        return Ok(());
+    }
+    let [x, y, z] = axes.each_ref().map(|n| n.len() - 1);
+    let better = edge * (cells / MOST_CELLS).cbrt();
+    Err(Fault::new(
+        "edge",
+        format!(
+            "steps of {} mm make a grid of {x} × {y} × {z} cells, {cells:.1e}, and at most {MOST_CELLS:.0e} are possible; use an \
+             edge of {:.2} mm or more, or a smaller part",
+            number(edge),
+            1.01 * better
+        ),
+    ))
+}
+
 /// The coordinates of the node planes normal to an axis: planes that are to be exact (`stops` at first), steps of about
 /// `edge` between them, and one step of padding.
 fn node_planes(
@@ -324,8 +348,8 @@ fn margin(axes: &[Vec<f64>; 3]) -> Result<f64, Fault> {
         return Err(Fault::new(
             "edge",
             format!(
-                "steps of {} mm at {} mm from the origin vanish in the files' single precision; use an edge above {} mm or \
-                 move the part nearer to the origin",
+                "steps of {} mm at {} mm from the origin vanish in the files' single precision; move the part nearer to the \
+                 origin, or use an edge above {} mm",
                 number(finest),
                 number(farthest),
                 number(64.0 * farthest * f64::from(f32::EPSILON))

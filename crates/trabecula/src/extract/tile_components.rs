@@ -143,8 +143,8 @@ impl TileSweep {
     }
 
     /// The components of the whole surface.
-    pub fn resolve(self, islands: Islands) -> Result<Resolved, Fault> {
-        self.graph.resolve(islands)
+    pub fn resolve(self, islands: Islands, spacing: f64) -> Result<Resolved, Fault> {
+        self.graph.resolve(islands, spacing)
     }
 }
 

@@ -65,11 +65,9 @@ impl<'a> At<'a> {
     /// `word` is none of `keys`; near to a word that others use, the right one is named.
     fn unknown_of(&self, what: &str, word: &str, keys: &[Key]) -> DesignError {
         let names: Vec<&str> = keys.iter().map(|k| k.name).collect();
-        let meant = || {
-            let near = nearest(word, keys.iter().flat_map(|k| k.hints.iter().copied()))?;
-            keys.iter().find(|k| k.hints.contains(&near)).map(|k| k.name)
-        };
-        let near = nearest(word, names.iter().copied()).or_else(meant);
+        let of = |hint: &str| keys.iter().find(|k| k.hints.contains(&hint)).map(|k| k.name);
+        let meant = || of(nearest(word, keys.iter().flat_map(|k| k.hints.iter().copied()))?);
+        let near = of(word).or_else(|| nearest(word, names.iter().copied())).or_else(meant);
         let line = self.line.or(self.node.line);
         DesignError { line, ..DesignError::unknown_but(&self.path, what, word, &names, near) }
     }
@@ -147,11 +145,9 @@ impl<'a> At<'a> {
         if let Some(known) = names.iter().find(|n| **n == word) {
             return Ok(known);
         }
-        let meant = || {
-            let hint = nearest(word, hints.iter().map(|h| h.0))?;
-            hints.iter().find(|h| h.0 == hint).map(|h| h.1)
-        };
-        let near = nearest(word, names.iter().copied()).or_else(meant);
+        let of = |hint: &str| hints.iter().find(|h| h.0 == hint).map(|h| h.1);
+        let meant = || of(nearest(word, hints.iter().map(|h| h.0))?);
+        let near = of(word).or_else(|| nearest(word, names.iter().copied())).or_else(meant);
         let line = self.line.or(self.node.line);
         Err(DesignError { line, ..DesignError::unknown_but(&self.path, what, word, names, near) })
     }

@@ -1,6 +1,6 @@
 //! What can be wrong with a design: the place, what was found, what is allowed, the nearest right word.
 
-use geometry::fault::{Fault, nearest};
+use geometry::fault::{Fault, brief, nearest};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -85,9 +85,9 @@ impl core::fmt::Display for DesignError {
             (None, None) => {}
         }
         if !self.path.is_empty() {
-            write!(f, "{}: ", self.path)?;
+            write!(f, "{}: ", brief(&self.path))?;
         }
-        f.write_str(&self.message)
+        f.write_str(&brief(&self.message))
     }
 }
 

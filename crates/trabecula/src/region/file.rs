@@ -7,7 +7,7 @@ use crate::kind::{Kind, Unit};
 use geometry::fault::Fault;
 use geometry::formats;
 use geometry::math::scale;
-use geometry::repair::Repair;
+use geometry::repair::{CAPPED, Repair};
 
 /// A mesh without a unit that is smaller than this (mm) is warned of: no part with a lattice in it is.
 const SMALL: f64 = 1.0;
@@ -26,6 +26,9 @@ pub struct MeshFile {
     /// Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
     #[kind(default = RepairKind::Auto)]
     pub repair: RepairKind,
+    /// Greatest share of the surface that caps of holes may make up, 0 to 1: a cap is a guess, flat over a flat hole.
+    #[kind(min = 0.0, max = 1.0, default = CAPPED)]
+    pub caps: f64,
 }
 
 /// What to do with a mesh that does not bound a solid.
@@ -62,7 +65,7 @@ impl BuildRegion for MeshFile {
             }
         }
         let repair = match self.repair {
-            RepairKind::Auto => Repair::Auto,
+            RepairKind::Auto => Repair::Caps(self.caps),
             RepairKind::Refuse => Repair::Refuse,
         };
         let made = MeshRegion::new(loaded.mesh, repair).map_err(of_file)?;

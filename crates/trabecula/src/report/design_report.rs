@@ -17,6 +17,10 @@ pub struct DesignReport {
     pub beams: BTreeMap<String, BeamsReport>,
     /// The region.
     pub region: RegionReport,
+    /// Grid spacing of a mesh unless another is asked for, mm: the smallest wavelength / 32, or less for what is finer: 1/24 of
+    /// a cell's finest wave (down to a wavelength / 128), half the thinnest wall or neck, a sixth of the thinnest beam, the skin
+    /// (down to a wavelength / 64).
+    pub spacing: f64,
     /// Possible mistakes in the design.
     pub warnings: Vec<Warning>,
     /// The blend of its lattices, where there is one.
@@ -59,10 +63,13 @@ pub struct LatticeReport {
 pub struct RegionReport {
     /// Lower and upper corner of its bounds, mm.
     pub bounds: [[f64; 3]; 2],
-    /// Volume, mm³.
+    /// Volume of what the lattice fills, mm³: of the tetrahedra, where it is a lattice over them.
     pub volume: f64,
-    /// Whether the volume is exact; else it is estimated at points.
+    /// Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra are not the region.
     pub volume_exact: bool,
+    /// Volume of the region as described, mm³, where a lattice fills tetrahedra in its place; else None.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub described_volume: Option<f64>,
 }
 
 /// A blend of lattices.
@@ -122,7 +129,7 @@ pub struct DistortionReport {
     pub density: [f64; 2],
     /// |curl Kᵢ| λᵢ², what no map can follow.
     pub curl: MapSpread,
-    /// Greatest turn of the wanted orientation within a cell, degrees.
+    /// Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees.
     pub turn: f64,
 }
 
@@ -141,6 +148,8 @@ pub struct TransitionReport {
     pub dangling: LooseBodies,
     /// The narrowest neck of the widest path from one lattice to the other; None where they are not connected.
     pub neck: Option<NarrowestNeck>,
+    /// Where the first lattice's solid ends if no path leads to the second's, mm; None where one does, or the grid cannot tell.
+    pub gap: Option<[f64; 3]>,
     /// Solid fraction along the transition, by tenths of the second lattice's share.
     pub fractions: Vec<FractionAlong>,
     /// Distance between sample points, mm.

@@ -153,6 +153,8 @@ pub struct IslandsReport {
     pub found: u64,
     /// Number of those that were left out.
     pub dropped: u64,
+    /// The volume of these in all, mm³.
+    pub dropped_volume: f64,
     /// Number of those with surface on the region's boundary: mostly fragments that it cuts off.
     pub border: u64,
     /// Their volume in all, mm³.
@@ -199,6 +201,7 @@ impl From<&Components> for IslandsReport {
         IslandsReport {
             found: p.others,
             dropped: p.dropped,
+            dropped_volume: p.dropped_volume,
             border: p.border,
             volume: p.volume,
             share: p.share(),

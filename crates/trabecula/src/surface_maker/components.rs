@@ -11,12 +11,20 @@ use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3};
 use geometry::union_find::{find, unite};
 
+/// Grid cells: a component with less volume is under two grid steps across.
+pub const SMALL: f64 = 8.0;
+/// A share of the largest component's volume: less is no loss.
+pub const NEGLIGIBLE: f64 = 1e-3;
+
 /// Treatment of all connected components of the solid but the largest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Islands {
     /// They are kept.
-    #[default]
     Keep,
+    /// Those at the region's boundary with less than the volume of `SMALL` grid cells and `NEGLIGIBLE` of the largest are
+    /// removed: what the boundary cuts off that the grid cannot resolve.
+    #[default]
+    DropSmall,
     /// They are removed.
     Drop,
     /// They are an error.
@@ -24,10 +32,11 @@ pub enum Islands {
 }
 
 impl Islands {
-    /// The value of this name: "keep", "drop" or "error".
+    /// The value of this name: "keep", "drop-small", "drop" or "error".
     pub fn named(word: &str) -> Option<Islands> {
         match word {
             "keep" => Some(Islands::Keep),
+            "drop-small" => Some(Islands::DropSmall),
             "drop" => Some(Islands::Drop),
             "error" => Some(Islands::Error),
             _ => None,
@@ -67,6 +76,8 @@ pub struct Components {
     pub others: u64,
     /// How many of them are not in the result.
     pub dropped: u64,
+    /// The total volume of those, mm³.
+    pub dropped_volume: f64,
     /// How many of them touch the region's boundary: mostly fragments of walls and struts that it cuts off. The rest lie
     /// inside.
     pub border: u64,
@@ -94,7 +105,7 @@ impl Components {
         let [x, y, z] = second.center().map(|v| number((1e3 * v).round() / 1e3 + 0.0));
         let (volume, largest) = (short(self.volume), short(second.volume));
         let place = format!("about ({x}, {y}, {z}) mm");
-        match (self.others, self.border) {
+        let sentence = match (self.others, self.border) {
             (1, b) => format!(
                 "1 connected component besides the largest ({share} % of the volume), of {volume} mm³, {} the region's boundary, {place}",
                 if b > 0 { "at" } else { "away from" }
@@ -103,6 +114,11 @@ impl Components {
                 "{n} connected components besides the largest ({share} % of the volume), of {volume} mm³ in all, {b} of them at the \
                  region's boundary; the largest of them has {largest} mm³ and lies {place}"
             ),
+        };
+        match self.dropped {
+            0 => sentence,
+            n if n == self.others => format!("{sentence}; dropped"),
+            n => format!("{sentence}; {n} of them, of {} mm³, are dropped", short(self.dropped_volume)),
         }
     }
 }
@@ -171,8 +187,8 @@ impl ComponentGraph {
         Ok(base as u32)
     }
 
-    /// Determines the connected components and which of them stay.
-    pub fn resolve(mut self, islands: Islands) -> Result<Resolved, Fault> {
+    /// Determines the connected components and which of them stay; `spacing` (mm) is the grid's.
+    pub fn resolve(mut self, islands: Islands, spacing: f64) -> Result<Resolved, Fault> {
         let count = self.totals.len();
         // Roots are never above their members: an ascending pass gathers whole components at their roots.
         let mut whole = self.totals.clone();
@@ -211,15 +227,27 @@ impl ComponentGraph {
         }
         let outer = || roots.iter().copied().filter(|&i| whole[i].volume > 0.0);
         let largest = outer().reduce(|a, b| if net[b] > net[a] { b } else { a });
+        let small = largest.map_or(0.0, |l| (SMALL * spacing.powi(3)).min(NEGLIGIBLE * net[l]));
         let mut found = Components::default();
+        let mut drops = vec![false; count];
         for i in outer() {
             if Some(i) == largest {
                 found.largest = net[i];
                 continue;
             }
+            let border = whole[i].area[1] > 0.0;
             found.others += 1;
-            found.border += u64::from(whole[i].area[1] > 0.0);
+            found.border += u64::from(border);
             found.volume += net[i];
+            drops[i] = match islands {
+                Islands::Drop => true,
+                Islands::DropSmall => border && net[i] < small,
+                Islands::Keep | Islands::Error => false,
+            };
+            if drops[i] {
+                found.dropped += 1;
+                found.dropped_volume += net[i];
+            }
             if found.second.is_none_or(|o| net[i] > o.volume) {
                 let Aabb { min, max } = whole[i].bounds;
                 found.second = Some(Component { volume: net[i], bounds: [min, max] });
@@ -228,21 +256,23 @@ impl ComponentGraph {
         if islands == Islands::Error && found.others > 0 {
             return Err(Fault::new("islands", refusal(&found)));
         }
-        let drops = islands == Islands::Drop && found.others > 0;
-        let stays = |i: usize| !drops || largest.is_some_and(|l| owner[i] == l as u32);
-        let mut sum = Totals::ZERO;
+        // A cavity goes with its solid.
+        let stays = |i: usize| match owner[i] {
+            NONE => found.dropped == 0,
+            o => !drops[o as usize],
+        };
+        let (mut sum, mut solids, mut cavities) = (Totals::ZERO, 0, 0);
         for &i in roots.iter().filter(|i| stays(**i)) {
             sum.add(&whole[i]);
-            found.count += u64::from(whole[i].volume > 0.0);
-            found.cavities += u64::from(whole[i].volume < 0.0);
-        }
-        if drops {
-            found.dropped = found.others;
+            solids += u64::from(whole[i].volume > 0.0);
+            cavities += u64::from(whole[i].volume < 0.0);
         }
         // Closed and made of triangles: three edges for two of them.
-        found.euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
+        let euler = sum.vertices as i64 - (sum.triangles / 2) as i64;
         let part = |i: usize| (self.totals[i].triangles, stays(self.surface[i] as usize));
-        Ok(Resolved { parts: (0..count).map(part).collect(), totals: sum, components: found })
+        let parts = (0..count).map(part).collect();
+        let components = Components { count: solids, cavities, euler, ..found };
+        Ok(Resolved { parts, totals: sum, components })
     }
 }
 

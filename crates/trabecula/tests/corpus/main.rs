@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use toml::{Table, Value};
 use trabecula::cell::{Cell, Part, Series, catalogue};
 use trabecula::design::{Design, Loader};
-use trabecula::surface_maker::Options;
+use trabecula::surface_maker::{Islands, Options};
 
 /// Samples per smallest wavelength, where a row does not name another number.
 const PER_CELL: f64 = 32.0;
@@ -54,7 +54,10 @@ fn differences(name: &str, row: &Table) -> Result<Vec<String>, String> {
     let design = Design::from_toml(&text).map_err(|e| e.to_string())?;
     let built = design.build(&Folder(corpus().join("designs"))).map_err(|e| e.to_string())?;
     let edge = built.solid.wavelength / row.get("per_cell").map_or(PER_CELL, number);
-    let made = built.surface().mesh(&Options::new(edge), &Silent).map_err(|e| format!("{e:?}"))?;
+    let made = built
+        .surface()
+        .mesh(&Options { islands: Islands::Keep, ..Options::new(edge) }, &Silent)
+        .map_err(|e| format!("{e:?}"))?;
     let found = made.surface;
     let all = size(&found.mesh);
     let area = |t: &[u32; 3]| {

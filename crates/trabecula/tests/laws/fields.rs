@@ -256,7 +256,7 @@ fn bad_files_are_refused_with_what_is_wrong() {
     );
     let warned =
         design("fraction = 0.3", "phase = { wavelength = 4, rotate_z = { formula = \"17*x\" } }").expect("built");
-    assert!(warned.warnings.iter().any(|w| w.path == "lattice.a.map.phase" && w.message.contains("within one cell")));
+    assert!(warned.warnings.iter().any(|w| w.path == "lattice.a.map.phase" && w.message.contains("degrees a cell")));
 }
 
 /// A gyroid given as numbers is the gyroid; a rod given as a mesh fills as much of the cell as it did.

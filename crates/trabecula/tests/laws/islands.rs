@@ -7,12 +7,13 @@ use geometry::formats::read_mesh;
 use geometry::measure::size;
 use geometry::mesh::Mesh;
 use geometry::progress::{Progress, Silent, Stopped};
+use geometry::surface_mesh::SurfaceMesh;
 use proptest::prelude::*;
 use trabecula::cell::{Part, catalogue};
 use trabecula::extract::{GridSurface, surface};
 use trabecula::region::{Cuboid, Cylinder, Difference, Intersection, Region, Union};
 use trabecula::solid::Solid;
-use trabecula::surface_maker::{Components, Islands, Options, SurfaceMaker};
+use trabecula::surface_maker::{Components, Islands, Options, SMALL, SurfaceMaker};
 
 use crate::common::{ball, cases, check, lattice, meshed, solid, stl, stream};
 
@@ -82,6 +83,30 @@ fn largest(mesh: &Mesh) -> f64 {
     net.into_iter().fold(0.0, f64::max)
 }
 
+/// What is dropped by default: components at the region's boundary with less than eight grid cells' volume and a thousandth of the
+/// largest one's, and nothing else.
+fn small(what: &str, solid: &Solid, edge: f64, all: &SurfaceMesh, found: &Components) {
+    let (most, told) = meshed(&GridSurface(solid), edge, Islands::DropSmall).expect("surface");
+    check(what, &most);
+    let left = size(&most.mesh);
+    assert_eq!(
+        (told.count as usize, told.cavities as usize, told.euler),
+        (left.pieces, left.cavities, left.euler),
+        "{what}"
+    );
+    assert_eq!((told.others, told.count), (found.others, found.count - told.dropped), "{what}");
+    assert!(
+        told.dropped <= found.border && told.dropped_volume <= told.dropped as f64 * SMALL * edge.powi(3),
+        "{what}"
+    );
+    // Where anything is dropped, voids below a grid cell that no grid line meets are filled.
+    let filled = left.volume - (all.mesh.volume() - told.dropped_volume);
+    let voids = (found.cavities - told.cavities) as f64 * edge.powi(3);
+    assert!((-1e-9 * left.volume..=voids + 1e-9 * left.volume).contains(&filled), "{what}: {filled}");
+    let (bytes, summary) = stream(solid, edge, Islands::DropSmall).expect("stl");
+    assert_eq!((summary.components, bytes), (told, stl(&most)), "{what}: the two roads differ");
+}
+
 /// All that is promised of pieces, for one solid.
 fn law(what: &str, solid: &Solid, edge: f64) -> Components {
     let (all, found) = meshed(&GridSurface(solid), edge, Islands::Keep).expect("surface");
@@ -110,6 +135,7 @@ fn law(what: &str, solid: &Solid, edge: f64) -> Components {
     assert_eq!(bytes, stl(&one), "{what}: the two roads differ");
     assert!(near(summary.volume, left.volume), "{what}");
 
+    small(what, solid, edge, &all, &found);
     match stream(solid, edge, Islands::Error) {
         Ok(_) => assert_eq!(found.count, 1, "{what}"),
         Err(Stopped::Refused(f)) => assert!(found.count > 1 && f.at == "islands", "{what}: {f}"),

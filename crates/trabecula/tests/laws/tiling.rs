@@ -301,11 +301,11 @@ fn zoned(mesh: &TetMesh, names: [&str; 2], part: Part, fraction: f64) -> Tiling 
     let mut mesh = mesh.clone();
     let sides = mesh.tets.iter().map(|t| {
         let middle = t.iter().map(|n| mesh.nodes[*n as usize][0]).sum::<f64>() / 4.0;
-        u32::from(middle > 9.0)
+        i64::from(middle > 9.0)
     });
     mesh.zones = sides.collect();
     let map = map(&mesh);
-    let of = |zone: u32| {
+    let of = |zone: i64| {
         let s = cell(names[zone as usize]).0;
         let range = s.range();
         Share { cell: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }
@@ -354,9 +354,9 @@ fn zones_hold_their_fraction_and_fit() {
     let mut some = Random(8);
     let mut mesh = shaken(3, 0.1, 6.0, &mut some);
     let middle = |t: &[u32; 4]| t.iter().map(|n| mesh.nodes[*n as usize][0]).sum::<f64>() / 4.0;
-    mesh.zones = mesh.tets.iter().map(|t| u32::from(middle(t) > 9.0)).collect();
+    mesh.zones = mesh.tets.iter().map(|t| i64::from(middle(t) > 9.0)).collect();
     let map = map(&mesh);
-    let of = |name: &str, zone: u32| {
+    let of = |name: &str, zone: i64| {
         let s = cell(name).0;
         let range = s.range();
         Share { cell: s, scale: 0.5 * (range.hi - range.lo), weights: Some(Arc::new(map.shares(|z| z == zone))) }

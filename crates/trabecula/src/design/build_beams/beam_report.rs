@@ -76,14 +76,15 @@ pub(super) fn warn(
     }
     if let Some(c) = truss.collisions.first() {
         say(format!(
-            "{} of beams run into each other without a common node, the first at {}: they are joined there, but not filleted, and \
-             no exact figures of the whole are given; make them thinner, or put nodes there",
+            "{} of beams run into or touch each other without a common node, the first at {}: they are joined there, but not \
+             filleted, and no exact figures of the whole are given; make them thinner, or put nodes there",
             counted(truss.collisions.len(), "pair"),
             at(c.at)
         ));
     }
     if let Some((n, p)) = truss.graph.contained_beams() {
-        say(format!("{} lie within another one of the same hub, the first about {}", counted(n, "beam"), at(p)));
+        let lie = if n == 1 { "lies" } else { "lie" };
+        say(format!("{} {lie} within another one of the same hub, the first about {}", counted(n, "beam"), at(p)));
     } else if let Some((angle, p)) = truss.report.min_angle.filter(|a| a.0 < NARROW) {
         say(format!(
             "the least angle between two beams is {angle:.1} degrees, at {}: below {NARROW} they run into one another",
