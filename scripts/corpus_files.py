@@ -55,6 +55,13 @@ def octahedron():
     return np.array(out)
 
 
+def open_box(size):
+    """The triangles of a box from the origin without its top, outward."""
+    sides = [(0, 2, 3, 1), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]  # bit a of a corner's number: upper along a
+    corner = [[size[a] * (i >> a & 1) for a in range(3)] for i in range(8)]
+    return np.array([[corner[i] for i in t] for a, b, c, d in sides for t in ((a, b, c), (a, c, d))], dtype=float)
+
+
 def stl(triangles):
     """A binary STL."""
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("mark", "<u2")])
@@ -109,6 +116,7 @@ def main():
     broken = bracket()[1:]
     broken[3] = broken[3][::-1]
     (FILES / "bracket_broken.stl").write_bytes(stl(broken))
+    (FILES / "bin.stl").write_bytes(stl(open_box((8, 6, 4))))
     (FILES / "octahedron.stl").write_bytes(stl(octahedron()))
     _, y, z = np.meshgrid([0, 4, 8], [0, 2, 4, 6], [0, 2, 4], indexing="ij")
     np.save(FILES / "plate.npy", plate(y, z).astype(float))
@@ -120,6 +128,7 @@ def main():
     (FILES / "scatter.csv").write_text("\n".join(["x,y,z,value", *rows]) + "\n", encoding="utf-8")
     nodes, tets = blocks((4, 3, 2), 2.0)
     (FILES / "load.vtu").write_text(vtu(nodes, tets, load=100 * nodes[:, 1] / 6), encoding="utf-8")
+    (FILES / "load_m.vtu").write_text(vtu(nodes / 1000, tets, load=100 * nodes[:, 1] / 6), encoding="utf-8")
     nodes, tets = blocks((1, 1, 1), 8.0)
     same = {name: np.tile(v, (len(nodes), 1)) for name, v in TURN.items()}
     (FILES / "turn.vtu").write_text(vtu(nodes - 4.0, tets, **same), encoding="utf-8")

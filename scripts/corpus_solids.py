@@ -214,7 +214,7 @@ CLOSED = {
     "beams_graded": row_of_beams,
     "frame_of_cell": lambda: [frame()],
     "ell_none": lambda: [ell(1.0)],
-    "ell_auto": lambda: [ell(1 / 2.85)],
+    "ell_auto": lambda: [ell(1 / 2.997)],
     "ell_radius": lambda: [ell(tau_of(0.5))],
     "ell_tau": lambda: [ell(0.5)],
 }

@@ -32,7 +32,11 @@ def python():
         thing = getattr(trabecula, name)
         members = [(name, thing)]
         if inspect.ismodule(thing) or inspect.isclass(thing):
-            public = sorted(k for k in getattr(thing, "__all__", vars(thing)) if not k.startswith("_"))
+            own = [
+                c for c in getattr(thing, "__mro__", [thing]) if getattr(c, "__module__", "trabecula").startswith("trabecula")
+            ]
+            named = getattr(thing, "__all__", {k for c in own for k in vars(c)})
+            public = sorted(k for k in named if not k.startswith("_"))
             owned = [(k, getattr(thing, k)) for k in public]
             owned = [(k, m) for k, m in owned if callable(m) or hasattr(m, "__get__")]
             keep = inspect.isclass(thing)

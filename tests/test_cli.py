@@ -98,7 +98,7 @@ def test_formats_agree(tmp_path, cube, name):
     summary = json.loads(run("mesh", cube, "-o", name, "--edge", "0.4", "--json", cwd=tmp_path).stdout)
     figures = json.loads(run("measure", name, "--json", cwd=tmp_path).stdout)
     keys = "volume area area_lattice area_cut solid_fraction porosity euler pieces cavities voids closed bounds"
-    keys += " specific_surface hydraulic_diameter self_intersections quality defects"
+    keys += " specific_surface hydraulic_diameter self_intersections quality defects warnings"
     assert list(figures) == keys.split()
     assert figures["porosity"] is None and figures["solid_fraction"] is None
     assert figures["closed"] and figures["cavities"] == 0
@@ -180,7 +180,8 @@ def test_cells(tmp_path):
         (["render", "cube.toml", "-o", "a.png", "--size", "0x5"], 2, "WIDTHxHEIGHT"),
         (["new", "cube.txt"], 2, ".toml"),
         (["new", "none/a.toml"], 1, "does not exist"),
-        (["moosh"], 2, "invalid choice"),
+        (["moosh"], 2, "no command is named moosh; did you mean mesh?"),
+        (["--quiet", "xyz"], 2, "There are: new, check, mesh"),
         ([], 2, "usage"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
@@ -476,3 +477,14 @@ def test_long_series_are_checked_in_seconds(tmp_path, kind):
     assert time.perf_counter() - start < 20  # a few seconds on a machine that does nothing else
     told = [w["message"] for w in report["warnings"] if "rough" in w["message"]]
     assert bool(told) == (kind == "fine")
+
+
+def test_cells_of_every_list_are_found_by_name(tmp_path):
+    """`cells NAME` says the same with and without the option that names the list."""
+    for name, option in (("octet", "--beams"), ("gyroid", None)):
+        shown = run("cells", name, "--json", cwd=tmp_path).stdout
+        assert shown == run("cells", name, *([option] if option else []), "--json", cwd=tmp_path).stdout
+    import trabecula as lt
+
+    for name in sorted(set(lt.cell.tet_names()) - set(lt.cell.names()))[:1]:  # a name of both lists is the periodic cell's
+        assert run("cells", name, cwd=tmp_path).stdout == run("cells", name, "--tet", cwd=tmp_path).stdout

@@ -74,7 +74,9 @@ def test_the_command_keeps_drops_and_refuses(tmp_path, balls, name):
         assert "not in one piece" in done.stderr if islands == "keep" else "pieces dropped" in done.stderr
     kept, one = made["keep"]["islands"], made["drop"]["islands"]
     assert (kept["dropped"], one["dropped"]) == (0, made["keep"]["pieces"] - 1)
-    assert {k: v for k, v in kept.items() if k != "dropped"} == {k: v for k, v in one.items() if k != "dropped"}
+    assert (kept["dropped_volume"], one["dropped_volume"]) == (0, one["volume"])
+    same = kept.keys() - {"dropped", "dropped_volume"}
+    assert {k: kept[k] for k in same} == {k: one[k] for k in same}
     assert 0 < kept["border"] < kept["found"]
     assert made["keep"]["volume"] == pytest.approx(made["drop"]["volume"] + kept["volume"])
     assert kept["share"] == pytest.approx(made["drop"]["volume"] / made["keep"]["volume"])
@@ -89,14 +91,31 @@ def test_the_command_keeps_drops_and_refuses(tmp_path, balls, name):
     assert names(tmp_path) == ["balls.toml"]
 
 
-def test_keep_is_the_default_and_one_piece_says_nothing(tmp_path, balls):
-    """The default leaves the part as it is; dropping nothing changes no byte."""
-    run("mesh", balls, "-o", "a.stl", "--edge", 0.25, cwd=tmp_path)
-    run("mesh", balls, "-o", "b.stl", "--edge", 0.25, "--islands", "keep", cwd=tmp_path)
-    assert (tmp_path / "a.stl").read_bytes() == (tmp_path / "b.stl").read_bytes()
+def test_small_ones_are_dropped_by_default_and_one_piece_says_nothing(tmp_path, balls):
+    """Those under eight grid cells at the region's boundary; dropping nothing changes no byte."""
+    made = {}
+    for name, words in {"default": (), "drop-small": ("--islands", "drop-small"), "keep": ("--islands", "keep")}.items():
+        done = run("mesh", balls, "-o", f"{name}.stl", "--edge", 0.25, "--json", *words, cwd=tmp_path)
+        made[name] = json.loads(done.stdout)
+    assert (tmp_path / "default.stl").read_bytes() == (tmp_path / "drop-small.stl").read_bytes()
+    small, kept = made["default"]["islands"], made["keep"]["islands"]
+    assert small["dropped"] <= small["border"] and small["dropped_volume"] <= small["dropped"] * 8 * 0.25**3
+    assert made["default"]["pieces"] == made["keep"]["pieces"] - small["dropped"]
+    assert made["default"]["volume"] == pytest.approx(made["keep"]["volume"] - small["dropped_volume"])
+    assert (small["found"], kept["dropped"]) == (kept["found"], 0)
+    # The cube of the README: its boundary cuts a crumb of 0.009 mm³ off at two corners.
+    cube = (
+        BALLS.replace("[8, 8, 8]\ncenter = [0.5, 0.3, 0.2]", "[20, 20, 20]")
+        .replace("primitive", "gyroid")
+        .replace("lower", "sheet")
+    )
+    cube = cube.replace("wavelength = 4\nrotate = [10, 20, 30]", "wavelength = 5").replace("0.1", "0.3")
+    (tmp_path / "cube.toml").write_text(cube)
+    done = json.loads(run("mesh", "cube.toml", "-o", "cube.stl", "--edge", 0.25, "--json", cwd=tmp_path).stdout)
+    assert (done["pieces"], done["islands"]["dropped"]) == (1, 2)
     (tmp_path / "ball.toml").write_text(HOLLOW.split("[[region")[0] + BALL)
     files = set()
-    for islands in ("keep", "drop", "error"):
+    for islands in ("keep", "drop-small", "drop", "error"):
         done = run("mesh", "ball.toml", "-o", "c.stl", "--edge", 0.1, "--islands", islands, "--threads", 2, cwd=tmp_path)
         assert "1 piece;" in done.stderr and "warning" not in done.stderr
         files.add((tmp_path / "c.stl").read_bytes())
@@ -108,7 +127,7 @@ def test_python(tmp_path, balls):
     with pytest.warns(lt.DesignWarning, match="periodic solid is not one piece"):
         solid = lt.load(balls).build()
     with pytest.warns(lt.DesignWarning, match="not in one piece: .* at the region's boundary"):
-        mesh = solid.mesh(edge=0.25)
+        mesh = solid.mesh(edge=0.25, islands="keep")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         one = solid.mesh(edge=0.25, islands="drop")
@@ -145,7 +164,7 @@ def test_other_words_are_refused(tmp_path, balls, islands):
     """Before any work is done."""
     solid = lt.load(balls).build()
     for make in (solid.mesh, lambda **k: solid.save_stl(tmp_path / "b.stl", **k)):
-        with pytest.raises(ValueError, match=r'islands is .*; it must be "keep", "drop" or "error"'):
+        with pytest.raises(ValueError, match=r'islands is .*; it must be "keep", "drop-small", "drop" or "error"'):
             make(edge=0.25, islands=islands)
     words = ["mesh", balls, "-o", "b.stl", "--islands", "some"]
     assert "--islands" in run(*words, cwd=tmp_path, status=2).stderr

@@ -38,7 +38,7 @@ def test_a_map_that_folds_is_refused_and_can_be_allowed():
     turn = lt.grade.formula("170*tanh(2*(x-6))")
     with pytest.raises(lt.DesignError, match="folds at"):
         design(lt.map.phase(wavelength=3, rotate_z=turn)).build()
-    with pytest.warns(lt.DesignWarning, match="within one cell"):
+    with pytest.warns(lt.DesignWarning, match="degrees a cell"):
         design(lt.map.phase(wavelength=3, rotate_z=turn, folds=True)).build()
 
 
@@ -52,6 +52,29 @@ def test_tubes_and_balls_close():
     at = np.array([6.0 * n + 4 * (np.cos(t) * seam + np.sin(t) * across) for t in np.linspace(0, 2 * np.pi, 721)])
     values = solid.field(at)
     assert np.abs(np.diff(values)).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    "hole, words", [(None, "the axis lies in the region: cells shrink to nothing at (0, 0, "), (0.5, "cells are only 0.1")]
+)
+def test_cells_pinched_round_an_axis_are_warned_of(hole, words):
+    """Twenty cells round a hole of 0.5 mm are 2 pi 0.5 / 20 = 0.157 mm wide there; round one of 5 mm all is well."""
+
+    def told(hole):
+        rod = lt.region.cylinder(base=[0, 0, 0], radius=8, height=8)
+        bored = rod if hole is None else lt.region.difference(rod, lt.region.cylinder(base=[0, 0, -1], radius=hole, height=10))
+        core = lt.Lattice("gyroid", "sheet", lt.map.cylinder(wavelength=3, around=20), lt.level.fraction(0.3))
+        return lt.Design(region=bored, lattice={"core": core}).build().warnings
+
+    (warning,) = told(hole)
+    assert warning["path"] == "lattice.core.map.cylinder.around" and words in warning["message"]
+    assert told(5) == []
+
+
+def test_faults_of_angles_name_the_key_that_was_given():
+    with pytest.raises(lt.DesignError) as e:
+        design(lt.map.phase(wavelength=4, rotate_z=lt.grade.formula("30*sin(40*x)"), step=1.0)).build()
+    assert e.value.path == "lattice.core.map.phase.rotate_z"
 
 
 def test_a_cell_meshed_once_comes_back_as_a_series(tmp_path):

@@ -61,3 +61,11 @@ def test_the_schema_refuses_what_the_reader_refuses(tmp_path, keys, value):
     assert not jsonschema.Draft202012Validator(json.loads(_core.schema())).is_valid(data)
     with pytest.raises(lt.DesignError):
         _core.Design.from_data(data)
+
+
+def test_the_command_prints_the_schema(tmp_path):
+    """What an installed package prints is the schema of the repository, without any file of it."""
+    done = subprocess.run(
+        [sys.executable, "-m", "trabecula", "schema"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert json.loads(done.stdout) == json.loads((ROOT / "schema" / "design.json").read_text())

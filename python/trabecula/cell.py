@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from .given import plain, settings
 
@@ -86,9 +86,10 @@ def tet(
     site: Sequence[float] | None = None,
     dual: bool | None = None,
     edge: float | None = None,
-    zones: dict[int, str] | None = None,
+    zones: Mapping[int | str, str] | None = None,
 ) -> dict:
-    """A tetrahedral cell, for ``map.tets``: a ready one by its name, your own, or a ready one for each of the mesh's ``zones``.
+    """A tetrahedral cell, for ``map.tets``: a ready one by its name, your own, or a ready one for each of the mesh's ``zones``,
+    by their numbers or their names in the mesh's file.
 
     Your own is what a regular tetrahedron of ``edge`` (in edges of the cubic cell) about ``site`` (turns) cuts out of the sum
     of ``terms`` over ``group``, which must have full tetrahedral symmetry there; ``dual`` turns the tetrahedron upside down.

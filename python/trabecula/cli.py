@@ -8,8 +8,9 @@ import os
 import sys
 from collections.abc import Callable
 
-from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
-from .terminal import interrupts_leave, interrupts_raise, outcome, say
+from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, STDIN, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
+from .islands import ISLANDS
+from .terminal import fail, interrupts_leave, interrupts_raise, listen, outcome, settle, warn
 
 __all__ = ["main"]
 
@@ -71,11 +72,11 @@ def size(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def ending(known: tuple[str, ...]):
-    """A check of file names: one of the known suffixes."""
+def ending(known: tuple[str, ...], stdin: bool = False):
+    """A check of file names: one of the known suffixes, or ``-`` for standard input."""
 
     def check(text: str) -> str:
-        if kind_of(text) not in known:
+        if kind_of(text) not in known and not (stdin and text == STDIN):
             found = os.path.basename(text)
             raise argparse.ArgumentTypeError(f"the name must end in {dotted(known)}; found {found!r}")
         return text
@@ -91,9 +92,9 @@ def option(*names: str, **more):
     return names, more
 
 
-def file(name: str, known: tuple[str, ...], text: str, metavar: str = "FILE", **more):
+def file(name: str, known: tuple[str, ...], text: str, metavar: str = "FILE", stdin: bool = False, **more):
     """A file by its position on the command line, or after an option."""
-    return option(*name.split(), type=ending(known), metavar=metavar, help=text, **more)
+    return option(*name.split(), type=ending(known, stdin), metavar=metavar, help=text, **more)
 
 
 def output(known: tuple[str, ...], text: str, required: bool = True):
@@ -103,8 +104,10 @@ def output(known: tuple[str, ...], text: str, required: bool = True):
 
 def spacing(word: str = "--edge", *more):
     """The spacing of the grid; of these options one at most."""
-    edge = option(word, type=LENGTH, metavar="MM", dest="edge", help="grid spacing in mm")
-    text = "grid spacing as the smallest wavelength / N (default: 32)"
+    edge = option(
+        word, type=LENGTH, metavar="MM", dest="edge", help="grid spacing in mm; without it what the walls need, as `check` says"
+    )
+    text = "grid spacing as the smallest wavelength / N"
     return [edge, option("--per-cell", type=SAMPLES, metavar="N", help=text), *more]
 
 
@@ -114,8 +117,8 @@ WRITTEN = ", ".join(
     for suffix, row in MESHES.items()
     if row.writes
 )
-DESIGN = file("design", DESIGNS, "a design file (.toml or .json)", "DESIGN")
-DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file")
+DESIGN = file("design", DESIGNS, "a design file (.toml or .json), or - for standard input", "DESIGN", True)
+DESIGN_OR_MESH = file("file", (*DESIGNS, *MESH_READS), "a design or a mesh file; - is a design on standard input", stdin=True)
 JSON = option("--json", action="store_true", help="print the figures as JSON on stdout")
 THREADS = option("--threads", type=COUNT, metavar="N", help="threads (default: all); the result is the same for any number")
 PROGRESS = option(
@@ -123,6 +126,10 @@ PROGRESS = option(
     action=argparse.BooleanOptionalAction,
     default=None,
     help="show progress on stderr (default: if it is a terminal)",
+)
+NOTICES = (
+    option("--quiet", action="store_true", help="errors only: no warnings, progress or summary on stderr"),
+    option("--strict", action="store_true", help="a warning is an error: exit status 1, and no file is written"),
 )
 LIGHTER = (
     option("--tolerance", type=LENGTH, metavar="MM", help="fewer triangles, the surface moved by at most this, mm"),
@@ -142,7 +149,7 @@ COMMANDS = {
     "check": (
         "Build a design and print its level, fraction, wall thickness and warnings, without meshing.",
         "example:\n  trabecula check part.toml --json",
-        *(DESIGN, JSON, TRANSITIONS),
+        *(DESIGN, JSON, TRANSITIONS, *NOTICES),
     ),
     "mesh": (
         "Mesh a design: closed, oriented, free of self-intersection.",
@@ -166,13 +173,14 @@ COMMANDS = {
         *(THREADS, PROGRESS),
         option(
             "--islands",
-            choices=("keep", "drop", "error"),
-            default="keep",
-            help="connected components other than the largest: keep them with a warning (default), drop them, or refuse",
+            choices=ISLANDS,
+            default="drop-small",
+            help="connected components other than the largest: drop those at the region's boundary with less volume than "
+            "eight grid cells and warn of the others (default), keep all with a warning, drop all, or refuse",
         ),
         *LIGHTER,
         option("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary"),
-        JSON,
+        *(JSON, *NOTICES),
     ),
     "simplify": (
         "Make a mesh file lighter: fewer triangles, every guarantee, sharp edges and the volume kept.",
@@ -187,7 +195,7 @@ COMMANDS = {
         "Write the solid as cubic voxels.",
         "The name of OUT decides the format: .npy (indexed [x, y, z], 1 is solid) or .vti (for ParaView).\n\n"
         "example:\n  trabecula voxels part.toml -o part.vti --step 0.2",
-        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step"), *(THREADS, PROGRESS), JSON),
+        *(DESIGN, output(VOXEL_WRITES, "the voxels to write"), spacing("--step"), *(THREADS, PROGRESS, JSON, *NOTICES)),
     ),
     "tets": (
         "Make or check the tetrahedral mesh that carries a lattice; print its quality; write it.",
@@ -206,7 +214,7 @@ COMMANDS = {
         "Slice the beams of a design at a height: loops of conic arcs, exact area, drawing.",
         "The beams are sliced uncut: without the region that cuts them, and without a skin.\n\n"
         "examples:\n  trabecula slice part.toml --z 5\n  trabecula slice part.toml --z 5 -o layer.svg --chord 0.005",
-        file("design", DESIGNS, "a design file (.toml or .json) with beams", "DESIGN"),
+        file("design", DESIGNS, "a design with beams (.toml or .json), or - for standard input", "DESIGN", True),
         option("--z", type=number("a height in mm"), required=True, metavar="MM", help="height of the plane, mm"),
         option("--beams", metavar="NAME", help="the beams to slice (needed only if there are several)"),
         output(("svg",), "the drawing to write (.svg)", False),
@@ -242,7 +250,7 @@ COMMANDS = {
             action="store_true",
             help="also weakly attached fragments of a design: necks under half the lattice's narrowest",
         ),
-        *(TRANSITIONS, JSON),
+        *(TRANSITIONS, JSON, *NOTICES),
     ),
     "cells": (
         "List the named cells: formula, space group, range, fractions in one piece, source.",
@@ -253,6 +261,11 @@ COMMANDS = {
         option("--beams", action="store_true", help="the unit cells of beams instead: group, nodes, valence, Maxwell count"),
         JSON,
     ),
+    "schema": (
+        "Print the JSON Schema of designs, by which an editor completes and checks them.",
+        "An editor that knows Taplo's directive takes the schema of a TOML file from its first line, `#:schema FILE`.\n\n"
+        "example:\n  trabecula schema > design.json",
+    ),
     "render": (
         "Draw a design or a mesh file as PNG.",
         "example:\n  trabecula render part.toml -o part.png --size 1600x1200 --azimuth 30 --elevation 25",
@@ -261,7 +274,7 @@ COMMANDS = {
         option("--azimuth", type=ANGLE, default=30.0, metavar="DEG", help="camera about +z (default: 30)"),
         option("--elevation", type=ANGLE, default=25.0, metavar="DEG", help="camera above xy (default: 25)"),
         option("--show", choices=SHOWN, help="colour by the deviation of a solved map from the one asked for"),
-        *(spacing(), THREADS, PROGRESS),
+        *(spacing(), THREADS, PROGRESS, *NOTICES),
     ),
 }
 
@@ -304,7 +317,7 @@ def main(argv: list[str] | None = None) -> int:
         finally:
             sys.stdout.flush()
     except KeyboardInterrupt:
-        say(outcome())
+        fail(outcome())
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -318,7 +331,9 @@ def serve(argv: list[str] | None) -> int:
     import warnings
 
     top = parser()
-    args = top.parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    known_command(top, words)
+    args = top.parse_args(words)
     if args.version:
         from . import __version__
 
@@ -329,20 +344,39 @@ def serve(argv: list[str] | None) -> int:
     if args.command is None:
         top.print_help(sys.stderr)
         return 2
-    warnings.showwarning = lambda message, *rest, **more: say(f"warning: {message}")
+    listen(getattr(args, "quiet", False), getattr(args, "strict", False))
     try:
         from . import commands
+        from .errors import DesignWarning
 
         interrupts_raise()
-        getattr(commands, args.command)(args)
+        with warnings.catch_warnings():
+            # Whatever the environment asks of Python's own warnings.
+            warnings.simplefilter("always", DesignWarning)
+            warnings.showwarning = lambda found, *rest, **more: warn(
+                getattr(found, "message", str(found)), getattr(found, "path", "")
+            )
+            getattr(commands, args.command)(args)
+        settle()
         return 0
     except BrokenPipeError:
         raise
     except Exception as error:
         if os.environ.get("TRABECULA_DEBUG"):
             raise
-        say("trabecula: " + words_of(error))
+        fail("trabecula: " + words_of(error))
         return 1
+
+
+def known_command(top: argparse.ArgumentParser, words: list[str]) -> None:
+    """Leaves with status 2 if the first word is no command, with the nearest one."""
+    name = next((word for word in words if not word.startswith("-")), None)
+    if name is not None and name not in COMMANDS:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name.lower(), COMMANDS, 1)
+        hint = f"; did you mean {near[0]}?" if near else "."
+        top.error(f"no command is named {name}{hint} There are: {', '.join(COMMANDS)}")
 
 
 def words_of(error: Exception) -> str:

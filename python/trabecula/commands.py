@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 import warnings
 from contextlib import contextmanager
+from functools import cache
 
+from . import _core, cell
 from . import beams as unit_cells
-from . import cell
 from .catalogue import cell_facts
 from .cli import SHOWN
-from .design import load
+from .design import Design, load, parsed
 from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
-from .formats import DESIGNS, MESH_READS, STREAMS, kind_of
+from .formats import DESIGNS, MESH_READS, STDIN, STREAMS, is_design, kind_of
 from .machine import fits
 from .mesh import Mesh
 from .solid import Solid
 from .starter import STARTER
-from .terminal import Progress, figure, say
-from .texts import counted, intervals, point, table, voids
+from .terminal import Progress, figure, say, settle, told, warn
+from .texts import counted, intervals, table, voids
 
-__all__ = ["cells", "check", "measure", "mesh", "new", "render", "simplify", "slice", "tets", "voxels"]
+__all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "tets", "voxels"]
 
 
 def new(args) -> None:
@@ -42,11 +44,13 @@ def check(args) -> None:
     """``trabecula check``."""
     solid = build(args.design, tell=not args.json)
     report = solid.report()
-    found = transitions(solid, args.transitions)
+    found = transitions(solid, args.transitions, tell=not args.json)
+    draw(found, args.transitions)
     if args.json:
         figures = report.to_dict()
         if report.blend:
             figures["blend"]["transitions"] = [t.to_dict() for t in found]
+            figures["warnings"] += found.warnings
         return put_json(figures)
     print("\n".join(map(str, [report, *found])))
 
@@ -66,13 +70,10 @@ def mesh(args) -> None:
     made["seconds"] = round(time.perf_counter() - start, 3)
     others = made["islands"]
     if others and others["dropped"]:
-        largest = others["largest"]
-        say(
-            f"{counted(others['dropped'])} dropped: {others['volume']:.3g} mm³ in all, {others['border']} at the "
-            f"region's boundary; the largest of {largest['volume']:.3g} mm³ about {point(largest['place'])} mm"
-        )
+        small = "at the region's boundary, smaller than eight grid cells, " if args.islands == "drop-small" else ""
+        say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
     if args.json:
-        return put_json(made)
+        return put_json(made | {"warnings": told()})
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
@@ -88,14 +89,17 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
     asked = {} if args.chord is None else {"chord": args.chord}
     streams = not (lighter or args.open) and kind_of(args.output) in STREAMS
     if streams and (asked or not closes(solid, resolution(args))):
-        made = solid.save_stl(args.output, **options).to_dict() | asked
-        if made["cavities"]:
-            progress.clear()
-            say(
-                f"warning: {counted(made['cavities'], 'closed void')}, from which powder or resin cannot "
-                f"drain; `trabecula measure {args.output}` tells where"
-            )
-        return made
+        given = {"edge": None, "per_cell": None, "chord": None} | options
+
+        def accept(found) -> None:
+            if found.cavities:
+                warn(
+                    f"{counted(found.cavities, 'closed void')}, from which powder or resin cannot drain; "
+                    f"`trabecula measure {args.output}` tells where"
+                )
+            settle()
+
+        return solid._save_stl(args.output, **given, accept=accept).to_dict() | asked
     if not lighter and not asked:
         solid.check_room(args.output, **resolution(args))
     surface = solid.mesh(**options)
@@ -108,7 +112,8 @@ def meshed_file(solid: Solid, args, progress: Progress) -> dict:
         if surface.simplification:
             made["simplification"] = surface.simplification.to_dict()
         if surface.voids:
-            say(voids(surface.voids))
+            warn(voids(surface.voids))
+    settle()
     if args.open:
         surface = surface.uncapped()
         made |= {"triangles": surface.counts[1], "open": True}
@@ -138,7 +143,7 @@ def simplified(mesh: Mesh, args) -> Mesh:
         say(f"{it.triangles} triangles are no more than {args.triangles} already: left as they are")
         return made
     if args.triangles and not args.tolerance and it.triangles > args.triangles:
-        say(f"warning: {it.triangles} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
+        warn(f"{it.triangles} triangles are the fewest that keep the surface whole; {args.triangles} were asked for")
     change = 100 * (it.volume / it.volume_before - 1)
     say(
         f"simplified from {it.triangles_before} to {it.triangles} triangles, nowhere farther than "
@@ -157,12 +162,13 @@ def voxels(args) -> None:
     options = {"step" if k == "edge" else k: v for k, v in resolution(args).items()}
     with Progress("sampling", args.progress) as progress:
         grid = solid.voxels(threads=args.threads, progress=progress, **options)
+    settle()
     grid.write(args.output)
     made = {"shape": list(grid.shape), "step": grid.step, "origin": grid.origin, "volume": grid.volume}
     made["solid_fraction"] = made["volume"] / solid.region_volume(grid.step)
     made["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
-        return put_json(made)
+        return put_json(made | {"warnings": told()})
     shape = " × ".join(map(str, grid.shape))
     say(
         f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
@@ -173,7 +179,7 @@ def voxels(args) -> None:
 def measure(args) -> None:
     """``trabecula measure``."""
     check_measure(args)
-    solid = build(args.file) if kind_of(args.file) in DESIGNS else None
+    solid = build(args.file) if is_design(args.file) else None
     if args.dangling and solid is None:
         raise Refused("--dangling is for designs: the narrowest neck of the lattice is not known for a mesh file")
     if solid is None and args.transitions is not None:
@@ -183,11 +189,18 @@ def measure(args) -> None:
     if args.region:
         made = made.within(args.region)
     figures = made.measure().to_dict()
-    warn_measured(args.file, made)
+    warn_measured("the design" if args.file == STDIN else args.file, made)
+    inverted = figures["closed"] and figures["volume"] < 0
+    if figures["closed"] and not inverted and made.voids:
+        warn(voids(made.voids))
     figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
+    if solid is not None:
+        figures["edge"] = solid.spacing(args.edge, args.per_cell)
     if args.dangling:
         with Progress("looking for fragments", args.progress) as progress:
             figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)
+    settle()
+    draw(found, args.transitions)
     if args.thickness:
         with Progress("fitting balls", args.progress) as progress:
             balls = made.thickness(args.step, args.threads, progress)
@@ -197,15 +210,12 @@ def measure(args) -> None:
     if found:
         figures["transitions"] = list(found)
     if args.json:
-        return put_json(figures)
+        return put_json(figures | {"warnings": told()})
     bare = solid is None and not args.region
-    inverted = figures["closed"] and figures["volume"] < 0
     shown = figures | ({"closed": "yes, but inside out"} if inverted else {})
     print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
     for transition in found:
         print(transition)
-    if figures["closed"] and not inverted and made.voids:
-        say(voids(made.voids))
 
 
 def check_measure(args) -> None:
@@ -223,19 +233,19 @@ def check_measure(args) -> None:
 def warn_measured(name: str, made: Mesh) -> None:
     """Warns of a mesh whose figures may mislead."""
     if (made.solid_fraction or 0) > 1.01:
-        say(f"warning: {name} holds more than the region does; they may not be in the same place or unit")
+        warn(f"{name} holds more than the region does; they may not be in the same place or unit")
     if not made.closed:
         flaws = [d for d in made.defects if d.split(" ", 1)[1].startswith("edge")]
         why = ", ".join(flaws) or "triangles with a corner twice"
-        return say(f"warning: {name} is not closed ({why}), so its volume and what follows from it mean little")
+        return warn(f"{name} is not closed ({why}), so its volume and what follows from it mean little")
     if made.volume < 0:
-        say(
-            f"warning: {name} is closed but inside out (its triangles run clockwise seen from outside), so its volume "
+        warn(
+            f"{name} is closed but inside out (its triangles run clockwise seen from outside), so its volume "
             "is negative and its solids count as cavities"
         )
     if made.self_intersections:
-        say(
-            f"warning: the surface of {name} crosses itself, so volume in several of its bodies is counted "
+        warn(
+            f"the surface of {name} crosses itself, so volume in several of its bodies is counted "
             "several times; taken as a region (region.mesh) they are united"
         )
 
@@ -301,8 +311,10 @@ def render(args) -> None:
     check_place(args.output)
     view = args.size, args.azimuth, args.elevation
     if args.show is None:
-        surface(args).render(args.output, *view)
-    elif kind_of(args.file) not in DESIGNS:
+        made = surface(args)
+        settle()
+        made.render(args.output, *view)
+    elif not is_design(args.file):
         raise Refused(f"{args.file} is a mesh; --show is for a design with a solved map (map.phase)")
     else:
         solid = build(args.file)
@@ -311,15 +323,26 @@ def render(args) -> None:
             found = solid.map_error(made.vertices)
         except ValueError as error:
             raise Refused(f"{args.file}: {error}") from None
+        settle()
         made.render(args.output, *view, found[args.show], SHOWN[args.show])
     say(f"{args.output}: {args.size[0]} × {args.size[1]} pixels")
 
 
+def schema(args) -> None:
+    """``trabecula schema``."""
+    print(_core.schema().rstrip("\n"))
+
+
 def cells(args) -> None:
     """``trabecula cells``."""
-    if args.tet:
+    tet, beams = args.tet, args.beams
+    if args.name and not (tet or beams) and args.name not in cell.names():
+        # A name of one of the other lists says itself which is meant.
+        tet = args.name in cell.tet_names()
+        beams = not tet and args.name in {it["name"] for it in unit_cells.cells()}
+    if tet:
         names, facts, words = cell.tet_names(), cell.tet_facts, tet_cell_words
-    elif args.beams:
+    elif beams:
         found = {it["name"]: it for it in unit_cells.cells()}
         names, facts, words = list(found), found.__getitem__, unit_cell_words
     else:
@@ -398,7 +421,7 @@ def keep_file(name: str, output: str) -> None:
 
 def keep_inputs(design: str, output: str) -> None:
     """Refuses an output that is the design, or a file that the design reads."""
-    for name in [design, *load(design).files()] if os.path.exists(output) else ():
+    for name in [design, *design_of(design).files()] if os.path.exists(output) else ():
         keep_file(name, output)
 
 
@@ -410,26 +433,52 @@ def quietly(category: type[Warning]):
         yield
 
 
+def design_of(path: str) -> Design:
+    """The design of a file, or of standard input: JSON if it begins with a brace, else TOML."""
+    if path != STDIN:
+        return load(path)
+    text = stdin_text()
+    return parsed(text, text.lstrip().startswith("{"), "<stdin>", os.getcwd())
+
+
+@cache
+def stdin_text() -> str:
+    """Standard input, which can be read once only."""
+    try:
+        return sys.stdin.buffer.read().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Refused(f"<stdin>: not text in UTF-8 (byte {error.start})") from None
+
+
 def build(path: str, tell: bool = True) -> Solid:
-    """The solid of a design file; its warnings go to stderr."""
+    """The solid of a design; its warnings are told, and with --strict refused before more work is done."""
     with quietly(DesignWarning):
-        solid = load(path).build()
-    for warning in solid.warnings if tell else ():
-        say(f"warning: {warning['path']}: {warning['message']}")
+        solid = design_of(path).build()
+    for warning in solid.warnings:
+        warn(warning["message"], warning["path"], tell)
+    settle()
     return solid
 
 
-def transitions(solid: Solid, picture: str | None, design: str | None = None):
-    """The transitions of a blend, drawn to ``picture`` if one is asked for."""
+def transitions(solid: Solid, picture: str | None, design: str | None = None, tell: bool = True):
+    """The transitions of a blend, if one is asked for with a picture that can be written."""
     found = solid.transitions()
+    for warning in found.warnings:
+        warn(warning["message"], warning["path"], tell)
+    settle()
     if picture is not None:
         if not found:
             raise Refused("--transitions is for designs with a blend; this one has none")
         check_place(picture)
         if design is not None:
             keep_inputs(design, picture)
-        found.render(picture)
     return found
+
+
+def draw(found, picture: str | None) -> None:
+    """Draws the transitions to ``picture`` if one is asked for."""
+    if picture is not None:
+        found.render(picture)
 
 
 def resolution(args) -> dict:
@@ -438,12 +487,12 @@ def resolution(args) -> dict:
         return {"chord": args.chord}
     if args.edge is not None:
         return {"edge": args.edge}
-    return {"per_cell": 32 if args.per_cell is None else args.per_cell}
+    return {"per_cell": args.per_cell}
 
 
 def surface(args) -> Mesh:
     """The mesh of a design or a mesh file."""
-    if kind_of(args.file) in DESIGNS:
+    if is_design(args.file):
         return meshed(build(args.file), args)
     if args.edge is not None or args.per_cell is not None:
         raise Refused(f"{args.file} is a mesh already; --edge and --per-cell are for designs")
@@ -463,6 +512,6 @@ def closes(solid: Solid, options: dict) -> bool:
     try:
         fits(2 * solid.estimate(**options).memory, "the surface")
     except ValueError:
-        say("warning: the surface does not fit into memory and is streamed; closed voids are not looked for")
+        warn("the surface does not fit into memory and is streamed; closed voids are not looked for")
         return False
     return True

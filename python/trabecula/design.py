@@ -151,7 +151,7 @@ class Design:
         folder = self.folder or os.getcwd()
         made = Solid(self._checked().build(folder), folder)
         for warning in made.warnings:
-            warnings.warn(f"{warning['path']}: {warning['message']}", DesignWarning, stacklevel=2)
+            warnings.warn(DesignWarning(warning["message"], warning["path"]), stacklevel=2)
         return made
 
     def files(self) -> list[str]:
@@ -190,11 +190,15 @@ def load(path: str | os.PathLike[str]) -> Design:
     """
     name = os.fsdecode(path)
     kind = extension(name, ("toml", "json"))
-    read = _core.Design.from_text(read_text(name), kind == "json", name)
+    return parsed(read_text(name), kind == "json", name, os.path.dirname(os.path.abspath(name)))
+
+
+def parsed(text: str, is_json: bool, name: str, folder: str) -> Design:
+    """The design of a text; ``name`` stands in messages, relative paths start from ``folder``."""
+    read = _core.Design.from_text(text, is_json, name)
     data: dict[str, Any] = json.loads(read.to_json())
     lattices = {k: Lattice(**v) for k, v in data["lattice"].items()} if "lattice" in data else None
     beams = {k: Beams(**v) for k, v in data["beams"].items()} if "beams" in data else None
-    folder = os.path.dirname(os.path.abspath(name))
     more = {key: data.get(key) for key in ("skin", "keep", "blend")}
     design = Design(data["region"], lattices, data["units"], data["schema"], beams=beams, folder=folder, **more)
     object.__setattr__(design, "_read", read)

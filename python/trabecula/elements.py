@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import shutil
+import sys
 import tempfile
 from typing import TYPE_CHECKING
 
+from . import children
 from .formats import MESHIO_READS, MESHIO_WRITES, TET_READS, dotted, kind_of
 
 if TYPE_CHECKING:
+    import meshio
     import numpy as np
     from numpy.typing import NDArray
 
@@ -36,6 +41,14 @@ ZONES = ("zone", "gmsh:physical", "medit:ref", "cell_tags", "MaterialIds", "mate
 HDF5 = ("med", "cgns")
 
 
+#: The arrays of a file that was read.
+KEYS = ("points", "connectivity", "ends", "kinds", "zones", "named", "names")
+
+#: Bytes of memory that reading takes at most: of the interpreter with its packages, and for each byte of the file. A digit
+#: of a text may become a list's number of 32 bytes and its place in the list, twice over while lists grow.
+BASE, PER_BYTE = 3e9, 100.0
+
+
 def needed(kind: str = ""):
     """The package meshio; one clear error if it, or what it needs for files of this ``kind``, is missing."""
     try:
@@ -53,54 +66,162 @@ def needed(kind: str = ""):
     return meshio
 
 
-def read(path: str | os.PathLike[str]) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Points (n, 3), the points of all volume cells one after the other, where each ends, its kind (VTK's number), zones.
+def read(
+    path: str | os.PathLike[str], limit: float | None = None
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, list[tuple[int, str]]]:
+    """Points (n, 3), the points of all volume cells one after the other, where each ends, its kind (VTK's number), its zone (a
+    number), and the names of zones as pairs (number, name).
 
-    Raises ValueError for what cannot be read.
+    Read in a process of its own, of at most ``limit`` seconds (20 and 2 for each MB, unless given) and of bounded memory:
+    damaged files make readers hang. Raises ValueError for what cannot be read.
     """
-    import contextlib
-    import io
+    import numpy as np
 
-    name = os.fsdecode(path)
+    name = os.path.abspath(os.fsdecode(path))
     kind = kind_of(name)
     if kind not in MESHIO_READS:
         raise ValueError(f"{name}: the name must end in {dotted(TET_READS)}; found .{kind or ' none'}")
     if not os.path.isfile(name):
         raise ValueError(f"{name} does not exist" if not os.path.exists(name) else f"{name} is no file")
-    meshio = needed(kind)
+    needed(kind)
+    size = os.path.getsize(name)
+    seconds = 20 + 2e-6 * size if limit is None else limit
+    with tempfile.TemporaryDirectory(prefix="trabecula-") as folder:
+        made = os.path.join(folder, "made.npz")
+        outcome = children.run(children.python("elements", name, made, str(BASE + PER_BYTE * size)), folder, seconds)
+        if outcome is not None:
+            outcome = outcome.removeprefix("failed: ")
+            raise ValueError(f"{name} cannot be read: {outcome if outcome[0] != 'd' else f'meshio {outcome}'}; is it damaged?")
+        with np.load(made) as found:
+            *arrays, named, names = (found[key] for key in KEYS)
+            return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
+
+
+def child(name: str, made: str, memory: str) -> None:
+    """Reads a file within ``memory`` bytes and writes its arrays; what is wrong with it is the last line of the words."""
+    import io
+
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        most = int(float(memory))
+        resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    import meshio
     import numpy as np
 
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # it talks, and leaves with sys.exit
             mesh = meshio.read(name)
+        arrays = volumes(mesh)
+    except MemoryError:
+        sys.exit(f"it takes more than {float(memory) / 1e9:.1f} GB of memory")
+    except NoVolume as error:
+        sys.exit(str(error))
+    except meshio.ReadError as error:
+        sys.exit(without_contents(str(error)) or "no such format")
     except (Exception, SystemExit) as error:
-        reason = str(error) if not isinstance(error, SystemExit) else " ".join(said.getvalue().split())
-        raise ValueError(f"{name} cannot be read: {reason or type(error).__name__}") from None
+        # What else goes wrong quotes the file, which may be another than was meant.
+        sys.exit(f"meshio finds no mesh in it ({type(error).__name__})")
+    np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
+
+
+def without_contents(text: str) -> str:
+    """The first 80 characters of a message, without what it quotes of a file: it may be another file than was meant."""
+    line = " ".join(text.split())
+    line = re.sub(r"""(["'`])(?!\*?\$?\w{1,16}\1).*?\1""", "...", line)
+    return line if len(line) <= 80 else line[:77] + "..."
+
+
+class NoVolume(ValueError):
+    """A mesh without cells of three dimensions."""
+
+
+def volumes(mesh: meshio.Mesh) -> tuple[NDArray, ...]:
+    """The volume cells of a mesh, as ``read`` gives them; the numbers and the names of zones apart."""
+    import numpy as np
+
     points = np.asarray(mesh.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"{name}: points of {points.shape[-1]} coordinates; three are needed")
-    key = next((z for z in ZONES if z in mesh.cell_data), None)
-    cells, ends, kinds, zones = [], [], [], []
+        raise NoVolume(f"its points have {points.shape[-1]} coordinates; three are needed")
+    cells, ends, kinds, blocks = [], [], [], []
     for i, block in enumerate(mesh.cells):
         number = VOLUMES.get(block.type)
         if number is None:
             continue
+        blocks.append(i)
         data = np.asarray(block.data)
         cells.append(data.reshape(-1).astype(np.uint32))
         ends.append(np.full(len(data), data.shape[1], dtype=np.uint64))
         kinds.append(np.full(len(data), number, dtype=np.uint8))
-        if key is not None:
-            zones.append(np.asarray(mesh.cell_data[key][i]).reshape(-1).astype(np.uint32))
     if not cells:
         held = ", ".join(sorted({block.type for block in mesh.cells})) or "nothing"
-        raise ValueError(f"{name} holds no volume (but {held}); tetrahedra are needed")
-    none = np.zeros(0, dtype=np.uint32)
+        raise NoVolume(f"it holds no volume (but {held:.60}); tetrahedra are needed")
     flat = np.concatenate(cells), np.cumsum(np.concatenate(ends), dtype=np.uint64), np.concatenate(kinds)
-    return np.ascontiguousarray(points), *flat, np.concatenate(zones) if zones else none
+    zones, names = zones_of(mesh, blocks)
+    named = np.array([number for number, _ in names], dtype=np.int64)
+    return np.ascontiguousarray(points), *flat, zones, named, np.array([name for _, name in names], dtype=np.str_)
 
 
-def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uint32], zones: NDArray[np.uint32]) -> None:
+def zones_of(mesh: meshio.Mesh, blocks: list[int]) -> tuple[NDArray, list[tuple[int, str]]]:
+    """The zone of each cell of these blocks, a number, or none, and the names of zones as pairs (number, name).
+
+    Numbers are the file's own. Where it has sets of elements, cells of equal number in different sets get numbers of their
+    own, and so do cells of sets alone, from 1; what is in no set is then 0.
+    """
+    import numpy as np
+
+    key = next((z for z in ZONES if len(mesh.cell_data.get(z, ())) == len(mesh.cells)), None)
+    count = sum(len(mesh.cells[i].data) for i in blocks)
+    zones = np.zeros(0, dtype=np.int64)
+    if key is not None:
+        zones = np.concatenate([np.asarray(mesh.cell_data[key][i]).reshape(-1) for i in blocks]).astype(np.int64)
+    # Families of MED; physical groups of Gmsh, by number and dimension, unless they are sets too.
+    families = getattr(mesh, "cell_tags", None) if key == "cell_tags" else None
+    names = [(int(number), str(name)) for number, of in (families or {}).items() for name in of]
+    sets = {name: flags for name in mesh.cell_sets if (flags := members(mesh, name, blocks)).any()}
+    if key == "gmsh:physical":
+        groups = {name: v for name, v in mesh.field_data.items() if name not in sets and np.shape(v) == (2,) and v[1] == 3}
+        names += [(int(v[0]), name) for name, v in groups.items()]
+    if not sets:
+        return zones, names
+    flags = np.stack(list(sets.values()))
+    base = zones if len(zones) else np.zeros(count, dtype=np.int64)
+    kinds, which = np.unique(np.vstack([base, ~flags]), axis=1, return_inverse=True)
+    own_names, numbers, fresh = list(names), [], max(0, int(base.max()))
+    for kind in kinds.T.tolist():
+        own = kind[0]
+        if (own in numbers) if len(zones) else (0 in kind[1:]):
+            fresh += 1
+            numbers.append(fresh)
+        else:
+            numbers.append(own)
+        if len(zones):
+            names += [(numbers[-1], name) for number, name in own_names if number == own != numbers[-1]]
+            names += [(n, str(own)) for n in {own, numbers[-1]} if own != numbers[-1] and (n, str(own)) not in names]
+        names += [(numbers[-1], name) for name, out in zip(sets, kind[1:], strict=True) if not out]
+    return np.array(numbers, dtype=np.int64)[which.reshape(-1)], names
+
+
+def members(mesh: meshio.Mesh, name: str, blocks: list[int]) -> NDArray:
+    """Which cells of these blocks are in a set; none, where the reader left something else than indices."""
+    import numpy as np
+
+    of = mesh.cell_sets[name]
+    parts = []
+    for i in blocks:
+        flags = np.zeros(len(mesh.cells[i].data), dtype=bool)
+        with contextlib.suppress(ValueError, TypeError):
+            # Sets that a file has before its last elements are shorter; Gmsh's bounding entities are no cells.
+            chosen = np.asarray(of[i] if i < len(of) and not name.startswith("gmsh:") else [])
+            if chosen.ndim == 1 and chosen.size and chosen.dtype.kind in "iu":
+                flags[chosen[(chosen >= 0) & (chosen < len(flags))]] = True
+        parts.append(flags)
+    return np.concatenate(parts)
+
+
+def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uint32], zones: NDArray[np.int64]) -> None:
     """Writes tetrahedra as a file of the format that ``kind`` (an extension) names."""
     meshio = needed(kind)
     import numpy as np
@@ -121,3 +242,7 @@ def write(path: str, kind: str, nodes: NDArray[np.float64], tets: NDArray[np.uin
         own = os.path.join(folder, f"mesh.{kind}")
         meshio.write(own, mesh, **more)
         shutil.copyfile(own, path)
+
+
+if __name__ == "__main__":
+    child(*sys.argv[1:])

@@ -34,7 +34,18 @@ class DesignError(ValueError):
 
 
 class DesignWarning(UserWarning):
-    """A possible mistake in the design: allowed, but perhaps not meant."""
+    """A possible mistake in the design: allowed, but perhaps not meant.
+
+    Attributes: ``message`` and ``path`` (of the table or key that it is about, or empty).
+    """
+
+    def __init__(self, message: str, path: str = ""):
+        super().__init__(f"{path}: {message}" if path else message)
+        self.message = message
+        self.path = path
+
+    def __reduce__(self):
+        return (type(self), (self.message, self.path))
 
 
 class IslandsWarning(DesignWarning):

@@ -8,10 +8,12 @@ from . import _core
 
 __all__ = [
     *("DESIGNS", "MESHES", "MESHIO_READS", "MESHIO_WRITES", "MESH_READS", "MESH_WRITES", "STREAMS", "TET_READS", "TET_WRITES"),
-    *("VOXEL_WRITES", "dotted", "kind_of"),
+    *("STDIN", "VOXEL_WRITES", "dotted", "is_design", "kind_of"),
 ]
 
 DESIGNS = ("toml", "json")
+#: The name that stands for standard input.
+STDIN = "-"
 #: The mesh formats by suffix.
 MESHES = {row.suffix: row for row in _core.mesh_formats()}
 MESH_READS = tuple(MESHES)
@@ -29,6 +31,11 @@ TET_WRITES = ("vtu", *MESHIO_WRITES)
 def kind_of(path: str) -> str:
     """The suffix in small letters, without the dot."""
     return os.path.splitext(path)[1].lower().lstrip(".")
+
+
+def is_design(name: str) -> bool:
+    """Whether a name on the command line is that of a design."""
+    return name == STDIN or kind_of(name) in DESIGNS
 
 
 def dotted(suffixes: tuple[str, ...]) -> str:

@@ -11,11 +11,14 @@ TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
     from typing import Any
 
+    from numpy.typing import NDArray
+
 __all__ = [
     "Points",
     "Stops",
     "control",
     "copied",
+    "fixed",
     "number",
     "numbered",
     "pairs",
@@ -79,6 +82,12 @@ def three(name: str, value: Any) -> list[float]:
     if len(items) != 3:
         raise ValueError(f"{name} must be one number or three, found {len(items)}")
     return [number(name, v) for v in items]
+
+
+def fixed(array: NDArray) -> NDArray:
+    """The array, read-only: what it is a copy of would not follow a change."""
+    array.flags.writeable = False
+    return array
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Literal
 
 from .given import Points, Stops, control, pairs, settings
 
@@ -85,15 +86,22 @@ def points(path: str | os.PathLike[str], neighbours: int | None = None, remap: S
     return {"points": settings(path=os.fspath(path), neighbours=neighbours, remap=pairs(remap))}
 
 
-def field(path: str | os.PathLike[str], array: str, component: int | None = None, remap: Stops | None = None) -> dict:
+def field(
+    path: str | os.PathLike[str],
+    array: str,
+    unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
+    component: int | None = None,
+    remap: Stops | None = None,
+) -> dict:
     """An array of a result on a mesh of volume elements, from a file.
 
-    path: Path of the file (vtu, vtk, vti), relative to the design file. Coordinates are mm.
+    path: Path of the file (vtu, vtk, vti), relative to the design file.
     array: Name of the array, of points or cells.
+    unit: Unit of the file's coordinates (mm unless given). [optional]
     component: Which of its components, from 0, where it has several. [from 0, optional]
     remap: The values that the numbers map to: pairs [number, value], number rising, linear between. [optional]
     """
-    return {"field": settings(path=os.fspath(path), array=array, component=component, remap=pairs(remap))}
+    return {"field": settings(path=os.fspath(path), array=array, unit=unit, component=component, remap=pairs(remap))}
 
 
 def sigmoid(of: float | dict, width: float, at: float | None = None) -> dict:

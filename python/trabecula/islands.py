@@ -14,22 +14,26 @@ if TYPE_CHECKING:
 
     from .reports import IslandsReport
 
-    Islands = Literal["keep", "drop", "error"]
+    Islands = Literal["keep", "drop-small", "drop", "error"]
+
+
+#: What can become of all connected components but the largest.
+ISLANDS = ("keep", "drop-small", "drop", "error")
 
 
 def check_islands(islands: object) -> None:
     """Refuses what is no word for it, before any work is done."""
-    if not (isinstance(islands, str) and islands in ("keep", "drop", "error")):
-        raise ValueError(f'islands is {islands!r}; it must be "keep", "drop" or "error"')
+    if not (isinstance(islands, str) and islands in ISLANDS):
+        raise ValueError(f'islands is {islands!r}; it must be "keep", "drop-small", "drop" or "error"')
 
 
 def left_out(islands: IslandsReport) -> float:
     """Volume of what was dropped, mm³."""
-    return islands.volume if islands.dropped else 0.0
+    return islands.dropped_volume
 
 
 def warn_islands(islands: IslandsReport, words: str) -> None:
     """Warns of a result in several pieces: to drop them unasked would change the part, to say nothing would hide them."""
     if islands.found > islands.dropped:
-        message = f'the result is not in one piece: {words}; islands = "drop" leaves them out'
+        message = f'the result is not in one piece: {words}; islands = "drop" (--islands drop) leaves all but the largest out'
         warnings.warn(message, IslandsWarning, stacklevel=3)

@@ -24,21 +24,26 @@ def thickness(value: Amount, mid: float = 0.0) -> dict:
     return _level("thickness", value, mid=mid)
 
 
-def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
+def fraction(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
     """The solid volume fraction, between 0 and 1, of the periodic cell (``of="cell"``) or of the finished part
     (``of="part"``, solved for).
 
     ``fit="spartan"`` uses the SPARTAN polynomial instead of the cell's own distribution (part ``lower``; diamond,
     gyroid). ``mid`` moves a sheet off its centre: |f - mid| ≤ t.
+
+    With ``thickness``, mm, of a sheet's wall or a network's narrowest neck, the wavelength is solved for: the map is
+    ``map.affine()`` or ``map.spartan()`` without one, or with three as ratios.
     """
-    return _level("fraction", value, of, fit, mid)
+    return _level("fraction", value, of, fit, mid, thickness)
 
 
-def porosity(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
+def porosity(value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None) -> dict:
     """One minus the solid fraction; see ``fraction``."""
-    return _level("porosity", value, of, fit, mid)
+    return _level("porosity", value, of, fit, mid, thickness)
 
 
-def _level(key: str, value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0) -> dict:
-    given = {"of": (of, "cell"), "fit": (fit, "table"), "mid": (mid, 0.0)}
+def _level(
+    key: str, value: Amount, of: str = "cell", fit: str = "table", mid: float = 0.0, thickness: float | None = None
+) -> dict:
+    given = {"of": (of, "cell"), "fit": (fit, "table"), "mid": (mid, 0.0), "thickness": (thickness, None)}
     return {key: value} | {k: v for k, (v, usual) in given.items() if v != usual}

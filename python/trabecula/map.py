@@ -13,14 +13,15 @@ __all__ = ["affine", "cylinder", "phase", "spartan", "sphere", "sweep", "tets"]
 
 
 def affine(
-    wavelength: float | Sequence[float],
+    wavelength: float | Sequence[float] | None = None,
     rotate: Sequence[float] | None = None,
     offset: Sequence[float] | None = None,
     skew: dict | None = None,
 ) -> dict:
     """A rigid rotation of the scaled lattice: u = D Rᵀ (x − offset), D = diag(1/wavelength).
 
-    wavelength: Cell edge, one number or three. [mm, above 0]
+    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it
+        follows; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     skew: Shears by name, in degrees: xz = 20 moves x by tan(20°) · z. [default {}]
@@ -29,13 +30,14 @@ def affine(
 
 
 def spartan(
-    wavelength: float | Sequence[float],
+    wavelength: float | Sequence[float] | None = None,
     rotate: Sequence[float] | None = None,
     offset: Sequence[float] | None = None,
 ) -> dict:
     """The SPARTAN reading, scaled first and rotated in phase: u = Rᵀ D (x − offset).
 
-    wavelength: Cell edge, one number or three. [mm, above 0]
+    wavelength: Cell edge, one number or three. Left out where the level has a fraction and a thickness, from which it
+        follows; three numbers are ratios then. [mm, above 0, optional]
     rotate: Angles about x, y, z: z is turned first, then y, then x. [degrees, default [0.0, 0.0, 0.0]]
     offset: Moves the lattice. [mm, default [0.0, 0.0, 0.0]]
     """

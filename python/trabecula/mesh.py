@@ -9,9 +9,10 @@ from functools import cached_property
 from . import _core
 from .files import extension, read_text, whole_file
 from .formats import DESIGNS, MESH_READS, MESH_WRITES
-from .given import number, positive, whole
+from .given import fixed, number, positive, whole
 from .machine import file_size, fits
 from .thickness import Thickness
+from .transforms import Transformed, determinant
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
@@ -51,20 +52,13 @@ class Picture:
     def _repr_png_(self) -> bytes:
         return self._png
 
-    def _repr_html_(self) -> str:
-        import base64
-        import html
 
-        data = base64.b64encode(self._png).decode("ascii")
-        text = html.escape(repr(self))
-        return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"/><figcaption>{text}</figcaption></figure>'
-
-
-class Mesh(Picture):
+class Mesh(Picture, Transformed):
     """A triangle mesh. Made by ``Solid.mesh``, read from a file by ``Mesh.read``, or ``Mesh.of`` arrays.
 
-    It never changes, so a copy is the mesh itself. Pickled it keeps its figures, but not its region: ``thickness`` is then of
-    the solid alone, until ``within`` gives a region back.
+    It never changes, and its arrays are read-only: ``moved``, ``scaled`` and ``rotated`` give another. So a copy is the mesh
+    itself. Pickled it keeps its figures, but not its region: ``thickness`` is then of the solid alone, until ``within`` gives
+    a region back.
     """
 
     def __init__(
@@ -134,18 +128,18 @@ class Mesh(Picture):
 
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
-        """Vertex positions, (n, 3), mm."""
-        return self._core.vertices
+        """Vertex positions, (n, 3), mm; read-only, as all arrays of a mesh."""
+        return fixed(self._core.vertices)
 
     @cached_property
     def triangles(self) -> NDArray[np.uint32]:
         """Vertex indices, (m, 3), counter-clockwise seen from outside."""
-        return self._core.triangles
+        return fixed(self._core.triangles)
 
     @cached_property
     def cut(self) -> NDArray[np.bool_]:
         """For each triangle, whether it lies on the region's boundary rather than on the lattice."""
-        return self._core.cut
+        return fixed(self._core.cut)
 
     @cached_property
     def _size(self) -> MeshReport:
@@ -342,6 +336,13 @@ class Mesh(Picture):
         if not isinstance(given, _core.Region):
             raise TypeError(f"within takes a Solid, a region or a path, found {region!r}")
         return Mesh(self._core.split_by(given), given, self._edge, self._islands)
+
+    def _transformed(self, matrix: list[list[float]], center: list[float], shift: list[float]) -> Mesh:
+        made = Mesh(self._core.transformed(matrix, center, shift))
+        a, b, c = matrix
+        volume = self._region_volume
+        made._region_volume = None if volume is None else volume * abs(determinant(a, b, c))
+        return made
 
     def uncapped(self) -> Mesh:
         """The lattice's own surface alone, open where the region cuts it: without the triangles that ``cut`` marks.

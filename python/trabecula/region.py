@@ -96,6 +96,7 @@ def mesh(
     unit: Literal["mm", "micron", "cm", "m", "inch", "foot"] | None = None,
     scale: float | None = None,
     repair: Literal["auto", "refuse"] | None = None,
+    caps: float | None = None,
 ) -> dict:
     """A triangle mesh from a file (stl, 3mf, ply, obj, off).
 
@@ -104,8 +105,10 @@ def mesh(
     scale: Factor on all coordinates, after the unit. [above 0, default 1.0]
     repair: Whether a mesh with holes, flipped faces or crossings is repaired (auto) or refused with counts (refuse).
         [default "auto"]
+    caps: Greatest share of the surface that caps of holes may make up, 0 to 1: a cap is a guess, flat over a flat hole.
+        [from 0 to 1, default 0.1]
     """
-    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair)}
+    return {"mesh": settings(path=os.fspath(path), unit=unit, scale=scale, repair=repair, caps=caps)}
 
 
 def union(*regions: dict) -> dict:

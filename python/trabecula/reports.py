@@ -153,6 +153,8 @@ class Creases(Report):
     """Maximum."""
     mean: float
     """Mean along all traces."""
+    smoothed: float | None
+    """Maximum after smoothing, at sampled points of the faces; None without overlap."""
 
 
 class DanglingReport(Report):
@@ -194,6 +196,10 @@ class DesignReport(Report):
     """The lattices by name."""
     region: RegionReport
     """The region."""
+    spacing: float
+    """Grid spacing of a mesh unless another is asked for, mm: the smallest wavelength / 32, or less for what is finer: 1/24
+    of a cell's finest wave (down to a wavelength / 128), half the thinnest wall or neck, a sixth of the thinnest beam,
+    the skin (down to a wavelength / 64)."""
     warnings: list[WarningReport]
     """Possible mistakes in the design."""
 
@@ -244,7 +250,7 @@ class DistortionReport(Report):
     """|∇Φᵢ| / |Kᵢ| for each axis: above one, cells are smaller than asked for. p95 and max are of the ratio or its inverse,
     whichever is greater."""
     turn: float
-    """Greatest turn of the wanted orientation within a cell, degrees."""
+    """Greatest turn of the wanted orientation within a cell, or twice that within half a cell or less, degrees."""
 
 
 class EstimateReport(Report):
@@ -312,6 +318,8 @@ class IslandsReport(Report):
     """Number of those with surface on the region's boundary: mostly fragments that it cuts off."""
     dropped: int
     """Number of those that were left out."""
+    dropped_volume: float
+    """The volume of these in all, mm³."""
     found: int
     """Their number."""
     largest: LargestIsland | None
@@ -481,10 +489,12 @@ class RegionReport(Report):
 
     bounds: list[list[float]]
     """Lower and upper corner of its bounds, mm."""
+    described_volume: float | None
+    """Volume of the region as described, mm³, where a lattice fills tetrahedra in its place; else None."""
     volume: float
-    """Volume, mm³."""
+    """Volume of what the lattice fills, mm³: of the tetrahedra, where it is a lattice over them."""
     volume_exact: bool
-    """Whether the volume is exact; else it is estimated at points."""
+    """Whether that is the region's exact volume: not where it is estimated at points, or tetrahedra are not the region."""
 
 
 class RepairReport(Report):
@@ -590,6 +600,8 @@ class TetMeshReport(Report):
     """What made it: background, ftetwild, or the file's name."""
     quality: TetQualityReport
     """Shapes and sizes."""
+    region_volume: float | None
+    """Volume of its region as described, mm³; None without one."""
     warnings: list[WarningReport] | None
     """Possible mistakes; None within the report of a design, which has them itself."""
 
@@ -696,7 +708,8 @@ class TilingReport(Report):
     overlap: float
     """Overlap of tetrahedra, 0 to 0.2 of their size."""
     pieces: int | None
-    """Number of connected components, predicted from the ports; None where that is not known."""
+    """Number of connected components, predicted from the ports; None where that is not known, as with an overlap: the mesh
+    tells it then."""
     ports: int | None
     """Number of ports on each face of a tetrahedron; None for zones."""
     solid_fraction: float
@@ -706,7 +719,7 @@ class TilingReport(Report):
     volume: float
     """Volume of the mesh, mm³."""
     zones: dict[str, ZoneReport] | None
-    """The zones by number, where zones have cells of their own."""
+    """The zones by the number or the name in the design, where zones have cells of their own."""
 
 
 class TransitionReport(Report):
@@ -725,6 +738,9 @@ class TransitionReport(Report):
     """Components attached by necks under half the narrowest neck of the widest path across."""
     fractions: list[FractionAlong]
     """Solid fraction along the transition, by tenths of the second lattice's share."""
+    gap: list[float] | None
+    """Where the first lattice's solid ends if no path leads to the second's, mm; None where one does, or the grid cannot
+    tell."""
     loose: LooseBodies
     """Components that touch neither side."""
     neck: NarrowestNeck | None
@@ -805,6 +821,8 @@ class ZoneReport(Report):
     """Name of its cell."""
     count: int
     """Number of tetrahedra."""
+    numbers: list[int]
+    """Numbers of its tetrahedra in the mesh: several, where elements of a group are of other groups too."""
     solid_fraction: float
     """Volume of solid over volume."""
     volume: float

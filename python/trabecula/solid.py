@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from . import _core
 from .errors import DesignWarning
 from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, VOXEL_WRITES
-from .given import positive, whole
+from .given import fixed, positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits
 from .mesh import Mesh, Picture
 from .quadors import Quadors
 from .thickness import Thickness
+from .transforms import factor_of, vector_of
 from .transition import Transitions
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["Solid", "Voxels"]
 
 PER_CELL = 32
+#: Most steps of a grid along an axis, as in the core.
+MOST_STEPS = 4e6
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
 
@@ -162,16 +165,25 @@ class Solid(Picture):
         return self._core.map_error(lattice, np.ascontiguousarray(given))
 
     def spacing(self, edge: float | None = None, per_cell: float | None = None) -> float:
-        """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell`` (32)."""
+        """The grid spacing (mm) of a request: ``edge`` itself, or the smallest wavelength / ``per_cell``. Without a request
+        the one that the design's walls need, ``report().spacing``.
+        """
         if edge is not None and per_cell is not None:
             raise ValueError("give edge or per_cell, not both")
-        if edge is None:
-            edge = self.wavelength / positive("per_cell", PER_CELL if per_cell is None else per_cell)
-        edge = positive("edge", edge)
+        if per_cell is not None:
+            edge = self.wavelength / positive("per_cell", per_cell)
+        edge = self._usual if edge is None else positive("edge", edge)
+        low, high = self.bounds
+        extent = max(b - a for a, b in zip(low, high, strict=True))
+        if extent / MOST_STEPS > edge:
+            raise ValueError(
+                f"grid spacing {edge:g} mm cuts the region's {extent:.6g} mm into more than {MOST_STEPS:g} steps; use "
+                f"{extent / MOST_STEPS:.2g} mm or more, {self.wavelength / 32:.3g} mm (wavelength / 32) is usual"
+            )
         if edge > self.wavelength / 2:
             raise ValueError(
                 f"grid spacing {edge:g} mm is more than half the smallest wavelength, {self.wavelength:g} mm: the lattice is "
-                f"not resolved; {self.wavelength / PER_CELL:.3g} mm (wavelength / {PER_CELL}) is usual"
+                f"not resolved; without a spacing {self._usual:.3g} mm is used"
             )
         return edge
 
@@ -185,6 +197,11 @@ class Solid(Picture):
         """
         low, high = self.bounds
         return self._core.region.volume(max(edge or 0.0, max(b - a for a, b in zip(low, high, strict=True)) / 200))
+
+    @cached_property
+    def _usual(self) -> float:
+        """The grid spacing that is used unless another is asked for, mm."""
+        return self.report().spacing
 
     @cached_property
     def _thinnest(self) -> dict[str, float]:
@@ -205,22 +222,31 @@ class Solid(Picture):
         """Warns of walls and necks that the grid cannot carry."""
         if self.skin is not None and self.skin < spacing:
             warnings.warn(
-                f"skin: at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
-                f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
-                DesignWarning,
+                DesignWarning(
+                    f"at its thinnest, {self.skin:.3g} mm, it is less than a grid step of {spacing:g} mm: it stays closed, "
+                    f"but its curved parts are rough; use {_a(word)} of {self.skin:.2g} mm or less",
+                    "skin",
+                ),
                 stacklevel=3,
             )
         for name, thin in {} if self._is_fine(spacing) else self._thinnest.items():
             if thin < 1.5 * spacing:
                 warnings.warn(
-                    f"{name}: its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
-                    f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
-                    DesignWarning,
+                    DesignWarning(
+                        f"its thinnest wall or neck, {thin:.3g} mm, is less than 1.5 grid steps of "
+                        f"{spacing:g} mm and may break up; use {_a(word)} of {thin / 2:.2g} mm or less",
+                        name,
+                    ),
                     stacklevel=3,
                 )
 
-    def _warn_coarse(self, volume: float, spacing: float, word: str = "edge") -> None:
-        """Warns of a result whose solid fraction has little to do with the design's, for want of grid steps."""
+    def _warn_coarse(self, volume: float, spacing: float, word: str = "edge", pieces: int | None = None) -> None:
+        """Warns of a result whose solid fraction has little to do with the design's, for want of grid steps; over tetrahedra
+        also of one that falls into more ``pieces`` than the lattice has.
+        """
+        if pieces is not None and (message := self._core.coarse_steps(spacing, volume, pieces)):
+            warnings.warn(message, DesignWarning, stacklevel=3)
+            return
         if self._is_fine(spacing):
             return
         share, region = self._core.expected()
@@ -244,16 +270,17 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
-        islands: Islands = "keep",
+        islands: Islands = "drop-small",
         chord: float | None = None,
     ) -> Mesh:
         """The surface as a closed mesh.
 
-        ``edge`` is the grid spacing in mm, or ``per_cell`` samples on the smallest wavelength (32 unless given). The
-        result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
+        ``edge`` is the grid spacing, mm, or ``per_cell`` samples on the smallest wavelength; else it is ``report().spacing``.
+        The result is the same for any number of ``threads``. ``progress(done, total)`` is called now and then.
 
-        ``islands``: what becomes of all pieces but the largest. ``"keep"`` leaves them, with a warning; ``"drop"`` leaves
-        them out; ``"error"`` refuses. ``Mesh.islands`` tells of them.
+        ``islands``: what becomes of all pieces but the largest. ``"drop-small"`` leaves out those at the region's boundary
+        with less than eight grid cells' volume and a thousandth of the largest one's, and warns of the others; ``"keep"``
+        leaves all, with a warning; ``"drop"`` leaves them out; ``"error"`` refuses. ``Mesh.islands`` counts them.
 
         ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
         the patches of beams and fillets at a distance of at most ``chord`` (mm); ``Mesh.chord_error`` is the distance reached.
@@ -272,7 +299,7 @@ class Solid(Picture):
         fits(2 * need.memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
-        self._warn_coarse(core.volume() + left_out(others), spacing)
+        self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
         warn_islands(others, words)
         return Mesh(core, self._core.region, spacing, others)
 
@@ -280,7 +307,7 @@ class Solid(Picture):
         """A chord error, where nothing is asked for that needs a grid."""
         if edge is not None or per_cell is not None:
             raise ValueError("give a chord error or the spacing of a grid, not both")
-        if islands != "keep":
+        if islands in ("drop", "error"):
             raise ValueError(f'islands = "{islands}" looks for pieces on a grid: give edge or per_cell instead of chord')
         return positive("chord", chord)
 
@@ -308,12 +335,26 @@ class Solid(Picture):
         per_cell: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
-        islands: Islands = "keep",
+        islands: Islands = "drop-small",
         chord: float | None = None,
     ) -> SurfaceReport:
         """Streams the surface to a binary STL without holding it in memory, and gives its figures. ``islands`` and ``chord``
         are as for ``mesh``.
         """
+        return self._save_stl(path, edge, per_cell, threads, progress, islands, chord)
+
+    def _save_stl(
+        self,
+        path: str | os.PathLike[str],
+        edge: float | None,
+        per_cell: float | None,
+        threads: int | None,
+        progress: Progress | None,
+        islands: Islands,
+        chord: float | None,
+        accept: Callable[[SurfaceReport], Any] = lambda made: None,
+    ) -> SurfaceReport:
+        """As ``save_stl``; what ``accept`` or a warning raises leaves no file behind."""
         check_islands(islands)
         extension(path, ("stl",))
         check_place(path)
@@ -322,14 +363,17 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         if special(os.fsdecode(path)):  # a stream cannot be gone back in, to write the count
             made = self.mesh(spacing, None, threads, progress, islands)
+            summary = made.summary()
+            accept(summary)
             made.write(path)
-            return made.summary()
+            return summary
         self.check_room(path, spacing)
         self._warn_thin(spacing)
         with whole_file(path) as temporary:
             summary, words = self._core.stream_stl(temporary, spacing, _threads(threads), progress, islands)
-        self._warn_coarse(summary.volume + left_out(summary.islands), spacing)
-        warn_islands(summary.islands, words)
+            self._warn_coarse(summary.volume + left_out(summary.islands), spacing, pieces=summary.islands.found + 1)
+            warn_islands(summary.islands, words)
+            accept(summary)
         return summary
 
     def voxels(
@@ -358,7 +402,8 @@ class Solid(Picture):
         progress: Progress | None = None,
     ) -> Thickness:
         """Local thickness of walls and pores on voxels of edge ``step`` (mm), as ``Mesh.thickness`` of the surface at grid
-        spacing ``edge``, or ``per_cell`` samples on the smallest wavelength (32 unless given).
+        spacing ``edge``, or ``per_cell`` samples on the smallest wavelength; without either
+        ``report().spacing``.
         """
         wanted = None if step is None else positive("step", step)
         return self.mesh(edge, per_cell, threads).thickness(wanted, threads, progress)
@@ -369,7 +414,7 @@ class Solid(Picture):
 
 
 class Voxels:
-    """Occupancy on a grid of cubic voxels."""
+    """Occupancy on a grid of cubic voxels. Its array is read-only: ``moved`` and ``scaled`` give others."""
 
     def __init__(self, core: _core.Voxels):
         self._core = core
@@ -395,8 +440,23 @@ class Voxels:
 
     @cached_property
     def solid(self) -> NDArray[np.uint8]:
-        """1 where the voxel's centre is solid, indexed [x, y, z]."""
-        return self._core.solid.transpose(2, 1, 0)
+        """1 where the voxel's centre is solid, indexed [x, y, z]; read-only."""
+        return fixed(self._core.solid).transpose(2, 1, 0)
+
+    def moved(self, vector: Sequence[float]) -> Voxels:
+        """The voxels with their origin moved by ``vector`` (three numbers, mm)."""
+        origin = [a + b for a, b in zip(self.origin, vector_of("vector", vector), strict=True)]
+        if not all(map(math.isfinite, origin)):
+            raise ValueError(f"vector is {list(vector)}; the origin would be beyond 1e308 mm")
+        return Voxels(self._core.placed(origin, self.step))
+
+    def scaled(self, factor: float, center: Sequence[float] = (0, 0, 0)) -> Voxels:
+        """The voxels with origin and step scaled by one ``factor`` greater than 0 about ``center``: they stay cubes. Mirrored
+        or stretched voxels are none; scale the design's mesh.
+        """
+        by = abs(factor_of("factor", positive("factor", factor)))
+        middle = vector_of("center", center)
+        return Voxels(self._core.placed([(a - c) * by + c for a, c in zip(self.origin, middle, strict=True)], self.step * by))
 
     @property
     def volume(self) -> float:

@@ -26,7 +26,7 @@ wavelength = 5.0            # the cell's edge; or three: [5, 5, 8]
 # rotate = [0, 0, 45]       # turns the lattice about x, y, z
 # offset = [0, 0, 0]        # moves it
 
-# How much is solid: exactly one of iso, fraction, porosity. Each may vary in space:
+# How much is solid: exactly one of iso, fraction, porosity, thickness. Each may vary in space:
 #   fraction = {{ linear = {{ along = [0, 0, 1], stops = [[-10, 0.20], [10, 0.45]] }} }}
 #   fraction = {{ depth = {{ stops = [[0, 0.60], [4, 0.25]] }} }}
 #   fraction = {{ formula = "0.3 + 0.1*sin(x/5)" }}

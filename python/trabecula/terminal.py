@@ -12,7 +12,20 @@ import signal
 import sys
 import time
 
-__all__ = ["Progress", "figure", "interrupts_leave", "interrupts_raise", "left", "outcome", "say", "span"]
+__all__ = [
+    *("Progress", "fail", "figure", "interrupts_leave", "interrupts_raise", "left", "listen", "outcome", "say", "settle"),
+    *("span", "told", "warn"),
+]
+
+TYPE_CHECKING = False  # as type checkers know it, without the import
+if TYPE_CHECKING:
+    from typing import TypedDict
+
+    class Notice(TypedDict):
+        """A warning, and the path of the key that it is about, or nothing."""
+
+        path: str
+        message: str
 
 
 class Progress:
@@ -21,16 +34,18 @@ class Progress:
     def __init__(self, word: str, wanted: bool | None):
         self.word = word
         self.terminal = sys.stderr.isatty()
-        self.shown = self.terminal if wanted is None else wanted
+        self.shown = not _voice.quiet and (self.terminal if wanted is None else wanted)
         self.start = self.last = time.monotonic()
         self.tenth = 0
         self.width = 0
 
     def __enter__(self) -> Progress:
+        _voice.progress = self
         return self
 
     def __exit__(self, *_) -> None:
         self.clear()
+        _voice.progress = None
 
     def __call__(self, done: int, total: int) -> None:
         """``done`` of ``total`` steps."""
@@ -79,9 +94,60 @@ def span(v) -> str:
     return " to ".join(dict.fromkeys(texts))
 
 
-def say(text: str) -> None:
-    """A message on stderr."""
+class _Voice:
+    """How much is said: ``quiet`` errors only; ``strict`` a warning is an error."""
+
+    def __init__(self, quiet: bool = False, strict: bool = False):
+        self.quiet = quiet
+        self.strict = strict
+        self.told: list[Notice] = []
+        self.progress: Progress | None = None
+
+
+_voice = _Voice()
+
+
+def listen(quiet: bool, strict: bool) -> None:
+    """Begins a command: nothing has been warned of yet."""
+    global _voice
+    _voice = _Voice(quiet, strict)
+
+
+def told() -> list[Notice]:
+    """What has been warned of, each text once."""
+    return list(_voice.told)
+
+
+def fail(text: str) -> None:
+    """An error on stderr, on a line of its own."""
+    if _voice.progress:
+        _voice.progress.clear()
     _write(text + "\n")
+
+
+def say(text: str) -> None:
+    """A message on stderr, on a line of its own."""
+    if not _voice.quiet:
+        fail(text)
+
+
+def warn(message: str, path: str = "", shown: bool = True) -> None:
+    """Warns, once with each text; with ``strict`` it is an error, and shown even if ``quiet``."""
+    notice: Notice = {"path": path, "message": message}
+    if notice in _voice.told:
+        return
+    _voice.told.append(notice)
+    if shown or _voice.strict:
+        (fail if _voice.strict else say)(f"warning: {path}: {message}" if path else f"warning: {message}")
+
+
+def settle() -> None:
+    """Refuses to go on, if a warning is an error and there was one."""
+    if _voice.strict and _voice.told:
+        from .errors import Refused
+
+        many = "a warning" if len(_voice.told) == 1 else f"{len(_voice.told)} warnings"
+        raise Refused(f"{many}, refused by --strict; nothing is written")
 
 
 def _write(text: str) -> None:

@@ -49,7 +49,12 @@ def _design(it: Report) -> Iterator[str]:
     low, high = it.region.bounds
     extent = " × ".join(figure(b - a) for a, b in zip(low, high, strict=True))
     about = "" if it.region.volume_exact else "about "
-    yield f"region  {extent} mm, {about}{figure(it.region.volume)} mm³"
+    volume, described = it.region.volume, it.region.described_volume
+    if described is None or it.region.volume_exact:
+        yield f"region  {extent} mm, {about}{figure(volume)} mm³"
+    else:
+        off = 100 * (volume / described - 1)
+        yield f"region  {extent} mm, {figure(described)} mm³, of which tetrahedra fill {figure(volume)} mm³ ({off:+.1f} %)"
     for name, lattice in it.lattices.items():
         yield f"lattice {name}: {lattice.part}, wavelength {figure(lattice.wavelength)} mm"
         yield from _lattice(lattice)
@@ -58,6 +63,7 @@ def _design(it: Report) -> Iterator[str]:
         yield from _beams(beams)
     if it.blend:
         yield from _blend(it.blend)
+    yield f"grid    spacing {it.spacing:.3g} mm unless another is asked for"
 
 
 def _lattice(it: Report) -> Iterator[str]:
@@ -153,7 +159,7 @@ def _transition(it: Report) -> Iterator[str]:
     error = "" if worst is None else f", off by {worst:+.4f} at most"
     found = [row.found for row in it.fractions]
     yield f"  fraction   {span([min(found), max(found)])}{error}"
-    yield f"  pieces     {it.pieces}"
+    yield f"  pieces     {it.pieces} on a grid of {it.step:.3g} mm"
     neck = "none: not connected across the transition"
     if it.neck:
         neck = f"{it.neck.diameter:.3g} mm at {point(it.neck.place)} mm, the narrowest of the widest path across"
@@ -188,6 +194,7 @@ UNITS = {
     "dangling.volume": " mm³",
     "dangling.neck": " mm",
     "dangling.step": " mm",
+    "edge": " mm",
 }
 #: What stands for a figure that is missing.
 ABSENT = {"dangling.largest": "none", "quality": "no triangles", "quality.largest_aspect": "a triangle has no area"}
@@ -224,13 +231,13 @@ LISTED = 20
 
 
 def voids(found: list) -> str:
-    """A warning of closed voids: powder and resin stay in them."""
+    """What is warned of closed voids: powder and resin stay in them."""
     total = figure(sum(v.volume for v in found))
     if len(found) == 1:
-        return f"warning: one closed void of {total} mm³ at {point(found[0].point)} mm: powder or resin cannot drain from it"
+        return f"one closed void of {total} mm³ at {point(found[0].point)} mm: powder or resin cannot drain from it"
     listed = ", ".join(f"{figure(v.volume)} mm³ at {point(v.point)} mm" for v in found[:LISTED])
     more = f", and {len(found) - LISTED} smaller ones" if len(found) > LISTED else ""
     return (
-        f"warning: {len(found)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "
+        f"{len(found)} closed voids of {total} mm³ in all: powder or resin cannot drain from them. "
         f"Largest first: {listed}{more}"
     )

@@ -1,0 +1,54 @@
+"""Work in processes of their own, for packages that may hang, take all memory, or take the process along."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+
+__all__ = ["python", "run", "stop"]
+
+#: The children that run, which an interrupt ends.
+running: set[subprocess.Popen] = set()
+lock = threading.Lock()
+
+
+def python(module: str, *given: str) -> list[str]:
+    """The command of a module of this package."""
+    return [sys.executable, "-m", f"trabecula.{module}", *given]
+
+
+def run(command: list[str], folder: str, limit: float) -> str | None:
+    """Runs a child at most ``limit`` seconds; what went wrong, if anything. Its words go to a file: a pipe may fill."""
+    path = os.pathsep.join(filter(None, [os.path.dirname(os.path.dirname(__file__)), os.environ.get("PYTHONPATH")]))
+    with open(os.path.join(folder, "said"), "w+b") as said:
+        child = subprocess.Popen(
+            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said, env={**os.environ, "PYTHONPATH": path}
+        )
+        with lock:
+            running.add(child)
+        try:
+            status = child.wait(limit)
+        except subprocess.TimeoutExpired:
+            return f"did not finish within {limit:g} s and was stopped"
+        finally:
+            if child.poll() is None:
+                child.kill()
+                child.wait()
+            with lock:
+                running.discard(child)
+        if status == 0:
+            return None
+        if status < 0:
+            return f"was ended by signal {-status}"
+        said.seek(0)
+        lines = said.read().decode("utf-8", "replace").strip().splitlines()
+        return f"failed: {lines[-1] if lines else f'exit status {status}'}"
+
+
+def stop() -> None:
+    """Ends all children: whoever waits for them goes on. The core calls it when it is interrupted."""
+    with lock:
+        for child in running:
+            child.kill()

@@ -1,0 +1,128 @@
+"""Warnings of the command: on stderr, in the figures, left out or refused, whatever the environment says."""
+
+import json
+import os
+import subprocess
+
+import pytest
+from conftest import CUBE
+from test_cli import COMMAND, names, run
+from test_islands import BALLS
+
+#: A sheet of walls 0.37 mm thick; a step of 0.5 mm is too coarse for it, as the warning says.
+COARSE = ("--edge", "0.5")
+
+
+def piped(text, *words, cwd, status=0, env=None):
+    """The command with this on its standard input."""
+    done = subprocess.run(
+        [*COMMAND, *words], cwd=cwd, input=text, capture_output=True, text=True, timeout=300, env={**os.environ, **(env or {})}
+    )
+    assert done.returncode == status, done.stderr
+    return done
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("mesh", "-o", "a.stl", *COARSE),
+        ("mesh", "-o", "a.3mf", *COARSE),
+        ("measure", *COARSE),
+        ("voxels", "-o", "a.npy", "--step", "0.5"),
+    ],
+    ids=" ".join,
+)
+def test_figures_have_the_warnings_of_the_grid(tmp_path, cube, words):
+    """Thin walls are warned of in the JSON, with the path of the lattice, and on stderr; `--quiet` leaves the figures only."""
+    command, *more = words
+    done = run(command, cube, *more, "--json", cwd=tmp_path)
+    (thin,) = [w for w in json.loads(done.stdout)["warnings"] if "thinnest wall" in w["message"]]
+    assert thin["path"] == "lattice.core" and not thin["message"].startswith("lattice")
+    assert f"warning: lattice.core: {thin['message']}\n" in done.stderr
+    quiet = run(command, cube, *more, "--json", "--quiet", "--progress", cwd=tmp_path)
+    assert quiet.stderr == ""
+    assert json.loads(quiet.stdout)["warnings"] == json.loads(done.stdout)["warnings"]
+
+
+def test_figures_have_the_warnings_of_design_and_islands(tmp_path):
+    """A network below its limit, in pieces: both are told, the design's with the path of the key."""
+    (tmp_path / "balls.toml").write_text(BALLS)
+    for name in ("a.stl", "a.3mf"):
+        found = json.loads(run("mesh", "balls.toml", "-o", name, "--edge", "0.3", "--json", cwd=tmp_path).stdout)["warnings"]
+        assert any("fraction" in w["path"] for w in found), found
+        assert any(w["path"] == "" and "not in one piece" in w["message"] for w in found), found
+
+
+@pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
+def test_strict_refuses_a_warning_and_writes_nothing(tmp_path, cube, name):
+    """Warnings of the design before meshing, of the grid and of islands after it; an older file stays as it was."""
+    (tmp_path / "balls.toml").write_text(BALLS)
+    clean = BALLS.replace("fraction = 0.1", "fraction = 0.4")
+    assert clean != BALLS
+    (tmp_path / "clean.toml").write_text(clean)
+    before = names(tmp_path)
+    for words in (
+        ("mesh", cube, "-o", name, *COARSE),
+        ("mesh", "balls.toml", "-o", name),
+        ("voxels", cube, "-o", "a.npy", "--step", "0.5"),
+    ):
+        done = run(*words, "--strict", "--quiet", cwd=tmp_path, status=1)
+        assert "warning: " in done.stderr and "refused by --strict" in done.stderr.splitlines()[-1]
+        assert names(tmp_path) == before
+    (tmp_path / name).write_text("older")
+    run("mesh", cube, "-o", name, *COARSE, "--strict", cwd=tmp_path, status=1)
+    assert (tmp_path / name).read_text() == "older"
+    run("mesh", "clean.toml", "-o", name, "--strict", "--islands", "drop", cwd=tmp_path)
+    assert (tmp_path / name).read_bytes()[:5] != b"older"
+    assert run("check", "balls.toml", "--strict", cwd=tmp_path, status=1).stdout == ""
+    run("render", cube, "-o", "a.png", "--size", "60x50", *COARSE, "--strict", cwd=tmp_path, status=1)
+    assert "a.png" not in names(tmp_path)
+
+
+@pytest.mark.parametrize("asked", ["ignore", "error"])
+def test_the_environment_does_not_silence_warnings(tmp_path, cube, asked):
+    """PYTHONWARNINGS is for Python's own."""
+    done = piped(None, "mesh", str(cube), "-o", "a.3mf", *COARSE, cwd=tmp_path, env={"PYTHONWARNINGS": asked})
+    assert "warning: lattice.core: its thinnest wall" in done.stderr
+
+
+def test_a_design_on_standard_input(tmp_path, cube):
+    """TOML or JSON; the same figures as from a file, errors with a line, files relative to the working directory."""
+    import trabecula as lt
+
+    figures = piped(cube.read_text(), "check", "-", "--json", cwd=tmp_path).stdout
+    assert figures == run("check", cube, "--json", cwd=tmp_path).stdout
+    data = json.dumps(lt.load(cube).to_dict())
+    assert figures == piped("\n" + data, "check", "-", "--json", cwd=tmp_path).stdout
+    piped(cube.read_text(), "mesh", "-", "-o", "a.stl", "--edge", "0.4", cwd=tmp_path)
+    piped(cube.read_text(), "mesh", "-", "-o", "a.stl", "--edge", "0.4", cwd=tmp_path)  # where the file exists
+    piped(cube.read_text(), "measure", "-", "--edge", "0.4", "--json", cwd=tmp_path)
+    part = CUBE.replace(CUBE[CUBE.index("[region.box]") : CUBE.index("[lattice")], '[region.mesh]\npath = "a.stl"\n')
+    piped(part, "check", "-", cwd=tmp_path)
+    assert "<stdin>:" in piped(CUBE.replace("gyroid", "gyriod"), "check", "-", cwd=tmp_path, status=1).stderr
+    assert "UTF-8" in subprocess.run([*COMMAND, "check", "-"], input=b"\xff", capture_output=True, cwd=tmp_path).stderr.decode()
+
+
+def test_a_warning_has_a_line_of_its_own(tmp_path, cube):
+    """On a terminal the progress line is taken away before a message."""
+    pty = pytest.importorskip("pty")
+    near, far = pty.openpty()
+    words = [*COMMAND, "mesh", str(cube), "-o", "a.stl", "--edge", "0.1", "--progress"]
+    text = BALLS.replace("[8, 8, 8]", "[12, 12, 12]")
+    (tmp_path / "b.toml").write_text(text)
+    words[words.index(str(cube))] = "b.toml"
+    with subprocess.Popen(words, cwd=tmp_path, stderr=far) as process:
+        os.close(far)
+        seen = b""
+        try:
+            while chunk := os.read(near, 4096):
+                seen += chunk
+        except OSError:  # the other end is closed
+            pass
+    assert process.returncode == 0
+    assert b"meshing:" in seen, seen
+    for line in seen.decode().split("\n"):
+        # What a terminal shows of a line is what comes after the last return to its beginning.
+        shown = line.rstrip("\r").rsplit("\r", 1)[-1]
+        assert "warning" not in shown or shown.startswith("warning: "), line
+        assert "warning" not in line or "left" not in shown, line

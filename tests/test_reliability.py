@@ -1,0 +1,89 @@
+"""Requests without end, interrupts, and what must not be shown."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import trabecula as lt
+
+#: A part whose surface is a thin shell of a ball of 14 m.
+HUGE = """
+schema = 1
+units = "mm"
+region.sphere.radius = 7000
+[lattice.a]
+cell = "primitive"
+part = "sheet"
+map.affine.wavelength = 5
+level.iso = { depth = { stops = [[0, 0.9], [4, 300]] } }
+"""
+
+#: A solve for a map on 30 million nodes.
+SOLVED = """
+schema = 1
+units = "mm"
+region.box.size = [60, 60, 60]
+[lattice.a]
+cell = "gyroid"
+part = "sheet"
+map.phase = { wavelength = { linear = { along = [1, 0, 0], stops = [[-30, 2.0], [30, 4.0]] } }, step = 0.2 }
+level.fraction = 0.3
+"""
+
+
+def test_a_grid_without_end_is_refused(tmp_path):
+    """By its cells, though hardly any tile that is looked at holds a surface."""
+    (tmp_path / "huge.toml").write_text(HUGE)
+    solid = lt.load(tmp_path / "huge.toml").build()
+    with pytest.raises(ValueError, match=r"cells, 1\.1e13, and at most 2e12 are possible; use an edge of 1\.\d+ mm or more"):
+        solid.mesh(per_cell=8)
+
+
+@pytest.mark.parametrize("edge", [1e-300, 5e-324, 1e-7])
+def test_spacings_beyond_any_grid(edge):
+    """One line with the place and what to use."""
+    core = lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.4))
+    solid = lt.Design(region=lt.region.box([8] * 3), lattice={"core": core}).build()
+    with pytest.raises(ValueError, match=r"grid spacing .* cuts the region's 8 mm into more than 4e\+06 steps; use 2e-06 mm"):
+        solid.mesh(edge=edge)
+
+
+@pytest.mark.parametrize("words", [("check",), ("mesh", "-o", "out.stl")])
+def test_an_interrupt_ends_a_solve(tmp_path, words):
+    """The command ends while the map is being solved for, long before it is solved."""
+    (tmp_path / "solved.toml").write_text(SOLVED)
+    command = [sys.executable, "-m", "trabecula", words[0], "solved.toml", *words[1:]]
+    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    # Under way when it has used a second of processor time more than its start takes.
+    tick = os.sysconf("SC_CLK_TCK")
+    while run.poll() is None:
+        with open(f"/proc/{run.pid}/stat") as file:
+            used = file.read().rsplit(")", 1)[1].split()
+        if (int(used[11]) + int(used[12])) / tick > 2.5:
+            break
+        time.sleep(0.02)
+    assert run.poll() is None, run.stderr.read()
+    run.send_signal(signal.SIGINT)
+    run.wait(10)  # the solve takes minutes
+    assert run.returncode in (130, -signal.SIGINT) and not (tmp_path / "out.stl").exists()
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply"])
+def test_contents_of_other_files_are_not_shown(tmp_path, kind):
+    """A path may lead to a file that is nobody's business."""
+    path = tmp_path / f"part.{kind}"
+    path.write_text("root:secret:0:0:Charlie &:/root:/bin/csh\ndaemon:*:1:1:Owner:/root:/bin/sh\n")
+    with pytest.raises(ValueError, match="part") as error:
+        lt.Mesh.read(path)
+    assert not any(word in str(error.value) for word in ("root:", "secret", "Charlie", "daemon:"))
+
+
+def test_messages_shorten_what_was_found():
+    """An unknown cell of 40 000 characters does not come back whole."""
+    core = lt.Lattice("x" * 40_000, "sheet", lt.map.affine(4), lt.level.fraction(0.4))
+    with pytest.raises(lt.DesignError, match=r'unknown cell "x{79}…"') as error:
+        lt.Design(region=lt.region.box([8] * 3), lattice={"core": core}).build()
+    assert len(str(error.value)) < 1400 and len(error.value.message) < 1400
