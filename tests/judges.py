@@ -20,7 +20,7 @@ def area(vertices, triangles):
 
 def status(vertices, triangles):
     """What manifold3d says: NoError if the mesh is closed, oriented and manifold."""
-    mesh = manifold3d.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(triangles, dtype=np.uint64))
+    mesh = manifold3d.Mesh64(np.array(vertices), np.ascontiguousarray(triangles, dtype=np.uint64))
     return manifold3d.Manifold(mesh).status()
 
 

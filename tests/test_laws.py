@@ -63,7 +63,7 @@ def test_every_mesh_is_closed(design):
     # edge² / 8r, r the least radius here, 2 mm.
     out = solid.spacing(per_cell=14) ** 2 / 16
     assert (mesh.vertices >= low - out).all() and (mesh.vertices <= high + out).all()
-    judge = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.triangles.astype(np.uint64)))
+    judge = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices.copy(), mesh.triangles.astype(np.uint64)))
     assert judge.status() == manifold3d.Error.NoError, judge.status()
     assert abs(judge.volume() / mesh.volume - 1) < 1e-9
 

@@ -1,8 +1,10 @@
 """Warnings of the command: on stderr, in the figures, left out or refused, whatever the environment says."""
 
+import io
 import json
 import os
 import subprocess
+import sys
 
 import pytest
 from conftest import CUBE
@@ -103,26 +105,26 @@ def test_a_design_on_standard_input(tmp_path, cube):
     assert "UTF-8" in subprocess.run([*COMMAND, "check", "-"], input=b"\xff", capture_output=True, cwd=tmp_path).stderr.decode()
 
 
-def test_a_warning_has_a_line_of_its_own(tmp_path, cube):
+def test_a_warning_has_a_line_of_its_own(monkeypatch):
     """On a terminal the progress line is taken away before a message."""
-    pty = pytest.importorskip("pty")
-    near, far = pty.openpty()
-    words = [*COMMAND, "mesh", str(cube), "-o", "a.stl", "--edge", "0.1", "--progress"]
-    text = BALLS.replace("[8, 8, 8]", "[12, 12, 12]")
-    (tmp_path / "b.toml").write_text(text)
-    words[words.index(str(cube))] = "b.toml"
-    with subprocess.Popen(words, cwd=tmp_path, stderr=far) as process:
-        os.close(far)
-        seen = b""
-        try:
-            while chunk := os.read(near, 4096):
-                seen += chunk
-        except OSError:  # the other end is closed
-            pass
-    assert process.returncode == 0
-    assert b"meshing:" in seen, seen
-    for line in seen.decode().split("\n"):
-        # What a terminal shows of a line is what comes after the last return to its beginning.
-        shown = line.rstrip("\r").rsplit("\r", 1)[-1]
-        assert "warning" not in shown or shown.startswith("warning: "), line
-        assert "warning" not in line or "left" not in shown, line
+    from itertools import count
+
+    from trabecula import terminal
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    monkeypatch.setattr(sys, "stderr", screen := Terminal())
+    monkeypatch.setattr(terminal.time, "monotonic", count().__next__)  # a second passes between any two calls
+    terminal.listen(quiet=False, strict=False)
+    with terminal.Progress("meshing", None) as progress:
+        for done in range(1, 6):
+            progress(done, 10)
+            if done == 3:
+                terminal.warn("a wall is thin", "lattice.a")
+    # What a terminal shows of a line is what comes after the last return to its beginning.
+    shown = [line.rstrip("\r").rsplit("\r", 1)[-1] for line in screen.getvalue().split("\n")]
+    assert shown[0] == "warning: lattice.a: a wall is thin"
+    assert screen.getvalue().count("meshing:") == 5
+    assert shown[1].strip() == "", "nothing of the progress line is left at the end"
