@@ -39,6 +39,27 @@ def samples(slice_, n=400):
     return plane["origin"] + uv[:, :1] * plane["u"] + uv[:, 1:] * plane["v"], np.prod((high - low) / n)
 
 
+@pytest.mark.parametrize("fillet, asked", [({"radius": 0.4}, (0.4, None)), ({"alpha": 0.4}, (None, 0.36 / 1.64))])
+def test_hubs_with_less_than_asked_for_are_listed(fillet, asked):
+    """The same of a report, in words, and of all hubs as arrays; tau = (1 - 4 alpha²) / (1 + 4 alpha²)."""
+    nodes = [[0, 0, 0], [12, 0, 0], [11, 5, 0], [-12, -0.5, 0], [0, 0, 40]]
+    beams = lt.Beams(nodes=nodes, struts=[[0, 1], [0, 2], [0, 3], [1, 4]], radius=0.5, fillet=fillet)
+    with pytest.warns(lt.DesignWarning, match="only the largest that fits"):
+        solid = lt.Design(region=lt.region.box(size=[30, 30, 30]), beams=beams).build()
+    report, all_ = solid.report(), solid.quadors().fillets()
+    [first, *others] = report.beams["core"].fillet_shortfalls
+    assert first.hub == 0 and first.position == [0, 0, 0] and first.crotches == 3
+    assert (first.asked_radius, first.asked_tau) == (asked[0], pytest.approx(asked[1]) if asked[1] else None)
+    assert all_["short"][0] == first.short > 0 and all_["crotches"].tolist() == [3, 1, 0, 0, 0]
+    assert all_["radius"][0].tolist() == first.radius and all_["tau"][0].tolist() == first.tau
+    assert first.radius[0] < first.radius[1] and first.tau[1] > first.tau[0]
+    assert np.all(np.isnan(all_["tau"][2])) and np.all(np.isinf(all_["radius"][2]))
+    # Hubs outside of the region are not in the report.
+    assert [it.hub for it in [first, *others]] == [i for i in np.flatnonzero(all_["short"]) if abs(nodes[i][2]) <= 15]
+    listed = [line for line in str(report).splitlines() if " crotches short" in line]
+    assert len(listed) == min(3, 1 + len(others)) and listed[0].lstrip().startswith("hub 0 at (0, 0, 0) mm: radius ")
+
+
 @pytest.mark.parametrize("cut", [{"z": 2.3}, {"z": 5}, {"point": [5, 5, 5], "normal": [1, 2, 0.5]}])
 def test_the_area_of_a_slice_is_that_of_its_points(quadors, cut):
     """A square on the outline errs by chance, half its area at most; four deviations of as many as there are."""

@@ -49,6 +49,15 @@ class Quadors:
         """The volume in mm³, fillets included, to 1e-10. Beams that run into each other without a node are refused."""
         return self._core.volume()
 
+    def fillets(self) -> dict[str, NDArray]:
+        """The fillets of each of the n hubs; a crotch is where two of its beams meet.
+
+        ``centers`` (n, 3), mm; ``crotches`` (n,), how many; ``short`` (n,), how many of them have a smaller fillet than asked
+        for; ``radius`` (n, 2), mm, of the smallest and the largest fillet, infinite where no crotch is concave, 0 without
+        fillets; ``tau`` (n, 2), the least and the greatest, which the smallest fillet has, NaN without crotches.
+        """
+        return self._core.fillets()
+
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether points (n, 3) in mm are in the beams."""
         return self._core.contains(_points("points", points))

@@ -16,6 +16,7 @@ __all__ = [
     "DihedralReport",
     "DistortionReport",
     "EstimateReport",
+    "FilletShortfall",
     "FitReport",
     "FractionAlong",
     "Histogram",
@@ -55,6 +56,7 @@ class BeamsReport(Report):
 
     _parts = {
         "cleaned": "CleanedReport",
+        "fillet_shortfalls": "FilletShortfall",
         "trimmed": "TrimmedReport",
     }
 
@@ -74,6 +76,8 @@ class BeamsReport(Report):
     """Number of nodes inside the region with a single beam."""
     fillet_radius: list[float] | None
     """Least and greatest radius of fillets at their tightest places, mm; None without fillets."""
+    fillet_shortfalls: list[FilletShortfall] | None
+    """Hubs in the region that cannot have the fillets asked for, that with the tightest crotch first."""
     fraction: float
     """Solid fraction of the part."""
     fraction_exact: bool
@@ -264,6 +268,27 @@ class EstimateReport(Report):
     """Bytes of a binary STL."""
     triangles: float
     """Number of triangles."""
+
+
+class FilletShortfall(Report):
+    """A hub with a fillet smaller than asked for. A crotch is where two of its beams meet."""
+
+    asked_radius: float | None
+    """Radius asked for, mm; None if τ, α or β was."""
+    asked_tau: float | None
+    """τ asked for, also by α or β; None if a radius was."""
+    crotches: int
+    """Number of its crotches."""
+    hub: int
+    """Number of the hub, as in `Solid.beams` and for `Quadors.hub`."""
+    position: list[float]
+    """Its centre, mm."""
+    radius: list[float] | None
+    """Radius of the smallest and of the largest fillet in its crotches, mm; None if no crotch is concave."""
+    short: int
+    """Number of its crotches with a smaller fillet than asked for."""
+    tau: list[float]
+    """Least and greatest τ of its crotches; the smallest fillet has the greatest."""
 
 
 class FitReport(Report):

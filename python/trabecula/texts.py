@@ -10,6 +10,9 @@ from .terminal import figure, span
 
 __all__ = ["counted", "intervals", "point", "table", "text", "voids"]
 
+#: Number of hubs listed that cannot have the fillets asked for; the report has all of them.
+FEW = 3
+
 
 def text(report: Report) -> str:
     """A report in words, line by line."""
@@ -95,6 +98,8 @@ def _beams(it: Report) -> Iterator[str]:
     yield f"  hubs       radius {_range(it.hub_radius)} mm"
     if it.fillet_radius:
         yield f"  fillets    radius {_range(it.fillet_radius)} mm at the tightest places"
+    if it.fillet_shortfalls:
+        yield from _shortfalls(it.fillet_shortfalls)
     if it.valence:
         yield f"  valence    {', '.join(f'{n} of {v}' for v, n in it.valence.items())}"
     if it.smallest_angle is not None:
@@ -110,6 +115,17 @@ def _beams(it: Report) -> Iterator[str]:
         if done:
             yield f"  {what}    {', '.join(done)}"
     yield f"  pieces     {it.pieces}; {counted(it.dangling, 'node')} with a free end"
+
+
+def _shortfalls(them: list[Report]) -> Iterator[str]:
+    """The first few hubs that cannot have the fillets asked for."""
+    asked = them[0].asked_radius
+    what = f"{figure(asked)} mm" if asked is not None else f"tau {figure(them[0].asked_tau)}"
+    yield f"  asked for  {what}, which {counted(len(them), 'hub')} cannot have in all crotches; the tightest:"
+    for it in them[:FEW]:
+        radius = "" if it.radius is None else f"radius {_range(it.radius)} mm, "
+        got = f"{radius}tau {_range(it.tau)}; {it.short} of {it.crotches} crotches short"
+        yield f"             hub {it.hub} at {point(it.position)} mm: {got}"
 
 
 def _tiling(it: Report) -> Iterator[str]:

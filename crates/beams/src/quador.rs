@@ -55,6 +55,7 @@ mod tessellation;
 pub use bezier::Bezier;
 pub use closest::{Closest, ClosestPoints};
 pub use collisions::Collision;
+pub use fillet_sizes::HubFillets;
 pub use hub::{HalfBeam, Hub};
 pub use hub_quadric::Quadric;
 pub use integral::MassProperties;
@@ -64,7 +65,7 @@ pub use rays::Hit;
 pub use tessellation::{Measures, Tessellation};
 
 use box_index::BoxIndex;
-use fillet_sizes::{FilletSizes, fillet_sizes, min_fillet_radius};
+use fillet_sizes::{FilletSizes, fillet_sizes, hub_fillets};
 use hub::AffineFunction;
 
 /// Size of the fillets.
@@ -85,8 +86,8 @@ pub enum Fillet {
 }
 
 impl Fillet {
-    /// τ requested for all pairs, if one is.
-    fn tau(self) -> Option<f64> {
+    /// τ requested for all pairs, if it is, or α or β.
+    pub fn tau(self) -> Option<f64> {
         match self {
             Fillet::Tau(t) => Some(t),
             Fillet::Alpha(a) => Some((1.0 - 4.0 * a * a) / (1.0 + 4.0 * a * a)),
@@ -128,15 +129,13 @@ struct Ball {
     curvature: f64,
 }
 
-/// A hub whose fillets are smaller than requested.
-#[derive(Clone, Debug, PartialEq)]
+/// A hub with a fillet smaller than requested.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shortfall {
     /// Index of the hub.
     pub hub: usize,
-    /// Fillet radius achieved in the tightest crotch, mm (0 in creases).
-    pub radius: f64,
-    /// Maximum τ of its crotches.
-    pub tau: f64,
+    /// What its crotches have.
+    pub fillets: HubFillets,
 }
 
 /// Two beams of a hub that still overlap at the split plane of the first: closed forms are not valid there.
@@ -155,6 +154,8 @@ pub struct Quadors {
     half_beams: Vec<HalfBeam>,
     /// G of each, close together in memory.
     g: Vec<AffineFunction>,
+    /// The fillets asked for.
+    fillet: Fillet,
     /// τ of the pairs of half-beams of each kind of hub, row by row; empty without fillets.
     taus: Vec<f64>,
     pencils: Vec<Pencil>,
@@ -224,6 +225,7 @@ impl Quadors {
             cap: 0.0,
             g: half_beams.iter().map(|s| s.g).collect(),
             half_beams,
+            fillet,
             taus: Vec::new(),
             pencils,
             ends,
@@ -251,15 +253,15 @@ impl Quadors {
                 curvature: 0.0,
             })
             .collect();
-        out.set_fillets(fillet);
+        out.set_fillets();
         out.index = BoxIndex::new(out.balls.iter().map(|b| b.bounds.grown(out.cap)));
         out.parts = BoxIndex::new(out.balls.iter().map(|b| b.part));
         Ok(out)
     }
 
     /// Sets the fillets, once for equal hubs, and the bounds that depend on them.
-    fn set_fillets(&mut self, fillet: Fillet) {
-        let classes = self.classes();
+    fn set_fillets(&mut self) {
+        let (fillet, classes) = (self.fillet, self.classes());
         let sizes: Vec<FilletSizes> =
             classes.sample.par_iter().map(|hub| fillet_sizes(self.hub(*hub), fillet)).collect();
         let mut starts = Vec::with_capacity(sizes.len());
@@ -270,7 +272,7 @@ impl Quadors {
         for (hub, class) in classes.of.iter().enumerate() {
             let of = &sizes[*class as usize];
             self.balls[hub].taus = starts[*class as usize];
-            self.shortfalls.extend(of.shortfall.map(|[radius, tau]| Shortfall { hub, radius, tau }));
+            self.shortfalls.extend(of.shortfall.map(|fillets| Shortfall { hub, fillets }));
             let first = self.balls[hub].first;
             let beams = |of: &[usize; 2]| of.map(|i| self.half_beams[first + i].beam);
             self.overlaps.extend(of.overlaps.iter().map(|pair| Overlap { hub, beams: beams(pair) }));
@@ -319,7 +321,12 @@ impl Quadors {
         &self.pencils[beam]
     }
 
-    /// Hubs whose fillets are smaller than requested.
+    /// The fillets asked for.
+    pub fn fillet(&self) -> Fillet {
+        self.fillet
+    }
+
+    /// Hubs with a fillet smaller than requested, in the order of their numbers. There is none with `Fillet::Auto`.
     pub fn shortfalls(&self) -> &[Shortfall] {
         &self.shortfalls
     }
@@ -336,7 +343,13 @@ impl Quadors {
 
     /// Fillet radius in the tightest crotch of a hub, mm: 0 in creases, infinite without a concave crotch.
     pub fn fillet_radius(&self, hub: usize) -> f64 {
-        min_fillet_radius(&self.hub(hub))
+        self.fillets(hub).radius[0]
+    }
+
+    /// What the crotches of a hub have, and how many have less than what was asked for.
+    pub fn fillets(&self, hub: usize) -> HubFillets {
+        let hub = self.hub(hub);
+        hub_fillets(&hub, self.fillet, &hub.adjacent_pairs())
     }
 
     /// # Errors

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use beams::quador::slice::{Plane, Slice as Cut};
-use beams::quador::{Bezier, Quadors as Core, homogeneous_matrix};
+use beams::quador::{Bezier, HubFillets, Quadors as Core, homogeneous_matrix};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -136,6 +136,20 @@ impl Quadors {
         let plane = Plane::new(point, normal).map_err(error::fault)?;
         let cut = run(py, None, None, |_| self.quadors.slice(&plane))?;
         Ok(Slice { cut: cut.map_err(error::fault)? })
+    }
+
+    /// For all hubs: centres (n, 3), crotches (n,), those with less than asked for (n,), radii (n, 2), τ (n, 2).
+    fn fillets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let core = &self.quadors;
+        let all: Vec<_> = run(py, None, None, |_| (0..core.len()).into_par_iter().map(|i| core.fillets(i)).collect())?;
+        let counts = |of: &dyn Fn(&HubFillets) -> usize| -> Vec<i64> { all.iter().map(|f| of(f) as i64).collect() };
+        let d = PyDict::new(py);
+        d.set_item("centers", rows(py, (0..core.len()).map(|i| core.center(i)))?)?;
+        d.set_item("crotches", counts(&|f| f.crotches).into_pyarray(py))?;
+        d.set_item("short", counts(&|f| f.short).into_pyarray(py))?;
+        d.set_item("radius", rows(py, all.iter().map(|f| f.radius))?)?;
+        d.set_item("tau", rows(py, all.iter().map(|f| f.tau))?)?;
+        Ok(d)
     }
 
     /// The surface of a hub: centre, vertices, arcs, faces; and its rational patches.

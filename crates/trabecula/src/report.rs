@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-pub use beams_report::{BeamsReport, CleanedReport, GraphReport, PatternReport, TrimmedReport};
+pub use beams_report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, PatternReport, TrimmedReport};
 pub use design_report::{
     BlendReport, DesignReport, DistortionReport, FractionAlong, LatticeReport, LooseBodies, MapSpread, NarrowestNeck,
     RbfReport, RegionReport, TransitionReport,

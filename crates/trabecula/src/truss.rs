@@ -10,8 +10,7 @@ pub use fill_region::fill;
 use crate::implicit::Implicit;
 use beams::graph::{Cleaned, Graph, Trimmed, WireframeReport};
 use beams::pattern::PatternField;
-use beams::quador::Collision;
-use beams::quador::Quadors;
+use beams::quador::{Collision, Quadors, Shortfall};
 
 /// The beams of a design.
 #[derive(Clone)]
@@ -56,6 +55,8 @@ pub struct Truss {
     /// Minimum and maximum fillet radius in the tightest crotches of hubs inside the region, mm; `None` without
     /// fillets.
     pub fillet: Option<[f64; 2]>,
+    /// Hubs inside the region with a fillet smaller than asked for, that with the tightest crotch first.
+    pub shortfalls: Vec<Shortfall>,
     /// Whether all beams lie inside the region.
     pub whole: bool,
     /// Counts of the clean-up.

@@ -18,6 +18,8 @@ const LEVELS: [f64; 3] = [4.0, 0.8, 0.01];
 const HALVINGS: usize = 16;
 /// Number of times that all pairs are moved on.
 const ROUNDS: usize = 4;
+/// A fillet is short if it has less than this share of what was asked for: radii follow from 1 − τ ≥ 10⁻³, known to rounding.
+const SHORT: f64 = 1.0 - 1e-9;
 
 /// R of a hub: a symmetric matrix with τ of each pair, and 1 on the diagonal.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,8 +129,8 @@ fn min_taus(hub: &Hub) -> (Pairs, Vec<[usize; 2]>) {
 pub(super) struct FilletSizes {
     /// R, row by row; empty without fillets.
     pub taus: Vec<f64>,
-    /// The least radius (mm) and the maximum τ, if less than what is asked for.
-    pub shortfall: Option<[f64; 2]>,
+    /// What its crotches have, if one has less than what is asked for.
+    pub shortfall: Option<HubFillets>,
     /// Pairs of half-beams that overlap at the split plane of the first.
     pub overlaps: Vec<[usize; 2]>,
 }
@@ -179,17 +181,9 @@ pub(super) fn fillet_sizes(hub: Hub, fillet: Fillet) -> FilletSizes {
     let may_be_short = fillet != Fillet::Auto && fillet.tau().is_none_or(|tau| pairs.narrowest() > tau.min(MAX_TAU));
     let shortfall = may_be_short.then(|| {
         let adjacent = known.unwrap_or_else(|| hub.adjacent_pairs());
-        let asked = |i, j| match fillet {
-            Fillet::Radius(r) => tau_for_radius(&hub, i, j, r),
-            _ => fillet.tau().map_or(1.0, |tau| tau.min(MAX_TAU)),
-        };
-        let less = |&(i, j): &(usize, usize)| pairs.at(i, j) > asked(i, j) * (1.0 + 1e-12) + 1e-15;
-        adjacent.iter().any(less).then(|| {
-            let tau = adjacent.iter().map(|&(i, j)| pairs.at(i, j)).fold(0.0, f64::max);
-            [min_fillet_radius(&Hub { taus: &pairs.tau, ..hub }), tau]
-        })
+        hub_fillets(&Hub { taus: &pairs.tau, ..hub }, fillet, &adjacent)
     });
-    let shortfall = shortfall.flatten();
+    let shortfall = shortfall.filter(|of| of.short > 0);
     FilletSizes { taus: pairs.tau, shortfall, overlaps }
 }
 
@@ -235,11 +229,38 @@ fn tau_for_radius(hub: &Hub, i: usize, j: usize, r: f64) -> f64 {
     lo
 }
 
-/// Fillet radius in the tightest crotch of a hub, mm.
-pub(super) fn min_fillet_radius(hub: &Hub) -> f64 {
-    if hub.sharp() {
-        return if hub.adjacent_pairs().is_empty() { f64::INFINITY } else { 0.0 };
+/// The fillets of a hub: one in each crotch, where two of its half-beams meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HubFillets {
+    /// Number of crotches.
+    pub crotches: usize,
+    /// Number of crotches with a smaller fillet than asked for.
+    pub short: usize,
+    /// Radius of curvature in the middle of the tightest and of the widest fillet, mm: 0 in creases; infinite if no crotch is
+    /// concave.
+    pub radius: [f64; 2],
+    /// Minimum and maximum τ; the smallest fillet has the maximum. NaN without crotches.
+    pub tau: [f64; 2],
+}
+
+/// The fillets in the crotches of a hub, and how many are smaller than asked for.
+pub(super) fn hub_fillets(hub: &Hub, fillet: Fillet, crotches: &[(usize, usize)]) -> HubFillets {
+    let mut out = HubFillets { crotches: crotches.len(), short: 0, radius: [f64::INFINITY; 2], tau: [f64::NAN; 2] };
+    for &(i, j) in crotches {
+        let tau = hub.tau(i, j);
+        let radius = if hub.sharp() { 0.0 } else { hub.crotch(i, j, tau).map_or(f64::INFINITY, |c| c.1) };
+        let is_short = match (fillet, fillet.tau()) {
+            (Fillet::Radius(asked), _) => radius < asked * SHORT,
+            (_, Some(asked)) => 1.0 - tau < (1.0 - asked.min(MAX_TAU)) * SHORT,
+            _ => false,
+        };
+        out.short += usize::from(is_short);
+        // f64::min and max pass NaN over.
+        out.tau = [out.tau[0].min(tau), out.tau[1].max(tau)];
+        if radius < f64::INFINITY {
+            let widest = if out.radius[1] < f64::INFINITY { out.radius[1].max(radius) } else { radius };
+            out.radius = [out.radius[0].min(radius), widest];
+        }
     }
-    let of = |(i, j): (usize, usize)| hub.crotch(i, j, hub.tau(i, j)).map_or(f64::INFINITY, |c| c.1);
-    hub.adjacent_pairs().into_iter().map(of).fold(f64::INFINITY, f64::min)
+    out
 }

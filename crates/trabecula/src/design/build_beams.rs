@@ -72,14 +72,17 @@ pub(super) fn beams(
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
     let inside = |p: Vec3| region.value(p) <= slack;
-    let fillets: Vec<(usize, f64)> = (0..quadors.len())
+    let fillets: Vec<f64> = (0..quadors.len())
         .into_par_iter()
         .filter(|i| spec.fillet != FilletSpec::None && inside(quadors.center(*i)))
-        .map(|i| (i, quadors.fillet_radius(i)))
-        .filter(|f| f.1.is_finite())
+        .map(|i| quadors.fillet_radius(i))
+        .filter(|radius| radius.is_finite())
         .collect();
-    let narrow = fillets.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
-    let wide = fillets.iter().map(|f| f.1).fold(0.0, f64::max);
+    let narrow = fillets.iter().copied().fold(f64::INFINITY, f64::min);
+    let wide = fillets.iter().copied().fold(0.0, f64::max);
+    let mut shortfalls = quadors.shortfalls().to_vec();
+    shortfalls.retain(|s| inside(quadors.center(s.hub)));
+    shortfalls.sort_by(|a, b| a.fillets.radius[0].total_cmp(&b.fillets.radius[0]));
     let mut collisions = quadors.collisions();
     collisions.retain(|c| inside(c.at));
     let truss = Truss {
@@ -87,6 +90,7 @@ pub(super) fn beams(
         collisions,
         report: wire.report(&inside),
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
+        shortfalls,
         cell: cell.map(|u| u.name),
         graph,
         quadors: Arc::new(quadors),
@@ -96,7 +100,7 @@ pub(super) fn beams(
         dangling: wire.dangling(&held),
     };
     check_open(&*truss.quadors, environment)?;
-    warn(&truss, &fillets, spec, environment, warnings);
+    warn(&truss, spec, environment, warnings);
     Ok(Beams::Truss(Arc::new(truss)))
 }
 

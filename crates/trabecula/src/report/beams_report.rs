@@ -53,6 +53,8 @@ pub struct GraphReport {
     pub valence: BTreeMap<String, usize>,
     /// Least and greatest radius of fillets at their tightest places, mm; None without fillets.
     pub fillet_radius: Option<[f64; 2]>,
+    /// Hubs in the region that cannot have the fillets asked for, that with the tightest crotch first.
+    pub fillet_shortfalls: Vec<FilletShortfall>,
     /// Least angle between two beams of a node, degrees.
     pub smallest_angle: Option<f64>,
     /// Position of that node, mm.
@@ -67,6 +69,27 @@ pub struct GraphReport {
     pub cleaned: CleanedReport,
     /// What the region trimmed.
     pub trimmed: TrimmedReport,
+}
+
+/// A hub with a fillet smaller than asked for. A crotch is where two of its beams meet.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct FilletShortfall {
+    /// Number of the hub, as in `Solid.beams` and for `Quadors.hub`.
+    pub hub: usize,
+    /// Its centre, mm.
+    pub position: [f64; 3],
+    /// Radius asked for, mm; None if τ, α or β was.
+    pub asked_radius: Option<f64>,
+    /// τ asked for, also by α or β; None if a radius was.
+    pub asked_tau: Option<f64>,
+    /// Radius of the smallest and of the largest fillet in its crotches, mm; None if no crotch is concave.
+    pub radius: Option<[f64; 2]>,
+    /// Least and greatest τ of its crotches; the smallest fillet has the greatest.
+    pub tau: [f64; 2],
+    /// Number of its crotches.
+    pub crotches: usize,
+    /// Number of its crotches with a smaller fillet than asked for.
+    pub short: usize,
 }
 
 /// What is known of a pattern of beams alone.

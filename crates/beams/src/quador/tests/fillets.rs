@@ -58,6 +58,43 @@ fn a_fillet_smaller_than_the_largest_that_fits_is_achieved_in_every_crotch() {
     }
 }
 
+#[test]
+fn a_hub_with_less_than_asked_for_is_listed_with_what_its_crotches_have() {
+    let mut random = Random(47);
+    let mut listed = [0; 2];
+    for n in 2..=8 {
+        for _ in 0..20 {
+            let graph = star_of_cylinders(&mut random, n);
+            let auto = Quadors::new(&graph, Fillet::Auto).expect("a star");
+            let most = auto.fillets(0);
+            assert_eq!((most.short, auto.shortfalls()), (0, &[][..]));
+            if !auto.overlaps().is_empty() {
+                continue;
+            }
+            for times in [0.9, 1.5, 4.0] {
+                let asked = times * most.radius[0];
+                let got = Quadors::new(&graph, Fillet::Radius(asked)).expect("a star");
+                let (all, fillets) = (radii(&got), got.fillets(0));
+                let short = all.iter().filter(|r| **r < asked * (1.0 - 1e-9)).count();
+                assert_eq!((fillets.crotches, fillets.short), (all.len(), short));
+                let finite = || all.iter().copied().filter(|r| r.is_finite());
+                assert_eq!(fillets.radius, [finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max)]);
+                let list: Vec<_> = got.shortfalls().iter().filter(|s| s.hub == 0).map(|s| s.fillets).collect();
+                // More than the tightest crotch can have cannot be had everywhere.
+                assert_eq!(list, if times > 1.0 { vec![fillets] } else { vec![] }, "{n} beams: asked for {asked}");
+                listed[usize::from(times > 1.0)] += 1;
+            }
+            // Two beams that are nearly opposite have τ = 0.
+            let tau = most.tau[1] / 2.0;
+            let got = Quadors::new(&graph, Fillet::Tau(tau)).expect("a star");
+            let list: Vec<_> = got.shortfalls().iter().filter(|s| s.hub == 0).collect();
+            assert_eq!(list.len(), usize::from(tau > 0.0), "{n} beams: asked for {tau}");
+            assert!(list.iter().all(|s| s.fillets.short > 0 && s.fillets.tau[1] > tau), "{n} beams: asked for {tau}");
+        }
+    }
+    assert!(listed.iter().all(|n| *n > 50), "{listed:?}");
+}
+
 /// The fillet radii that the crotches of the first hub would have if each were alone in it.
 fn alone(graph: &Graph, q: &Quadors) -> Vec<f64> {
     let pair = |&(i, j): &(usize, usize)| {

@@ -4,10 +4,11 @@ use super::whole;
 use crate::design::data::*;
 use crate::design::{Built, Warning, build_pattern};
 use crate::environment::Environment;
-use crate::report::{BeamsReport, CleanedReport, GraphReport, TrimmedReport};
+use crate::report::{BeamsReport, CleanedReport, FilletShortfall, GraphReport, TrimmedReport};
 use crate::truss::{Beams, Truss};
 use ::beams::graph::Cleaned;
 use ::beams::pattern::PatternField;
+use ::beams::quador::{Fillet, Shortfall};
 use geometry::fault::{counted, number};
 use geometry::math::Vec3;
 
@@ -30,13 +31,7 @@ pub(super) fn warn_cleaned(c: &Cleaned, path: &str, warnings: &mut Vec<Warning>)
     }
 }
 
-pub(super) fn warn(
-    truss: &Truss,
-    fillets: &[(usize, f64)],
-    spec: &BeamsSpec,
-    environment: &Environment,
-    warnings: &mut Vec<Warning>,
-) {
+pub(super) fn warn(truss: &Truss, spec: &BeamsSpec, environment: &Environment, warnings: &mut Vec<Warning>) {
     let mut say = |message: String| {
         warnings.push(Warning { path: environment.path.clone(), message });
     };
@@ -48,22 +43,16 @@ pub(super) fn warn(
         ));
     }
     let inside = |hub: usize| environment.region.value(truss.quadors.center(hub)) <= 0.0;
-    let short: Vec<(usize, f64)> = match spec.fillet {
-        FilletSpec::Radius(r) => {
-            let less = |f: &&(usize, f64)| f.1 < r * (1.0 - 1e-9);
-            fillets.iter().filter(less).copied().collect()
-        }
-        _ => (truss.quadors.shortfalls().iter()).filter(|s| inside(s.hub)).map(|s| (s.hub, s.radius)).collect(),
-    };
-    if let Some((hub, radius)) = short.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+    if let Some(tightest) = truss.shortfalls.first() {
         let target = match spec.fillet {
             FilletSpec::Radius(r) => format!("a fillet of {} mm", number(r)),
             _ => "the fillet asked for".into(),
         };
         say(format!(
-            "{} cannot have {target}, only the largest that fits; the tightest has {radius:.3} mm, at {}",
-            counted(short.len(), "hub"),
-            at(truss.quadors.center(*hub))
+            "{} cannot have {target}, only the largest that fits; the tightest has {:.3} mm, at {}",
+            counted(truss.shortfalls.len(), "hub"),
+            tightest.fillets.radius[0],
+            at(truss.quadors.center(tightest.hub))
         ));
     }
     let over: Vec<_> = (truss.quadors.overlaps().iter()).filter(|o| inside(o.hub)).collect();
@@ -129,6 +118,25 @@ pub(in crate::design) fn share(
     }
 }
 
+/// A hub that cannot have the fillets asked for.
+fn fillet_shortfall(truss: &Truss, short: &Shortfall) -> FilletShortfall {
+    let of = &short.fillets;
+    let [asked_radius, asked_tau] = match truss.quadors.fillet() {
+        Fillet::Radius(radius) => [Some(radius), None],
+        other => [None, other.tau()],
+    };
+    FilletShortfall {
+        hub: short.hub,
+        position: truss.quadors.center(short.hub),
+        asked_radius,
+        asked_tau,
+        radius: of.radius[0].is_finite().then_some(of.radius),
+        tau: of.tau,
+        crotches: of.crotches,
+        short: of.short,
+    }
+}
+
 /// The figures of beams; `sampled` is the solid share of the region, by sampling at points.
 pub(in crate::design) fn report(
     beams: &Beams,
@@ -158,6 +166,7 @@ pub(in crate::design) fn report(
         inertia: mass.map(|m| m.inertia()),
         valence: frame.valence.iter().map(|(v, n)| (v.to_string(), *n)).collect(),
         fillet_radius: truss.fillet,
+        fillet_shortfalls: truss.shortfalls.iter().map(|s| fillet_shortfall(truss, s)).collect(),
         smallest_angle: frame.min_angle.map(|a| a.0),
         smallest_angle_at: frame.min_angle.map(|a| a.1),
         pieces: frame.components,
