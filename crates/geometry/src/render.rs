@@ -6,6 +6,7 @@ use crate::math::{Aabb, Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
 
 mod font;
+mod occlusion;
 mod paper;
 mod png;
 mod raster;
@@ -14,7 +15,8 @@ mod tint;
 
 use paper::Paper;
 pub use png::png;
-use raster::Raster;
+use raster::{BAND, Projected};
+use shade::Shader;
 pub use tint::Tint;
 
 /// How to draw.
@@ -32,7 +34,7 @@ pub struct View {
 const LARGEST: usize = 1 << 26;
 /// Samples along each side of a pixel.
 const OVER: usize = 3;
-/// Samples drawn at once, more or less; larger pictures get fewer samples a pixel.
+/// Samples drawn at once, more or less: larger pictures are drawn in bands of rows.
 const SAMPLES: usize = 6_000_000;
 
 /// Where the eye is and how it sees: right, up, and from the scene to the eye.
@@ -73,6 +75,11 @@ impl Camera {
         camera
     }
 
+    /// The same view in a picture of `factor` times as many samples across and down.
+    fn scaled(&self, factor: f64) -> Camera {
+        Camera { focal: factor * self.focal, middle: self.middle.map(|m| factor * m), ..*self }
+    }
+
     /// Column, row (samples) and depth: the inverse distance along the view, greater when nearer.
     fn project(&self, p: Vec3) -> [f64; 3] {
         let d = sub(p, self.center);
@@ -99,55 +106,62 @@ impl Camera {
 
 /// Draws the surface; returns RGB rows from the top.
 ///
-/// Perspective with a narrow lens, fitted to the bounds, +Z up. The lattice is smooth and warm, cuts by the region's
+/// Perspective with a narrow lens, fitted to the bounds, +Z up, nine samples a pixel. The lattice is smooth and warm, cuts by the region's
 /// boundary are flat and cool; with a tint, both have its colours. The picture is the same for any number of threads. A side of 0 pixels gives no
 /// rows; sizes beyond 2²⁶ pixels are answered by an empty picture as well.
 pub fn render(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>) -> Vec<u8> {
+    render_in_bands(surface, view, tint, SAMPLES)
+}
+
+/// Draws about `samples` samples at once.
+fn render_in_bands(surface: &SurfaceMesh, view: &View, tint: Option<&Tint>, samples: usize) -> Vec<u8> {
     let [w, h] = view.size;
     let pixels = w.saturating_mul(h);
     if pixels == 0 || pixels > LARGEST || w > 1 << 15 || h > 1 << 15 {
         return Vec::new();
     }
-    let over = (1..=OVER).rev().find(|k| pixels * k * k <= SAMPLES).unwrap_or(1);
-    let size = [w * over, h * over];
     let bounds = surface.mesh.bounds();
-    let drawn = !bounds.is_empty() && bounds.is_finite();
-    let angles = view.azimuth.is_finite() && view.elevation.is_finite();
-    let picture = if drawn && angles {
+    let drawn = !bounds.is_empty() && bounds.is_finite() && view.azimuth.is_finite() && view.elevation.is_finite();
+    let mut rgb = vec![0u8; 3 * pixels];
+    if drawn {
+        let size = [w * OVER, h * OVER];
         let camera = Camera::new(&bounds, &surface.mesh.vertices, view, size);
-        let raster = Raster::draw(surface, &camera, size);
-        shade::shade(surface, &camera, &raster, tint)
+        let projected = Projected::of(surface, &camera, size);
+        let shader = Shader::new(surface, &camera, size, tint);
+        // Whole bands of the projection and whole rows of pixels.
+        let rows = (samples / (size[0] * BAND)).max(1) * BAND;
+        for (i, part) in rgb.chunks_mut(rows / OVER * w * 3).enumerate() {
+            let raster = projected.draw(surface, i * rows / BAND, part.len() / (3 * w) * OVER);
+            resolve(&shader.shade(&raster), view.size, i * rows / OVER, part);
+        }
     } else {
-        vec![[0.0; 4]; size[0] * size[1]]
-    };
-    let rgb = resolve(&picture, [w, h], over);
+        resolve(&vec![[0.0; 4]; pixels * OVER * OVER], view.size, 0, &mut rgb);
+    }
     let Some(tint) = tint else { return rgb };
     let mut paper = Paper { size: [w, h], rgb };
     tint.legend(&mut paper);
     paper.rgb
 }
 
-/// Averages the samples of each pixel over the background and encodes them as sRGB.
-fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], over: usize) -> Vec<u8> {
-    let mut rgb = vec![0u8; w * h * 3];
+/// Averages the samples of each pixel over the background and encodes them as sRGB, for the rows from `first` on.
+fn resolve(picture: &[[f32; 4]], [w, h]: [usize; 2], first: usize, rgb: &mut [u8]) {
     rgb.par_chunks_mut(w * 3).enumerate().for_each(|(y, row)| {
         for x in 0..w {
             let mut sum = [0.0f32; 4];
-            for j in 0..over {
-                let first = (y * over + j) * w * over + x * over;
-                for s in &picture[first..first + over] {
+            for j in 0..OVER {
+                let start = (y * OVER + j) * w * OVER + x * OVER;
+                for s in &picture[start..start + OVER] {
                     (0..4).for_each(|k| sum[k] += s[k]);
                 }
             }
-            let n = (over * over) as f32;
-            let back = shade::background((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32);
+            let n = (OVER * OVER) as f32;
+            let back = shade::background((x as f32 + 0.5) / w as f32, ((first + y) as f32 + 0.5) / h as f32);
             for k in 0..3 {
                 let v = (sum[k] + (n - sum[3]) * back[k]) / n;
                 row[3 * x + k] = encode(v);
             }
         }
     });
-    rgb
 }
 
 /// Linear light to an sRGB byte.

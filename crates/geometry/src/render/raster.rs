@@ -8,60 +8,71 @@ use crate::surface_mesh::SurfaceMesh;
 
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
-/// Rows drawn by one thread at a time.
-const BAND: usize = 48;
+/// Rows drawn by one thread at a time: whole rows of pixels.
+pub(super) const BAND: usize = 16 * super::OVER;
 
-/// Depth and triangle of each sample.
+/// Depth and triangle of each sample of some rows.
 pub(super) struct Raster {
-    /// Samples across and down.
-    pub size: [usize; 2],
+    /// The first row.
+    pub first: usize,
+    /// Samples across.
+    pub width: usize,
     /// Inverse distance, 0 where nothing is seen.
     pub near: Vec<f32>,
     /// The triangle seen.
     pub triangle: Vec<u32>,
 }
 
-impl Raster {
-    /// Draws all triangles. Bands of rows are independent, and within one the triangles come in their own order, so
-    /// the result does not depend on the number of threads.
-    pub(super) fn draw(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Raster {
+/// Where the vertices lie in the picture, and the triangles of each band of rows.
+pub(super) struct Projected {
+    points: Vec<[f32; 3]>,
+    width: usize,
+    /// By chunks of triangles, then by bands: a band's triangles are in their own order.
+    binned: Vec<Vec<Vec<u32>>>,
+}
+
+impl Projected {
+    /// Projects into a picture of `size` samples across and down.
+    pub(super) fn of(surface: &SurfaceMesh, camera: &Camera, size: [usize; 2]) -> Projected {
+        const CHUNK: usize = 1 << 16;
         let mesh = &surface.mesh;
         let points: Vec<[f32; 3]> = mesh.vertices.par_iter().map(|p| camera.project(*p).map(|v| v as f32)).collect();
         let rows = size[1].div_ceil(BAND);
-        // Triangles by the bands they touch, chunk by chunk so that their order is kept.
-        const CHUNK: usize = 1 << 16;
-        let binned: Vec<Vec<Vec<u32>>> = mesh
-            .triangles
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map(|(c, part)| {
-                let mut bins = vec![Vec::new(); rows];
-                for (i, t) in part.iter().enumerate() {
-                    let y = t.map(|v| points[v as usize][1]);
-                    let (low, high) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
-                    if !(high >= 0.0 && low < size[1] as f32) {
-                        continue;
-                    }
-                    let first = (low.max(0.0) as usize / BAND).min(rows - 1);
-                    let last = (high as usize / BAND).min(rows - 1);
-                    for bin in &mut bins[first..=last] {
-                        bin.push((c * CHUNK + i) as u32);
-                    }
+        let chunks = mesh.triangles.par_chunks(CHUNK).enumerate().map(|(c, part)| {
+            let mut bins = vec![Vec::new(); rows];
+            for (i, t) in part.iter().enumerate() {
+                let y = t.map(|v| points[v as usize][1]);
+                let (low, high) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
+                if !(high >= 0.0 && low < size[1] as f32) {
+                    continue;
                 }
-                bins
-            })
-            .collect();
-        let mut near = vec![0.0f32; size[0] * size[1]];
-        let mut triangle = vec![NONE; size[0] * size[1]];
-        near.par_chunks_mut(BAND * size[0]).zip(triangle.par_chunks_mut(BAND * size[0])).enumerate().for_each(
-            |(band, (near, triangle))| {
-                for i in binned.iter().flat_map(|bins| &bins[band]) {
-                    let corners = mesh.triangles[*i as usize].map(|v| points[v as usize]);
-                    fill(corners, *i, size[0], band * BAND, near, triangle);
+                let first = (low.max(0.0) as usize / BAND).min(rows - 1);
+                let last = (high as usize / BAND).min(rows - 1);
+                for bin in &mut bins[first..=last] {
+                    bin.push((c * CHUNK + i) as u32);
+                }
+            }
+            bins
+        });
+        let binned = chunks.collect();
+        Projected { points, width: size[0], binned }
+    }
+
+    /// Draws `rows` rows from a band on. Bands are independent, and within one the triangles come in their own order, so
+    /// the result does not depend on the number of threads.
+    pub(super) fn draw(&self, surface: &SurfaceMesh, band: usize, rows: usize) -> Raster {
+        let (width, first) = (self.width, band * BAND);
+        let mut near = vec![0.0f32; width * rows];
+        let mut triangle = vec![NONE; width * rows];
+        near.par_chunks_mut(BAND * width).zip(triangle.par_chunks_mut(BAND * width)).enumerate().for_each(
+            |(i, (near, triangle))| {
+                for t in self.binned.iter().flat_map(|bins| &bins[band + i]) {
+                    let corners = surface.mesh.triangles[*t as usize].map(|v| self.points[v as usize]);
+                    fill(corners, *t, width, first + i * BAND, near, triangle);
                 }
             },
         );
-        Raster { size, near, triangle }
+        Raster { first, width, near, triangle }
     }
 }
 

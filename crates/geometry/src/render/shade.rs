@@ -1,10 +1,11 @@
-//! Light: a key light, a sky and a back light, and ambient occlusion.
+//! Light: a key light, a sky and a back light.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::raster::{NONE, Raster, weights};
+use super::occlusion::Occlusion;
+use super::raster::{NONE, Projected, Raster, weights};
 use super::{Camera, Tint, View};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::surface_mesh::SurfaceMesh;
@@ -12,8 +13,6 @@ use crate::surface_mesh::SurfaceMesh;
 /// Colours in linear light.
 const LATTICE: [f32; 3] = [0.83, 0.72, 0.56];
 const CUT: [f32; 3] = [0.27, 0.38, 0.52];
-/// Samples of the sky about each point.
-const SKY: usize = 20;
 
 /// Background of the picture at a place from the left and from the top, 0 to 1.
 pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
@@ -22,47 +21,80 @@ pub(super) fn background(x: f32, y: f32) -> [f32; 3] {
     [0.965 - 0.165 * t, 0.972 - 0.150 * t, 0.985 - 0.130 * t]
 }
 
-/// Premultiplied colour and cover of each sample.
-pub(super) fn shade(surface: &SurfaceMesh, camera: &Camera, raster: &Raster, tint: Option<&Tint>) -> Vec<[f32; 4]> {
-    let normals = Normals::of(surface);
-    let [w, h] = raster.size;
-    let open = occlusion(camera, raster);
-    let key = towards(camera, -0.55, 0.75, 0.60);
-    let shadows = Shadows::cast(surface, key);
-    let mut picture = vec![[0.0f32; 4]; w * h];
-    picture.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-        for (x, out) in row.iter_mut().enumerate() {
-            let at = y * w + x;
-            let id = raster.triangle[at];
-            if id == NONE {
-                continue;
-            }
-            let p = camera.unproject(x as f64 + 0.5, y as f64 + 0.5, f64::from(raster.near[at]));
-            let eye = camera.towards(p);
-            let cut = surface.cut.get(id as usize).copied().unwrap_or(false);
-            let flat = unit(area(surface, id as usize));
-            let t = surface.mesh.triangles[id as usize].map(|v| v as usize);
-            let k = weights(surface, id, p);
-            let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(normals.at(surface, t[i], flat), k[i])));
-            let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
-            // An open mesh may show its inside.
-            if dot(flat, eye) < 0.0 {
-                n = scale(n, -1.0);
-            }
-            let colour = match tint {
-                Some(tint) => {
-                    let value = |i: usize| tint.values.get(t[i]).copied().unwrap_or(f64::NAN);
-                    tint.colour((0..3).map(|i| k[i] * value(i)).sum())
-                }
-                None if cut => CUT,
-                None => LATTICE,
-            };
-            let sun = shadows.light(p, flat);
-            let light = lit([n, eye, key], sun, camera, colour, open[at], cut);
-            *out = [light[0], light[1], light[2], 1.0];
+/// What the colours of a picture come from.
+pub(super) struct Shader<'a> {
+    surface: &'a SurfaceMesh,
+    camera: &'a Camera,
+    tint: Option<&'a Tint>,
+    normals: Normals,
+    /// The direction to the key light.
+    key: Vec3,
+    shadows: Shadows,
+    occlusion: Occlusion,
+}
+
+impl<'a> Shader<'a> {
+    /// Prepares a picture of `size` samples across and down.
+    pub(super) fn new(
+        surface: &'a SurfaceMesh,
+        camera: &'a Camera,
+        size: [usize; 2],
+        tint: Option<&'a Tint>,
+    ) -> Shader<'a> {
+        let key = towards(camera, -0.55, 0.75, 0.60);
+        Shader {
+            surface,
+            camera,
+            tint,
+            normals: Normals::of(surface),
+            key,
+            shadows: Shadows::cast(surface, key),
+            occlusion: Occlusion::of(surface, camera, size),
         }
-    });
-    picture
+    }
+
+    /// Premultiplied colour and cover of each sample.
+    pub(super) fn shade(&self, raster: &Raster) -> Vec<[f32; 4]> {
+        let width = raster.width;
+        let mut picture = vec![[0.0f32; 4]; raster.near.len()];
+        picture.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, out) in row.iter_mut().enumerate() {
+                let at = y * width + x;
+                if raster.triangle[at] != NONE {
+                    let [r, g, b] = self.colour(x, raster.first + y, raster.near[at], raster.triangle[at]);
+                    *out = [r, g, b, 1.0];
+                }
+            }
+        });
+        picture
+    }
+
+    /// The light from a triangle at a sample.
+    fn colour(&self, x: usize, y: usize, near: f32, triangle: u32) -> [f32; 3] {
+        let (surface, camera) = (self.surface, self.camera);
+        let p = camera.unproject(x as f64 + 0.5, y as f64 + 0.5, f64::from(near));
+        let eye = camera.towards(p);
+        let cut = surface.cut.get(triangle as usize).copied().unwrap_or(false);
+        let flat = unit(area(surface, triangle as usize));
+        let t = surface.mesh.triangles[triangle as usize].map(|v| v as usize);
+        let k = weights(surface, triangle, p);
+        let n = (0..3).fold([0.0; 3], |n, i| add(n, scale(self.normals.at(surface, t[i], flat), k[i])));
+        let mut n = if norm(n) > 0.0 { unit(n) } else { flat };
+        // An open mesh may show its inside.
+        if dot(flat, eye) < 0.0 {
+            n = scale(n, -1.0);
+        }
+        let colour = match self.tint {
+            Some(tint) => {
+                let value = |i: usize| tint.values.get(t[i]).copied().unwrap_or(f64::NAN);
+                tint.colour((0..3).map(|i| k[i] * value(i)).sum())
+            }
+            None if cut => CUT,
+            None => LATTICE,
+        };
+        let sun = self.shadows.light(p, flat);
+        lit([n, eye, self.key], sun, camera, colour, self.occlusion.open(x, y, near), cut)
+    }
 }
 
 /// A direction by its parts to the right, up and towards the eye.
@@ -89,7 +121,7 @@ impl Shadows {
         let azimuth = key[1].atan2(key[0]).to_degrees();
         let elevation = key[2].clamp(-1.0, 1.0).asin().to_degrees();
         let eye = Camera::new(&surface.mesh.bounds(), &surface.mesh.vertices, &View { size, azimuth, elevation }, size);
-        let raster = Raster::draw(surface, &eye, size);
+        let raster = Projected::of(surface, &eye, size).draw(surface, 0, Self::SIZE);
         let texel = eye.distance / eye.focal;
         Shadows { eye, raster, texel }
     }
@@ -193,121 +225,4 @@ impl Normals {
 fn area(surface: &SurfaceMesh, triangle: usize) -> Vec3 {
     let [a, b, c] = surface.mesh.corners(triangle);
     cross(sub(b, a), sub(c, a))
-}
-
-/// How much of the sky each sample sees (1 all, 0 nothing), from the depths about it.
-///
-/// Alchemy's estimator (McGuire et al. 2011): neighbours on a spiral count by how far they stand above the tangent
-/// plane, and less the farther they are. It is worked out on every second sample and smoothed among equals.
-fn occlusion(camera: &Camera, raster: &Raster) -> Vec<f32> {
-    const STRIDE: usize = 2;
-    let [w, h] = raster.size;
-    let (cw, ch) = (w.div_ceil(STRIDE), h.div_ceil(STRIDE));
-    let at = |x: usize, y: usize| (y * STRIDE).min(h - 1) * w + (x * STRIDE).min(w - 1);
-    let point = |x: usize, y: usize| {
-        let near = raster.near[at(x, y)];
-        let p = camera.unproject((x * STRIDE) as f64 + 0.5, (y * STRIDE) as f64 + 0.5, f64::from(near));
-        (near > 0.0).then_some(p)
-    };
-    let scene = camera.distance / 6.0;
-    // Two reaches: the openings of a cell, and the part as a whole.
-    let reaches = [0.05 * scene, 0.22 * scene];
-    let mut raw = vec![1.0f32; cw * ch];
-    raw.par_chunks_mut(cw).enumerate().for_each(|(y, row)| {
-        for (x, out) in row.iter_mut().enumerate() {
-            let Some(p) = point(x, y) else { continue };
-            let n = screen_normal(&point, p, x, y, [cw, ch], camera);
-            let near = f64::from(raster.near[at(x, y)]);
-            // A pattern of 4×4 turns, the same in every picture.
-            let turn = ((x & 3) + 4 * (y & 3)) as f64 * 0.618_033_988_75 * core::f64::consts::TAU;
-            let mut dark = 0.0;
-            for (reach, weight) in reaches.into_iter().zip([0.62, 0.38]) {
-                let radius = (camera.focal * near * reach / STRIDE as f64).max(2.0);
-                let mut sum = 0.0;
-                for k in 0..SKY {
-                    let r = radius * ((k as f64 + 0.5) / SKY as f64);
-                    let (s, c) = (turn + k as f64 * 2.399_963_229_73).sin_cos();
-                    let (sx, sy) = (x as f64 + r * c, y as f64 + r * s);
-                    if sx < 0.0 || sy < 0.0 || sx >= cw as f64 || sy >= ch as f64 {
-                        continue;
-                    }
-                    let Some(q) = point(sx as usize, sy as usize) else {
-                        continue;
-                    };
-                    let v = sub(q, p);
-                    let d2 = dot(v, v);
-                    let fall = (1.0 - d2 / (reach * reach * 2.0)).max(0.0);
-                    let above = dot(v, n) - 0.02 * reach;
-                    sum += fall * above.max(0.0) / (d2.sqrt() + 1e-3 * reach);
-                }
-                dark += weight * sum / SKY as f64;
-            }
-            *out = (1.0 - 3.3 * dark).clamp(0.0, 1.0) as f32;
-        }
-    });
-    let smooth = smoothed(&raw, [cw, ch], |x, y| raster.near[at(x, y)]);
-    let mut open = vec![1.0f32; w * h];
-    open.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-        for (x, out) in row.iter_mut().enumerate() {
-            // The nearest in depth of the four coarse samples about this one.
-            let here = raster.near[y * w + x];
-            let mut best = f32::INFINITY;
-            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let (cx, cy) = ((x / STRIDE + i).min(cw - 1), (y / STRIDE + j).min(ch - 1));
-                let gap = (raster.near[at(cx, cy)] - here).abs();
-                if gap < best {
-                    best = gap;
-                    *out = smooth[cy * cw + cx];
-                }
-            }
-        }
-    });
-    open
-}
-
-/// The normal of the surface seen about a sample, from the nearer of its neighbours in depth on each axis.
-fn screen_normal(
-    point: &impl Fn(usize, usize) -> Option<Vec3>,
-    p: Vec3,
-    x: usize,
-    y: usize,
-    [w, h]: [usize; 2],
-    camera: &Camera,
-) -> Vec3 {
-    let pick = |before: Option<Vec3>, after: Option<Vec3>| {
-        let (a, b) = (before.map(|q| sub(p, q)), after.map(|q| sub(q, p)));
-        match (a, b) {
-            (Some(a), Some(b)) => Some(if dot(a, a) < dot(b, b) { a } else { b }),
-            (a, b) => a.or(b),
-        }
-    };
-    let dx = pick(x.checked_sub(1).and_then(|x| point(x, y)), (x + 1 < w).then(|| point(x + 1, y)).flatten());
-    let dy = pick(y.checked_sub(1).and_then(|y| point(x, y)), (y + 1 < h).then(|| point(x, y + 1)).flatten());
-    match (dx, dy) {
-        (Some(dx), Some(dy)) => unit(cross(dy, dx)),
-        _ => camera.axes[2],
-    }
-}
-
-/// Averages 4×4 samples of like depth, which takes out the pattern of the spiral.
-fn smoothed(raw: &[f32], [w, h]: [usize; 2], near: impl Fn(usize, usize) -> f32 + Sync) -> Vec<f32> {
-    let mut out = raw.to_vec();
-    out.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-        for (x, out) in row.iter_mut().enumerate() {
-            let here = near(x, y);
-            if here == 0.0 {
-                continue;
-            }
-            let (mut sum, mut count) = (0.0, 0.0);
-            for j in y.saturating_sub(2)..(y + 3).min(h) {
-                for i in x.saturating_sub(2)..(x + 3).min(w) {
-                    let weight = (1.0 - (near(i, j) / here - 1.0).abs() * 150.0).max(0.0);
-                    sum += weight * raw[j * w + i];
-                    count += weight;
-                }
-            }
-            *out = sum / count;
-        }
-    });
-    out
 }

@@ -108,6 +108,35 @@ fn nearer_hides_farther_and_cut_differs_from_lattice() {
 }
 
 #[test]
+fn bands_do_not_show() {
+    let s = contour(24, gyroid(2.0));
+    let one = render(&s, &VIEW, None);
+    assert_eq!(render_in_bands(&s, &VIEW, None, 1), one);
+    assert_eq!(render_in_bands(&s, &VIEW, None, 2 * BAND * VIEW.size[0] * OVER), one);
+}
+
+/// An inclined edge runs through pixels that have part of both sides, in large pictures as in small ones.
+#[test]
+fn edges_are_smooth_at_any_size() {
+    let mesh =
+        Mesh { vertices: vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.4, 1.0]], triangles: vec![[0, 1, 2]] };
+    let s = SurfaceMesh { mesh, cut: vec![true] };
+    for size in [[200, 150], [2400, 1800]] {
+        let view = View { azimuth: 0.0, elevation: 0.0, size };
+        let (with, without) = (render(&s, &view, None), render(&SurfaceMesh::default(), &view, None));
+        let level = |y: usize, x: usize| i32::from(with[3 * (y * size[0] + x)]);
+        // In each row, the pixels between the background and the first that is like its right neighbour.
+        let blended = |y: usize| {
+            let first = (0..size[0]).find(|x| with[3 * (y * size[0] + x)] != without[3 * (y * size[0] + x)]);
+            first.map_or(0, |x| usize::from((level(y, x) - level(y, x + 2)).abs() > 8))
+        };
+        let rows = size[1] / 4..size[1] * 3 / 4;
+        let share = rows.clone().map(blended).sum::<usize>() as f64 / rows.len() as f64;
+        assert!(share > 0.5, "{size:?}: {share}");
+    }
+}
+
+#[test]
 fn the_number_of_threads_does_not_show() {
     let s = contour(24, gyroid(2.0));
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
