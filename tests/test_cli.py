@@ -7,7 +7,9 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+import trabecula as lt
 from conftest import CUBE
 
 COMMAND = [sys.executable, "-m", "trabecula"]
@@ -56,6 +58,30 @@ def test_starter_meshes_at_once(tmp_path):
     run("new", "a.toml", "--force", cwd=tmp_path)
     assert '"gyroid"' in run("new", "b.toml", "--cell", "gyriod", cwd=tmp_path, status=1).stderr
     assert names(tmp_path) == ["a.STL", "a.toml"]
+
+
+@pytest.mark.parametrize("words", [(), ("--cell", "diamond"), ("--beams", "octet"), ("--beams", "bcc", "--skin", "0.8")])
+def test_starter_fills_a_part(words, tmp_path):
+    """The part is found from the design's folder, wherever the command runs; at least four cells go through it."""
+    corners = np.array([[x, y, z] for x in (0, 30) for y in (0, 12) for z in (0, 20)], float)
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    lt.Mesh.of(corners, [t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]).write(tmp_path / 'it\'s "a part".stl')
+    (tmp_path / "designs").mkdir()
+    run("new", "designs/a.toml", "--part", 'it\'s "a part".stl', *words, cwd=tmp_path)
+    report = json.loads(run("check", "designs/a.toml", "--json", cwd=tmp_path).stdout)
+    assert np.allclose(np.ptp(report["region"]["bounds"], axis=0), [30, 12, 20], atol=0.01)
+    made = lt.load(tmp_path / "designs" / "a.toml")
+    assert (made.beams if "--beams" in words else made.lattice)["core"].map["affine"]["wavelength"] == 3
+    assert (made.skin is not None) == ("--skin" in words)
+
+
+def test_starter_refuses_what_is_no_part(tmp_path):
+    (tmp_path / "bad.stl").write_text("nothing")
+    assert "bad.stl: 7 bytes" in run("new", "a.toml", "--part", "bad.stl", cwd=tmp_path, status=1).stderr
+    assert "does not exist" in run("new", "a.toml", "--part", "none.stl", cwd=tmp_path, status=1).stderr
+    assert 'did you mean "octet"' in run("new", "a.toml", "--beams", "octett", cwd=tmp_path, status=1).stderr
+    assert "greater than 0" in run("new", "a.toml", "--skin", "-1", cwd=tmp_path, status=2).stderr
+    assert names(tmp_path) == ["bad.stl"]
 
 
 def test_check_prints_the_figures(tmp_path, cube):

@@ -35,7 +35,7 @@ CASES = [
     ),
     # amounts
     ("fraction = 0.3", "fraction = 0.3\niso = 0.2", LEVEL, ["fraction and iso at once", "give either"]),
-    ("fraction = 0.3", 'of = "part"', LEVEL, ['"thickness" is missing', "or give fraction"]),
+    ("fraction = 0.3", 'of = "part"', LEVEL, ["exactly one of thickness, fraction"]),
     ("fraction = 0.3", "porosity = 0", f"{LEVEL}.porosity", ["porosity is 0", "greater than 0 and less than 1"]),
     ("fraction = 0.3", "porosity = 1", f"{LEVEL}.porosity", ["porosity is 1", "less than 1"]),
     ("fraction = 0.3", "porosity = 1.2", f"{LEVEL}.porosity", ["porosity is 1.2"]),
@@ -189,7 +189,7 @@ CASES = [
         "blend.between[1]",
         ["b", "core"],
     ),
-    ('units = "mm"', "beams.a.radius = 1", "beams.a", ['"cell" is missing']),
+    ('units = "mm"', "beams.a.radius = 1", "beams.a", ["exactly one of cell and map; nodes and struts"]),
     ("fraction = 0.3", f"fraction = 0.3\n[lattice.shell]\n{SHELL}", "lattice.shell", ["blend", "between"]),
     ("fraction = 0.3", "fraction = = 0.3", "", ["TOML"]),
 ]

@@ -141,9 +141,15 @@ TRANSITIONS = file("--transitions", ("svg",), "draw the solid fraction along the
 COMMANDS = {
     "new": (
         "Write a commented design to start from.",
-        "example:\n  trabecula new first.toml --cell diamond",
+        "examples:\n  trabecula new first.toml --cell diamond\n"
+        "  trabecula new stem.toml --part stem.stl --beams octet --skin 0.8",
         file("file", ("toml",), "the design file to write (.toml)"),
-        option("--cell", default="gyroid", metavar="NAME", help="a named cell; see `trabecula cells`"),
+        [
+            option("--cell", default="gyroid", metavar="NAME", help="a named cell; see `trabecula cells`"),
+            option("--beams", metavar="NAME", help="a unit cell of beams; see `trabecula cells --beams`"),
+        ],
+        file("--part", MESH_READS, "the part to fill, a closed mesh; without it a box", "PART"),
+        option("--skin", type=LENGTH, metavar="MM", help="a skin of this thickness, mm"),
         option("--force", action="store_true", help="replace the file if it exists"),
     ),
     "check": (

@@ -19,9 +19,9 @@ from .errors import DesignWarning, IslandsWarning, Refused
 from .files import check_place, whole_file
 from .formats import DESIGNS, MESH_READS, STDIN, STREAMS, is_design, kind_of
 from .machine import fits
-from .mesh import Mesh
+from .mesh import Mesh, region_of_file
 from .solid import Solid
-from .starter import STARTER
+from .starter import starter
 from .terminal import Progress, figure, say, settle, told, warn
 from .texts import counted, intervals, table, voids
 
@@ -31,12 +31,20 @@ __all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simp
 def new(args) -> None:
     """``trabecula new``."""
     known_cell(args.cell, cell.names())
+    if args.beams:
+        known_cell(args.beams, unit_cells.names())
     if os.path.exists(args.file) and not args.force and not os.path.isdir(args.file):
         raise Refused(f"{args.file} exists; choose another name, or replace it with --force")
     check_place(args.file)
+    part = None
+    if args.part:
+        low, high = region_of_file(args.part).bounds
+        path = os.path.relpath(os.path.abspath(args.part), os.path.dirname(os.path.abspath(args.file)))
+        part = (path.replace(os.sep, "/"), [b - a for a, b in zip(low, high, strict=True)])
+    meshes = "/".join(MESH_READS).upper()
+    text = starter(os.path.basename(args.file), args.cell, args.beams, part, args.skin, meshes)
     with whole_file(args.file) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as out:
-        meshes = "/".join(MESH_READS).upper()
-        out.write(STARTER.format(cell=args.cell, file=os.path.basename(args.file), meshes=meshes))
+        out.write(text)
     say(f"{args.file} written; next: trabecula check {args.file}")
 
 

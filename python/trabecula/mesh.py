@@ -330,7 +330,7 @@ class Mesh(Picture, Transformed):
         given = getattr(region, "_core", region)
         given = given.region if isinstance(given, _core.Solid) else given
         if isinstance(given, (str, os.PathLike)):
-            given = _region_of_file(os.fsdecode(given))
+            given = region_of_file(os.fsdecode(given))
         if isinstance(given, dict):
             given = _core.Region.from_data({"region": given}, os.getcwd())
         if not isinstance(given, _core.Region):
@@ -434,7 +434,7 @@ def _revived(state: tuple, known: dict) -> Mesh:
     return mesh
 
 
-def _region_of_file(name: str) -> _core.Region:
+def region_of_file(name: str) -> _core.Region:
     """The region in a file: a design, a region alone, or a mesh."""
     folder = os.path.dirname(os.path.abspath(name))
     kind = extension(name, (*DESIGNS, *MESH_READS))

@@ -178,7 +178,7 @@ class Solid(Picture):
         if extent / MOST_STEPS > edge:
             raise ValueError(
                 f"grid spacing {edge:g} mm cuts the region's {extent:.6g} mm into more than {MOST_STEPS:g} steps; use "
-                f"{extent / MOST_STEPS:.2g} mm or more, {self.wavelength / 32:.3g} mm (wavelength / 32) is usual"
+                f"{extent / MOST_STEPS:.2g} mm or more; without a spacing {self._usual:.3g} mm is used"
             )
         if edge > self.wavelength / 2:
             raise ValueError(

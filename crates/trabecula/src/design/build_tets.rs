@@ -468,7 +468,7 @@ mod tests {
             assert_eq!((e.path.as_str(), e.line), (below.as_str(), line), "{e}");
             assert!(e.message.contains(words), "{e}");
         };
-        wrong("", "", Some(6), "\"size\" is missing");
+        wrong("", "", Some(6), "give exactly one of size, path");
         wrong("size = -1", ".size", Some(7), "size is -1 mm");
         wrong("size = 1\npath = \"tets.vtk\"", ".path", Some(8), "size and path at once");
         wrong("size = 1\nsplit = true", ".split", Some(8), "size and split at once");

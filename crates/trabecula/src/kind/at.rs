@@ -258,18 +258,17 @@ impl<'a> Fields<'a> {
         let most = sets.iter().map(|s| needed(s)).max().unwrap_or(0);
         let first = sets.iter().position(|s| given(s).is_some() && needed(s) == most);
         let Some(first) = first.or(sets.iter().position(|s| given(s).is_some())) else {
-            // None is: that of which no key is required, or else the first required key is missing.
+            // None is: that of which no key is required, if there is one.
             if let Some(free) = sets.iter().position(|s| !s.iter().any(|k| k.required && !shared(k.name))) {
                 return Ok(free);
             }
-            let mut needed = sets.iter().flatten().filter(|k| k.required && self.get(k.name).is_none());
-            return match needed.next() {
-                Some(key) => {
-                    let others = sets[1..].iter().map(|s| own(s)).collect::<Vec<_>>().join("; or ");
-                    self.need(key.name, &format!("{} (or give {others})", key.meaning())).map(|_| 0)
-                }
-                None => Ok(0),
+            let needed = |set: &[Key]| {
+                let own = set.iter().filter(|k| k.required && !shared(k.name)).map(|k| k.name);
+                own.collect::<Vec<_>>().join(" and ")
             };
+            let each: Vec<String> = sets.iter().map(|s| needed(s)).collect();
+            let each = each.join(if each.iter().any(|e| e.contains(' ')) { "; " } else { ", " });
+            return Err(DesignError { found: None, ..self.at.error(format!("give exactly one of {each}")) });
         };
         let fits = |set: &[Key]| {
             given(set).is_some() && self.entries.iter().all(|(name, _)| has(set, name) || !known(sets, name))
