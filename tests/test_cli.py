@@ -507,10 +507,8 @@ def test_long_series_are_checked_in_seconds(tmp_path, kind):
 
 def test_cells_of_every_list_are_found_by_name(tmp_path):
     """`cells NAME` says the same with and without the option that names the list."""
-    for name, option in (("octet", "--beams"), ("gyroid", None)):
-        shown = run("cells", name, "--json", cwd=tmp_path).stdout
-        assert shown == run("cells", name, *([option] if option else []), "--json", cwd=tmp_path).stdout
-    import trabecula as lt
+    shown = run("cells", "octet", "--json", cwd=tmp_path).stdout
+    assert shown == run("cells", "octet", "--beams", "--json", cwd=tmp_path).stdout and json.loads(shown)["name"] == "octet"
 
     for name in sorted(set(lt.cell.tet_names()) - set(lt.cell.names()))[:1]:  # a name of both lists is the periodic cell's
         assert run("cells", name, cwd=tmp_path).stdout == run("cells", name, "--tet", cwd=tmp_path).stdout

@@ -21,7 +21,8 @@ def python(module: str, *given: str) -> list[str]:
 
 def run(command: list[str], folder: str, limit: float) -> str | None:
     """Runs a child at most ``limit`` seconds; what went wrong, if anything. Its words go to a file: a pipe may fill."""
-    path = os.pathsep.join(filter(None, [os.path.dirname(os.path.dirname(__file__)), os.environ.get("PYTHONPATH")]))
+    # What can be imported here can be there.
+    path = os.pathsep.join([os.path.dirname(os.path.dirname(__file__)), *filter(None, sys.path)])
     with open(os.path.join(folder, "said"), "w+b") as said:
         child = subprocess.Popen(
             command, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said, env={**os.environ, "PYTHONPATH": path}

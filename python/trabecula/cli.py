@@ -182,7 +182,8 @@ COMMANDS = {
             choices=ISLANDS,
             default="drop-small",
             help="connected components other than the largest: drop those at the region's boundary with less volume than "
-            "eight grid cells and warn of the others (default), keep all with a warning, drop all, or refuse",
+            "eight grid cells and a thousandth of the largest one, and warn of the others (default), keep all with a "
+            "warning, drop all, or refuse",
         ),
         *LIGHTER,
         option("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary"),
@@ -362,6 +363,7 @@ def serve(argv: list[str] | None) -> int:
             warnings.showwarning = lambda found, *rest, **more: warn(
                 getattr(found, "message", str(found)), getattr(found, "path", "")
             )
+            commands.stdin_text.cache_clear()
             getattr(commands, args.command)(args)
         settle()
         return 0

@@ -78,7 +78,9 @@ def mesh(args) -> None:
     made["seconds"] = round(time.perf_counter() - start, 3)
     others = made["islands"]
     if others and others["dropped"]:
-        small = "at the region's boundary, smaller than eight grid cells, " if args.islands == "drop-small" else ""
+        small = ""
+        if args.islands == "drop-small":
+            small = "at the region's boundary, smaller than eight grid cells and a thousandth of the largest, "
         say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
     if args.json:
         return put_json(made | {"warnings": told()})
@@ -451,7 +453,7 @@ def design_of(path: str) -> Design:
 
 @cache
 def stdin_text() -> str:
-    """Standard input, which can be read once only."""
+    """Standard input, which can be read once only in a command."""
     try:
         return sys.stdin.buffer.read().decode("utf-8-sig")
     except UnicodeDecodeError as error:

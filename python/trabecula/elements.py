@@ -90,8 +90,8 @@ def read(
         made = os.path.join(folder, "made.npz")
         outcome = children.run(children.python("elements", name, made, str(BASE + PER_BYTE * size)), folder, seconds)
         if outcome is not None:
-            outcome = outcome.removeprefix("failed: ")
-            raise ValueError(f"{name} cannot be read: {outcome if outcome[0] != 'd' else f'meshio {outcome}'}; is it damaged?")
+            failed, words = outcome.startswith("failed: "), outcome.removeprefix("failed: ")
+            raise ValueError(f"{name} cannot be read: {words if failed else f'meshio {words}; is it damaged?'}")
         with np.load(made) as found:
             *arrays, named, names = (found[key] for key in KEYS)
             return (*arrays, list(zip(named.tolist(), names.tolist(), strict=True)))
@@ -107,6 +107,8 @@ def child(name: str, made: str, memory: str) -> None:
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         most = int(float(memory))
         resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    # Its threads would each reserve memory.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     import meshio
     import numpy as np
 
@@ -123,7 +125,7 @@ def child(name: str, made: str, memory: str) -> None:
         sys.exit(without_contents(str(error)) or "no such format")
     except (Exception, SystemExit) as error:
         # What else goes wrong quotes the file, which may be another than was meant.
-        sys.exit(f"meshio finds no mesh in it ({type(error).__name__})")
+        sys.exit(f"meshio finds no mesh in it ({type(error).__name__}); is it damaged?")
     np.savez(made, **dict(zip(KEYS, arrays, strict=True)))
 
 
@@ -186,11 +188,15 @@ def zones_of(mesh: meshio.Mesh, blocks: list[int]) -> tuple[NDArray, list[tuple[
         names += [(int(v[0]), name) for name, v in groups.items()]
     if not sets:
         return zones, names
-    flags = np.stack(list(sets.values()))
     base = zones if len(zones) else np.zeros(count, dtype=np.int64)
-    kinds, which = np.unique(np.vstack([base, ~flags]), axis=1, return_inverse=True)
+    # The kinds of cells: number, and for each set whether they are outside; set by set, in the order of these columns.
+    first, which = np.unique(base, return_inverse=True)
+    kinds = first[:, None]
+    for flags in sets.values():
+        both, which = np.unique(2 * which.reshape(-1) + ~flags, return_inverse=True)
+        kinds = np.column_stack([kinds[both // 2], both % 2])
     own_names, numbers, fresh = list(names), [], max(0, int(base.max()))
-    for kind in kinds.T.tolist():
+    for kind in kinds.tolist():
         own = kind[0]
         if (own in numbers) if len(zones) else (0 in kind[1:]):
             fresh += 1

@@ -9,7 +9,7 @@ from . import _core
 from .files import check_place, special
 from .formats import MESHES
 
-__all__ = ["file_size", "fits"]
+__all__ = ["file_size", "fits", "rounded_up"]
 
 
 def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
@@ -55,8 +55,8 @@ def fits(
     if edge is not None:
         better = edge * (need / (0.8 * max(have, 1.0))) ** (1 / power)
         request = f"{word} {edge:g} mm"
-        advice = f"; try {word} {_up(better):g} mm"
-        if _up(better) > coarsest:
+        advice = f"; try {word} {rounded_up(better):g} mm"
+        if rounded_up(better) > coarsest:
             place = " or another disk" if path else ""
             advice = f"; even the coarsest useful {word} needs more: take a smaller part{place}"
     raise ValueError(f"{request} needs about {_bytes(need)} of {kind} for {what}, and {_bytes(have)} is free{advice}")
@@ -70,7 +70,7 @@ def _bytes(n: float) -> str:
     return ""
 
 
-def _up(v: float) -> float:
+def rounded_up(v: float) -> float:
     """v, rounded up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(v)) - 1)
     return round(math.ceil(v / unit) * unit, 12)

@@ -14,7 +14,7 @@ from .files import check_place, extension, special, whole_file
 from .formats import MESH_WRITES, VOXEL_WRITES
 from .given import fixed, positive, whole
 from .islands import check_islands, left_out, warn_islands
-from .machine import file_size, fits
+from .machine import file_size, fits, rounded_up
 from .mesh import Mesh, Picture
 from .quadors import Quadors
 from .thickness import Thickness
@@ -35,9 +35,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Solid", "Voxels"]
 
-PER_CELL = 32
-#: Most steps of a grid along an axis, as in the core.
-MOST_STEPS = 4e6
+#: Most steps of a grid along an axis, and most cells, as in the core.
+MOST_STEPS, MOST_CELLS = 4e6, 2e12
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
 
@@ -174,11 +173,12 @@ class Solid(Picture):
             edge = self.wavelength / positive("per_cell", per_cell)
         edge = self._usual if edge is None else positive("edge", edge)
         low, high = self.bounds
-        extent = max(b - a for a, b in zip(low, high, strict=True))
-        if extent / MOST_STEPS > edge:
+        extents = [b - a for a, b in zip(low, high, strict=True)]
+        least = max(max(extents) / MOST_STEPS, (math.prod(extents) / MOST_CELLS) ** (1 / 3))
+        if max(extents) / MOST_STEPS > edge:
             raise ValueError(
-                f"grid spacing {edge:g} mm cuts the region's {extent:.6g} mm into more than {MOST_STEPS:g} steps; use "
-                f"{extent / MOST_STEPS:.2g} mm or more; without a spacing {self._usual:.3g} mm is used"
+                f"grid spacing {edge:g} mm cuts the region's {max(extents):.6g} mm into more than {MOST_STEPS:g} steps; use "
+                f"{rounded_up(least):g} mm or more; without a spacing {self._usual:.3g} mm is used"
             )
         if edge > self.wavelength / 2:
             raise ValueError(
@@ -212,12 +212,6 @@ class Solid(Picture):
         ends = {name: t[0] if isinstance(t, list) else t for name, t in all_.items()}
         return {name: t for name, t in ends.items() if t}
 
-    def _is_fine(self, spacing: float) -> bool:
-        """Whether a wavelength has at least 64 grid steps: walls too thin for them are then a hundredth or two of the part, and
-        nothing is warned of.
-        """
-        return self.wavelength / spacing >= 64
-
     def _warn_thin(self, spacing: float, word: str = "edge") -> None:
         """Warns of walls and necks that the grid cannot carry."""
         if self.skin is not None and self.skin < spacing:
@@ -229,7 +223,7 @@ class Solid(Picture):
                 ),
                 stacklevel=3,
             )
-        for name, thin in {} if self._is_fine(spacing) else self._thinnest.items():
+        for name, thin in self._thinnest.items():
             if thin < 1.5 * spacing:
                 warnings.warn(
                     DesignWarning(
@@ -246,8 +240,6 @@ class Solid(Picture):
         """
         if pieces is not None and (message := self._core.coarse_steps(spacing, volume, pieces)):
             warnings.warn(message, DesignWarning, stacklevel=3)
-            return
-        if self._is_fine(spacing):
             return
         share, region = self._core.expected()
         found = volume / region

@@ -176,13 +176,18 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         let most = if let Repair::Caps(share) = repair { share } else { CAPPED };
         if done.hole_share > most {
             return Err(refuse(format!(
-                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from, or allow more with caps = {}; found {}",
+                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from{}; found {}",
                 counted(caps.holes, "hole", "holes"),
                 short(caps.length),
                 short(caps.area),
                 short(100.0 * done.hole_share),
                 (1000.0 * most).round() / 10.0,
-                ((20.0 * done.hole_share).ceil() / 20.0).min(1.0),
+                match repair {
+                    Repair::Caps(_) => {
+                        format!(", or allow more with caps = {}", ((20.0 * done.hole_share).ceil() / 20.0).min(1.0))
+                    }
+                    _ => String::new(),
+                },
                 found.unwrap_or_default()
             )));
         }

@@ -33,7 +33,9 @@ impl Transform {
         let to = |p: &Vec3| add(add(apply(&self.matrix, sub(*p, self.center)), self.center), self.shift);
         let made: Vec<Vec3> = points.iter().map(to).collect();
         let bounds = made.iter().fold(Aabb::EMPTY, |b, p| b.with(*p));
-        let reach = bounds.min.iter().chain(&bounds.max).fold(0.0f64, |m, x| m.max(x.abs()));
+        // What is subtracted on the way and added again is rounded, too.
+        let passed = bounds.min.iter().chain(&bounds.max).chain(&self.center).chain(&self.shift);
+        let reach = passed.fold(0.0f64, |m, x| m.max(x.abs()));
         let size = bounds.size().into_iter().fold(0.0f64, f64::max);
         let lost = made.iter().any(|p| p.iter().any(|x| !x.is_finite()));
         if !made.is_empty() && (lost || (size > 0.0 && f64::EPSILON * reach > ROUNDING * size)) {
@@ -107,6 +109,9 @@ mod tests {
         for x in [1e7, 1e300, f64::INFINITY, f64::NAN] {
             assert!(solid.transformed(&far(x)).unwrap_err().message.contains("f64 rounds its shape"));
         }
+        // There and back again.
+        let about = Transform { center: [1e16, 0.0, 0.0], ..scaling([1.0; 3]) };
+        assert!(solid.transformed(&about).unwrap_err().message.contains("f64 rounds its shape"));
         assert!(Mesh::default().transformed(&far(1e300)).is_ok());
     }
 }

@@ -10,6 +10,7 @@ use crate::csg_tree::{CsgSolid, Sign};
 use crate::field::Field;
 use crate::implicit::Surface;
 use geometry::math::{Aabb, Vec3, add, dot, norm, scale};
+use geometry::random::low_discrepancy;
 
 /// Offset of a perturbed surface, as a share of the region's size.
 const OFFSET: f64 = 1e-5;
@@ -119,10 +120,11 @@ type Sample = (Vec3, Vec3);
 
 /// Sample points of a surface within the bounds.
 fn samples(surface: &dyn Field, bounds: &Aabb) -> Vec<Sample> {
-    // The fractional parts of multiples of these fill a cube evenly: powers of the root of x⁴ = x + 1.
-    const STEPS: Vec3 = [0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_97];
     let size = bounds.size();
-    let position = |i: usize| core::array::from_fn(|a| bounds.min[a] + size[a] * (STEPS[a] * (i + 1) as f64).fract());
+    let position = |i: usize| {
+        let u = low_discrepancy(i + 1);
+        core::array::from_fn(|a| bounds.min[a] + size[a] * u[a])
+    };
     let mut points: Vec<Vec3> = (0..SAMPLES).map(position).collect();
     let (mut values, mut gradients) = (vec![0.0; SAMPLES], vec![[0.0; 3]; SAMPLES]);
     for _ in 0..4 {

@@ -63,8 +63,6 @@ pub struct Tiling {
     cut: Cut,
     /// Shares of the blended function in the whole mesh, where tetrahedra of one cell overlap.
     blended: Option<Arc<FractionTable>>,
-    /// By how much levels were moved because tetrahedra of several cells overlap.
-    moved: f64,
 }
 
 /// f, the level t, and their gradients (per mm) at a point.
@@ -115,16 +113,7 @@ impl Tiling {
             own * more * spectral_norm(&j) + cells.iter().filter_map(turn).sum::<f64>()
         };
         let lipschitz: Vec<f64> = (0..map.len()).map(of).collect();
-        Tiling {
-            map,
-            cells,
-            part,
-            level,
-            lipschitz: Arc::new(lipschitz),
-            cut: Cut::new(part),
-            blended: None,
-            moved: 0.0,
-        }
+        Tiling { map, cells, part, level, lipschitz: Arc::new(lipschitz), cut: Cut::new(part), blended: None }
     }
 
     /// The level where barycentric coordinates in a tetrahedron are these.

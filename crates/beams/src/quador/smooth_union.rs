@@ -250,7 +250,7 @@ impl Hub<'_> {
 
 /// The part of the way from y to z at which zero is reached.
 fn part_of(y: f64, z: f64) -> f64 {
-    y / (y - z)
+    if y <= 0.0 { 0.0 } else { y / (y - z) }
 }
 
 /// Row k of Cholesky's factor L of a matrix, from the rows before it, each of `stride` numbers; whether the matrix is positive

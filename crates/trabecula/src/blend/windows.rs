@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 
 use super::constituent::Constituent;
 use geometry::math::{Aabb, Mat3, Vec3, apply, inverse, norm, product, sub, transpose};
+use geometry::random::low_discrepancy;
 
 /// How the phases of the lattices of a blend go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,11 +206,6 @@ impl Windows {
         }
         out
     }
-}
-
-/// The k-th point of the R₃ sequence in the unit cube: multiples of the inverse powers of the root of x⁴ = x + 1.
-fn low_discrepancy(k: usize) -> Vec3 {
-    [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3].map(|a| (0.5 + a * k as f64).fract())
 }
 
 /// Sample positions of `PERIOD`³ windows one after another, with the density Π (1 + cos πs)/2 on [−1, 1]³ (by the inverse of its

@@ -259,11 +259,17 @@ fn count(axes: &[Vec<f64>; 3], edge: f64) -> Result<(), Fault> {
         "edge",
         format!(
             "steps of {} mm make a grid of {x} × {y} × {z} cells, {cells:.1e}, and at most {MOST_CELLS:.0e} are possible; use an \
-             edge of {:.2} mm or more, or a smaller part",
+             edge of {} mm or more, or a smaller part",
             number(edge),
-            1.01 * better
+            number(rounded_up(1.001 * better))
         ),
     ))
+}
+
+/// At least v, with two significant digits.
+fn rounded_up(v: f64) -> f64 {
+    let unit = 10f64.powf(v.log10().floor() - 1.0);
+    ((v / unit).ceil() * unit * 1e12).round() / 1e12
 }
 
 /// The coordinates of the node planes normal to an axis: planes that are to be exact (`stops` at first), steps of about

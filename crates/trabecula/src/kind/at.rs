@@ -249,7 +249,19 @@ impl<'a> Fields<'a> {
         let has = |set: &[Key], name: &str| set.iter().any(|k| k.name == name);
         let shared = |name: &str| sets.iter().all(|s| has(s, name));
         let given = |set: &[Key]| self.entries.iter().find(|(name, _)| has(set, name) && !shared(name)).map(|e| e.0);
-        let own = |set: &[Key]| set.iter().map(|k| k.name).filter(|n| !shared(n)).collect::<Vec<_>>().join(", ");
+        // The keys that a set needs, or else may have, of each set.
+        let each = || {
+            let own = |set: &Vec<Key>| {
+                let own = set.iter().filter(|k| !shared(k.name));
+                let needed: Vec<&str> = own.clone().filter(|k| k.required).map(|k| k.name).collect();
+                match needed[..] {
+                    [] => own.map(|k| k.name).collect::<Vec<_>>().join(" or "),
+                    _ => needed.join(" and "),
+                }
+            };
+            let each: Vec<String> = sets.iter().map(own).collect();
+            each.join(if each.iter().any(|e| e.contains(' ')) { "; " } else { ", " })
+        };
         // The set of which most required keys are given, or else of which any key is.
         let needed = |set: &[Key]| {
             let own = |k: &&Key| k.required && !shared(k.name) && self.get(k.name).is_some();
@@ -262,13 +274,7 @@ impl<'a> Fields<'a> {
             if let Some(free) = sets.iter().position(|s| !s.iter().any(|k| k.required && !shared(k.name))) {
                 return Ok(free);
             }
-            let needed = |set: &[Key]| {
-                let own = set.iter().filter(|k| k.required && !shared(k.name)).map(|k| k.name);
-                own.collect::<Vec<_>>().join(" and ")
-            };
-            let each: Vec<String> = sets.iter().map(|s| needed(s)).collect();
-            let each = each.join(if each.iter().any(|e| e.contains(' ')) { "; " } else { ", " });
-            return Err(DesignError { found: None, ..self.at.error(format!("give exactly one of {each}")) });
+            return Err(DesignError { found: None, ..self.at.error(format!("give exactly one of {}", each())) });
         };
         let fits = |set: &[Key]| {
             given(set).is_some() && self.entries.iter().all(|(name, _)| has(set, name) || !known(sets, name))
@@ -278,10 +284,7 @@ impl<'a> Fields<'a> {
         }
         let stray = self.entries.iter().find(|(name, _)| !has(&sets[first], name) && known(sets, name));
         match (given(&sets[first]), stray) {
-            (Some(a), Some((b, at))) => {
-                let each = sets.iter().map(|s| own(s)).collect::<Vec<_>>().join("; or ");
-                Err(at.error(format!("{a} and {b} at once; give either {each}")))
-            }
+            (Some(a), Some((b, at))) => Err(at.error(format!("{a} and {b} at once; give exactly one of {}", each()))),
             _ => Ok(first),
         }
     }

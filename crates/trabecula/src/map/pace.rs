@@ -12,6 +12,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub};
+use geometry::random::low_discrepancy;
 
 /// Most nodes of a grid that is chosen, and of one that the design requests.
 const NODES: [f64; 2] = [2.2e6, 4e7];
@@ -58,10 +59,12 @@ pub(super) fn choose(
     let axis = (0..3).fold(0, |m, a| if missed[a].share > missed[m].share { a } else { m });
     let what = missed[axis].words(first.step[axis]);
     let enough = grid.step.into_iter().fold(f64::INFINITY, f64::min);
-    let remedy = if left.iter().any(Missed::much) {
-        "let it vary more slowly".to_string()
-    } else {
-        format!("let it vary more slowly, or give step = {}", number(rounded_down(enough)))
+    let enough = rounded_down(enough);
+    let fits = count(bounds.size().map(|s| nodes_along(s, enough))) <= NODES[1];
+    let remedy = match (left.iter().any(Missed::much), step) {
+        (false, _) if fits => format!("let it vary more slowly, or give step = {}", number(enough)),
+        (false, Some(_)) => "let it vary more slowly, or leave step out".into(),
+        _ => "let it vary more slowly".to_string(),
     };
     let lost = |missed: &[Missed; 3]| {
         let wrong = missed.iter().any(|m| m.lost > FALSE[1]);
@@ -191,8 +194,9 @@ impl<'a> Probe<'a> {
             return Ok(None);
         }
         let size = bounds.size();
-        let mut points: Vec<Vec3> =
-            (0..POINTS[1]).map(|i| core::array::from_fn(|a| bounds.min[a] + scattered(i)[a] * size[a])).collect();
+        let mut points: Vec<Vec3> = (0..POINTS[1])
+            .map(|i| core::array::from_fn(|a| bounds.min[a] + low_discrepancy(i + 1)[a] * size[a]))
+            .collect();
         if let Some(region) = region {
             let mut depth = vec![0.0; points.len()];
             region.values(&points, &mut depth);
@@ -271,11 +275,6 @@ impl<'a> Probe<'a> {
             halvings[axis] += 1;
         }
     }
-}
-
-/// A sequence that fills the unit cube evenly (powers of the inverse of the root of x⁴ = x + 1).
-pub(super) fn scattered(i: usize) -> Vec3 {
-    [0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_970].map(|s: f64| (s * (i + 1) as f64).fract())
 }
 
 /// Refuses wavelengths that jump between nodes, or whose variation the nodes do not resolve.

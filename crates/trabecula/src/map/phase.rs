@@ -19,6 +19,7 @@ use crate::field::{Block, Field};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
+use geometry::random::low_discrepancy;
 
 /// Weights fall off outside the region by e² for each of this many steps.
 const FALL: f64 = 3.0;
@@ -290,7 +291,7 @@ fn compared(grid: &Grid, inside: &[bool], region: Option<&dyn Field>) -> (Vec<us
     let far: usize = grid.strides().iter().sum();
     let cell = |n: &usize| (0..3).all(|a| grid.index(*n)[a] + 1 < grid.shape[a]) && (inside[*n] || inside[n + far]);
     let off = |n: usize| -> Vec3 {
-        let s = pace::scattered(n);
+        let s = low_discrepancy(n + 1);
         core::array::from_fn(|a| grid.node(n)[a] + s[a] * grid.step[a])
     };
     let mut between: Vec<Vec3> = some(BETWEEN).filter(cell).map(off).collect();

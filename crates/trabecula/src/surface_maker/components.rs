@@ -118,6 +118,7 @@ impl Components {
         match self.dropped {
             0 => sentence,
             n if n == self.others => format!("{sentence}; dropped"),
+            1 => format!("{sentence}; 1 of them, of {} mm³, is dropped", short(self.dropped_volume)),
             n => format!("{sentence}; {n} of them, of {} mm³, are dropped", short(self.dropped_volume)),
         }
     }

@@ -11,13 +11,14 @@ use rayon::prelude::*;
 use super::{Level, Tiling};
 use crate::cell::Part;
 use crate::cell::tet::FractionTable;
-use geometry::random::random;
+use geometry::random::{low_discrepancy, random};
 
-/// Number of points in all, and the least in a tetrahedron: the standard error of a share is below 0.001.
+/// Number of points in all, and the least in a tetrahedron that is sampled: the standard error of a share is below 0.001 where
+/// tetrahedra are alike.
 const POINTS: usize = 400_000;
 const FEWEST: usize = 400;
-/// Steps of an evenly spread sequence in the cube: powers of the root of x⁴ = x + 1 (Roberts 2018).
-const EVEN: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2];
+/// Points in a tetrahedron where all are sampled, at least.
+const LEAST: usize = 16;
 
 impl Tiling {
     /// The tiling whose solid has the fractions asked for (one, or one for each node; `None` keeps the levels) with its
@@ -49,7 +50,6 @@ impl Tiling {
             // The half-level of a sheet stays one.
             let least = if self.part == Part::Sheet { 1e-6 } else { f64::NEG_INFINITY };
             self.level = Level::Nodes(Arc::new(levels.iter().map(|v| (v + by).max(least)).collect()));
-            self.moved = by;
         }
         self
     }
@@ -60,21 +60,36 @@ impl Tiling {
         let each = POINTS / count;
         let tet = |i: usize| {
             let t = i * self.map.len() / count;
-            let c = self.map.corners(t);
-            let mut state = t as u64;
-            let shift = [0; 3].map(|_| random(&mut state));
-            let point = |k: usize| {
-                // The gaps between three sorted numbers are uniform in the tetrahedron.
-                let mut cuts: [f64; 3] = core::array::from_fn(|a| (shift[a] + k as f64 * EVEN[a]).rem_euclid(1.0));
-                cuts.sort_unstable_by(f64::total_cmp);
-                let l = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
-                [0, 1, 2].map(|a| (0..4).map(|i| l[i] * c[i][a]).sum())
-            };
-            let points: Vec<[f64; 3]> = (0..each).map(point).collect();
-            let values = self.known(&points).iter().map(|k| of(k.f, k.t)).collect();
+            let values = self.known(&self.points_in(t, each)).iter().map(|k| of(k.f, k.t)).collect();
             (self.map.volume(t), values)
         };
         let sample: Vec<(f64, Vec<f64>)> = (0..count).into_par_iter().map(tet).collect();
         FractionTable::sampled(&sample)
+    }
+
+    /// The solid share of each tetrahedron, sampled of the blended function.
+    pub(super) fn sampled_shares(&self) -> Vec<f64> {
+        let each = (POINTS / self.map.len()).clamp(LEAST, FEWEST);
+        let solid = |t: usize| {
+            let known = self.known(&self.points_in(t, each));
+            known.iter().filter(|k| self.cut.value(k.f, k.t) <= 0.0).count() as f64 / each as f64
+        };
+        (0..self.map.len()).into_par_iter().map(solid).collect()
+    }
+
+    /// Points evenly spread over a tetrahedron, mm.
+    fn points_in(&self, t: usize, count: usize) -> Vec<[f64; 3]> {
+        let c = self.map.corners(t);
+        let mut state = t as u64;
+        let shift = [0; 3].map(|_| random(&mut state));
+        let point = |k: usize| {
+            // The gaps between three sorted numbers are uniform in the tetrahedron.
+            let even = low_discrepancy(k);
+            let mut cuts: [f64; 3] = core::array::from_fn(|a| (shift[a] + even[a]).rem_euclid(1.0));
+            cuts.sort_unstable_by(f64::total_cmp);
+            let l = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
+            [0, 1, 2].map(|a| (0..4).map(|i| l[i] * c[i][a]).sum())
+        };
+        (0..count).map(point).collect()
     }
 }

@@ -177,11 +177,14 @@ impl Tiling {
         if let (Level::Same(t), [_]) = (&self.level, &self.cells[..]) {
             return vec![self.fraction(*t); self.map.len()];
         }
+        if self.map.overlap() > 0.0 && self.cells.len() > 1 {
+            return self.sampled_shares();
+        }
         let mixture = Mixture::new(&self.cells, self.part);
         let share = |t: usize| {
             let weights = weights(&self.map, &self.cells, t);
             let corner = |i: usize| core::array::from_fn(|k| f64::from(u8::from(k == i)));
-            let levels = core::array::from_fn(|i| self.level_at(t, corner(i)) - self.moved);
+            let levels = core::array::from_fn(|i| self.level_at(t, corner(i)));
             let alike = only(&weights).and_then(|one| {
                 let c = &self.cells[one];
                 let fraction = |t: f64| match &self.blended {
