@@ -83,6 +83,23 @@ def test_every_cell_fills_a_region(cell):
     assert np.all(solid.field(middles[inside]) < 0)
 
 
+def test_a_fraction_gives_the_radius_for_which_it_is_known():
+    """Equal cylinders along the edges of a cube: 3 pi r² a - 8 sqrt(2) r³; and the share of a region that cuts a frame."""
+    a, r = 5, 0.7
+    fraction = (3 * np.pi * r**2 * a - 8 * np.sqrt(2) * r**3) / a**3
+    solid = built(cell="sc", map=lt.map.affine(wavelength=a), fraction=fraction)
+    assert told(solid)["solved_radius"] == pytest.approx(r, rel=1e-9)
+    frame = built(nodes=SQUARE, struts=RING, fraction=0.03, fillet="auto")
+    again = built(nodes=SQUARE, struts=RING, radius=told(frame)["solved_radius"], fillet="auto")
+    assert told(again)["fraction"] == pytest.approx(0.03, rel=1e-9) and told(again)["solved_radius"] is None
+    # One that the region cuts, by 50 000 points: four deviations of as many chances.
+    cut = [[-5, 5, 5], [5, 5, 5], [5, 5, 15], [5, 15, 5]]
+    part = built(nodes=cut, struts=[[0, 1], [1, 2], [1, 3]], fraction=0.1)
+    points = np.random.default_rng(3).uniform(0, 10, (100_000, 3))
+    deviation = np.sqrt(0.1 * 0.9 * (1 / 50_000 + 1 / 100_000))
+    assert np.mean(part.field(points) < 0) == pytest.approx(0.1, abs=4 * deviation)
+
+
 def test_fillets_add_only_where_beams_meet():
     """A filleted lattice holds the sharp one; at mid length nothing is added."""
     args = {"cell": "bcc", "map": lt.map.affine(wavelength=10), "radius": 0.6}

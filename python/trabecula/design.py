@@ -47,11 +47,12 @@ class Beams:
 
     ``nodes`` is an array (n, 3), or (n, 4) with hub radii, mm, or the path of a table (csv) of id, x, y, z and perhaps r;
     ``struts`` an array (m, 2) of numbers of nodes, or the path of a table of pairs of ids. ``radius`` is a beam's at mid
-    length and ``hub`` that of the balls in which beams meet (mm, numbers or grades). ``profile`` is "cone", "cylinder",
-    {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v}, {"alpha": v},
-    {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within
-    ``merge`` (mm) are one. ``pattern``, instead of a cell or nodes and struts, is a program of repeats: ``nodes``, ``struts``
-    (two nodes and how many repeats on the second lies) and ``repeat``, up to three steps {count, by, rotate, scale, about}.
+    length and ``hub`` that of the balls in which beams meet (mm, numbers or grades); ``fraction``, instead of both, is the
+    solid fraction of the cell (of the region for nodes and struts), from which the radius is solved for. ``profile`` is
+    "cone", "cylinder", {"waist": mm} or {"lambda": v}; ``fillet`` "none", "auto", {"radius": mm} or one of {"tau": v},
+    {"alpha": v}, {"beta": v}; ``trim`` "cut", "drop" or "snap"; ``dangling`` "keep" or "drop"; nodes within ``merge`` (mm)
+    are one. ``pattern``, instead of a cell or nodes and struts, is a program of repeats: ``nodes``, ``struts`` (two nodes
+    and how many repeats on the second lies) and ``repeat``, up to three steps {count, by, rotate, scale, about}.
     """
 
     cell: str | None = None
@@ -66,6 +67,7 @@ class Beams:
     dangling: str | None = None
     merge: float | None = None
     pattern: dict | None = None
+    fraction: float | None = None
 
     def to_dict(self) -> dict:
         """The beams as plain data."""

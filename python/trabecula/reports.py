@@ -102,6 +102,8 @@ class BeamsReport(Report):
     """Least angle between two beams of a node, degrees."""
     smallest_angle_at: list[float] | None
     """Position of that node, mm."""
+    solved_radius: float | None
+    """Radius of beams, mm, solved for from the fraction asked for; None where the radius is given."""
     thickness: float
     """Diameter of the thinnest beam, mm."""
     total_length: float | None

@@ -94,6 +94,8 @@ def _beams_title(it: Report) -> str:
 def _beams(it: Report) -> Iterator[str]:
     if it.length:
         yield f"  length     {_range(it.length)} mm, {figure(it.total_length)} mm in all"
+    if it.solved_radius is not None:
+        yield f"  radius     {figure(it.solved_radius)} mm, from the fraction asked for"
     yield f"  thickness  {figure(it.thickness)} mm (thinnest beam)"
     yield f"  hubs       radius {_range(it.hub_radius)} mm"
     if it.fillet_radius:

@@ -48,6 +48,8 @@ pub struct Truss {
     pub quadors: Arc<Quadors>,
     /// The unit cell it was made from, if any.
     pub cell: Option<&'static str>,
+    /// Radius of the beams (mm) that was solved for from a fraction; `None` where it is given.
+    pub solved_radius: Option<f64>,
     /// Length scale for grids, mm: the minimum wavelength of the map, or the mean strut length.
     pub wavelength: f64,
     /// Statistics of the wireframe.

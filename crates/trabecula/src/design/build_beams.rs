@@ -1,6 +1,7 @@
 //! Beams: data to a graph and its field.
 
 mod beam_report;
+mod radius_for_fraction;
 mod wire;
 
 use std::sync::Arc;
@@ -42,8 +43,8 @@ pub(super) fn beams(
         return build_pattern::laid(spec, &of.pattern, environment, warnings).map(|p| Beams::Pattern(Arc::new(p)));
     }
     let fault = |f: Fault| DesignError::fault(&environment.path, f);
-    let radii = radii(spec, environment)?;
-    let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &radii, environment, warnings)?;
+    let mut radii = radii(spec, environment)?;
+    let Frame { mut wire, mut own, wavelength, reach } = frame(spec, &mut radii, environment, warnings)?;
     let trimming = spec.graph.trimming();
     let mut cleaned = wire.clean(trimming.merge.unwrap_or_else(|| ONE * mean_length(&wire)), &mut own);
     let cell = match &spec.graph {
@@ -67,6 +68,9 @@ pub(super) fn beams(
     if trimming.dangling == DanglingSpec::Drop {
         cleaned.dangling = wire.drop_dangling(&held, &mut own);
         check_left(&wire, "dangling", environment)?;
+    }
+    if let (Some(fraction), None) = (spec.fraction, &radii.radius) {
+        radii.radius = Some(Grade::Constant(radius_for_fraction::of_frame(fraction, &wire, spec, environment)?));
     }
     let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
@@ -92,6 +96,7 @@ pub(super) fn beams(
         fillet: (!fillets.is_empty()).then_some([narrow, wide]),
         shortfalls,
         cell: cell.map(|u| u.name),
+        solved_radius: spec.fraction.and(radii.radius.as_ref()).and_then(Grade::constant),
         graph,
         quadors: Arc::new(quadors),
         wavelength,
@@ -162,17 +167,16 @@ struct Frame {
 
 fn frame(
     spec: &BeamsSpec,
-    radii: &Radii<Grade>,
+    radii: &mut Radii<Grade>,
     environment: &Environment,
     warnings: &mut Vec<Warning>,
 ) -> Result<Frame, DesignError> {
     let below = |key: &str| format!("{}.{key}", environment.path);
     let bounds = environment.region.bounds();
-    let thick = thickest(radii, &bounds, environment);
     // Fillets end halfway along the beams: all those of a hub so near count for what is in the region.
-    let reach = |longest: f64| match spec.fillet {
-        FilletSpec::None => thick,
-        _ => thick.max(0.5 * longest),
+    let reach = |radii: &Radii<Grade>, longest: f64| match (spec.fillet, &radii.radius) {
+        (FilletSpec::None, Some(_)) => thickest(radii, &bounds, environment),
+        _ => thickest(radii, &bounds, environment).max(0.5 * longest),
     };
     let (cell, map) = match &spec.graph {
         GraphSpec::Cell(of) => (&of.cell.0, &of.map),
@@ -180,7 +184,7 @@ fn frame(
             let (wire, own) = tables(of, spec, environment)?;
             let longest = wire.struts.iter().map(|s| wire.length(*s)).fold(0.0, f64::max);
             let largest = own.iter().copied().filter(|r| r.is_finite()).fold(0.0, f64::max);
-            return Ok(Frame { wavelength: mean_length(&wire), reach: reach(longest).max(largest), wire, own });
+            return Ok(Frame { wavelength: mean_length(&wire), reach: reach(radii, longest).max(largest), wire, own });
         }
         GraphSpec::Pattern(_) => return Err(DesignError::new(&environment.path, "a pattern is no frame")),
     };
@@ -189,6 +193,10 @@ fn frame(
     let at = Environment { path: below("map"), ..*environment };
     let made = map.build(&at)?;
     solved_map(&made, map, &environment.path, warnings);
+    if let Some(fraction) = spec.fraction {
+        let radius = radius_for_fraction::of_cell(fraction, &net, &made, spec, environment)?;
+        radii.radius = Some(Grade::Constant(radius));
+    }
     for (key, grade) in [("radius", &radii.radius), ("hub", &radii.hub)] {
         let most = grade.as_ref().map_or(0.0, |g| greatest(g, environment));
         if most > made.longest() {
@@ -201,7 +209,7 @@ fn frame(
         }
     }
     let longest = net.lengths([made.longest(); 3]).into_iter().fold(0.0, f64::max);
-    let reach = reach(longest);
+    let reach = reach(radii, longest);
     let wire = fill(&net, &made, &bounds, reach).map_err(|f| DesignError::fault(&below("map"), f))?;
     Ok(Frame { wire, own: Vec::new(), wavelength: made.wavelength(), reach })
 }

@@ -39,6 +39,8 @@ pub struct GraphReport {
     pub hubs: usize,
     /// Number of beams in the region.
     pub beams: usize,
+    /// Radius of beams, mm, solved for from the fraction asked for; None where the radius is given.
+    pub solved_radius: Option<f64>,
     /// Least and greatest length of beams, mm.
     pub length: [f64; 2],
     /// Length of all beams, mm.

@@ -1,5 +1,6 @@
 //! Laws of the whole: random designs, rates of convergence, bodies known exactly.
 
+mod beam_fraction;
 mod blend;
 mod combined;
 mod common;

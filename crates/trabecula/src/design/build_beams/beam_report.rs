@@ -159,6 +159,7 @@ pub(in crate::design) fn report(
     let graph = GraphReport {
         hubs: frame.valence.values().sum(),
         beams: frame.struts,
+        solved_radius: truss.solved_radius,
         length: frame.length,
         total_length: frame.total_length,
         area: mass.map(|m| m.area),

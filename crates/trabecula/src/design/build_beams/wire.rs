@@ -46,13 +46,17 @@ pub(super) fn radii(spec: &BeamsSpec, environment: &Environment) -> Result<Radii
         let quantity = Quantity::new(format!("{}.{key}", environment.path), environment, key_of::<BeamsSpec>(key));
         spec.as_ref().map(|spec| spec.build(&quantity)).transpose()
     };
-    let profile = spec.profile.map(|p| match p {
+    let profile = spec.profile.map(profile);
+    Ok(Radii { radius: varied(&spec.radius, "radius")?, hub: varied(&spec.hub, "hub")?, profile })
+}
+
+pub(super) fn profile(spec: ProfileSpec) -> Profile {
+    match spec {
         ProfileSpec::Cone => Profile::Cone,
         ProfileSpec::Cylinder => Profile::Cylinder,
         ProfileSpec::Waist(v) => Profile::Waist(v),
         ProfileSpec::Lambda(v) => Profile::Lambda(v),
-    });
-    Ok(Radii { radius: varied(&spec.radius, "radius")?, hub: varied(&spec.hub, "hub")?, profile })
+    }
 }
 
 /// The greatest value at points in the region.
@@ -133,7 +137,12 @@ pub(super) fn tables(
             Wireframe { nodes: nodes.positions.clone(), struts: rows.clone() }
         }
     };
-    if spec.radius.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
+    if spec.fraction.is_some() && !nodes.radii.is_empty() {
+        let message =
+            "with fraction the radius of all beams is solved for; leave out the radii of nodes, or give radius";
+        return Err(DesignError::new(below("nodes"), message));
+    }
+    if spec.radius.is_none() && spec.fraction.is_none() && spec.hub.is_none() && nodes.radii.is_empty() {
         let message = "\"radius\" is missing, and no node has a radius of its own: of a beam at mid length, mm";
         return Err(DesignError::new(&environment.path, message));
     }

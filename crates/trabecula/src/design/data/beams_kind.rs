@@ -29,6 +29,9 @@ pub struct BeamsSpec {
     /// Radius of a beam at mid length, taken there. It may be left out where all hubs have radii.
     #[kind(unit = "mm", above = 0.0)]
     pub radius: Option<GradeSpec>,
+    /// Solid fraction of the cell, or of the region for nodes and struts; the radius of all beams is solved for.
+    #[kind(above = 0.0, below = 1.0)]
+    pub fraction: Option<f64>,
     /// Radius of the balls in which beams meet, taken at their centres; the largest radius of the beams that meet there unless
     /// given.
     #[kind(unit = "mm", above = 0.0)]
@@ -43,8 +46,11 @@ pub struct BeamsSpec {
 
 impl BeamsSpec {
     fn consistent(&self, _: &Key) -> Result<(), Fault> {
+        if self.fraction.is_some() {
+            return self.solvable();
+        }
         if let (GraphSpec::Cell(_), None, None) = (&self.graph, &self.radius, &self.hub) {
-            return Err(Fault::new("", "\"radius\" is missing: of a beam at mid length, mm"));
+            return Err(Fault::new("", "\"radius\" is missing: of a beam at mid length, mm (or give fraction)"));
         }
         let GraphSpec::Pattern(_) = &self.graph else { return Ok(()) };
         for (key, given) in [("radius", &self.radius), ("hub", &self.hub)] {
@@ -56,6 +62,28 @@ impl BeamsSpec {
             }
         }
         Ok(())
+    }
+}
+
+impl BeamsSpec {
+    /// Refuses what leaves no radius to be solved for from a fraction.
+    fn solvable(&self) -> Result<(), Fault> {
+        if self.radius.is_some() {
+            return Err(Fault::new("fraction", "the radius follows from it; give radius or fraction, not both"));
+        }
+        if self.hub.is_some() {
+            return Err(Fault::new(
+                "hub",
+                "with fraction hubs have the radius of their beams; leave hub out, or give radius",
+            ));
+        }
+        if let Some(ProfileSpec::Waist(_)) = self.profile {
+            return Err(Fault::new("profile", "with fraction it is cone, cylinder or lambda; or give radius"));
+        }
+        match self.graph {
+            GraphSpec::Pattern(_) => Err(Fault::new("fraction", "a pattern has none; give radius instead")),
+            _ => Ok(()),
+        }
     }
 }
 
