@@ -77,8 +77,9 @@ class Beams:
 def skin(thickness: float | dict, open: Iterable[str | dict] | None = None) -> dict:
     """A skin: all of the region that is at most ``thickness`` (mm, a number or a grade) below its surface.
 
-    ``open`` names flat faces of the region that it leaves open: sides of its bounds such as "-z", or the planes of
-    half-spaces (``region.halfspace``, or {point, normal}; the normal points out of the region).
+    ``open`` names what it leaves open: flat faces of the region, as sides of its bounds such as "-z" or by the planes of
+    half-spaces (``region.halfspace``, or {point, normal}; the normal points out of the region), and all that lies in
+    another region ({"region": …}).
     """
     made: dict = {"thickness": thickness}
     if open is not None:

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use crate::coincident;
 use crate::csg_tree::{CsgSolid, CsgTree, Sign};
 use crate::field::Field;
 use crate::grade::Grade;
@@ -68,6 +69,19 @@ pub fn skin(region: &Region, thickness: &Grade, open: &[HalfSpace]) -> Result<Cs
         return Err(Fault::new("open", message));
     }
     Ok(CsgSolid { surfaces: kept, tree: hollow.complement() })
+}
+
+/// The part of a skin that is outside an opening.
+pub fn outside(skin: CsgSolid, opening: &Region) -> CsgSolid {
+    let CsgSolid { mut surfaces, tree } = skin;
+    let first = surfaces.len();
+    let mut cut = Vec::new();
+    let of = opening.clone().surfaces(0.0, &mut cut).complement();
+    surfaces.extend(cut.into_iter().map(|s| s.complement()));
+    let tree = CsgTree::Intersection(vec![tree, of.simplified(&|f| Sign::Varies(first + f))]);
+    let mut body = CsgSolid { surfaces, tree };
+    coincident::separate(&mut body, &opening.bounds(), &mut 0);
+    body
 }
 
 /// Whether a surface of the region shrunk by `depth` is the plane of `cut` shrunk by as much.

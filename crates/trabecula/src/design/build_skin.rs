@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use super::built_report::Varied;
-use super::data::{OpenSpec, SkinSpec};
+use super::data::{OpenPlace, OpenSpec, SkinSpec};
 use super::{Design, Loader, sample};
 use crate::csg_tree::CsgSolid;
 use crate::environment::{self, Environment};
 use crate::field::Field;
 use crate::grade::{Quantity, key_of};
 use crate::kind::DesignError;
-use crate::region::{HalfSpace, Intersection, Region};
-use crate::skin::skin;
+use crate::region::{HalfSpace, Intersection, Notes, Region};
+use crate::skin::{outside, skin};
 use geometry::fault::number;
 use geometry::math::Vec3;
 
@@ -21,20 +21,20 @@ pub(super) fn filled(
     region: &Region,
     points: &[Vec3],
     loader: &dyn Loader,
-    notes: &mut crate::region::Notes,
+    notes: &mut Notes,
 ) -> Result<(Vec<CsgSolid>, Option<f64>), DesignError> {
     let mut filled = Vec::new();
     let mut thinnest = None;
     if let Some(spec) = &d.skin {
         let environment = Environment { path: "skin".into(), region, points, filled: &[], loader };
-        let (body, least) = grown(spec, &environment)?;
+        let (body, least) = grown(spec, &environment, notes)?;
         filled.push(body);
         thinnest = Some(least);
     }
     for (name, spec) in &d.keep.0 {
         let path = format!("keep.{name}");
         let zone = environment::region(spec, &path, loader, notes)?;
-        check_zone(&zone, region, points, &path)?;
+        check_zone(&zone, region, points, &path, "the part would be solid")?;
         let mut surfaces = Vec::new();
         let tree = zone.surfaces(0.0, &mut surfaces);
         filled.push(CsgSolid { surfaces, tree });
@@ -66,23 +66,42 @@ fn is_open(filled: &[CsgSolid], region: &Region, points: &[Vec3]) -> bool {
 }
 
 /// The skin and its least thickness.
-fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), DesignError> {
-    let Environment { region, points, .. } = *environment;
+fn grown(spec: &SkinSpec, environment: &Environment, notes: &mut Notes) -> Result<(CsgSolid, f64), DesignError> {
+    let Environment { region, points, loader, .. } = *environment;
     let path = "skin.thickness";
     let thickness = spec.thickness.build(&Quantity::new(path, environment, key_of::<SkinSpec>("thickness")))?;
     let bounds = region.bounds();
-    let open = spec.open.iter().enumerate().map(|(i, o)| match o {
-        OpenSpec::Plane(h) => environment::half_space(h, &format!("skin.open[{i}]")),
-        OpenSpec::Side(side) => {
-            let (axis, upper) = side.axis();
-            let mut normal = [0.0; 3];
-            normal[axis] = if upper { 1.0 } else { -1.0 };
-            let point = if upper { bounds.max } else { bounds.min };
-            HalfSpace::new(point, normal).map_err(|f| DesignError::fault("skin.open", f))
+    let (mut faces, mut places, mut openings) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, open) in spec.open.iter().enumerate() {
+        let path = format!("skin.open[{i}]");
+        let face = match open {
+            OpenSpec::Place(OpenPlace::Region(r)) => {
+                let path = format!("{path}.region");
+                let opening = environment::region(&r.region, &path, loader, notes)?;
+                check_zone(&opening, region, points, &path, "there would be no skin")?;
+                openings.push(opening);
+                continue;
+            }
+            OpenSpec::Place(OpenPlace::Plane(h)) => environment::half_space(h, &path)?,
+            OpenSpec::Side(side) => {
+                let (axis, upper) = side.axis();
+                let mut normal = [0.0; 3];
+                normal[axis] = if upper { 1.0 } else { -1.0 };
+                let point = if upper { bounds.max } else { bounds.min };
+                HalfSpace::new(point, normal).map_err(|f| DesignError::fault("skin.open", f))?
+            }
+        };
+        faces.push(face);
+        places.push(path);
+    }
+    let body = skin(region, &thickness, &faces).map_err(|f| match f.at.strip_prefix("open[") {
+        // Faces are numbered among themselves.
+        Some(n) => {
+            DesignError::new(n.trim_end_matches(']').parse().map_or("skin.open", |n: usize| &places[n]), f.message)
         }
-    });
-    let open = open.collect::<Result<Vec<HalfSpace>, DesignError>>()?;
-    let body = skin(region, &thickness, &open).map_err(|f| DesignError::fault("skin", f))?;
+        None => DesignError::fault("skin", f),
+    })?;
+    let body = openings.iter().fold(body, outside);
     let mut widths = vec![0.0; points.len()];
     thickness.values(points, &mut widths);
     let width = Varied::of(&widths);
@@ -101,11 +120,11 @@ fn grown(spec: &SkinSpec, environment: &Environment) -> Result<(CsgSolid, f64), 
 }
 
 /// Refuses a zone that is disjoint from the region or contains all of it.
-fn check_zone(zone: &Region, region: &Region, points: &[Vec3], path: &str) -> Result<(), DesignError> {
+fn check_zone(zone: &Region, region: &Region, points: &[Vec3], path: &str, then: &str) -> Result<(), DesignError> {
     let mut distance = vec![0.0; points.len()];
     zone.values(points, &mut distance);
     if distance.iter().all(|d| *d <= 0.0) {
-        let message = "it holds the whole region: the part would be solid";
+        let message = format!("it holds the whole region: {then}");
         return Err(DesignError::new(path, message));
     }
     if distance.iter().any(|d| *d < 0.0) {

@@ -433,19 +433,37 @@ pub struct SkinSpec {
     /// Depth below the region's surface to which it reaches.
     #[kind(unit = "mm", above = 0.0)]
     pub thickness: GradeSpec,
-    /// Flat faces of the region that it leaves open: sides of its bounds such as "-z", or half-spaces.
+    /// Where it leaves the region's surface open: flat faces, named as sides of its bounds such as "-z" or by half-spaces, or
+    /// what lies in another region.
     #[kind(default)]
     pub open: Vec<OpenSpec>,
 }
 
-/// A flat face of the region that stays open.
-#[derive(Clone, Copy, Debug, PartialEq, Kind)]
+/// What stays open of the region's surface.
+#[derive(Clone, Debug, PartialEq, Kind)]
 #[kind(untagged)]
 pub enum OpenSpec {
-    /// The one on a side of the region's bounds.
+    /// The flat face on a side of the region's bounds.
     Side(SideSpec),
-    /// The one on the plane of a half-space, facing as its normal does.
+    /// A place.
+    Place(OpenPlace),
+}
+
+/// A place that stays open.
+#[derive(Clone, Debug, PartialEq, Kind)]
+#[kind(noun = "a half-space or a region", alternatives)]
+pub enum OpenPlace {
+    /// The flat face on the plane of a half-space, facing as its normal does.
     Plane(HalfSpaceKind),
+    /// What lies in another region.
+    Region(OpenRegion),
+}
+
+/// A region in which there is no skin.
+#[derive(Clone, Debug, PartialEq, Kind)]
+pub struct OpenRegion {
+    /// The region in which there is no skin.
+    pub region: RegionKind,
 }
 
 /// A side of the region's bounds.

@@ -15,7 +15,7 @@ use trabecula::field::Field;
 use trabecula::grade::{Formula, Grade, Linear};
 use trabecula::implicit::Implicit;
 use trabecula::region::{Cylinder, Difference, HalfSpace, Intersection, MeshRegion, Offset, Region, Union};
-use trabecula::skin::skin;
+use trabecula::skin::{outside, skin};
 use trabecula::solid::Solid;
 
 use crate::common::{ball, cases, check, check_both, cuboid, drawn, lattice};
@@ -114,6 +114,38 @@ fn an_open_face_has_no_skin_and_its_walls_are_full() {
         let on_top = |i: &usize| s.mesh.corners(*i).iter().all(|p| p[2] == 6.0);
         let rim: f64 = (0..s.mesh.triangles.len()).filter(on_top).map(|i| area(&s.mesh, i)).sum();
         close(rim, 80.0 - 48.0, SINGLE, "rim");
+    }
+}
+
+/// An opening in a curved part: a ball's skin without what a cylinder along an axis takes of it.
+#[test]
+fn an_opening_is_a_region_without_skin() {
+    let hole = |r| cylinder([0.0, 0.0, -3.0], r, 6.0);
+    // What the cylinder shares with a ball of radius a: 4/3 π (a³ − (a² − r²)^3/2).
+    let shared = |a: f64, r: f64| 4.0 / 3.0 * PI * (a.powi(3) - (a * a - r * r).powf(1.5));
+    for r in [0.35, 0.61] {
+        let want = 4.0 / 3.0 * PI * (1.0 - 0.8f64.powi(3)) - (shared(1.0, r) - shared(0.8, r));
+        let body = skin(&ball([0.0; 3], 1.0), &Grade::Constant(0.2), &[]).expect("skin");
+        let solid = filled(&ball([0.0; 3], 1.0), Arc::new(Nothing), vec![outside(body, &hole(r))]);
+        let errors = [16.0, 64.0].map(|n| (volume(&solid, 1.0 / n, "open ball") / want - 1.0).abs());
+        println!("open ball: {errors:?}");
+        // Second order or better: cylinders keep chords.
+        assert!(errors[1] < 2e-4 && errors[0] / errors[1] > 4f64.powf(1.6), "{errors:?}");
+    }
+}
+
+/// Openings whose sides lie in planes of the skin and of the region.
+#[test]
+fn openings_may_share_planes_with_the_skin() {
+    let region = cuboid([0.0; 3], [10.0, 8.0, 6.0]);
+    for depth in [1.0, 1.5] {
+        let body = skin(&region, &Grade::Constant(1.0), &[]).expect("skin");
+        let window = cuboid([3.0, 1.0, 6.0 - depth], [7.0, 8.0, 6.0]);
+        let v = volume(&filled(&region, Arc::new(Nothing), vec![outside(body, &window)]), 0.25, "window");
+        // Of the roof 4 by 7, and of the wall above the hollow's floor.
+        let want = 480.0 - 8.0 * 6.0 * 4.0 - (4.0 * 6.0 + 4.0 * depth);
+        // The window's edges, some 50 mm, keep chamfers within half a cell's section.
+        close(v, want, 0.5 * 0.25f64.powi(2) * 50.0 / want, "window");
     }
 }
 
