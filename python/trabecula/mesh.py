@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         MeshReport,
         QualityReport,
         SimplifyReport,
+        SmoothReport,
         SpecificSurface,
         SurfaceReport,
         VoidReport,
@@ -77,6 +78,7 @@ class Mesh(Picture, Transformed):
         self._islands = islands
         self._chord_error = chord_error
         self._simplification: SimplifyReport | None = None
+        self._smoothing: SmoothReport | None = None
 
     @staticmethod
     def of(vertices: ArrayLike, triangles: ArrayLike) -> Mesh:
@@ -114,7 +116,7 @@ class Mesh(Picture, Transformed):
 
     def __reduce__(self) -> tuple:
         state = (self._core.vertices, self._core.triangles, self._core.known_cut(), self._core.design)
-        names = ("_region_volume", "_edge", "_islands", "_chord_error", "_simplification")
+        names = ("_region_volume", "_edge", "_islands", "_chord_error", "_simplification", "_smoothing")
         return _revived, (state, {name: getattr(self, name) for name in names})
 
     def __repr__(self) -> str:
@@ -320,6 +322,13 @@ class Mesh(Picture, Transformed):
         between the two surfaces in both directions, mm. None for a mesh that was not simplified.
         """
         return self._simplification
+
+    @property
+    def smoothing(self) -> SmoothReport | None:
+        """What ``Solid.mesh(smooth=True)`` did: triangles, smallest angle and its 5th percentile (degrees) and volume (mm³)
+        before and after, numbers of changes. None for a mesh that was not smoothed.
+        """
+        return self._smoothing
 
     def within(self, region: Solid | dict | str | os.PathLike[str]) -> Mesh:
         """The same mesh measured against a region: solid fraction, lattice and cut area.

@@ -34,6 +34,7 @@ __all__ = [
     "RegionReport",
     "RepairReport",
     "SimplifyReport",
+    "SmoothReport",
     "SpecificSurface",
     "SurfaceReport",
     "TetMeshReport",
@@ -562,6 +563,33 @@ class SimplifyReport(Report):
     """Area before, mm²."""
     deviation: float
     """Proven bound of the distance between the two surfaces, in both directions, mm."""
+    triangles: int
+    """Triangles after."""
+    triangles_before: int
+    """Triangles before."""
+    volume: float
+    """Volume after, mm³."""
+    volume_before: float
+    """Volume before, mm³."""
+
+
+class SmoothReport(Report):
+    """What smoothing did to the triangles of a mesh. Angles are the smallest of each triangle."""
+
+    flipped: int
+    """Number of edges flipped."""
+    merged: int
+    """Number of edges whose ends were merged."""
+    moved: int
+    """Number of moves of vertices."""
+    smallest_angle: float
+    """Smallest angle after, degrees."""
+    smallest_angle_before: float
+    """Smallest angle before, degrees."""
+    smallest_angle_p05: float
+    """5th percentile of the smallest angles after, degrees."""
+    smallest_angle_p05_before: float
+    """5th percentile of the smallest angles before, degrees."""
     triangles: int
     """Triangles after."""
     triangles_before: int

@@ -39,6 +39,8 @@ __all__ = ["Solid", "Voxels"]
 MOST_STEPS, MOST_CELLS = 4e6, 2e12
 #: Bytes for each triangle of a mesh without a grid: its numbers and half a place, twice while parts are joined.
 TRIANGLE = 2 * (12 + 12)
+#: Bytes for each triangle that smoothing takes: copies, links, edges that stay, a tree, debts of volume.
+SMOOTHED = 200
 
 
 class Solid(Picture):
@@ -264,6 +266,7 @@ class Solid(Picture):
         progress: Progress | None = None,
         islands: Islands = "drop-small",
         chord: float | None = None,
+        smooth: bool = False,
     ) -> Mesh:
         """The surface as a closed mesh.
 
@@ -277,8 +280,14 @@ class Solid(Picture):
         ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
         the patches of beams and fillets at a distance of at most ``chord`` (mm); ``Mesh.chord_error`` is the distance reached.
         All pieces are kept.
+
+        ``smooth`` improves the triangles, as finite elements and simulations want them: slivers are merged, edges flipped and
+        vertices moved within the surface. Every guarantee, sharp edges, flat faces and the volume are kept; positions are then
+        single-precision numbers. ``Mesh.smoothing`` says what was done. Not for ``chord``.
         """
         check_islands(islands)
+        if smooth and chord is not None:
+            raise ValueError("smooth is for meshes on a grid; with chord the triangles follow the patches of beams")
         if chord is not None:
             need, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
             # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
@@ -288,12 +297,18 @@ class Solid(Picture):
         spacing = self.spacing(edge, per_cell)
         need = self._need(spacing)
         # Measuring and writing take as much again.
-        fits(2 * need.memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
+        memory = 2 * need.memory + (SMOOTHED * need.triangles if smooth else 0)
+        fits(memory, f"{need['triangles']:.3g} triangles", edge=spacing, coarsest=self.wavelength / 2)
         self._warn_thin(spacing)
         core, others, words = self._core.mesh(spacing, _threads(threads), progress, islands)
         self._warn_coarse(core.volume() + left_out(others), spacing, pieces=others.found + 1)
         warn_islands(others, words)
-        return Mesh(core, self._core.region, spacing, others)
+        if not smooth:
+            return Mesh(core, self._core.region, spacing, others)
+        core, report = core.smoothed(progress)
+        made = Mesh(core, self._core.region, spacing, others)
+        made._smoothing = report
+        return made
 
     def _chord(self, chord: float, edge: float | None, per_cell: float | None, islands: str) -> float:
         """A chord error, where nothing is asked for that needs a grid."""

@@ -12,6 +12,7 @@
 //! - **Signed distance**: [`MeshDistance`] repairs a mesh and gives its exact signed distance, negative inside; the sign is
 //!   that of angle-weighted normals or of winding numbers. [`feature_edges`] finds where the surface turns sharply.
 //! - **Simplification**: [`simplify()`] removes triangles within a proven distance, without self-intersections.
+//! - **Smoothing**: [`smooth()`] makes better triangles of slivers, the volume and sharp edges kept.
 //! - **Search**: [`Bvh`] is a bounding-volume hierarchy over anything with a box ([`Aabb`]); [`weld`] finds points
 //!   near each other; [`union_find`] joins sets.
 //! - **Symmetry**: [`symmetry`] has the 230 space groups by Hall symbol; [`math`] has vectors, matrices and intervals,
@@ -59,9 +60,11 @@ pub mod measure;
 pub mod mesh;
 pub mod progress;
 pub mod random;
+mod remesh;
 pub mod render;
 pub mod repair;
 pub mod simplify;
+pub mod smooth;
 pub mod surface_mesh;
 pub mod symmetry;
 pub mod tetmesh;
@@ -79,6 +82,7 @@ pub use mesh::Mesh;
 pub use progress::{Progress, Stopped};
 pub use repair::{Repair, Repaired};
 pub use simplify::{Goal, simplify};
+pub use smooth::smooth;
 pub use surface_mesh::SurfaceMesh;
 pub use tetmesh::TetMesh;
 pub use transform::Transform;

@@ -20,18 +20,16 @@ use crate::math::Vec3;
 use crate::measure;
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Stopped};
+use crate::remesh::half_edge_mesh::HalfEdgeMesh;
+use crate::remesh::{gathered, in_order};
 use crate::surface_mesh::SurfaceMesh;
 
 mod bucket_queue;
 mod collapse;
 mod deviation;
 mod error_quadric;
-mod half_edge_mesh;
-mod kept_edges;
-mod refit_tree;
 
 use collapse::Simplification;
-use half_edge_mesh::{HalfEdgeMesh, NONE};
 
 /// Candidates between two reports of progress.
 const STRIDE: u64 = 4096;
@@ -113,7 +111,7 @@ pub fn simplify(surface: &SurfaceMesh, goal: &Goal, progress: &dyn Progress) -> 
         }
     }
     let deviation = work.deviation();
-    let made = gathered(work, &ordered.cut);
+    let made = gathered(&work.half_edges, &work.positions, &ordered.cut);
     let report = report(size(&made.mesh), deviation);
     Ok((made, report))
 }
@@ -181,76 +179,4 @@ fn sound(mesh: &Mesh) -> Result<HalfEdgeMesh, Fault> {
         ));
     }
     Ok(half_edges)
-}
-
-/// The same surface, its triangles along a space-filling curve and its vertices in the order of their first use, so that
-/// what is near in space is near in memory.
-fn in_order(surface: &SurfaceMesh) -> SurfaceMesh {
-    let mesh = &surface.mesh;
-    let b = mesh.bounds();
-    let longest = b.size().iter().fold(0.0f64, |m, s| m.max(*s));
-    let scale = if longest > 0.0 { 2_097_151.0 / longest } else { 0.0 };
-    let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len())
-        .map(|t| {
-            let [p, q, r] = mesh.corners(t);
-            let key = (0..3).fold(0, |key, k| {
-                let middle = (p[k] + q[k] + r[k]) / 3.0 - b.min[k];
-                key | spread((middle * scale) as u64) << k
-            });
-            (key, t as u32)
-        })
-        .collect();
-    keys.sort_unstable();
-    let mut names = vec![NONE; mesh.vertices.len()];
-    let mut out = SurfaceMesh::default();
-    for (_, t) in keys {
-        let triangle = mesh.triangles[t as usize].map(|v| {
-            let name = &mut names[v as usize];
-            if *name == NONE {
-                *name = out.mesh.vertices.len() as u32;
-                out.mesh.vertices.push(mesh.vertices[v as usize]);
-            }
-            *name
-        });
-        out.mesh.triangles.push(triangle);
-        out.cut.push(surface.cut[t as usize]);
-    }
-    out
-}
-
-/// The lowest 21 bits of a number, three apart.
-fn spread(x: u64) -> u64 {
-    let mut x = x & 0x1f_ffff;
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        x = (x | x << shift) & mask;
-    }
-    x
-}
-
-/// The triangles that are left.
-fn gathered(work: Simplification, cut: &[bool]) -> SurfaceMesh {
-    let mut names = vec![NONE; work.positions.len()];
-    let mut out = SurfaceMesh::default();
-    for (t, corners) in work.half_edges.triangles.iter().enumerate() {
-        if corners[0] == NONE {
-            continue;
-        }
-        let triangle = corners.map(|v| {
-            let name = &mut names[v as usize];
-            if *name == NONE {
-                *name = out.mesh.vertices.len() as u32;
-                out.mesh.vertices.push(work.positions[v as usize]);
-            }
-            *name
-        });
-        out.mesh.triangles.push(triangle);
-        out.cut.push(cut[t]);
-    }
-    out
 }

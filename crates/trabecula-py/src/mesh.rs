@@ -8,6 +8,7 @@ use geometry::math::Vec3;
 use geometry::measure;
 use geometry::render::{Tint, View, png, render};
 use geometry::simplify::{Goal, simplify};
+use geometry::smooth::smooth;
 use geometry::surface_mesh::SurfaceMesh;
 use geometry::transform::Transform;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
@@ -15,7 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use trabecula::analysis;
-use trabecula::report::{MeshReport, QualityReport, SimplifyReport, ThicknessReport, ThicknessSpread};
+use trabecula::report::{MeshReport, QualityReport, SimplifyReport, SmoothReport, ThicknessReport, ThicknessSpread};
 
 use crate::error;
 use crate::file;
@@ -202,6 +203,14 @@ impl Mesh {
             run(py, None, progress, |p| simplify(&self.surface, &goal, p))?.map_err(error::stopped)?;
         let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
         Ok((mesh, report(py, "SimplifyReport", &SimplifyReport::from(done))?))
+    }
+
+    /// The same surface with better triangles, and what was done, as `reports.SmoothReport`.
+    #[pyo3(signature = (progress=None))]
+    fn smoothed<'py>(&self, py: Python<'py>, progress: Option<Py<PyAny>>) -> PyResult<(Mesh, Bound<'py, PyAny>)> {
+        let (surface, done) = run(py, None, progress, |p| smooth(&self.surface, p))?.map_err(error::stopped)?;
+        let mesh = Mesh { surface, split: self.split, design: self.design.clone() };
+        Ok((mesh, report(py, "SmoothReport", &SmoothReport::from(done))?))
     }
 
     /// The figures, against a region of this volume (mm³) if one is known, as `reports.MeshReport`.

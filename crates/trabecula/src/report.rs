@@ -17,7 +17,8 @@ pub use design_report::{
 };
 pub use mesh_report::{
     DanglingReport, EstimateReport, Histogram, IslandsReport, LargestBit, LargestIsland, MeshReport, QualityReport,
-    RepairReport, SimplifyReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread, VoidReport,
+    RepairReport, SimplifyReport, SmoothReport, SpecificSurface, SurfaceReport, ThicknessReport, ThicknessSpread,
+    VoidReport,
 };
 pub use tets_report::{
     Creases, DihedralReport, FitReport, MinMeanMax, TetMeshReport, TetQualityReport, TilingReport, WallSpread,
@@ -53,6 +54,7 @@ struct Reports {
     quality: QualityReport,
     surface: SurfaceReport,
     simplified: SimplifyReport,
+    smoothed: SmoothReport,
     thickness: ThicknessReport,
     dangling: DanglingReport,
     repair: RepairReport,

@@ -3,10 +3,10 @@
 use super::bucket_queue::{Candidate, Queue};
 use super::deviation::{Displacements, Patch};
 use super::error_quadric::Quadric;
-use super::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
-use super::kept_edges;
-use super::refit_tree::{Bounds, Prism, RefitTree};
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
+use crate::remesh::kept_edges;
+use crate::remesh::refit_tree::{Bounds, Prism, RefitTree};
 
 /// Most triangles about a vertex.
 const CROWD: usize = 48;

@@ -1,7 +1,8 @@
 //! Figures of a mesh, and of what was done to it.
 
 use geometry::repair::Repaired;
-use geometry::simplify::Report;
+use geometry::simplify;
+use geometry::smooth;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -229,8 +230,8 @@ pub struct SimplifyReport {
     pub area: f64,
 }
 
-impl From<Report> for SimplifyReport {
-    fn from(r: Report) -> Self {
+impl From<simplify::Report> for SimplifyReport {
+    fn from(r: simplify::Report) -> Self {
         SimplifyReport {
             triangles_before: r.triangles[0],
             triangles: r.triangles[1],
@@ -239,6 +240,53 @@ impl From<Report> for SimplifyReport {
             volume: r.volume[1],
             area_before: r.area[0],
             area: r.area[1],
+        }
+    }
+}
+
+/// What smoothing did to the triangles of a mesh. Angles are the smallest of each triangle.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct SmoothReport {
+    /// Triangles before.
+    pub triangles_before: usize,
+    /// Triangles after.
+    pub triangles: usize,
+    /// Smallest angle before, degrees.
+    pub smallest_angle_before: f64,
+    /// Smallest angle after, degrees.
+    pub smallest_angle: f64,
+    /// 5th percentile of the smallest angles before, degrees.
+    pub smallest_angle_p05_before: f64,
+    /// 5th percentile of the smallest angles after, degrees.
+    pub smallest_angle_p05: f64,
+    /// Volume before, mm³.
+    pub volume_before: f64,
+    /// Volume after, mm³.
+    pub volume: f64,
+    /// Number of edges flipped.
+    pub flipped: usize,
+    /// Number of edges whose ends were merged.
+    pub merged: usize,
+    /// Number of moves of vertices.
+    pub moved: usize,
+}
+
+impl From<smooth::Report> for SmoothReport {
+    fn from(r: smooth::Report) -> Self {
+        let [before, after] = r.quality;
+        let [flipped, merged, moved] = r.changes;
+        SmoothReport {
+            triangles_before: r.triangles[0],
+            triangles: r.triangles[1],
+            smallest_angle_before: before.smallest_angle,
+            smallest_angle: after.smallest_angle,
+            smallest_angle_p05_before: before.smallest_angle_p05,
+            smallest_angle_p05: after.smallest_angle_p05,
+            volume_before: r.volume[0],
+            volume: r.volume[1],
+            flipped,
+            merged,
+            moved,
         }
     }
 }

@@ -13,6 +13,7 @@ mod local_thickness;
 mod phase;
 mod simplify;
 mod skin;
+mod smooth;
 mod spacing;
 mod surface;
 mod tets;

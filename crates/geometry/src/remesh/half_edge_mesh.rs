@@ -135,6 +135,28 @@ impl HalfEdgeMesh {
         }
     }
 
+    /// Replaces the edge `h`, the diagonal of two triangles, by the other diagonal: `h` then runs between the two corners that
+    /// were opposite it, from the one right of it to the one left of it.
+    ///
+    /// The caller has checked that these two have no edge yet, and that the ends of `h` keep at least three triangles.
+    pub fn flip(&mut self, h: u32) {
+        let g = self.twin(h);
+        let (a, b) = (self.from(h), self.from(g));
+        let (c, d) = (self.from(prev(h)), self.from(prev(g)));
+        let around = [prev(h), next(g), prev(g), next(h)].map(|e| self.twin(e));
+        for (e, corners) in [(h, [d, c, a]), (g, [c, d, b])] {
+            for (e, v) in [e, next(e), prev(e)].into_iter().zip(corners) {
+                self.triangles[(e / 3) as usize][(e % 3) as usize] = v;
+            }
+        }
+        for (e, twin) in [next(h), prev(h), next(g), prev(g)].into_iter().zip(around) {
+            self.join(e, twin);
+        }
+        for (v, e) in [(a, prev(h)), (b, prev(g)), (c, next(h)), (d, next(g))] {
+            self.out[v as usize] = e;
+        }
+    }
+
     fn join(&mut self, a: u32, b: u32) {
         self.twin[a as usize] = b;
         self.twin[b as usize] = a;
@@ -185,6 +207,37 @@ mod tests {
                 };
                 assert_eq!(count(&half_edges), count(&fresh));
             }
+        }
+    }
+
+    #[test]
+    fn a_flip_turns_a_diagonal_and_four_give_the_first_mesh() {
+        let first = HalfEdgeMesh::new(octahedron(), 6).expect("closed");
+        for h in 0..24 {
+            let mut half_edges = HalfEdgeMesh::new(octahedron(), 6).expect("closed");
+            let corners = [h, half_edges.twin(h)].map(|e| half_edges.from(prev(e)));
+            half_edges.flip(h);
+            assert_eq!([half_edges.to(h), half_edges.from(h)], corners);
+            let fresh = HalfEdgeMesh::new(half_edges.triangles.clone(), 6);
+            // The octahedron's opposite corners had no edge, so the result is closed, too.
+            let fresh = fresh.expect("closed");
+            for e in 0..24 {
+                assert_eq!(half_edges.twin(e), fresh.twin(e));
+            }
+            for v in 0..6 {
+                assert!(half_edges.leaving(v).count() >= 3 && half_edges.leaving(v).all(|e| half_edges.from(e) == v));
+            }
+            (0..3).for_each(|_| half_edges.flip(h));
+            let sorted = |l: &HalfEdgeMesh| {
+                let mut all: Vec<[u32; 3]> = l.triangles.clone();
+                all.iter_mut().for_each(|t| {
+                    let least = (0..3).min_by_key(|k| t[*k]).expect("three");
+                    t.rotate_left(least);
+                });
+                all.sort_unstable();
+                all
+            };
+            assert_eq!(sorted(&half_edges), sorted(&first));
         }
     }
 
