@@ -1,5 +1,5 @@
 use super::*;
-use crate::math::{norm, sub};
+use crate::math::norm;
 use crate::mesh::samples::{cube, icosphere, join, torus};
 use crate::progress::Silent;
 
