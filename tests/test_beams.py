@@ -409,7 +409,7 @@ def whole(**beams):
 
 
 def test_exact_figures_are_those_of_the_mesh_and_of_the_grid():
-    """Both roads come to the exact volume: the patches within what the chord error leaves room for."""
+    """Both methods come to the exact volume: the patches at any chord error."""
     import judges
 
     solid = whole()
@@ -423,11 +423,36 @@ def test_exact_figures_are_those_of_the_mesh_and_of_the_grid():
         assert mesh.closed and mesh.pieces == 1 and mesh.self_intersections == 0
         assert abs(judges.sound(mesh) / mesh.volume - 1) < 1e-6
         assert mesh.chord_error <= chord
-        # What lies between surfaces that near to each other.
-        assert abs(mesh.volume - exact["volume"]) < 1.1 * mesh.chord_error * exact["area"]
+        # The closed form is known to 1e-10.
+        assert abs(mesh.volume / exact["volume"] - 1) < 1e-9
     grid = solid.mesh(edge=0.15)
     # A radius is four steps of the grid, whose volume is of fourth order or, over seams of fillets, of third.
     assert abs(grid.volume / exact["volume"] - 1) < 2e-3
+
+
+def test_whole_beams_are_meshed_from_their_patches_unless_a_grid_is_asked_for(tmp_path):
+    """At a fiftieth of the radius: mesh, stream and the command. Beams that the region cuts, and islands, need a grid."""
+    solid = whole(fillet="none")
+    chord, exact = solid.report().chord, told(solid)["volume"]
+    assert chord == pytest.approx(0.6 / 50, rel=1e-9) and f"{chord:.3g} mm off at most" in str(solid.report())
+    mesh = solid.mesh()
+    assert np.array_equal(mesh.vertices, solid.mesh(chord=chord).vertices) and 0 < mesh.chord_error <= chord
+    assert abs(mesh.volume / exact - 1) < 1e-9
+    assert solid.save_stl(tmp_path / "a.stl").triangles == mesh.counts[1]
+    assert solid.mesh(edge=0.4).chord_error is None and solid.mesh(per_cell=24, islands="drop").chord_error is None
+    cut = built(**GOOD)
+    assert cut.report().chord is None and "grid " in str(cut.report()) and cut.mesh(edge=0.4).chord_error is None
+    design = tmp_path / "d.json"
+    small = lt.Beams(cell="bcc", radius=0.6, trim="drop", map=lt.map.affine(wavelength=10))
+    lt.Design(region=lt.region.box(min=[-1, -1, -1], max=[11, 11, 11]), beams=small).save(design)
+    for command in (
+        ["mesh", design, "-o", tmp_path / "b.stl"],
+        ["mesh", design, "-o", tmp_path / "b.3mf"],
+        ["measure", design],
+    ):
+        status, out, _ = run(*command, "--json")
+        made = json.loads(out)
+        assert status == 0 and made["edge"] is None and made["chord_error"] <= 0.6 / 50 and made["pieces"] == 1
 
 
 GYROID = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=4.0), level=lt.level.fraction(0.3))

@@ -176,7 +176,8 @@ COMMANDS = {
                 "--chord",
                 type=LENGTH,
                 metavar="MM",
-                help="mesh uncut beams without a grid, triangles within this distance of the surface, mm",
+                help="mesh uncut beams without a grid, triangles within this distance of the surface, mm (default without a "
+                "spacing: a fiftieth of the thinnest beam's radius)",
             ),
         ),
         *(THREADS, PROGRESS),

@@ -69,6 +69,8 @@ def mesh(args) -> None:
     start = time.perf_counter()
     solid = build(args.design)
     keep_inputs(args.design, args.output)
+    if not (args.smooth or args.open or args.tolerance is not None or args.triangles is not None):
+        args.chord = solid._chord_of(args.chord, args.edge, args.per_cell, args.islands)
     with Progress("meshing", args.progress) as progress:
         made = meshed_file(solid, args, progress)
     edge = solid.spacing(args.edge, args.per_cell)
@@ -213,7 +215,8 @@ def measure(args) -> None:
         warn(voids(made.voids))
     figures |= {"self_intersections": made.self_intersections, "quality": made.quality, "defects": made.defects}
     if solid is not None:
-        figures["edge"] = solid.spacing(args.edge, args.per_cell)
+        off = made.chord_error
+        figures |= {"edge": solid.spacing(args.edge, args.per_cell)} if off is None else {"edge": None, "chord_error": off}
     if args.dangling:
         with Progress("looking for fragments", args.progress) as progress:
             figures["dangling"] = solid.dangling(threads=args.threads, progress=progress)

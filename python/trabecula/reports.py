@@ -199,6 +199,9 @@ class DesignReport(Report):
     """The graphs and patterns of beams by name."""
     blend: BlendReport | None
     """The blend of its lattices, where there is one."""
+    chord: float | None
+    """Chord error of a mesh of whole beams unless another resolution is asked for, mm: a fiftieth of the radius of the
+    thinnest. None for what is meshed on a grid."""
     lattices: dict[str, LatticeReport]
     """The lattices by name."""
     region: RegionReport

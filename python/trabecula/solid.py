@@ -278,8 +278,9 @@ class Solid(Picture):
         leaves all, with a warning; ``"drop"`` leaves them out; ``"error"`` refuses. ``Mesh.islands`` counts them.
 
         ``chord``, instead of a spacing, is for beams alone that the region does not cut: no grid is made, triangles follow
-        the patches of beams and fillets at a distance of at most ``chord`` (mm); ``Mesh.chord_error`` is the distance reached.
-        All pieces are kept.
+        the patches of beams and fillets at a distance of at most ``chord`` (mm) and enclose their exact volume;
+        ``Mesh.chord_error`` is the distance reached. All pieces are kept. Such beams are meshed so, at ``report().chord``,
+        if no resolution is given and ``smooth`` is not asked for.
 
         ``smooth`` improves the triangles, as finite elements and simulations want them: slivers are merged, edges flipped and
         vertices moved within the surface. Every guarantee, sharp edges, flat faces and the volume are kept; positions are then
@@ -288,6 +289,8 @@ class Solid(Picture):
         check_islands(islands)
         if smooth and chord is not None:
             raise ValueError("smooth is for meshes on a grid; with chord the triangles follow the patches of beams")
+        if not smooth:
+            chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None:
             need, _ = self._core.expected_beams(self._chord(chord, edge, per_cell, islands))
             # Places and triangles, their parts while they are joined, and as much again for measuring and writing.
@@ -309,6 +312,12 @@ class Solid(Picture):
         made = Mesh(core, self._core.region, spacing, others)
         made._smoothing = report
         return made
+
+    def _chord_of(self, chord: float | None, edge: float | None, per_cell: float | None, islands: str) -> float | None:
+        """The chord error that is asked for; that of whole beams if no resolution is; None for a grid."""
+        if chord is not None or edge is not None or per_cell is not None or islands in ("drop", "error"):
+            return chord
+        return self._core.default_chord
 
     def _chord(self, chord: float, edge: float | None, per_cell: float | None, islands: str) -> float:
         """A chord error, where nothing is asked for that needs a grid."""
@@ -365,6 +374,7 @@ class Solid(Picture):
         check_islands(islands)
         extension(path, ("stl",))
         check_place(path)
+        chord = self._chord_of(chord, edge, per_cell, islands)
         if chord is not None:
             return self._stream_beams(path, self._chord(chord, edge, per_cell, islands), threads)
         spacing = self.spacing(edge, per_cell)

@@ -66,7 +66,10 @@ def _design(it: Report) -> Iterator[str]:
         yield from _beams(beams)
     if it.blend:
         yield from _blend(it.blend)
-    yield f"grid    spacing {it.spacing:.3g} mm unless another is asked for"
+    if it.chord is not None:
+        yield f"mesh    of the beams' own patches, {it.chord:.3g} mm off at most, unless a resolution is asked for"
+    else:
+        yield f"grid    spacing {it.spacing:.3g} mm unless another is asked for"
 
 
 def _lattice(it: Report) -> Iterator[str]:

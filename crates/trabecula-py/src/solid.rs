@@ -234,6 +234,12 @@ impl Solid {
         Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
     }
 
+    /// The chord error at which a mesh is made unless another resolution is asked for, mm; None on a grid.
+    #[getter]
+    fn default_chord(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        run(py, None, None, |_| self.built.default_chord())
+    }
+
     /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches, and of how many all others
     /// are copies.
     fn expected_beams(&self, py: Python<'_>, chord: f64) -> PyResult<[f64; 2]> {

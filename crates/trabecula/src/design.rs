@@ -270,6 +270,12 @@ impl Built {
         Ok(BeamSurface(build_beams::alone(self)?))
     }
 
+    /// The chord error (mm) at which `beam_surface` makes a surface unless another resolution is asked for: a fiftieth of the radius
+    /// of the thinnest beam. `None` for what is made on a grid.
+    pub fn default_chord(&self) -> Option<f64> {
+        build_beams::default_chord(self)
+    }
+
     /// Whether the beams of a name are all that the design is: no region cuts them, nothing is added. Of a large pattern, by a box
     /// that holds it.
     pub fn whole_beams(&self, name: &str) -> bool {

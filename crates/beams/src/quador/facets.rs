@@ -14,6 +14,7 @@ use super::complex::{Arc, COLLAPSE_LENGTH, Complex};
 use super::hub::Hub;
 use ear_clipping::strip;
 
+mod balance;
 mod ear_clipping;
 mod refinement;
 

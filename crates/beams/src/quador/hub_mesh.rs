@@ -14,7 +14,7 @@ use geometry::mesh::Mesh;
 
 use super::Quadors;
 use super::hub::HalfBeam;
-use super::integral::unresolved_face;
+use super::integral::{DEFAULT_ORDER, hub_mass, unresolved_face};
 use super::tessellation::{HubMesh, Tessellation};
 
 /// Number of representative hubs meshed to estimate the number of triangles.
@@ -58,7 +58,9 @@ impl Quadors {
         let of = self.hub(hub);
         let circle_size = |s: &HalfBeam| self.circle_size(s.beam as usize, chord);
         let rings: Vec<usize> = of.half_beams.iter().map(circle_size).collect();
-        HubMesh::new(&of, &self.complex(hub)?, &rings, chord).ok_or_else(|| unresolved_face(hub))
+        let complex = self.complex(hub)?;
+        let volume = hub_mass::<false>(&of, &complex, DEFAULT_ORDER).map(|m| m.volume);
+        HubMesh::new(&of, &complex, &rings, chord, volume).ok_or_else(|| unresolved_face(hub))
     }
 
     /// The surface as one triangle mesh within `chord` (mm) of it, and the greatest distance found, mm.
@@ -79,14 +81,24 @@ impl Quadors {
         check(chord)?;
         self.require_closed_forms()?;
         let mut tessellation = Tessellation { quadors: self, classes: self.classes(), meshes: Vec::new(), chord };
-        // If triangles of beams that nearly touch cross, everything is refined.
+        // If triangles of beams that nearly touch cross, or vertices cannot be moved, everything is refined.
+        let mut fault = None;
         for finer in [1.0, 0.5, 0.25, 0.125] {
             tessellation.chord = chord * finer;
             let meshes = (tessellation.classes.sample.par_iter()).map(|&i| self.hub_mesh(i, tessellation.chord));
-            tessellation.meshes = meshes.collect::<Result<_, _>>()?;
+            match meshes.collect::<Result<_, _>>() {
+                Ok(meshes) => tessellation.meshes = meshes,
+                Err(found) => {
+                    fault = Some(found);
+                    continue;
+                }
+            }
             if !tessellation.has_crossings() {
                 return Ok(tessellation);
             }
+        }
+        if let Some(fault) = fault {
+            return Err(fault);
         }
         Err(Fault::new("chord", "triangles of adjacent beams intersect at this chord error: use a smaller one"))
     }

@@ -15,6 +15,9 @@ use super::facets::{Facets, SEAM_SHARE};
 use super::hub::{HalfBeam, Hub};
 use super::hub_classes::HubClasses;
 
+/// Shares of the chord error that are tried for triangles before their vertices are moved.
+const SHARES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
+
 /// A triangulated surface of beams.
 pub struct Tessellation<'a> {
     pub(super) quadors: &'a Quadors,
@@ -73,7 +76,8 @@ impl Quadors {
         let axis = scale(sub(ends[1], ends[0]), 1.0 / p.length);
         let middle = add(ends[0], scale(axis, p.split()));
         let radius = p.radius_squared(p.split()).max(0.0).sqrt();
-        circle(axis, self.circle_size(beam, chord), radius).map(move |x| add(middle, x))
+        let n = self.circle_size(beam, chord);
+        circle(axis, n, radius * equal_area(n)).map(move |x| add(middle, x))
     }
 }
 
@@ -127,11 +131,7 @@ impl Tessellation<'_> {
                 six += dot(a, cross(b, c));
                 twice += norm(cross(sub(b, a), sub(c, a)));
             }
-            // End circles are closed by flat polygons.
-            for s in hub.half_beams {
-                let k = self.quadors.circle_size(s.beam as usize, self.chord) as f64;
-                six += s.split * s.radius_squared(s.split) * k * (TAU / k).sin();
-            }
+            six += 6.0 * below_circles(&hub);
             volume += n * six / 6.0;
             area += n * twice / 2.0;
             // Every end circle has as many vertices as edges, so that a hub counts as a sphere with a hole for each.
@@ -185,6 +185,17 @@ impl Tessellation<'_> {
     }
 }
 
+/// Volume of the cones from the centre of a hub to its end circles, mm³, and to the polygons of their areas.
+fn below_circles(hub: &Hub) -> f64 {
+    hub.half_beams.iter().map(|s| PI * s.radius_squared(s.split).max(0.0) * s.split / 3.0).sum()
+}
+
+/// Distance of the vertices of a regular polygon from its centre, in radii of the circle of its area.
+fn equal_area(n: usize) -> f64 {
+    let angle = TAU / n as f64;
+    (angle / angle.sin()).sqrt()
+}
+
 /// `n` points on a circle about an axis through the origin.
 fn circle(axis: Vec3, n: usize, r: f64) -> impl Iterator<Item = Vec3> {
     let side = perpendicular(axis);
@@ -196,9 +207,15 @@ fn circle(axis: Vec3, n: usize, r: f64) -> impl Iterator<Item = Vec3> {
 }
 
 impl HubMesh {
-    /// Meshes a hub, with the given number of vertices on each end circle; `None` if a boundary polygon intersects
-    /// itself.
-    pub(super) fn new(hub: &Hub, complex: &Complex, circle_sizes: &[usize], chord: f64) -> Option<HubMesh> {
+    /// Meshes a hub, with the given number of vertices on each end circle, so that the triangles enclose its `volume` (mm³), if it is
+    /// known; `None` if a boundary polygon intersects itself, or vertices cannot be moved.
+    pub(super) fn new(
+        hub: &Hub,
+        complex: &Complex,
+        circle_sizes: &[usize],
+        chord: f64,
+        volume: Option<f64>,
+    ) -> Option<HubMesh> {
         let end_circles: Vec<Vec<Vec3>> = (hub.half_beams.iter().zip(circle_sizes))
             .map(|(s, &n)| {
                 // The frame of a beam starts at its first end.
@@ -208,18 +225,26 @@ impl HubMesh {
                 circle(axis, n, radius).map(|x| add(middle, x)).collect()
             })
             .collect();
-        let mut facets = Facets::new(hub, complex, &end_circles, chord)?;
-        // Maximum distance of the end circles' chords.
-        let sagitta =
-            |(s, n): (&HalfBeam, &usize)| s.radius_squared(s.split).max(0.0).sqrt() * (1.0 - (PI / *n as f64).cos());
-        let rims_off = hub.half_beams.iter().zip(circle_sizes).map(sagitta).fold(0.0, f64::max);
-        let error = facets.refine()?.max(rims_off);
+        let circles: Vec<(usize, f64)> = circle_sizes.iter().map(|&n| (n, equal_area(n))).collect();
+        // Where vertices are moved as others are, triangles may be farther from the surface than before.
+        let (facets, error) = SHARES.iter().find_map(|share| {
+            let mut facets = Facets::new(hub, complex, &end_circles, share * chord)?;
+            facets.refine()?;
+            let error = facets.balance(&circles, below_circles(hub), volume)?;
+            (error <= chord).then_some((facets, error))
+        })?;
+        // Maximum distance of the end circles' vertices and chords.
+        let off = |(s, &n): (&HalfBeam, &usize)| {
+            let wide = equal_area(n);
+            s.radius_squared(s.split).max(0.0).sqrt() * (wide - 1.0).max(1.0 - wide * (PI / n as f64).cos())
+        };
+        let circles_off = hub.half_beams.iter().zip(circle_sizes).map(off).fold(0.0, f64::max);
         Some(HubMesh {
             circle_vertices: circle_sizes.iter().sum(),
             bounds: facets.points.iter().fold(Aabb::EMPTY, |b, p| b.with(*p)),
             points: facets.points,
             triangles: facets.triangles,
-            error,
+            error: error.max(circles_off),
         })
     }
 }

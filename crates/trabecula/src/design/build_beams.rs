@@ -23,8 +23,8 @@ use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
 
+use beam_report::{FEW, warn, warn_cleaned};
 pub(super) use beam_report::{held, inside, lone, report, share};
-use beam_report::{warn, warn_cleaned};
 pub(super) use wire::given;
 use wire::{check_beams, check_left, greatest, mean_length, radii, tables, thickest};
 
@@ -153,6 +153,22 @@ pub(super) fn alone(built: &Built) -> Result<Arc<Quadors>, Fault> {
         );
     }
     Ok(quadors)
+}
+
+/// Chord errors in the radius of the thinnest beam, unless another resolution is asked for: a circle has eighteen edges.
+const PER_RADIUS: f64 = 50.0;
+
+/// The chord error (mm) at which the surface of beams is made unless another resolution is asked for; `None` for what is
+/// made on a grid: other solids, beams that the region cuts or that overlap, patterns of many beams.
+pub(super) fn default_chord(built: &Built) -> Option<f64> {
+    if let [(_, Beams::Pattern(laid))] = &built.beams[..]
+        && laid.pattern().counts().1 > FEW
+    {
+        return None;
+    }
+    let quadors = alone(built).ok().filter(|q| q.overlaps().is_empty())?;
+    let thin = (0..quadors.beams()).map(|b| quadors.pencil(b).waist()).fold(f64::INFINITY, f64::min);
+    (thin < f64::INFINITY).then_some(thin / PER_RADIUS)
 }
 
 /// A frame before it is cleaned and trimmed.

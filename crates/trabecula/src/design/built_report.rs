@@ -120,6 +120,7 @@ pub(super) fn report(built: &Built) -> DesignReport {
     };
     DesignReport {
         spacing: spacing(built, &lattices, &beams),
+        chord: built.default_chord(),
         lattices,
         beams,
         region,

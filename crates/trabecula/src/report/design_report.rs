@@ -21,6 +21,9 @@ pub struct DesignReport {
     /// a cell's finest wave (down to a wavelength / 128), half the thinnest wall or neck, a sixth of the thinnest beam, the skin
     /// (down to a wavelength / 64).
     pub spacing: f64,
+    /// Chord error of a mesh of whole beams unless another resolution is asked for, mm: a fiftieth of the radius of the thinnest.
+    /// None for what is meshed on a grid.
+    pub chord: Option<f64>,
     /// Possible mistakes in the design.
     pub warnings: Vec<Warning>,
     /// The blend of its lattices, where there is one.

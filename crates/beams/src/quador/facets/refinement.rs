@@ -33,7 +33,7 @@ impl Facets<'_> {
     }
 
     /// Distance from an edge to the surface, at its quarter points, mm.
-    fn edge_distance(&self, a: u32, b: u32) -> f64 {
+    pub(super) fn edge_distance(&self, a: u32, b: u32) -> f64 {
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         [0.25, 0.5, 0.75].map(|s| self.distance(add(scale(p, 1.0 - s), scale(q, s)))).into_iter().fold(0.0, f64::max)
     }

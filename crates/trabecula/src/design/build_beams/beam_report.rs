@@ -88,7 +88,7 @@ pub(in crate::design) fn lone(built: &Built) -> bool {
 }
 
 /// Largest number of beams of a pattern that are checked one by one.
-const FEW: f64 = 2e4;
+pub(super) const FEW: f64 = 2e4;
 
 /// Whether all beams lie in the region: of a large pattern, by the box that holds it.
 pub(in crate::design) fn held(beams: &Beams, built: &Built) -> bool {
