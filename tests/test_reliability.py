@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 
 import pytest
@@ -47,7 +48,7 @@ def test_spacings_beyond_any_grid(edge):
     """One line with the place and what to use."""
     core = lt.Lattice("gyroid", "sheet", lt.map.affine(4), lt.level.fraction(0.4))
     solid = lt.Design(region=lt.region.box([8] * 3), lattice={"core": core}).build()
-    with pytest.raises(ValueError, match=r"grid spacing .* cuts the region's 8 mm into more than 4e\+06 steps; use 2e-06 mm"):
+    with pytest.raises(ValueError, match=r"grid spacing .* cuts the region's 8 mm into more than 4e\+06 steps; use 0.00064 mm"):
         solid.mesh(edge=edge)
 
 
@@ -87,3 +88,28 @@ def test_messages_shorten_what_was_found():
     with pytest.raises(lt.DesignError, match=r'unknown cell "x{79}…"') as error:
         lt.Design(region=lt.region.box([8] * 3), lattice={"core": core}).build()
     assert len(str(error.value)) < 1400 and len(error.value.message) < 1400
+
+
+def test_an_interrupt_ends_the_work_itself(tmp_path):
+    """Of a session that goes on, such as a notebook: no processor time is used up after Ctrl-C in a build."""
+    script = """
+        import os, signal, sys, threading, time
+        import trabecula as lt
+
+        turn = lt.map.phase(2.0, rotate_z=lt.grade.formula("40*sin(x/9)*cos(y/7)"), step=0.3)
+        core = lt.Lattice(cell="gyroid", part="sheet", map=turn, level=lt.level.fraction(0.3))
+        design = lt.Design(region=lt.region.box([60, 60, 60]), lattice=core)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            design.build()
+            sys.exit("it was built before the interrupt")
+        except KeyboardInterrupt:
+            time.sleep(3.0)  # the last round
+            before = time.process_time()
+            time.sleep(2.0)
+            print(time.process_time() - before)
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.2, "the work went on"

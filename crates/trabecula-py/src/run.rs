@@ -4,14 +4,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use geometry::progress::Progress;
-use pyo3::exceptions::PyValueError;
+use geometry::progress::{Cancellation, Progress};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error;
 
 /// How often signals are checked and progress is reported.
 const TICK: Duration = Duration::from_millis(50);
+/// How long an interrupt waits for work to come to a checkpoint.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Progress that the working threads write and the calling thread reads.
 #[derive(Default)]
@@ -47,8 +49,8 @@ fn pool(threads: Option<usize>) -> PyResult<Option<rayon::ThreadPool>> {
     }
 }
 
-/// Runs `work`, which does not ask whether it is to stop, on `threads` threads (all processors if `None`). An interrupt is heard
-/// at once: the work is left to itself then, and its result dropped. (The command ends, and the work with it.)
+/// Runs `work`, which reports no progress, on `threads` threads (all processors if `None`). An interrupt ends it at its next
+/// checkpoint; if none comes soon, it is left to itself and its result dropped.
 pub fn run_apart<T: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -57,18 +59,26 @@ pub fn run_apart<T: Send + 'static>(
     let pool = pool(threads)?;
     py.detach(|| {
         let (finished, waiting) = channel::<()>();
+        let request = Cancellation::default();
+        let asked = request.clone();
         let work = move || {
             let _finished = finished; // dropped, and so signalled, even if the work panics
             match pool {
-                Some(pool) => pool.install(work),
-                None => work(),
+                Some(pool) => pool.install(|| asked.run(work)),
+                None => asked.run(work),
             }
         };
         let worker = std::thread::Builder::new().spawn(work)?;
         while let Err(RecvTimeoutError::Timeout) = waiting.recv_timeout(TICK) {
-            Python::attach(|py| py.check_signals().inspect_err(|_| stop_children(py)))?;
+            let raised = Python::attach(|py| py.check_signals().inspect_err(|_| stop_children(py)));
+            if let Err(interrupt) = raised {
+                request.cancel();
+                let _ = waiting.recv_timeout(PATIENCE); // whichever comes first
+                return Err(interrupt);
+            }
         }
-        worker.join().map_err(error::internal)
+        let made = worker.join().map_err(error::internal)?;
+        made.ok_or_else(|| PyKeyboardInterrupt::new_err(()))
     })
 }
 

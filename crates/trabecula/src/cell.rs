@@ -21,6 +21,7 @@ pub use series::{Series, Term};
 use std::sync::OnceLock;
 
 use geometry::math::{Interval, Mat3, Vec3, add, apply, norm, scale, spectral_norm, transpose};
+use geometry::progress::Cancellation;
 
 /// Which part of space about the level is solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -162,7 +163,8 @@ impl Cell {
     /// The intervals of solid fraction in which the periodic solid is connected in R³.
     pub fn connected_fraction(&self, part: Part) -> Vec<[f64; 2]> {
         let f = |u: &[Vec3], v: &mut [f64], g: &mut [Vec3]| self.plain.gradients(u, v, g);
-        let found = || self.connected[part as usize].get_or_init(|| connected(&f, part));
+        let request = Cancellation::current();
+        let found = || request.enter(|| self.connected[part as usize].get_or_init(|| connected(&f, part)));
         // The table is needed next: both are computed in parallel.
         let (intervals, _) = rayon::join(found, || (self.range(), self.table()));
         intervals.iter().map(|i| i.map(|t| self.fraction(part, t).clamp(0.0, 1.0))).collect()

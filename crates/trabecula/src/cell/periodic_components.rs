@@ -15,6 +15,7 @@ use super::Part;
 use rayon::prelude::*;
 
 use geometry::math::{Vec3, add, scale, sub, unit};
+use geometry::progress::checkpoint;
 
 mod critical;
 mod offset_forest;
@@ -156,6 +157,7 @@ impl Sweep<'_> {
         }
         let mut nears = Vec::with_capacity(28);
         for &node in self.order {
+            checkpoint();
             nears.clear();
             let near = AROUND.map(self.grid.steps(node));
             if sheet {

@@ -9,6 +9,7 @@ use geometry::fault::{Fault, number};
 use geometry::math::{
     IDENTITY, Mat3, Vec3, cross, determinant, dot, norm, product, rotation, scale, sub, transpose, unit,
 };
+use geometry::progress::checkpoint;
 
 /// Orientation of the cell at each position. A frame's columns are the directions of the cell's axes in space.
 #[derive(Clone)]
@@ -352,6 +353,7 @@ fn comb<T: Copy + FirstOf>(
     values[start] = agree(start, &values[start], &T::FIRST);
     heap.push(Step { sure: sure(start), behind: sure(start), node: start, from: start });
     while let Some(Step { node, from, .. }) = heap.pop() {
+        checkpoint();
         if core::mem::replace(&mut reached[node], true) {
             continue;
         }

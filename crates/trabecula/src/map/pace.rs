@@ -12,6 +12,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, dot, norm, scale, sub};
+use geometry::progress::checkpoint;
 use geometry::random::low_discrepancy;
 
 /// Most nodes of a grid that is chosen, and of one that the design requests.
@@ -261,6 +262,7 @@ impl<'a> Probe<'a> {
         let (mut grid, mut missed) = (first, missed);
         let mut halvings = [0; 3];
         loop {
+            checkpoint();
             let open = (0..3).filter(|a| missed[*a].much() && halvings[*a] < HALVINGS);
             let Some(axis) = open.reduce(|m, a| if missed[a].share > missed[m].share { a } else { m }) else {
                 return Ok((grid, missed));

@@ -19,6 +19,7 @@ use crate::field::{Block, Field};
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, IDENTITY, Mat3, Vec3, add, determinant, dot, norm, scale, spectral_norm, sub, transpose};
+use geometry::progress::{Cancellation, checkpoint};
 use geometry::random::low_discrepancy;
 
 /// Weights fall off outside the region by e² for each of this many steps.
@@ -88,7 +89,9 @@ impl Phase {
         let grid = chosen.grid;
         let nodes: Vec<Vec3> = (0..grid.len()).map(|n| grid.node(n)).collect();
         let wavelength = wavelengths(&wanted.wavelength, &nodes)?;
+        checkpoint();
         let frames = wanted.orientation.frames(&grid, &nodes)?;
+        checkpoint();
         let mut depth = vec![f64::NEG_INFINITY; grid.len()];
         if let Some(region) = settings.region {
             let chunks = depth.par_chunks_mut(4096).zip(nodes.par_chunks(4096));
@@ -112,8 +115,11 @@ impl Phase {
             );
             return Err(Fault::new("angle_weight", message));
         }
+        checkpoint();
         let (values, mean, steps) = integrate(&grid, &k, close.as_deref(), ratio);
+        checkpoint();
         let spline = Spline::through(grid, values);
+        checkpoint();
         let within: Vec<usize> = (0..grid.len()).filter(|&n| inside[n]).collect();
         // The density at every node; the other measures, which cost more, at some tens of thousands.
         let density: Vec<f64> = within
@@ -123,6 +129,7 @@ impl Phase {
                 cells * wavelength[n].iter().product::<f64>()
             })
             .collect();
+        checkpoint();
         let (compared, between) = compared(&grid, &inside, settings.region);
         let positions: Vec<Vec3> = compared.iter().map(|n| nodes[*n]).chain(between.iter().copied()).collect();
         let jacobians: Vec<Mat3> = positions.par_iter().map(|p| spline.jacobian(*p).1).collect();
@@ -379,9 +386,9 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> 
     let weights: Vec<f64> = (0..grid.len()).map(|n| grid.trapezoid(n) * s.map_or(1.0, |s| s[n] * s[n])).collect();
     let whole: f64 = weights.iter().sum();
     let poisson = Poisson::new(*grid);
-    let solved: Vec<(Vec<f64>, Vec3, usize)> = k
-        .par_iter()
-        .map(|k| {
+    let request = Cancellation::current();
+    let solved = k.par_iter().map(|k| {
+        request.enter(|| {
             // From a first value on, so that a K that does not vary has exactly itself as its mean.
             let first = k[0];
             let off = k.iter().zip(&weights).fold([0.0; 3], |m, (k, w)| add(m, scale(sub(*k, first), *w)));
@@ -402,7 +409,8 @@ fn integrate(grid: &Grid, k: &[Vec<Vec3>; 3], s: Option<&[f64]>, ratio: f64) -> 
             }
             (f, mean, steps)
         })
-        .collect();
+    });
+    let solved: Vec<(Vec<f64>, Vec3, usize)> = solved.collect();
     let mean = [solved[0].1, solved[1].1, solved[2].1];
     let steps = solved.iter().map(|s| s.2).max().unwrap_or(0);
     let mut values = solved.into_iter().map(|s| s.0);

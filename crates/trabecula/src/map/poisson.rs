@@ -16,6 +16,7 @@ use rustfft::{Fft, FftDirection, FftPlannerScalar, num_complex::Complex64};
 use super::phase_grid::Grid;
 use super::tilt::Tilt;
 use geometry::math::Vec3;
+use geometry::progress::checkpoint;
 
 /// Residual, relative to the first, at which conjugate gradients end.
 const RESIDUAL: f64 = 1e-7;
@@ -106,6 +107,7 @@ impl Poisson {
         let mut rz = dot(&r, &z);
         let (mut steps, mut left) = (0, 1.0);
         while steps < STEPS && left > RESIDUAL {
+            checkpoint();
             let q = operator(&p);
             let alpha = rz / dot(&p, &q);
             if !alpha.is_finite() {
@@ -186,6 +188,7 @@ impl Poisson {
     /// DCT-I along all three axes.
     fn transform(&self, f: &mut Vec<f64>, spare: &mut Vec<f64>) {
         for (a, plan) in self.plans.iter().enumerate() {
+            checkpoint();
             let n = self.grid.shape[a];
             f.par_chunks_mut(2 * n).for_each_init(
                 || vec![Complex64::default(); 2 * (n - 1) + plan.get_inplace_scratch_len()],

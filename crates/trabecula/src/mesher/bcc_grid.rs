@@ -13,6 +13,7 @@ use crate::field::Field;
 use crate::grade::Grade;
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Vec3, norm, sub};
+use geometry::progress::checkpoint;
 use geometry::tetmesh::tet_quality::size_of;
 
 /// Integer coordinate units per cube edge; the number of possible bisections is its logarithm.
@@ -66,6 +67,7 @@ impl Grid {
         let mut names = HashMap::new();
         let mut todo = vec![([-1; 3], end)];
         while let Some((low, high)) = todo.pop() {
+            checkpoint();
             let block = grid.block(low, high);
             if region.bound(&block.grown(0.5 * cube)).lo > 0.0 {
                 continue;

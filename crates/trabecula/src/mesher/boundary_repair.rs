@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::work::Around;
+use geometry::progress::checkpoint;
 use geometry::tetmesh::{FACES, TetMesh, volume};
 
 /// A connected component is a fragment if its volume is less than this fraction of the largest one's,
@@ -15,6 +16,7 @@ const FRAGMENT_TETS: usize = 100;
 pub(super) fn repair(mesh: &mut TetMesh) -> f64 {
     let mut lost = 0.0;
     loop {
+        checkpoint();
         let mut removed = non_manifold(mesh);
         if removed.is_empty() {
             removed = fragments(mesh);

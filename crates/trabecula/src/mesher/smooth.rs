@@ -4,6 +4,7 @@ use super::tet_shape::shape;
 use super::work::Work;
 use crate::field::Field;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use geometry::progress::checkpoint;
 use geometry::tetmesh::FACES;
 
 /// Shapes better than this are not changed: dihedral angles of about 26 to 142 degrees.
@@ -19,6 +20,7 @@ pub(super) fn smooth(work: &mut Work) {
     for _ in 0..ROUNDS {
         let mut moved = false;
         for n in 0..work.mesh.nodes.len() {
+            checkpoint();
             if work.held[n] == 0 && !work.around.of(n).is_empty() {
                 moved |= improve(work, n);
             }

@@ -3,6 +3,7 @@
 //! Where weights vary, what is solid follows from no cell's own table. It is summed over small tetrahedra on which f − t is
 //! taken as linear, in two sizes of them, which together are of fourth order (Richardson).
 
+use geometry::progress::checkpoint;
 use rayon::prelude::*;
 
 use super::{Level, Share, Tiling};
@@ -131,6 +132,7 @@ impl Level {
         let tets: Vec<usize> = (0..map.len()).filter(moves).collect();
         let mixture = Mixture::new(cells, part);
         for _ in 0..ROUNDS {
+            checkpoint();
             // For each tetrahedron its deficit, how much a common move of its free nodes adds, and its volume, mm³; each of
             // these nodes has an equal part, so that nothing lacks in all when none does.
             let deficit = |t: &usize| {
