@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .errors import DesignError, DesignWarning
     from .levels import fraction, iso
     from .mesh import Mesh
+    from .parts import write_parts
     from .quadors import Quadors, Slice
     from .solid import Solid, Voxels
     from .tets import TetMesh
@@ -56,6 +57,7 @@ __all__ = [
     "reports",
     "skin",
     "spartan",
+    "write_parts",
 ]
 
 # Names are fetched on first use, so that the command's help does not wait for numpy.
@@ -76,6 +78,7 @@ _HOMES = {
     "Transitions": "transition",
     "Voxels": "solid",
     "spartan": "design",
+    "write_parts": "parts",
     "iso": "levels",
     "fraction": "levels",
     "__version__": "_core",

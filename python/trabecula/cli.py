@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from .formats import DESIGNS, MESH_READS, MESH_WRITES, MESHES, STDIN, TET_READS, TET_WRITES, VOXEL_WRITES, dotted, kind_of
 from .islands import ISLANDS
+from .parts import check_parts
 from .terminal import fail, interrupts_leave, interrupts_raise, listen, outcome, settle, warn
 
 __all__ = ["main"]
@@ -70,6 +71,14 @@ def size(text: str) -> tuple[int, int]:
     if len(parts) != 2 or not all(p.isdigit() and 1 <= int(p) <= 16384 for p in parts):
         raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, each from 1 to 16384, found {text!r}")
     return int(parts[0]), int(parts[1])
+
+
+def parts(text: str) -> list[str]:
+    """Names of parts by commas."""
+    try:
+        return check_parts([name.strip() for name in text.split(",")])
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def ending(known: tuple[str, ...], stdin: bool = False):
@@ -168,6 +177,7 @@ COMMANDS = {
         "  trabecula mesh part.toml -o part.stl --per-cell 48 --threads 4\n"
         "  trabecula mesh part.toml -o part.stl --edge 0.1 --tolerance 0.01\n"
         "  trabecula mesh part.toml -o part.stl --smooth\n"
+        "  trabecula mesh exchanger.toml -o exchanger.3mf --parts wall,lower,upper\n"
         "  trabecula mesh beams.toml -o beams.stl --chord 0.01",
         *(DESIGN, output(MESH_WRITES, "the mesh to write")),
         spacing(
@@ -187,13 +197,20 @@ COMMANDS = {
             default="drop-small",
             help="connected components other than the largest: drop those at the region's boundary with less volume than "
             "eight grid cells and a thousandth of the largest one, and warn of the others (default), keep all with a "
-            "warning, drop all, or refuse",
+            "warning, drop all, or refuse; --parts keep all",
         ),
         *LIGHTER,
         option(
             "--smooth",
             action="store_true",
             help="better triangles: slivers merged, edges flipped, vertices moved in the surface",
+        ),
+        option(
+            "--parts",
+            type=parts,
+            metavar="NAMES",
+            help="several solids of a sheet, by commas: wall (what the design makes), lower, upper (what is left of the region "
+            "on each side); objects of one .3mf, else files OUT-wall.stl …",
         ),
         option("--open", action="store_true", help="write the lattice's own surface alone, open at the region's boundary"),
         *(JSON, *NOTICES),

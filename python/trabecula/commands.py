@@ -20,6 +20,7 @@ from .files import check_place, whole_file
 from .formats import DESIGNS, MESH_READS, STDIN, STREAMS, is_design, kind_of
 from .machine import fits
 from .mesh import Mesh, region_of_file
+from .parts import part_files, write_parts
 from .solid import Solid
 from .starter import starter
 from .terminal import Progress, figure, say, settle, told, warn
@@ -65,6 +66,8 @@ def check(args) -> None:
 
 def mesh(args) -> None:
     """``trabecula mesh``."""
+    if args.parts:
+        return mesh_parts(args)
     check_place(args.output)
     start = time.perf_counter()
     solid = build(args.design)
@@ -92,6 +95,47 @@ def mesh(args) -> None:
         f"{made['solid_fraction']:.4f}, area {figure(made['area'])} mm², {counted(made['pieces'])}; {size}, "
         f"{made['seconds']:.2f} s"
     )
+
+
+def mesh_parts(args) -> None:
+    """``trabecula mesh --parts``."""
+    others = {
+        "--open": args.open,
+        "--smooth": args.smooth,
+        "--chord": args.chord,
+        "--tolerance": args.tolerance,
+        "--triangles": args.triangles,
+    }
+    if alone := [name for name, value in others.items() if value]:
+        raise Refused(f"{alone[0]} does not go with --parts: the parts have to keep their common triangles; leave it out")
+    if args.islands == "drop":
+        raise Refused("--islands drop does not go with --parts: a dropped piece would leave a gap between them; leave it out")
+    files = part_files(args.output, args.parts)
+    start = time.perf_counter()
+    for name in files.values():
+        check_place(name)
+    solid = build(args.design)
+    for name in files.values():
+        keep_inputs(args.design, name)
+    islands = "error" if args.islands == "error" else "keep"
+    with Progress("meshing", args.progress) as progress:
+        parts = solid.parts(args.edge, args.per_cell, args.parts, args.threads, progress, islands)
+    settle()
+    write_parts(args.output, parts)
+    edge = solid.spacing(args.edge, args.per_cell)
+    made = {"parts": {}, "edge": edge, "region_volume": solid.region_volume(edge)}
+    for name, mesh in parts.items():
+        share = {"solid_fraction": mesh.volume / made["region_volume"], "file": files[name]}
+        made["parts"][name] = mesh.summary().to_dict() | share
+    made["seconds"] = round(time.perf_counter() - start, 3)
+    if args.json:
+        return put_json(made | {"warnings": told()})
+    for name, it in made["parts"].items():
+        say(
+            f"{name}: {it['triangles']} triangles, volume {figure(it['volume'])} mm³, {it['solid_fraction']:.4f} of the "
+            f"region, area {figure(it['area'])} mm², {counted(it['pieces'])}; {it['file']}"
+        )
+    say(f"edge {edge:g} mm, {made['seconds']:.2f} s")
 
 
 def meshed_file(solid: Solid, args, progress: Progress) -> dict:

@@ -16,6 +16,7 @@ from .given import fixed, positive, whole
 from .islands import check_islands, left_out, warn_islands
 from .machine import file_size, fits, rounded_up
 from .mesh import Mesh, Picture
+from .parts import PARTS, check_parts, warn_pieces
 from .quadors import Quadors
 from .thickness import Thickness
 from .transforms import factor_of, vector_of
@@ -23,7 +24,7 @@ from .transition import Transitions
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, Literal
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -318,6 +319,48 @@ class Solid(Picture):
         if chord is not None or edge is not None or per_cell is not None or islands in ("drop", "error"):
             return chord
         return self._core.default_chord
+
+    def parts(
+        self,
+        edge: float | None = None,
+        per_cell: float | None = None,
+        names: Sequence[str] = PARTS,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        islands: Literal["keep", "error"] = "keep",
+    ) -> dict[str, Mesh]:
+        """The solids into which a sheet divides its region, as closed meshes by name.
+
+        ``wall`` is what the design makes: the sheet with skin and keep zones. ``lower`` and ``upper`` are what is left of the
+        region on either side of the mid-surface, where the cell's function is less and greater than in its middle. ``names``
+        says which are wanted, in which order; ``edge``, ``per_cell``, ``threads`` and ``progress`` are those of ``mesh``.
+
+        All come from one grid: the triangles between two of them are the same in both, turned round, with the same
+        coordinates to the last bit, and the three volumes (mm³) add up to the region's. No piece is dropped, since that would
+        leave a gap: several pieces of one part are warned of, or refused by ``islands = "error"``.
+
+        A ValueError if the design is not a sheet (a network, beams, tetrahedra, a blend with any of these), or where its wall
+        has no thickness, so that nothing is between lower and upper.
+        """
+        chosen = check_parts(names)
+        if islands not in ("keep", "error"):
+            raise ValueError(
+                f'islands is {islands!r}; of parts it must be "keep" or "error": a dropped piece would leave a gap'
+            )
+        spacing = self.spacing(edge, per_cell)
+        need = self._need(spacing)
+        # Each part has its own copy of what it shares; measuring and writing take as much again.
+        most = 2 * len(chosen) * need.memory
+        fits(most, f"{need['triangles']:.3g} triangles in each part", edge=spacing, coarsest=self.wavelength / 2)
+        self._warn_thin(spacing)
+        made = self._core.parts(chosen, spacing, _threads(threads), progress, islands == "error")
+        parts = {}
+        for name, (core, others, words) in zip(chosen, made, strict=True):
+            if name == "wall":
+                self._warn_coarse(core.volume(), spacing)
+            warn_pieces(name, others, words)
+            parts[name] = Mesh(core, self._core.region, spacing, others)
+        return parts
 
     def _chord(self, chord: float, edge: float | None, per_cell: float | None, islands: str) -> float:
         """A chord error, where nothing is asked for that needs a grid."""

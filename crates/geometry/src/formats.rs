@@ -190,6 +190,20 @@ pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out:
         let written = FORMATS.iter().filter(|f| f.writer.is_some());
         return Err(invalid(unknown(suffix, &suffixes(written))));
     };
+    check_mesh(mesh)?;
+    (writer.write)(mesh, meta, out)
+}
+
+/// Writes several meshes into one 3MF, each an object of its own with its name, all to be built where they are.
+///
+/// **Errors**: as [`write_mesh`].
+pub fn write_objects<W: io::Write>(objects: &[(&str, &Mesh)], meta: &Metadata, out: &mut W) -> io::Result<()> {
+    objects.iter().try_for_each(|o| check_mesh(o.1))?;
+    threemf::write_objects(objects, meta, out)
+}
+
+/// Refuses what no format can hold.
+fn check_mesh(mesh: &Mesh) -> io::Result<()> {
     let count = mesh.vertices.len();
     if let Some(i) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= count)) {
         return Err(invalid(format!("triangle {i} is {:?}, but there are {count} vertices", mesh.triangles[i])));
@@ -198,7 +212,7 @@ pub fn write_mesh<W: io::Write>(mesh: &Mesh, suffix: &str, meta: &Metadata, out:
     if let Some(i) = mesh.vertices.par_iter().position_first(outside) {
         return Err(invalid(format!("vertex {i} at {:?} is not finite in single precision", mesh.vertices[i])));
     }
-    (writer.write)(mesh, meta, out)
+    Ok(())
 }
 
 fn invalid(message: String) -> io::Error {

@@ -296,6 +296,21 @@ impl Mesh {
         report(py, "ThicknessReport", &told)
     }
 
+    /// Writes meshes, each with its name, to a 3MF at `path` as one object each; the design is that of the first one.
+    #[staticmethod]
+    fn write_objects(py: Python<'_>, path: PathBuf, objects: Vec<(String, Py<Mesh>)>, title: String) -> PyResult<()> {
+        let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));
+        let design = objects.first().map_or(String::new(), |o| o.1.get().design.clone());
+        let meta = formats::Metadata { title, design, application };
+        let meshes: Vec<_> = objects.iter().map(|(name, mesh)| (name.as_str(), &mesh.get().surface.mesh)).collect();
+        let written = run(py, None, None, |_| {
+            let mut out = BufWriter::with_capacity(1 << 20, file::anew(&path)?);
+            formats::write_objects(&meshes, &meta, &mut out)?;
+            out.flush()
+        })?;
+        Ok(written?)
+    }
+
     /// Writes the mesh to `path` in the format `extension`.
     fn write(&self, py: Python<'_>, path: PathBuf, extension: &str, title: String) -> PyResult<()> {
         let application = format!("Trabecula {}", env!("CARGO_PKG_VERSION"));

@@ -10,9 +10,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use trabecula::analysis;
 use trabecula::design::Built;
-use trabecula::extract;
+use trabecula::extract::{self, SpaceMade};
 use trabecula::map::Misfit;
 use trabecula::report::{DanglingReport, EstimateReport, IslandsReport, RepairReport, SurfaceReport};
+use trabecula::solid::Space;
 use trabecula::surface_maker::{Islands, Options, SurfaceMaker};
 use trabecula::truss::Beams;
 
@@ -238,6 +239,32 @@ impl Solid {
     #[getter]
     fn default_chord(&self, py: Python<'_>) -> PyResult<Option<f64>> {
         run(py, None, None, |_| self.built.default_chord())
+    }
+
+    /// Some of the solids into which a sheet divides the region, at grid spacing `edge` (mm): each with its connected components
+    /// as `reports.IslandsReport`, and these in words. With `whole`, each must be in one piece.
+    #[pyo3(signature = (names, edge, threads=None, progress=None, whole=false))]
+    fn parts<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        edge: f64,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+        whole: bool,
+    ) -> PyResult<Vec<(Mesh, Bound<'py, PyAny>, String)>> {
+        let of = |name: &String| {
+            let found = Space::ALL.into_iter().find(|s| s.name() == name);
+            found.ok_or_else(|| PyValueError::new_err(format!("no part is named {name}: wall, lower, upper")))
+        };
+        let wanted = names.iter().map(of).collect::<PyResult<Vec<Space>>>()?;
+        let made = run(py, threads, progress, |p| extract::spaces(&self.built.solid, &wanted, edge, whole, p))?;
+        let made = made.map_err(error::stopped)?.into_iter();
+        made.map(|SpaceMade { made, .. }| {
+            let others = report(py, "IslandsReport", &IslandsReport::from(&made.components))?;
+            Ok((Mesh::new(made.surface, self.design.clone()), others, made.components.words()))
+        })
+        .collect()
     }
 
     /// About how many triangles the surface of beams alone has within `chord` (mm) of their patches, and of how many all others

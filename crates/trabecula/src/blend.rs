@@ -129,6 +129,10 @@ impl Implicit for Blend {
         vec![side(Side::High), side(Side::Low)]
     }
 
+    fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
+        if self.summands.iter().all(Summand::is_sheet) { self.parts().try_into().ok() } else { None }
+    }
+
     fn lipschitz(&self) -> f64 {
         self.lipschitz
     }

@@ -6,12 +6,13 @@ use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use geometry::math::{Aabb, Interval, Vec3};
 
-/// A CSG tree over numbered implicit surfaces. It is monotone: making a surface's function negative never removes solid,
-/// since there is no negation.
+/// A CSG tree over numbered implicit surfaces. Negation is at the leaves alone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
     /// Where the function of the surface with this number is negative.
     Leaf(usize),
+    /// Where that function is not negative: in the spaces adjacent to a wall, which have the wall's surfaces. No `CsgSolid` has it.
+    Outside(usize),
     /// Where all are solid; everywhere if the list is empty.
     Intersection(Vec<CsgTree>),
     /// Where any is solid; nowhere if the list is empty.
@@ -29,8 +30,31 @@ impl CsgTree {
     pub fn solid(&self, negative: &impl Fn(usize) -> u64) -> u64 {
         match self {
             CsgTree::Leaf(i) => negative(*i),
+            CsgTree::Outside(i) => !negative(*i),
             CsgTree::Intersection(of) => of.iter().fold(u64::MAX, |w, t| w & t.solid(negative)),
             CsgTree::Union(of) => of.iter().fold(0, |w, t| w | t.solid(negative)),
+        }
+    }
+
+    /// The positions that may be solid, if each surface is negative in `all` and may be in `some`.
+    #[inline]
+    pub fn possible(&self, some: &impl Fn(usize) -> u64, all: &impl Fn(usize) -> u64) -> u64 {
+        match self {
+            CsgTree::Leaf(i) => some(*i),
+            CsgTree::Outside(i) => !all(*i),
+            CsgTree::Intersection(of) => of.iter().fold(u64::MAX, |w, t| w & t.possible(some, all)),
+            CsgTree::Union(of) => of.iter().fold(0, |w, t| w | t.possible(some, all)),
+        }
+    }
+
+    /// The positions that are certainly solid, if each surface is negative in `all` and may be in `some`.
+    #[inline]
+    pub fn certain(&self, some: &impl Fn(usize) -> u64, all: &impl Fn(usize) -> u64) -> u64 {
+        match self {
+            CsgTree::Leaf(i) => all(*i),
+            CsgTree::Outside(i) => !some(*i),
+            CsgTree::Intersection(of) => of.iter().fold(u64::MAX, |w, t| w & t.certain(some, all)),
+            CsgTree::Union(of) => of.iter().fold(0, |w, t| w | t.certain(some, all)),
         }
     }
 
@@ -45,14 +69,15 @@ impl CsgTree {
         found: &mut impl FnMut(usize, u64),
     ) {
         let (of, join) = match self {
-            CsgTree::Leaf(i) => return found(*i, here & some(*i) & !all(*i)),
+            CsgTree::Leaf(i) | CsgTree::Outside(i) => return found(*i, here & some(*i) & !all(*i)),
             CsgTree::Intersection(of) => (of, true),
             CsgTree::Union(of) => (of, false),
         };
         for (n, t) in of.iter().enumerate() {
             // This child decides only where its siblings can all be solid (intersection) or all be empty (union).
             let others = of.iter().enumerate().filter(|(m, _)| *m != n);
-            let open = others.fold(here, |w, (_, o)| w & if join { o.solid(some) } else { !o.solid(all) });
+            let open =
+                others.fold(here, |w, (_, o)| w & if join { o.possible(some, all) } else { !o.certain(some, all) });
             if open != 0 {
                 t.deciding(open, some, all, found);
             }
@@ -66,6 +91,11 @@ impl CsgTree {
                 Sign::Negative => return CsgTree::FULL,
                 Sign::Positive => return CsgTree::EMPTY,
                 Sign::Varies(n) => return CsgTree::Leaf(n),
+            },
+            CsgTree::Outside(i) => match sign(*i) {
+                Sign::Negative => return CsgTree::EMPTY,
+                Sign::Positive => return CsgTree::FULL,
+                Sign::Varies(n) => return CsgTree::Outside(n),
             },
             CsgTree::Intersection(of) => (of, true),
             CsgTree::Union(of) => (of, false),
@@ -87,11 +117,22 @@ impl CsgTree {
         }
     }
 
+    /// The tree of the complement, for the same surfaces.
+    pub fn inverse(self) -> CsgTree {
+        let each = |of: Vec<CsgTree>| of.into_iter().map(CsgTree::inverse).collect();
+        match self {
+            CsgTree::Leaf(i) => CsgTree::Outside(i),
+            CsgTree::Outside(i) => CsgTree::Leaf(i),
+            CsgTree::Intersection(of) => CsgTree::Union(each(of)),
+            CsgTree::Union(of) => CsgTree::Intersection(each(of)),
+        }
+    }
+
     /// The tree of the complement, for surfaces whose functions have been negated.
     pub fn complement(self) -> CsgTree {
         let each = |of: Vec<CsgTree>| of.into_iter().map(CsgTree::complement).collect();
         match self {
-            CsgTree::Leaf(i) => CsgTree::Leaf(i),
+            CsgTree::Leaf(_) | CsgTree::Outside(_) => self,
             CsgTree::Intersection(of) => CsgTree::Union(each(of)),
             CsgTree::Union(of) => CsgTree::Intersection(each(of)),
         }
@@ -103,6 +144,7 @@ impl CsgTree {
         let nothing = |v| (v, None);
         match self {
             CsgTree::Leaf(i) => (value(*i), Some(*i)),
+            CsgTree::Outside(i) => (-value(*i), Some(*i)),
             CsgTree::Intersection(of) => {
                 of.iter().map(|t| t.value(value)).fold(nothing(f64::NEG_INFINITY), |a, b| if b.0 > a.0 { b } else { a })
             }
@@ -116,6 +158,7 @@ impl CsgTree {
     pub fn bound(&self, bound: &impl Fn(usize) -> Interval) -> Interval {
         match self {
             CsgTree::Leaf(i) => bound(*i),
+            CsgTree::Outside(i) => -bound(*i),
             CsgTree::Intersection(of) => of
                 .iter()
                 .map(|t| t.bound(bound))
@@ -131,6 +174,7 @@ impl CsgTree {
         let each = |of: Vec<CsgTree>| of.into_iter().map(|t| t.renumbered(first)).collect();
         match self {
             CsgTree::Leaf(i) => CsgTree::Leaf(first + i),
+            CsgTree::Outside(i) => CsgTree::Outside(first + i),
             CsgTree::Intersection(of) => CsgTree::Intersection(each(of)),
             CsgTree::Union(of) => CsgTree::Union(each(of)),
         }
@@ -139,7 +183,7 @@ impl CsgTree {
     /// Whether the lowest common ancestor of two surfaces, each named once, is an intersection.
     pub fn intersects(&self, pair: [usize; 2]) -> bool {
         let (of, all) = match self {
-            CsgTree::Leaf(_) => return false,
+            CsgTree::Leaf(_) | CsgTree::Outside(_) => return false,
             CsgTree::Intersection(of) => (of, true),
             CsgTree::Union(of) => (of, false),
         };
@@ -155,8 +199,17 @@ impl CsgTree {
     /// Calls `f` for every surface of the tree.
     pub fn for_each(&self, f: &mut impl FnMut(usize)) {
         match self {
-            CsgTree::Leaf(i) => f(*i),
+            CsgTree::Leaf(i) | CsgTree::Outside(i) => f(*i),
             CsgTree::Intersection(of) | CsgTree::Union(of) => of.iter().for_each(|t| t.for_each(f)),
+        }
+    }
+
+    /// Whether the tree is solid where a surface is positive.
+    pub fn is_outside(&self, surface: usize) -> bool {
+        match self {
+            CsgTree::Leaf(_) => false,
+            CsgTree::Outside(i) => *i == surface,
+            CsgTree::Intersection(of) | CsgTree::Union(of) => of.iter().any(|t| t.is_outside(surface)),
         }
     }
 
@@ -165,7 +218,7 @@ impl CsgTree {
         match self {
             CsgTree::Leaf(i) => f(*i),
             CsgTree::Intersection(of) => of.iter().for_each(|t| t.for_each_bounding(f)),
-            CsgTree::Union(_) => {}
+            CsgTree::Union(_) | CsgTree::Outside(_) => {}
         }
     }
 }

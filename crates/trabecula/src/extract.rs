@@ -10,7 +10,6 @@ use geometry::formats::stl;
 use geometry::progress::{Progress, Stopped};
 use geometry::surface_mesh::SurfaceMesh;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use crate::solid::Solid;
 use crate::surface_maker::{
@@ -23,6 +22,8 @@ mod feature_edges;
 mod planar_caps;
 mod sampling_grid;
 mod sign_words;
+mod spaces;
+mod stitched;
 mod tile;
 mod tile_components;
 mod tile_queue;
@@ -30,6 +31,8 @@ mod vertex_id;
 mod voxelize;
 
 use sampling_grid::Grid;
+pub use spaces::{SpaceMade, spaces};
+use stitched::Stitched;
 use tile::{Scratch, View};
 use tile_components::{TileComponents, TileSweep};
 use tile_queue::{borrow, each_tile, give_back};
@@ -70,34 +73,9 @@ impl SurfaceMaker for GridSurface<'_> {
     fn mesh(&self, options: &Options, progress: &dyn Progress) -> Result<Made, Stopped> {
         let grid = Grid::new(self.0, options.resolution).map_err(Stopped::Refused)?;
         let middle = self.0.region.bounds().center();
-        let mut out = SurfaceMesh::default();
-        let mut sweep = TileSweep::default();
-        // Vertices on the borders of tiles, by name.
-        let mut border: FxHashMap<u128, u32> = FxHashMap::default();
-        let map = |view: View| view.patch(middle);
-        each_tile(&grid, progress, map, |(patch, components)| {
-            let mut numbers = Vec::with_capacity(patch.vertices.len());
-            for (v, shared) in patch.vertices.iter().zip(&patch.shared) {
-                let vertices = &mut out.mesh.vertices;
-                let new = u32::try_from(vertices.len()).map_err(|_| {
-                    Stopped::Refused(Fault::new("edge", "more than 2^32 vertices; use a larger edge, or STL"))
-                })?;
-                let number = match shared {
-                    Some(key) => *border.entry(*key).or_insert(new),
-                    None => new,
-                };
-                if number == new {
-                    vertices.push(*v);
-                }
-                numbers.push(number);
-            }
-            out.mesh.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| numbers[v as usize])));
-            out.cut.extend_from_slice(&patch.cut);
-            sweep.add(components).map_err(Stopped::Refused)
-        })?;
-        not_empty(out.mesh.triangles.len() as u64, options.resolution)?;
-        let found = sweep.resolve(options.islands, options.resolution).map_err(Stopped::Refused)?;
-        Ok(Made { surface: surface_maker::kept(out, &found), components: found.components, error: None })
+        let mut out = Stitched::default();
+        each_tile(&grid, progress, |view: View| view.patch(0, middle), |patch| out.add(patch))?;
+        out.finish(options)
     }
 
     fn stream_stl(&self, options: &Options, out: &mut dyn Store, progress: &dyn Progress) -> Result<Summary, Stopped> {
@@ -110,7 +88,7 @@ impl SurfaceMaker for GridSurface<'_> {
         let map = |view: View| {
             let mut records = borrow(&spare);
             let positions = view.positions();
-            let components = TileComponents::each_triangle(&view, middle, |t, _| {
+            let components = TileComponents::each_triangle(&view, 0, middle, |t, _| {
                 let corners = t.map(|v| positions[v as usize].map(|x| x as f32));
                 stl::push_record(&mut records, corners);
             });
@@ -145,7 +123,7 @@ impl SurfaceMaker for GridSurface<'_> {
             let each = batch.into_par_iter().map_init(Scratch::default, |scratch, i| {
                 let tile = grid.tile((total / 2 + i * stride) % total);
                 grid.local(&grid.nodes(tile), &grid.block(tile).bounds())?;
-                Some(tile::extract(&grid, tile, scratch).map_or(0, |v| v.triangles().count()))
+                Some(tile::extract(&grid, tile, scratch).map_or(0, |v| v.triangles(0).count()))
             });
             let each: Vec<usize> = each.flatten_iter().collect();
             worked += each.len();

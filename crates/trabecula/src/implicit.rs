@@ -24,6 +24,12 @@ pub trait Implicit: Field {
     fn parts(&self) -> Vec<Arc<dyn Implicit>> {
         Vec::new()
     }
+
+    /// Of a sheet, the functions of its two faces: negative in the wall, the first positive on the upper side of the
+    /// mid-surface, the second on the lower one. `None` if there is no mid-surface.
+    fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
+        None
+    }
 }
 
 /// An implicit surface: the zero set of a smooth function that is negative towards the solid.

@@ -331,6 +331,10 @@ impl Implicit for Lattice {
         self.cut.sides(|cut| Lattice { cut, ..self.clone() })
     }
 
+    fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
+        self.parts().try_into().ok()
+    }
+
     fn lipschitz(&self) -> f64 {
         match self.map.affine() {
             Some(_) => self.core_lipschitz,

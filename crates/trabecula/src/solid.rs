@@ -7,6 +7,7 @@ use crate::csg_tree::{CsgSolid, CsgTree};
 use crate::field::{Block, Field};
 use crate::implicit::{Implicit, Surface};
 use crate::region::Region;
+use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3};
 
 /// What a design means: the part of the region in which the field is negative, or that is filled anyway.
@@ -22,6 +23,37 @@ pub struct Solid {
     pub wavelength: f64,
     /// The width of the narrowest transition between lattices (mm), if there is one: no grid may be coarser.
     pub transition: Option<f64>,
+}
+
+/// One of the solids into which a sheet divides its region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// What the design makes: the sheet, with skin and keep zones.
+    Wall,
+    /// What is left of the region on the lower side of the mid-surface, where the cell's function is below its level there.
+    Lower,
+    /// What is left on the upper side.
+    Upper,
+}
+
+impl Space {
+    /// All, in the order of `Spaces::trees`.
+    pub const ALL: [Space; 3] = [Space::Wall, Space::Lower, Space::Upper];
+
+    /// The word for it: `wall`, `lower`, `upper`.
+    pub fn name(self) -> &'static str {
+        ["wall", "lower", "upper"][self as usize]
+    }
+}
+
+/// The solids into which a sheet divides its region, over the same surfaces: no two overlap, and together they are the region.
+pub struct Spaces {
+    /// The surfaces. The region's come first.
+    pub surfaces: Vec<Surface>,
+    /// Wall, lower and upper space.
+    pub trees: [CsgTree; 3],
+    /// The surfaces of the wall towards the upper and the lower space.
+    pub faces: [usize; 2],
 }
 
 impl Solid {
@@ -47,6 +79,34 @@ impl Solid {
         let mut body = CsgSolid { surfaces, tree };
         coincident::separate(&mut body, &self.region.bounds(), &mut 0);
         body
+    }
+
+    /// The wall and the two spaces adjacent to it, which fill the region together; and the surfaces that the mid-surface runs
+    /// between, upper and lower.
+    ///
+    /// # Errors
+    /// A field that is not a sheet, at `parts`.
+    pub fn spaces(&self) -> Result<Spaces, Fault> {
+        let Some(faces) = self.field.as_ref().and_then(|f| f.faces()) else {
+            let message = "this design has no lower and upper side: only sheets have, whether of one lattice or of a blend of \
+                           sheets. Give the lattices part = \"sheet\", or leave the parts out";
+            return Err(Fault::new("parts", message));
+        };
+        let CsgSolid { mut surfaces, tree: region } = self.boundary();
+        let mut filled = Vec::new();
+        for body in &self.filled {
+            filled.push(body.tree.clone().renumbered(surfaces.len()));
+            surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
+        }
+        let [upper, lower] = [surfaces.len(), surfaces.len() + 1];
+        surfaces.extend(faces.map(Surface::smooth));
+        let sheet = CsgTree::Intersection(vec![CsgTree::Leaf(upper), CsgTree::Leaf(lower)]);
+        let free = CsgTree::Union(filled.clone()).inverse();
+        filled.push(sheet);
+        let within = |of: Vec<CsgTree>| CsgTree::Intersection([vec![region.clone()], of].concat());
+        let wall = within(vec![CsgTree::Union(filled)]);
+        let beside = |face| within(vec![free.clone(), CsgTree::Outside(face)]);
+        Ok(Spaces { trees: [wall, beside(lower), beside(upper)], surfaces, faces: [upper, lower] })
     }
 
     /// The solid as a combination of smooth implicit surfaces. The region's come first.

@@ -1,4 +1,4 @@
-//! 3MF, core specification: one object in millimetres, with the design that it came from as metadata.
+//! 3MF, core specification: objects in millimetres, with the design that they came from as metadata.
 //!
 //! Source: 3MF Consortium, 3D Manufacturing Format Core Specification 1.2; ECMA-376-2, Open Packaging Conventions.
 
@@ -31,10 +31,16 @@ const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// Writes 3MF. Coordinates are rounded to single precision, which is what readers of the format hold.
+pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
+    write_objects(&[("", mesh)], meta, out)
+}
+
+/// Writes several meshes as one 3MF: an object and an item of the build for each, with its name unless that is empty.
 ///
 /// The model is deflated in pieces on all threads; the pieces join to one stream, since each ends at a byte.
-pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<()> {
-    if mesh.vertices.len() >= i32::MAX as usize || mesh.triangles.len() >= i32::MAX as usize {
+pub fn write_objects<W: Write>(objects: &[(&str, &Mesh)], meta: &Metadata, out: &mut W) -> io::Result<()> {
+    let large = |m: &Mesh| m.vertices.len() >= i32::MAX as usize || m.triangles.len() >= i32::MAX as usize;
+    if objects.iter().any(|o| large(o.1)) {
         return Err(invalid(format!("3MF counts to {}: the mesh has more vertices or triangles", i32::MAX)));
     }
     let mut model = Entry::new(MODEL);
@@ -46,8 +52,26 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
     for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
         head.push_str(&format!("<metadata name=\"{name}\">{}</metadata>\n", escaped(text)));
     }
-    head.push_str("<resources>\n<object id=\"1\" type=\"model\">\n<mesh>\n<vertices>\n");
-    model.push(Piece::of(head.as_bytes()));
+    head.push_str("<resources>\n");
+    let mut tail = String::from("</resources>\n<build>\n");
+    for (id, (name, mesh)) in (1..).zip(objects) {
+        let name = if name.is_empty() { String::new() } else { format!(" name=\"{}\"", escaped(name)) };
+        head.push_str(&format!("<object id=\"{id}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n"));
+        model.push(Piece::of(head.as_bytes()));
+        push_mesh(&mut model, mesh)?;
+        head = "</triangles>\n</mesh>\n</object>\n".into();
+        tail.push_str(&format!("<item objectid=\"{id}\"/>\n"));
+    }
+    model.push(Piece::of(format!("{head}{tail}</build>\n</model>\n").as_bytes()));
+    let mut types = Entry::new("[Content_Types].xml");
+    types.push(Piece::of(TYPES.as_bytes()));
+    let mut relations = Entry::new("_rels/.rels");
+    relations.push(Piece::of(RELATIONS.as_bytes()));
+    package::write(&[types, relations, model], package::LIMIT, out)
+}
+
+/// Adds the vertices and triangles of a mesh.
+fn push_mesh(model: &mut Entry, mesh: &Mesh) -> io::Result<()> {
     let points = |r: std::ops::Range<usize>| {
         let mut text = Vec::with_capacity(r.len() * 48);
         for p in &mesh.vertices[r] {
@@ -81,12 +105,5 @@ pub fn write<W: Write>(mesh: &Mesh, meta: &Metadata, out: &mut W) -> io::Result<
         }
         Piece::of(&text)
     };
-    in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)?;
-    let tail = "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
-    put(Piece::of(tail.as_bytes()))?;
-    let mut types = Entry::new("[Content_Types].xml");
-    types.push(Piece::of(TYPES.as_bytes()));
-    let mut relations = Entry::new("_rels/.rels");
-    relations.push(Piece::of(RELATIONS.as_bytes()));
-    package::write(&[types, relations, model], package::LIMIT, out)
+    in_order(mesh.triangles.len(), 1 << 14, faces, &mut put)
 }

@@ -25,7 +25,7 @@ use rustc_hash::FxHashMap;
 
 use super::cube_table::{CASES, EDGES};
 use super::feature_edges::{DividedFaces, EdgeStore};
-use super::sampling_grid::{Grid, LocalSolid};
+use super::sampling_grid::{Grid, LocalSolid, Sides};
 use super::sign_words::Signs;
 use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
@@ -37,8 +37,8 @@ pub(super) struct FeatureMesh {
     names: FxHashMap<VertexId, u32>,
     /// The ids of the vertices.
     pub keys: Vec<VertexId>,
-    /// Triangles, and whether they are cuts.
-    pub triangles: Vec<([u32; 3], bool)>,
+    /// Triangles, and what lies on their sides.
+    pub triangles: Vec<([u32; 3], Sides)>,
 }
 
 impl FeatureMesh {
@@ -112,15 +112,15 @@ impl FeatureCells<'_> {
     }
 
     /// Adds a convex polygon by the ids of its vertices.
-    pub fn polygon(&mut self, ring: &[VertexId], cut: bool) {
+    pub fn polygon(&mut self, ring: &[VertexId], sides: Sides) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
-        self.fan(&names, cut);
+        self.fan(&names, sides);
     }
 
     /// Adds a convex polygon by its vertices.
-    pub fn fan(&mut self, names: &[u32], cut: bool) {
+    pub fn fan(&mut self, names: &[u32], sides: Sides) {
         for i in 2..names.len() {
-            self.extra.triangles.push(([names[0], names[i - 1], names[i]], cut));
+            self.extra.triangles.push(([names[0], names[i - 1], names[i]], sides));
         }
     }
 
@@ -159,32 +159,32 @@ impl FeatureCells<'_> {
             let from = key(self, a, b);
             ring.extend(self.trace(cell, axis, upper, surface, from).0);
         }
-        let cut = self.grid.surfaces[self.local.live[surface]].cut;
+        let sides = self.sides_of(cell, surface);
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         if names.len() == n {
             // Nothing was added: the plain patch serves.
             let name = |e: u8| case.ring.iter().position(|r| *r == e).map_or(0, |at| names[at]);
-            self.extra.triangles.extend(case.triangles[..case.count].iter().map(|t| (t.map(name), cut)));
+            self.extra.triangles.extend(case.triangles[..case.count].iter().map(|t| (t.map(name), sides)));
             return;
         }
         let boundary_loop: Vec<Vec3> = names.iter().map(|v| self.positions[*v as usize]).collect();
-        self.cone(VertexId::center(node, 7), middle(&boundary_loop), &names, cut);
+        self.cone(VertexId::center(node, 7), middle(&boundary_loop), &names, sides);
     }
 
     /// Adds the cone over a ring of vertices from a new one.
-    pub fn cone(&mut self, apex: VertexId, position: Vec3, ring: &[u32], cut: bool) {
+    pub fn cone(&mut self, apex: VertexId, position: Vec3, ring: &[u32], sides: Sides) {
         let middle = self.push(apex, position);
         for at in 0..ring.len() {
             let (a, b) = (ring[at], ring[(at + 1) % ring.len()]);
-            self.extra.triangles.push(([middle, a, b], cut));
+            self.extra.triangles.push(([middle, a, b], sides));
         }
     }
 
     /// Adds a polygon in a cell face that spans two axes; it may have straight angles.
-    pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[VertexId]) {
+    pub fn flat_polygon(&mut self, low: usize, span: usize, ring: &[VertexId], part: u8) {
         let names: Vec<u32> = ring.iter().map(|k| self.vertex(*k)).collect();
         let boundary_loop: Vec<Vec3> = names.iter().map(|v| self.positions[*v as usize]).collect();
-        self.cone(VertexId::center(low, span), middle(&boundary_loop), &names, true);
+        self.cone(VertexId::center(low, span), middle(&boundary_loop), &names, Sides::cut(part));
     }
 
     /// Whether cells are fitted to a surface.
@@ -192,14 +192,40 @@ impl FeatureCells<'_> {
         self.grid.fitted == Some(self.local.live[surface])
     }
 
-    /// Whether these negative surfaces make a position in a cell solid.
-    pub fn is_solid(&self, [i, j, k]: [usize; 3], negative: u64) -> bool {
+    /// The part of the solid where these surfaces are negative in a cell: 0 is void, the parts count from 1.
+    pub fn part_in(&self, [i, j, k]: [usize; 3], negative: u64) -> u8 {
         let live = self.local.live.len();
         let sign = |f: usize| match f.checked_sub(live) {
             Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
             None => negative >> f,
         };
-        self.local.tree.solid(&sign) & 1 == 1
+        self.local.part(&sign)
+    }
+
+    /// Whether no surface is needed in a simplex: the part is the same whichever of the `mixed` surfaces are negative.
+    pub fn is_uniform(&self, [i, j, k]: [usize; 3], (negative, mixed): (u64, u64)) -> bool {
+        let live = self.local.live.len();
+        let sign = |f: usize, mask: u64| match f.checked_sub(live) {
+            Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
+            None => mask >> f,
+        };
+        let (some, all) = (|f: usize| sign(f, negative | mixed), |f: usize| sign(f, negative));
+        self.local.trees.iter().all(|t| (t.possible(&some, &all) ^ t.certain(&some, &all)) & 1 == 0)
+    }
+
+    /// What lies on the sides of a surface where some surfaces are negative in a cell.
+    pub fn sides(&self, cell: [usize; 3], negative: u64, surface: usize) -> Sides {
+        Sides {
+            behind: self.part_in(cell, negative | 1 << surface),
+            ahead: self.part_in(cell, negative & !(1 << surface)),
+            cut: self.grid.surfaces[self.local.live[surface]].cut,
+        }
+    }
+
+    /// What lies on the sides of the only surface of a cell.
+    pub fn sides_of(&self, cell: [usize; 3], surface: usize) -> Sides {
+        let [behind, ahead] = self.signs.parts_beside(self.local, surface, cell);
+        Sides { behind, ahead, cut: self.grid.surfaces[self.local.live[surface]].cut }
     }
 
     /// Cuts a feature cell.
@@ -208,21 +234,17 @@ impl FeatureCells<'_> {
         for ([one, two], right) in PATHS {
             let simplex = self.simplex(node, &[one, two, 7]);
             let (negative, mixed) = self.signs_of(&simplex);
-            if mixed == 0 || self.is_solid(cell, negative) == self.is_solid(cell, negative | mixed) {
+            if mixed == 0 || self.is_uniform(cell, (negative, mixed)) {
                 continue;
             }
             for fragment in self.cut(&simplex, right, (negative, mixed), [None; 4]) {
-                if !self.is_solid(cell, fragment.negative) {
-                    continue;
-                }
-                for facet in &fragment.facets {
-                    let Some(f) = facet.surface else { continue };
-                    if self.is_solid(cell, fragment.negative & !(1 << f)) {
+                for (f, facet) in fragment.negative_facets() {
+                    let sides = self.sides(cell, fragment.negative, f);
+                    if sides.behind == sides.ahead {
                         continue;
                     }
-                    let ring: Vec<VertexId> = facet.ring.iter().map(|s| self.key(&simplex, *s)).collect();
-                    let cut = self.grid.surfaces[self.local.live[f]].cut;
-                    self.polygon(&ring, cut);
+                    let ring: Vec<VertexId> = facet.iter().map(|s| self.key(&simplex, *s)).collect();
+                    self.polygon(&ring, sides);
                 }
             }
         }
@@ -319,8 +341,9 @@ impl FeatureCells<'_> {
     /// The cap of a feature cell on its lower or upper face along an axis.
     fn cap_face(&mut self, cell: [usize; 3], axis: usize, upper: bool) {
         for (negative, ring) in self.face_fragments(cell, axis, upper) {
-            if self.is_solid(cell, negative) {
-                self.polygon(&ring, true);
+            let part = self.part_in(cell, negative);
+            if part > 0 {
+                self.polygon(&ring, Sides::cut(part));
             }
         }
     }

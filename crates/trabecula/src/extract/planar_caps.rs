@@ -5,8 +5,10 @@
 use std::ops::Range;
 
 use super::feature_cells::FeatureCells;
+use super::sampling_grid::Sides;
 use super::sign_words::{Signs, bits};
 use super::vertex_id::VertexId;
+use crate::csg_tree::CsgTree;
 
 /// Adds the cap of a grid-aligned plane on the tile's own cells.
 pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize>; 3]) {
@@ -22,20 +24,20 @@ pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize
         (at[u], at[v]) = (a, b);
         at
     };
-    let solid = solid_nodes(features, axis, plane);
+    let parts: Vec<[u64; 64]> = features.local.trees.iter().map(|t| solid_nodes(features, t, axis, plane)).collect();
     let mut names = [[u32::MAX; 64]; 64];
     for b in own[v].clone() {
-        let both = solid[b] & solid[b + 1];
+        let both: Vec<u64> = parts.iter().map(|solid| solid[b] & solid[b + 1]).collect();
         for a in own[u].clone() {
             let cell = at(layer, a, b);
             if features.signs.is_feature(cell) {
                 continue;
             }
-            let whole = both >> a & 3 == 3 && is_solid(features, cell);
-            if !whole || is_next_to_feature(features, cell, [u, v]) {
-                plain(features, cell, axis, upper);
+            let whole = both.iter().position(|w| w >> a & 3 == 3).filter(|_| is_solid(features, cell));
+            let Some(part) = whole.filter(|_| !is_next_to_feature(features, cell, [u, v])) else {
+                (0..parts.len()).for_each(|part| plain(features, cell, axis, upper, part));
                 continue;
-            }
+            };
             // Nearly all of a cap: squares of nodes.
             let mut ring = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)].map(|(a, b)| {
                 let name = &mut names[b][a];
@@ -49,7 +51,8 @@ pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize
                 ring.reverse();
             }
             let [p, q, r, s] = ring;
-            features.extra.triangles.extend([([p, q, r], true), ([p, r, s], true)]);
+            let sides = Sides::cut(part as u8 + 1);
+            features.extra.triangles.extend([([p, q, r], sides), ([p, r, s], sides)]);
         }
     }
 }
@@ -72,12 +75,12 @@ fn is_next_to_feature(features: &FeatureCells, cell: [usize; 3], faces: [usize; 
     })
 }
 
-/// Where the other surfaces make a plane of nodes solid: a word along the next axis, for each node along the last.
-fn solid_nodes(features: &FeatureCells, axis: usize, plane: usize) -> [u64; 64] {
+/// Where the other surfaces make a plane of nodes one part of the solid: a word along the next axis, for each node along the last.
+fn solid_nodes(features: &FeatureCells, tree: &CsgTree, axis: usize, plane: usize) -> [u64; 64] {
     let signs = features.signs;
     let [_, ny, nz] = signs.shape;
     let row = |j: usize, k: usize| {
-        features.local.tree.solid(&|f| {
+        tree.solid(&|f| {
             let negative = signs.negative.get(f);
             negative.map_or(u64::MAX, |n| n[k * ny + j])
         })
@@ -105,8 +108,8 @@ fn solid_nodes(features: &FeatureCells, axis: usize, plane: usize) -> [u64; 64] 
     words
 }
 
-/// The cap of a cell that at most one surface crosses: a polygon of nodes and of points on grid edges.
-fn plain(features: &mut FeatureCells, cell: [usize; 3], axis: usize, upper: bool) {
+/// The cap of a part of the solid in a cell that at most one surface crosses: a polygon of nodes and of points on grid edges.
+fn plain(features: &mut FeatureCells, cell: [usize; 3], axis: usize, upper: bool, part: usize) {
     let [i, j, k] = cell;
     let signs = features.signs;
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -124,7 +127,7 @@ fn plain(features: &mut FeatureCells, cell: [usize; 3], axis: usize, upper: bool
             Some(flat) => Signs::adjacent(features.local, flat, j, k) >> i,
             None => signs.negative[f][row] >> at[0],
         };
-        features.local.tree.solid(&negative) & 1 == 1
+        features.local.trees[part].solid(&negative) & 1 == 1
     };
     // Counter-clockwise seen from above the axis.
     let ring = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
@@ -169,8 +172,8 @@ fn plain(features: &mut FeatureCells, cell: [usize; 3], axis: usize, upper: bool
     }
     if divided {
         let low = features.nodes.index(ring[0]);
-        features.flat_polygon(low, 1 << u | 1 << v, &polygon);
+        features.flat_polygon(low, 1 << u | 1 << v, &polygon, part as u8 + 1);
     } else {
-        features.polygon(&polygon, true);
+        features.polygon(&polygon, Sides::cut(part as u8 + 1));
     }
 }

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use crate::csg_tree::{CsgTree, Sign};
 use crate::field::Block;
 use crate::implicit::Surface;
-use crate::solid::Solid;
+use crate::solid::{Solid, Spaces};
 use geometry::fault::{Fault, number};
 use geometry::math::Aabb;
 
@@ -32,8 +32,10 @@ pub(super) struct Grid {
     pub step: f64,
     /// The implicit surfaces of the solid.
     pub surfaces: Vec<Surface>,
-    /// How they make it.
-    tree: CsgTree,
+    /// How they make the parts of the solid, which do not overlap; nearly always it is one.
+    trees: Vec<CsgTree>,
+    /// Both surfaces of a sheet, if its spaces are parts too.
+    pub faces: Option<[usize; 2]>,
     /// For each surface, the index of the node plane that it is, if it is one: then it needs no samples.
     grid_plane: Vec<Option<usize>>,
     /// For each surface, its feature edges near each tile.
@@ -44,8 +46,8 @@ pub(super) struct Grid {
 
 /// What bounds say of the solid in a block, without sampling.
 pub(super) struct LocalSolid {
-    /// The solid, by the indices of surfaces here: those in `live`, then those in `grid_planes`.
-    pub tree: CsgTree,
+    /// The parts of the solid, by the indices of surfaces here: those in `live`, then those in `grid_planes`.
+    pub trees: Vec<CsgTree>,
     /// Surfaces that may change sign at the block's nodes.
     pub live: Vec<usize>,
     /// Surfaces that are node planes within the block.
@@ -62,13 +64,31 @@ pub(super) struct GridPlane {
 }
 
 impl Grid {
+    /// A grid for a solid.
     pub(super) fn new(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
         check(solid, edge)?;
         let (surfaces, tree) = solid.surfaces();
+        Grid::of(solid, edge, surfaces, vec![tree], None)
+    }
+
+    /// A grid for the wall of a solid and the spaces adjacent to it.
+    pub(super) fn of_spaces(solid: &Solid, edge: f64) -> Result<Grid, Fault> {
+        check(solid, edge)?;
+        let Spaces { surfaces, trees, faces } = solid.spaces()?;
+        Grid::of(solid, edge, surfaces, trees.into(), Some(faces))
+    }
+
+    fn of(
+        solid: &Solid,
+        edge: f64,
+        surfaces: Vec<Surface>,
+        trees: Vec<CsgTree>,
+        faces: Option<[usize; 2]>,
+    ) -> Result<Grid, Fault> {
         // Planes that bound the whole solid become node planes and so are exact. (Others may meet each other in ways that a
         // node plane cannot represent, such as two boxes that touch along an edge.)
         let mut required = Vec::new();
-        tree.for_each_bounding(&mut |f| required.push(f));
+        trees[0].for_each_bounding(&mut |f| required.push(f));
         let mut planes: Vec<_> = required.iter().filter_map(|&f| Some((f, surfaces[f].plane?))).collect();
         // Perturbed surfaces are too near to others for fitted cells.
         let fits = surfaces.iter().any(|f| !f.creases.segments.is_empty()) && !surfaces.iter().any(|f| f.perturbed);
@@ -87,7 +107,8 @@ impl Grid {
         for (f, p) in planes {
             grid_plane[f] = axes[p.axis].iter().position(|&x| x == p.at);
         }
-        let mut grid = Grid { axes, margin, step: edge, surfaces, tree, grid_plane, creases: Vec::new(), fitted: None };
+        let mut grid =
+            Grid { axes, margin, step: edge, surfaces, trees, faces, grid_plane, creases: Vec::new(), fitted: None };
         grid.creases = (grid.surfaces.iter()).map(|f| feature_edges::by_tile(&grid, &f.creases)).collect();
         // The region's come first.
         let mut creased = (0..grid.creases.len()).filter(|f| !grid.creases[*f].is_empty());
@@ -117,6 +138,11 @@ impl Grid {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Whether a part of the solid lies where a surface is positive.
+    pub(super) fn is_outside(&self, part: usize, surface: usize) -> bool {
+        self.trees[part].is_outside(surface)
     }
 
     /// Number of cells along each axis.
@@ -208,8 +234,9 @@ impl Grid {
             });
         }
         // A surface may still not matter here; but it may matter to an adjacent tile in a cell that both have.
-        let tree = self.tree.simplified(&|f| signs[f].unwrap_or(Sign::Varies(f)));
-        if matches!(&tree, CsgTree::Intersection(of) | CsgTree::Union(of) if of.is_empty()) {
+        let trees = self.trees.iter().map(|t| t.simplified(&|f| signs[f].unwrap_or(Sign::Varies(f))));
+        let trees: Vec<CsgTree> = trees.collect();
+        if trees.iter().all(|t| matches!(t, CsgTree::Intersection(of) | CsgTree::Union(of) if of.is_empty())) {
             return None;
         }
         live.extend((0..self.surfaces.len()).filter(|&f| signs[f].is_none() && !flat.iter().any(|(g, _)| *g == f)));
@@ -217,8 +244,47 @@ impl Grid {
             let at = live.iter().position(|&g| g == f);
             at.or_else(|| Some(live.len() + flat.iter().position(|(g, _)| *g == f)?))
         };
-        let tree = tree.simplified(&|f| position(f).map_or(Sign::Negative, Sign::Varies));
-        Some(LocalSolid { tree, live, grid_planes: flat.into_iter().map(|(_, p)| p).collect() })
+        let trees = trees.iter().map(|t| t.simplified(&|f| position(f).map_or(Sign::Negative, Sign::Varies)));
+        Some(LocalSolid { trees: trees.collect(), live, grid_planes: flat.into_iter().map(|(_, p)| p).collect() })
+    }
+}
+
+impl LocalSolid {
+    /// The part at a position, given in the lowest bit whether each surface is negative there: 0 is void, the parts count from 1.
+    #[inline]
+    pub(super) fn part(&self, negative: &impl Fn(usize) -> u64) -> u8 {
+        let found = self.trees.iter().position(|t| t.solid(negative) & 1 == 1);
+        found.map_or(0, |p| p as u8 + 1)
+    }
+}
+
+/// What lies on the two sides of a triangle: 0 is void, the parts of the solid count from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sides {
+    /// The part that sees the triangle counter-clockwise from outside.
+    pub behind: u8,
+    /// The part on the other side.
+    pub ahead: u8,
+    /// Whether the triangle is a cut.
+    pub cut: bool,
+}
+
+impl Sides {
+    /// A triangle of the boundary of a part, towards void or another region.
+    pub(super) fn cut(part: u8) -> Sides {
+        Sides { behind: part, ahead: 0, cut: true }
+    }
+
+    /// A triangle as the boundary of a part; `None` if it is not of that.
+    #[inline]
+    pub(super) fn seen(&self, [a, b, c]: [u32; 3], part: u8) -> Option<[u32; 3]> {
+        if self.behind == part {
+            Some([a, b, c])
+        } else if self.ahead == part {
+            Some([a, c, b])
+        } else {
+            None
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use multiversion::multiversion;
 
 use super::cube_table::CASES;
 use super::sampling_grid::LocalSolid;
+use crate::csg_tree::CsgTree;
 
 /// The words of signs in a block. Rows of nodes and rows of cells have the same numbers: y + ny · z.
 #[derive(Default)]
@@ -53,11 +54,13 @@ impl Signs {
         let inner = below(nx - 1);
         for k in 0..nz - 1 {
             for j in 0..ny - 1 {
-                let solid = local.tree.solid(&|f| match f.checked_sub(local.live.len()) {
-                    Some(flat) => Signs::adjacent(local, flat, j, k),
-                    None if f < known => self.some_and_all(f, j, k).0,
-                    None => u64::MAX,
-                }) & inner;
+                let sign = |f: usize| match f.checked_sub(local.live.len()) {
+                    Some(flat) => (Signs::adjacent(local, flat, j, k), Signs::adjacent(local, flat, j, k)),
+                    None if f < known => self.some_and_all(f, j, k),
+                    None => (u64::MAX, 0),
+                };
+                let possible = |t: &CsgTree| t.possible(&|f| sign(f).0, &|f| sign(f).1);
+                let solid = local.trees.iter().fold(0, |w, t| w | possible(t)) & inner;
                 let both = solid | solid << 1;
                 for row in [k * ny + j, k * ny + j + 1, (k + 1) * ny + j, (k + 1) * ny + j + 1] {
                     nodes[row] |= both;
@@ -94,16 +97,18 @@ impl Signs {
                 }
                 decides.fill(0);
                 let adjacent = |f: usize| Signs::adjacent(local, f - surfaces, j, k);
-                local.tree.deciding(
-                    crossed & inner,
-                    &|f| if f < surfaces { context[f].0 } else { adjacent(f) },
-                    &|f| if f < surfaces { context[f].1 } else { adjacent(f) },
-                    &mut |f, positions| {
-                        if f < surfaces {
-                            decides[f] |= positions;
-                        }
-                    },
-                );
+                for tree in &local.trees {
+                    tree.deciding(
+                        crossed & inner,
+                        &|f| if f < surfaces { context[f].0 } else { adjacent(f) },
+                        &|f| if f < surfaces { context[f].1 } else { adjacent(f) },
+                        &mut |f, positions| {
+                            if f < surfaces {
+                                decides[f] |= positions;
+                            }
+                        },
+                    );
+                }
                 let (mut once, mut double_crossings) = (0u64, 0u64);
                 for d in &decides {
                     double_crossings |= once & d;
@@ -147,6 +152,18 @@ impl Signs {
         let row = k * self.shape[1] + j;
         let pair = |r: usize| (n[r] >> i & 3) as usize;
         pair(row) | pair(row + 1) << 2 | pair(row + self.shape[1]) << 4 | pair(row + self.shape[1] + 1) << 6
+    }
+
+    /// The parts behind and ahead of the only surface in a cell.
+    pub fn parts_beside(&self, local: &LocalSolid, surface: usize, [i, j, k]: [usize; 3]) -> [u8; 2] {
+        let row = k * self.shape[1] + j;
+        [u64::MAX, 0].map(|own| {
+            local.part(&|f| match f.checked_sub(local.live.len()) {
+                Some(flat) => Signs::adjacent(local, flat, j, k) >> i,
+                None if f == surface => own,
+                None => self.negative[f][row] >> i,
+            })
+        })
     }
 
     /// Whether a surface is negative at a node.

@@ -18,6 +18,7 @@
 //! order, so that adjacent tiles find bit-identical vertices.
 
 mod edge_vertices;
+mod holes;
 mod plain_triangles;
 mod volume_balance;
 
@@ -30,11 +31,12 @@ use geometry::math::Vec3;
 use super::feature_cells::{FeatureCells, FeatureMesh};
 use super::feature_edges::{DividedFaces, EdgeStore, SurfaceContext};
 use super::planar_caps;
-use super::sampling_grid::{Grid, GridPlane, LocalSolid, TILE};
+use super::sampling_grid::{Grid, GridPlane, LocalSolid, Sides, TILE};
 use super::sign_words::{Signs, below, bits, negative};
 use super::tile_components::TileComponents;
 use super::vertex_id::VertexId;
 use edge_vertices::{list_vertices, solve};
+use holes::hole;
 use plain_triangles::list_triangles;
 use volume_balance::balance;
 
@@ -117,6 +119,8 @@ struct Plain {
     /// Number of triangles of each surface.
     counts: Vec<usize>,
     kinds: Vec<Kind>,
+    /// What lies on the sides of each triangle, if the solid has several parts.
+    sides: Vec<Sides>,
     seams: Vec<Seam>,
 }
 
@@ -232,6 +236,8 @@ pub(super) struct View<'a> {
     from: [usize; 3],
     /// Cells of the tile itself, in block coordinates.
     pub own: [Range<usize>; 3],
+    /// A position at which there is no wall between the spaces adjacent to it.
+    pub hole: Option<Vec3>,
 }
 
 /// Extracts the surface of a tile; `None` when bounds or signs show that there is none.
@@ -247,6 +253,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     });
     trace_edges(s, grid, &local, &nodes, tile);
     sample(s, grid, &local, &block, &nodes);
+    let hole = grid.faces.and_then(|faces| hole(s, &local, &nodes, faces));
     let crossed = s.signs.sort(&local);
     if !crossed && local.grid_planes.is_empty() {
         return None;
@@ -283,7 +290,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     balance(s, grid, &local, &nodes, &own);
     finish(s, grid, &local, &nodes, &own);
     let own_triangles = s.plain.kinds.iter().any(|k| *k != Kind::Neighbour) || !s.extra.triangles.is_empty();
-    own_triangles.then_some(View { s, nodes, grid, local, from, own })
+    (own_triangles || hole.is_some()).then_some(View { s, nodes, grid, local, from, own, hole })
 }
 
 /// Fills the samples and signs of the live surfaces. Those of the lattice are expensive, so they are evaluated only where the
@@ -433,22 +440,31 @@ impl View<'_> {
         &self.s.positions
     }
 
-    /// The triangles of the tile's own cells, and whether they are cuts.
-    pub fn triangles(&self) -> impl Iterator<Item = ([u32; 3], bool)> {
-        let plain = self.s.plain.triangles.iter().zip(&self.s.plain.kinds);
-        plain
-            .filter(|(_, k)| **k != Kind::Neighbour)
-            .map(|(t, k)| (*t, *k == Kind::Cut))
-            .chain(self.s.extra.triangles.iter().copied())
+    /// The triangles of the tile's own cells that bound a part of the solid, and whether they are cuts.
+    pub fn triangles(&self, part: usize) -> impl Iterator<Item = ([u32; 3], bool)> {
+        let part = part as u8 + 1;
+        let Plain { triangles, kinds, sides, .. } = &self.s.plain;
+        let plain = triangles.iter().zip(kinds).enumerate().filter(|(_, (_, k))| **k != Kind::Neighbour);
+        let plain = plain.filter_map(move |(n, (t, k))| {
+            let seen = sides.get(n).map_or(Some(*t), |s| s.seen(*t, part));
+            Some((seen?, *k == Kind::Cut))
+        });
+        let extra = self.s.extra.triangles.iter();
+        plain.chain(extra.filter_map(move |(t, s)| Some((s.seen(*t, part)?, s.cut))))
     }
 
-    /// The surface of the tile by components, with what stitching needs; and the components.
-    pub fn patch(&self, middle: Vec3) -> (Patch, TileComponents) {
+    /// Whether a part of the solid lies where a live surface is positive.
+    pub fn is_outside(&self, part: usize, surface: usize) -> bool {
+        self.grid.is_outside(part, self.local.live[surface])
+    }
+
+    /// The surface of a part of the solid in the tile by components, with what stitching needs; and the components.
+    pub fn patch(&self, part: usize, middle: Vec3) -> (Patch, TileComponents) {
         let mut patch = Patch::default();
         let mut renamed = vec![u32::MAX; self.s.positions.len()];
         let mut shared = vec![false; self.s.positions.len()];
         self.each_shared(&mut |v| shared[v as usize] = true);
-        let bodies = TileComponents::each_triangle(self, middle, |t, cut| {
+        let bodies = TileComponents::each_triangle(self, part, middle, |t, cut| {
             patch.cut.push(cut);
             patch.triangles.push(t.map(|v| {
                 let slot = &mut renamed[v as usize];

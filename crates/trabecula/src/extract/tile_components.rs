@@ -45,13 +45,18 @@ pub(super) struct TileComponents {
 }
 
 impl TileComponents {
-    /// Finds the components of a tile's surface and calls `take` for its triangles, component by component, so that what is
+    /// Finds the components of the surface of a part of the solid in a tile and calls `take` for its triangles, component by component, so that what is
     /// removed later is contiguous: with the numbers of the vertices, and whether the triangle is a cut. `middle` is the
     /// apex of the cones by which volumes are summed.
-    pub fn each_triangle(view: &View, middle: Vec3, mut take: impl FnMut([u32; 3], bool)) -> TileComponents {
+    pub fn each_triangle(
+        view: &View,
+        part: usize,
+        middle: Vec3,
+        mut take: impl FnMut([u32; 3], bool),
+    ) -> TileComponents {
         let positions = view.positions();
         let mut root = vec![NONE; positions.len()];
-        for (t, _) in view.triangles() {
+        for (t, _) in view.triangles(part) {
             join(&mut root, t);
         }
         let (component, mut totals) = number(root, positions);
@@ -66,10 +71,10 @@ impl TileComponents {
         // A local sum stays in registers.
         if let [sum] = &mut totals[..] {
             let mut whole = *sum;
-            view.triangles().for_each(|(t, cut)| add(&mut whole, t, cut));
+            view.triangles(part).for_each(|(t, cut)| add(&mut whole, t, cut));
             *sum = whole;
         } else {
-            let sorted = sorted(view, &component, totals.len());
+            let sorted = sorted(view, part, &component, totals.len());
             for (sum, triangles) in totals.iter_mut().zip(sorted) {
                 let mut whole = *sum;
                 for (t, cut) in triangles {
@@ -79,7 +84,7 @@ impl TileComponents {
             }
         }
         let border = border(view, &component, &mut totals);
-        let (lines, adjacent) = lines(view, &component);
+        let (lines, adjacent) = lines(view, part, &component);
         TileComponents { tile: view.tile(), border, adjacent, lines, totals }
     }
 }
@@ -202,19 +207,19 @@ fn border(view: &View, component: &[u32], totals: &mut [Totals]) -> Vec<(u128, u
 }
 
 /// The triangles of each component, in their order.
-fn sorted(view: &View, component: &[u32], count: usize) -> Vec<Vec<([u32; 3], bool)>> {
+fn sorted(view: &View, part: usize, component: &[u32], count: usize) -> Vec<Vec<([u32; 3], bool)>> {
     let mut of = vec![Vec::new(); count];
-    for (t, cut) in view.triangles() {
+    for (t, cut) in view.triangles(part) {
         of[component[t[0] as usize] as usize].push((t, cut));
     }
     of
 }
 
 /// The components that grid lines in x cross, and the pairs of components with an interval of solid between them.
-fn lines(view: &View, component: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
+fn lines(view: &View, part: usize, component: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
     // Row, position, whether the solid begins there, component: in parts that are in order already.
     let mut met: Vec<(u32, f64, bool, u32)> = Vec::new();
-    view.each_crossing(&mut |row, v, x, enters| {
+    view.each_crossing(part, &mut |row, v, x, enters| {
         let component = component[v as usize];
         if component != NONE {
             met.push((row, x, enters, component));
@@ -245,9 +250,9 @@ fn lines(view: &View, component: &[u32]) -> (Vec<Line>, Vec<(u32, u32)>) {
 }
 
 impl View<'_> {
-    /// Calls `found` for every vertex at which a grid line in x that belongs to the tile may cross the surface, with the
-    /// numbers of the line and the vertex, the position on the line, and whether the line enters the solid there.
-    fn each_crossing(&self, found: &mut impl FnMut(u32, u32, f64, bool)) {
+    /// Calls `found` for every vertex at which a grid line in x that belongs to the tile may cross the surface of a part of the
+    /// solid, with the numbers of the line and the vertex, the position on the line, and whether the line enters the part there.
+    fn each_crossing(&self, part: usize, found: &mut impl FnMut(u32, u32, f64, bool)) {
         let mine = within(&self.own[0]);
         let row_of = |j: usize, k: usize| {
             let inside = self.own[1].contains(&j) && self.own[2].contains(&k);
@@ -255,6 +260,7 @@ impl View<'_> {
         };
         let ny = self.nodes.shape[1];
         for (surface, numbers) in self.numbers().iter().enumerate() {
+            let outside = self.is_outside(part, surface);
             for k in self.own[2].clone() {
                 for j in self.own[1].clone() {
                     let Some(row) = row_of(j, k) else { continue };
@@ -263,7 +269,7 @@ impl View<'_> {
                     for (n, i) in bits(crossed).enumerate() {
                         if mine >> i & 1 == 1 {
                             let v = first + n as u32;
-                            found(row, v, self.positions()[v as usize][0], solid >> i & 1 == 0);
+                            found(row, v, self.positions()[v as usize][0], (solid >> i & 1 == 0) != outside);
                         }
                     }
                 }
@@ -273,7 +279,10 @@ impl View<'_> {
             let [i, j, k] = self.nodes.at(key.node());
             let Some(row) = row_of(j, k) else { continue };
             let enters = if key.is_along(0) && mine >> i & 1 == 1 {
-                key.surfaces().next().map(|f| (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2))
+                key.surfaces().next().map(|f| {
+                    let falls = (self.negative(f, k * ny + j) >> i & 1 == 0) != (key.index() == 2);
+                    falls != self.is_outside(part, f)
+                })
             } else if key.spans() == 0 {
                 // A node of a cap: on lines that pass through the plane, it is where they do.
                 let caps = self.flat().iter().filter(|f| f.axis == 0);

@@ -14,6 +14,7 @@ mod phase;
 mod simplify;
 mod skin;
 mod smooth;
+mod spaces;
 mod spacing;
 mod surface;
 mod tets;

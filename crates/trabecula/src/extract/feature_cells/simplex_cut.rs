@@ -34,6 +34,14 @@ pub(in crate::extract) struct Fragment {
     pub facets: Vec<FragmentFacet>,
 }
 
+impl Fragment {
+    /// The facets on surfaces that are negative in it: each facet between two fragments is one of these of just one of them.
+    pub fn negative_facets(&self) -> impl Iterator<Item = (usize, &[CutVertex])> {
+        let on = self.facets.iter().filter_map(|facet| Some((facet.surface?, &facet.ring[..])));
+        on.filter(|(f, _)| self.negative >> f & 1 == 1)
+    }
+}
+
 /// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps.
 const SHIFT: f64 = 1.0 / 512.0;
 

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::polygon_triangulation::triangles;
 use super::surface_patch::Patches;
 use crate::extract::feature_cells::FeatureCells;
+use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{add, scale, sub};
 use geometry::mesh::exact::drop_axis;
@@ -33,7 +34,7 @@ impl FeatureCells<'_> {
     pub fn fill_edge_cell(&mut self, cell: [usize; 3], surface: usize) {
         let steps = self.steps(cell, surface);
         let boundary_loops = boundary_loops(&steps.iter().map(Step::path).collect::<Vec<_>>());
-        let (node, cut) = (self.nodes.index(cell), self.grid.surfaces[self.local.live[surface]].cut);
+        let (node, sides) = (self.nodes.index(cell), self.sides_of(cell, surface));
         let (edges, of) = (self.edges, self.cell_of(cell, surface));
         let patches: Vec<Patches> = boundary_loops
             .iter()
@@ -51,7 +52,7 @@ impl FeatureCells<'_> {
                 let inner = patch.inner.iter();
                 names.extend(inner.map(|p| self.push(VertexId::center(node, 7), *p)));
                 let triangles = patch.triangles.iter();
-                let vertex_at = triangles.map(|t| (t.map(|i| names[i]), cut));
+                let vertex_at = triangles.map(|t| (t.map(|i| names[i]), sides));
                 self.extra.triangles.extend(vertex_at);
             }
             // A single cone cannot intersect itself; several patches may intersect each other.
@@ -61,7 +62,7 @@ impl FeatureCells<'_> {
             }
             self.extra.triangles.truncate(first);
         }
-        self.fill_by_shell(cell, surface, &steps, cut);
+        self.fill_by_shell(cell, surface, &steps, sides);
     }
 
     /// The parts of all loops in the faces of a cell, counter-clockwise seen from the void.
@@ -127,7 +128,7 @@ impl FeatureCells<'_> {
     /// Fills a cell with several loops without looking at the surface inside: strips run from the loops half-way to the centre
     /// of the cell, where they end at the solid part of the boundary of a smaller cell. Strips of loops that do not meet do not
     /// meet either.
-    fn fill_by_shell(&mut self, cell: [usize; 3], surface: usize, steps: &[Step], cut: bool) {
+    fn fill_by_shell(&mut self, cell: [usize; 3], surface: usize, steps: &[Step], sides: Sides) {
         let node = self.nodes.index(cell);
         let ends = [node, node + self.offset(7)].map(|n| self.nodes.position(n));
         let center = scale(add(ends[0], ends[1]), 0.5);
@@ -161,8 +162,8 @@ impl FeatureCells<'_> {
             for w in s.path().windows(2) {
                 let (a, b) = (pairs[&w[0]], pairs[&w[1]]);
                 let (c, d) = (inner[&w[0]], inner[&w[1]]);
-                self.extra.triangles.push(([c, a, b], cut));
-                self.extra.triangles.push(([c, b, d], cut));
+                self.extra.triangles.push(([c, a, b], sides));
+                self.extra.triangles.push(([c, b, d], sides));
             }
         }
         for ((axis, upper), ring) in polygons {
@@ -170,16 +171,16 @@ impl FeatureCells<'_> {
             if upper {
                 names.reverse();
             }
-            self.flat(&names, axis, cut);
+            self.flat(&names, axis, sides);
         }
     }
 
     /// Adds a simple polygon normal to an axis by its vertices; it need not be convex.
-    pub(super) fn flat(&mut self, names: &[u32], axis: usize, cut: bool) {
+    pub(super) fn flat(&mut self, names: &[u32], axis: usize, sides: Sides) {
         let flat: Vec<[f64; 2]> =
             names.iter().map(|v| drop_axis(self.positions[*v as usize].map(|x| f64::from(x as f32)), axis)).collect();
         for t in triangles(&flat, 0) {
-            self.extra.triangles.push((t.map(|i| names[i]), cut));
+            self.extra.triangles.push((t.map(|i| names[i]), sides));
         }
     }
 

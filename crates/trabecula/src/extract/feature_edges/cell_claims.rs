@@ -6,6 +6,7 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use super::TracedEdges;
+use crate::csg_tree::CsgTree;
 use crate::extract::sampling_grid::LocalSolid;
 use crate::extract::sign_words::{Signs, bits};
 use crate::extract::tile::Nodes;
@@ -144,34 +145,43 @@ impl<'a> OtherSurfaces<'a> {
         OtherSurfaces { local, cell: [i, j, k], own: 1 << surface, negative, varies }
     }
 
-    fn is_solid(&self, mask: u64) -> bool {
+    /// For each part of the solid, whether it is certain and whether it is possible, if some surfaces are negative and others
+    /// may be.
+    fn parts(&self, negative: u64, varies: u64) -> impl Iterator<Item = (bool, bool)> {
         let [i, j, k] = self.cell;
         let live = self.local.live.len();
-        let sign = |f: usize| match f.checked_sub(live) {
+        let sign = move |f: usize, mask: u64| match f.checked_sub(live) {
             Some(flat) => Signs::adjacent(self.local, flat, j, k) >> i,
             None => mask >> f,
         };
-        self.local.tree.solid(&sign) & 1 == 1
+        let (some, all) = (move |f: usize| sign(f, negative | varies), move |f: usize| sign(f, negative));
+        let both = move |t: &CsgTree| (t.certain(&some, &all) & 1 == 1, t.possible(&some, &all) & 1 == 1);
+        self.local.trees.iter().map(both)
     }
 
-    /// Whether this surface decides what is solid, whatever the others do. The CSG tree is monotone, so two cases cover all.
+    /// The part on one side of this surface, if it does not depend on the others: 0 is void, the parts count from 1.
+    fn part(&self, own: u64) -> Option<usize> {
+        let (mut certain, mut any) = (None, false);
+        for (p, (is_certain, is_possible)) in self.parts(self.negative | own, self.varies).enumerate() {
+            certain = certain.or(is_certain.then_some(p + 1));
+            any |= is_possible;
+        }
+        certain.or((!any).then_some(0))
+    }
+
+    /// Whether this surface lies between the same two parts, or part and void, whatever the others do.
     pub fn always_decides(&self) -> bool {
-        self.each_case(|without, with| with && !without)
+        matches!((self.part(self.own), self.part(0)), (Some(a), Some(b)) if a != b)
     }
 
-    /// Whether it decides in neither of the two cases.
+    /// Whether it decides in neither of the two extreme cases.
     pub fn never_decides(&self) -> bool {
-        self.each_case(|without, with| with == without)
-    }
-
-    fn each_case(&self, is: impl Fn(bool, bool) -> bool) -> bool {
-        let cases = [self.negative, self.negative | self.varies];
-        cases.iter().all(|n| is(self.is_solid(*n), self.is_solid(n | self.own)))
+        self.parts(self.negative | self.own, self.varies).eq(self.parts(self.negative, self.varies))
     }
 
     /// Whether the cell contains no surface at all.
     pub fn is_dead(&self) -> bool {
-        self.is_solid(self.negative) == self.is_solid(self.negative | self.varies | self.own)
+        self.parts(self.negative, self.varies | self.own).all(|(certain, possible)| certain == possible)
     }
 }
 

@@ -2,34 +2,36 @@
 //!
 //! It is used where a cell self-intersects in single precision whichever point it is filled from, or one of its volumes is not
 //! star-shaped. It uses nothing but the division of the cell's faces, which adjacent cells share: from the edges there between
-//! solid and void, strips run inwards to a smaller cell that is all solid or all void. At every depth between the two cells is
+//! parts of the solid and void, strips run inwards to a smaller cell that is all of one part or all void. At every depth between the two cells is
 //! a scaled copy of the faces, so strips meet only where edges of the faces do.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use crate::extract::feature_cells::FeatureCells;
+use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, scale, sub};
 
 /// Sizes of the smaller cell as a share of the cell, tried in turn.
 const INNER: [f64; 6] = [0.9, 0.75, 0.6, 0.5, 0.4, 0.25];
 
-/// A polygon of a cell face, counter-clockwise seen from outside; the face's axis, and whether the polygon is solid.
+/// A polygon of a cell face, counter-clockwise seen from outside; the face's axis, and the part of the solid behind the
+/// polygon.
 struct Polygon {
     ring: Vec<VertexId>,
     axis: usize,
-    solid: bool,
+    part: u8,
 }
 
 impl FeatureCells<'_> {
     /// Fills a cell, with one smaller cell after the other while the result self-intersects in single precision.
     pub(super) fn fallback_fill(&mut self, cell: [usize; 3]) {
         let polygons = self.polygons(cell);
-        let solid = self.is_solid_at(cell, self.center_of(cell));
+        let part = self.part_at(cell, self.center_of(cell));
         let first = self.extra.triangles.len();
         for share in INNER {
             self.extra.triangles.truncate(first);
-            self.fallback_walls(cell, &polygons, solid, share);
+            self.fallback_walls(cell, &polygons, part, share);
             if !self.self_intersects_rounded(first) {
                 return;
             }
@@ -42,13 +44,13 @@ impl FeatureCells<'_> {
         scale(add(ends[0], ends[1]), 0.5)
     }
 
-    /// Whether a position in a cell is solid.
-    fn is_solid_at(&self, cell: [usize; 3], position: Vec3) -> bool {
+    /// The part of the solid at a position in a cell.
+    fn part_at(&self, cell: [usize; 3], position: Vec3) -> u8 {
         let negative = self.local.live.iter().enumerate().fold(0, |w, (f, id)| {
             let is = self.grid.surfaces[*id].field.value(position) <= 0.0;
             w | u64::from(is) << f
         });
-        self.is_solid(cell, negative)
+        self.part_in(cell, negative)
     }
 
     /// The faces of a cell, divided by all surfaces.
@@ -66,14 +68,14 @@ impl FeatureCells<'_> {
                 if fitted.is_some() && !upper {
                     ring.reverse();
                 }
-                let solid = self.is_solid(cell, negative);
-                all.push(Polygon { ring, axis, solid });
+                let part = self.part_in(cell, negative);
+                all.push(Polygon { ring, axis, part });
             }
         }
         all
     }
 
-    fn fallback_walls(&mut self, cell: [usize; 3], polygons: &[Polygon], solid: bool, share: f64) {
+    fn fallback_walls(&mut self, cell: [usize; 3], polygons: &[Polygon], center_part: u8, share: f64) {
         let node = self.nodes.index(cell);
         let center = self.center_of(cell);
         let mut inner: HashMap<VertexId, u32> = HashMap::new();
@@ -87,24 +89,36 @@ impl FeatureCells<'_> {
         let around = |ring: &[VertexId]| -> Vec<(VertexId, VertexId)> {
             (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()])).collect()
         };
-        let of_solid = polygons.iter().filter(|p| p.solid);
-        let lines: Vec<(VertexId, VertexId)> = of_solid.flat_map(|p| around(&p.ring)).collect();
-        let known: HashSet<(VertexId, VertexId)> = lines.iter().copied().collect();
-        for (p, q) in lines.into_iter().filter(|(p, q)| !known.contains(&(*q, *p))) {
-            let cut = self.is_cut(p, q);
+        // Each edge between two parts once: from the one with the higher number.
+        let lines = || polygons.iter().flat_map(|p| around(&p.ring).into_iter().map(|line| (line, p.part)));
+        let known: HashMap<(VertexId, VertexId), u8> = lines().collect();
+        for ((p, q), part) in lines() {
+            let ahead = known.get(&(q, p)).copied().unwrap_or(0);
+            if part <= ahead {
+                continue;
+            }
+            let sides = self.fallback_sides([part, ahead], [p, q]);
             let [a, b] = [p, q].map(|k| self.vertex(k));
             let [c, d] = [p, q].map(|k| within(self, k));
-            self.extra.triangles.push(([d, b, a], cut));
-            self.extra.triangles.push(([d, a, c], cut));
+            self.extra.triangles.push(([d, b, a], sides));
+            self.extra.triangles.push(([d, a, c], sides));
         }
-        for p in polygons.iter().filter(|p| p.solid != solid) {
-            let cut = self.is_cut(p.ring[0], p.ring[1]);
-            let mut names: Vec<u32> = p.ring.iter().map(|k| within(self, *k)).collect();
-            if !solid {
-                names.reverse();
-            }
-            self.flat(&names, p.axis, cut);
+        for p in polygons.iter().filter(|p| p.part != center_part) {
+            let names: Vec<u32> = p.ring.iter().map(|k| within(self, *k)).collect();
+            // A ring runs counter-clockwise seen from outside the cell, where the polygon's part is: it faces that part.
+            let sides = self.fallback_sides([center_part, p.part], [p.ring[0], p.ring[1]]);
+            self.flat(&names, p.axis, sides);
         }
+    }
+
+    /// What lies on the sides of a triangle that ends at an edge between two points. Of several parts, which fill the region together, the
+    /// region's boundary is where one ends at void.
+    fn fallback_sides(&self, [behind, ahead]: [u8; 2], [p, q]: [VertexId; 2]) -> Sides {
+        let cut = match self.local.trees.len() {
+            1 => self.is_cut(p, q),
+            _ => behind == 0 || ahead == 0,
+        };
+        Sides { behind, ahead, cut }
     }
 
     /// Whether an edge between two points lies on the region's boundary: not if it lies on a surface of something else.

@@ -6,6 +6,7 @@ use super::boundary_loops::{Step, boundary_loops};
 use super::cell_faces::{CellFace, FaceTriangle};
 use super::surface_patch::{BoundaryLoop, Patch, Patches};
 use crate::extract::feature_cells::{CutVertex, FeatureCells, Simplex, middle};
+use crate::extract::sampling_grid::Sides;
 use crate::extract::vertex_id::VertexId;
 use geometry::math::{Vec3, add, scale};
 
@@ -202,41 +203,36 @@ impl FeatureCells<'_> {
         for tet in tets {
             let (negative, mixed) = self.others_of(&tet.simplex, surface, tet.inside);
             let on_surface = tet.on_patch.map(|w| w.then_some(surface));
-            let on_patch = tet.on_patch.contains(&true) && self.is_solid(cell, negative | mixed);
-            if !on_patch && self.is_solid(cell, negative) == self.is_solid(cell, negative | mixed) {
+            if !tet.on_patch.contains(&true) && self.is_uniform(cell, (negative, mixed)) {
                 continue;
             }
             if mixed == 0 {
-                if !self.is_solid(cell, negative & !(1 << surface)) {
-                    self.fill_patch(node, surface, bases, tet, &mut names);
+                let sides = self.sides(cell, negative, surface);
+                if tet.inside && sides.behind != sides.ahead {
+                    self.fill_patch(node, sides, bases, tet, &mut names);
                 }
                 continue;
             }
             for fragment in self.cut(&tet.simplex, tet.right, (negative, mixed), on_surface) {
-                if !self.is_solid(cell, fragment.negative) {
-                    continue;
-                }
-                for facet in &fragment.facets {
-                    let Some(f) = facet.surface else { continue };
-                    if self.is_solid(cell, fragment.negative & !(1 << f)) {
+                for (f, facet) in fragment.negative_facets() {
+                    let sides = self.sides(cell, fragment.negative, f);
+                    if sides.behind == sides.ahead {
                         continue;
                     }
                     let ring: Vec<u32> =
-                        facet.ring.iter().map(|s| self.vertex_name(node, bases, tet, *s, &mut names)).collect();
-                    let cut = self.grid.surfaces[self.local.live[f]].cut;
-                    self.fan(&ring, cut);
+                        facet.iter().map(|s| self.vertex_name(node, bases, tet, *s, &mut names)).collect();
+                    self.fan(&ring, sides);
                 }
             }
         }
     }
 
     /// Adds the facets of a tetrahedron that lie on the surface, where no other surface crosses it.
-    fn fill_patch(&mut self, node: usize, surface: usize, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
-        let cut = self.grid.surfaces[self.local.live[surface]].cut;
+    fn fill_patch(&mut self, node: usize, sides: Sides, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
         let facets = Simplex::facets(tet.right);
         for (ring, _) in facets.iter().zip(tet.on_patch).filter(|s| s.1) {
             let ring = ring.map(|s| self.vertex_name(node, bases, tet, s, names));
-            self.fan(&ring, cut);
+            self.fan(&ring, sides);
         }
     }
 

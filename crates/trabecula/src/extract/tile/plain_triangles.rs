@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::{Kind, Numbers, Plain, Scratch};
 use crate::extract::cube_table::{CASES, EDGES, MOST};
-use crate::extract::sampling_grid::{Grid, LocalSolid};
+use crate::extract::sampling_grid::{Grid, LocalSolid, Sides};
 use crate::extract::sign_words::{Signs, within};
 
 /// Lists the triangles of all plain cells of the block, halo included; and the plain cells adjacent to feature cells, which
@@ -17,10 +17,11 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, o
     plain.counts.clear();
     plain.kinds.clear();
     plain.seams.clear();
+    plain.sides.clear();
     for (surface, numbers) in numbers.iter().enumerate().take(local.live.len()) {
         let kind = if grid.surfaces[local.live[surface]].cut { Kind::Cut } else { Kind::Lattice };
         let before = plain.triangles.len();
-        list_patches(signs, &edges.claims.cells, numbers, surface, own, kind, plain);
+        list_patches(signs, local, &edges.claims.cells, numbers, (surface, kind), own, plain);
         plain.counts.push(plain.triangles.len() - before);
     }
 }
@@ -28,14 +29,16 @@ pub(super) fn list_triangles(s: &mut Scratch, grid: &Grid, local: &LocalSolid, o
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+popcnt+lzcnt", "aarch64+neon"))]
 fn list_patches(
     signs: &Signs,
+    local: &LocalSolid,
     fill_edge_cell: &[u64],
     numbers: &Numbers,
-    surface: usize,
+    of: (usize, Kind),
     own: &[Range<usize>; 3],
-    kind: Kind,
     out: &mut Plain,
 ) {
-    let Plain { triangles, kinds, seams, .. } = out;
+    let (surface, kind) = of;
+    let Plain { triangles, kinds, seams, sides, .. } = out;
+    let several = local.trees.len() > 1;
     let [_, ny, nz] = signs.shape;
     let cases = &*CASES;
     let mine_x = within(&own[0]);
@@ -60,12 +63,13 @@ fn list_patches(
             let rows = [row, row + 1, row + ny, row + ny + 1];
             let crossed = EDGES.map(|(corner, axis)| numbers.crossed[axis][rows[corner >> 1]]);
             let first = EDGES.map(|(corner, axis)| numbers.offset[axis][rows[corner >> 1]]);
-            let signs = rows.map(|r| signs.negative[surface][r]);
+            let negative = rows.map(|r| signs.negative[surface][r]);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let pair = |w: u64| (w >> i & 3) as usize;
-                let corners = pair(signs[0]) | pair(signs[1]) << 2 | pair(signs[2]) << 4 | pair(signs[3]) << 6;
+                let corners =
+                    pair(negative[0]) | pair(negative[1]) << 2 | pair(negative[2]) << 4 | pair(negative[3]) << 6;
                 let case = &cases[corners];
                 // All edges, crossed or not, and room for the most triangles: to count them takes longer. Sixteen
                 // names, so that four bits never lead outside.
@@ -86,6 +90,10 @@ fn list_patches(
                 triangles.truncate(count);
                 kinds.extend_from_slice(&[kind; MOST]);
                 kinds.truncate(count);
+                if several {
+                    let [behind, ahead] = signs.parts_beside(local, surface, [i, j, k]);
+                    sides.resize(count, Sides { behind, ahead, cut: kind == Kind::Cut });
+                }
             }
         }
     }
