@@ -122,6 +122,29 @@ fn refuse(message: impl Into<String>) -> Fault {
     Fault::new("", message)
 }
 
+/// Refuses holes whose caps are too great a part of the surface: a cap is a guess.
+fn check_caps(done: &Repaired, repair: Repair, given: usize, found: Option<&str>) -> Result<(), Fault> {
+    let (most, allow) = match repair {
+        Repair::Caps(share) => {
+            let enough = ((20.0 * done.hole_share).ceil() / 20.0).min(1.0);
+            (share, format!(", or allow more with caps = {enough}"))
+        }
+        _ => (CAPPED, String::new()),
+    };
+    if done.hole_share <= most {
+        return Ok(());
+    }
+    Err(refuse(format!(
+        "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from{allow}; found {}",
+        counted(done.holes, "hole", "holes"),
+        short(done.hole_length),
+        short(done.hole_area),
+        short(100.0 * done.hole_share),
+        (1000.0 * most).round() / 10.0,
+        found.unwrap_or_default()
+    )))
+}
+
 /// The boundary of the solid inside a mesh. A clean mesh comes back as it is.
 pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     validity::numbers(&mesh)?;
@@ -173,24 +196,7 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
                 found.unwrap_or_default()
             )));
         }
-        let most = if let Repair::Caps(share) = repair { share } else { CAPPED };
-        if done.hole_share > most {
-            return Err(refuse(format!(
-                "the mesh of {given} triangles has {} with boundary loops of {} mm: their caps take {} mm², {} % of the surface; at most {} % are allowed. Close the holes in the program the mesh came from{}; found {}",
-                counted(caps.holes, "hole", "holes"),
-                short(caps.length),
-                short(caps.area),
-                short(100.0 * done.hole_share),
-                (1000.0 * most).round() / 10.0,
-                match repair {
-                    Repair::Caps(_) => {
-                        format!(", or allow more with caps = {}", ((20.0 * done.hole_share).ceil() / 20.0).min(1.0))
-                    }
-                    _ => String::new(),
-                },
-                found.unwrap_or_default()
-            )));
-        }
+        check_caps(&done, repair, given, found.as_deref())?;
         stitch::drop_degenerate(&mut mesh);
     }
     done.bodies_turned = orientation::face_out(&mut mesh);
