@@ -28,7 +28,8 @@ def main():
     )
     print()
     for name, what in FILES.items():
-        print(f"  {(folder / name).resolve()}  {what}")
+        print(f"  {folder / name}  {what}")
+    print("\nNext: a part of your own, docs/guide/fill-a-part.md")
 
 
 if __name__ == "__main__":
