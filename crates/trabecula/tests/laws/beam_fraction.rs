@@ -49,7 +49,7 @@ proptest! {
     #[test]
     fn frames_have_the_fraction_of_their_region(
         corner in proptest::array::uniform3(2.0..4.0f64),
-        fraction in 0.001..0.01f64,
+        fraction in 0.001..0.004f64,
         fillet in proptest::sample::select(vec!["\"none\"", "\"auto\""]),
     ) {
         let frame = |size: f64| {
@@ -60,8 +60,8 @@ proptest! {
             beams(&region, &format!("nodes = {nodes}\nstruts = {struts}\nfillet = {fillet}\nfraction = {fraction}"))
         };
         let [one, two] = [1.0, 2.0].map(|size| frame(size).expect("a frame"));
-        // Thick beams at narrow angles overlap beyond the planes that split them, and volumes are sampled then.
-        prop_assume!(one.fraction_exact);
+        // Thicker beams overlap beyond the planes that split them: then shares are sampled.
+        prop_assert!(one.fraction_exact);
         // The volume is known to 1e-10.
         prop_assert!((one.fraction / fraction - 1.0).abs() < 1e-9, "{}", one.fraction);
         prop_assert!((radius(&two) / radius(&one) - 2.0).abs() < 1e-9);
