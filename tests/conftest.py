@@ -3,9 +3,12 @@
 import contextlib
 import io
 import signal
+import subprocess
+import sys
 import warnings
 
 import pytest
+import trabecula as lt
 from trabecula import cli
 
 CUBE = """schema = 1
@@ -28,6 +31,18 @@ def cube(tmp_path):
     path = tmp_path / "cube.toml"
     path.write_text(CUBE)
     return path
+
+
+@pytest.fixture(scope="session")
+def block():
+    """A cube of 10 mm with eight cells of a gyroid sheet."""
+    core = lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
+    return lt.Design(region=lt.region.box(size=[10, 10, 10]), lattice={"core": core}).build()
+
+
+def command(*words):
+    """The command in a process of its own: its status and what it prints."""
+    return subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True, timeout=300)
 
 
 def in_process(*words, status=0):

@@ -2,27 +2,11 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import trabecula as lt
-
-
-@pytest.fixture(scope="module")
-def block():
-    """A finely meshed cube of 10 mm."""
-    return lt.Design(
-        region=lt.region.box(size=[10, 10, 10]),
-        lattice={
-            "core": lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
-        },
-    ).build()
-
-
-def trabecula(*words):
-    return subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True, timeout=300)
+from conftest import command
 
 
 def test_a_tolerance_and_a_number(block):
@@ -67,13 +51,13 @@ def test_progress_is_told_and_stops(block):
 
 def test_the_command(cube, tmp_path):
     full, light, again = (tmp_path / name for name in ("full.stl", "light.stl", "again.ply"))
-    assert trabecula("mesh", cube, "-o", full).returncode == 0
-    done = trabecula("mesh", cube, "-o", light, "--tolerance", 0.02, "--json")
+    assert command("mesh", cube, "-o", full).returncode == 0
+    done = command("mesh", cube, "-o", light, "--tolerance", 0.02, "--json")
     assert done.returncode == 0, done.stderr
     made = json.loads(done.stdout)
     assert made["simplification"]["triangles"] == made["triangles"] == lt.Mesh.read(light).counts[1]
     assert "nowhere farther than" in done.stderr
-    done = trabecula("simplify", full, "-o", again, "--triangles", 20000, "--json")
+    done = command("simplify", full, "-o", again, "--triangles", 20000, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["triangles"] <= 20000
     mesh = lt.Mesh.read(again)
@@ -82,17 +66,17 @@ def test_the_command(cube, tmp_path):
 
 def test_the_command_refuses(cube, tmp_path):
     full = tmp_path / "full.stl"
-    assert trabecula("mesh", cube, "-o", full, "--per-cell", 8).returncode == 0
-    done = trabecula("simplify", full, "-o", tmp_path / "x.stl")
+    assert command("mesh", cube, "-o", full, "--per-cell", 8).returncode == 0
+    done = command("simplify", full, "-o", tmp_path / "x.stl")
     assert done.returncode == 2 and "--tolerance" in done.stderr
     for words in (["--tolerance", "0"], ["--tolerance", "nan"], ["--triangles", "3"]):
-        assert trabecula("simplify", full, "-o", tmp_path / "x.stl", *words).returncode == 2
-    done = trabecula("simplify", full, "-o", full, "--tolerance", "0.1")
+        assert command("simplify", full, "-o", tmp_path / "x.stl", *words).returncode == 2
+    done = command("simplify", full, "-o", full, "--tolerance", "0.1")
     assert done.returncode == 1 and "another output" in done.stderr
     # One triangle less.
     data = bytearray(full.read_bytes()[:-50])
     data[80:84] = (int.from_bytes(data[80:84], "little") - 1).to_bytes(4, "little")
     (tmp_path / "open.stl").write_bytes(data)
-    done = trabecula("simplify", tmp_path / "open.stl", "-o", tmp_path / "x.stl", "--tolerance", "0.1")
+    done = command("simplify", tmp_path / "open.stl", "-o", tmp_path / "x.stl", "--tolerance", "0.1")
     assert done.returncode == 1 and "3 edges with one triangle" in done.stderr
     assert not (tmp_path / "x.stl").exists()

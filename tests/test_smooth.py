@@ -2,27 +2,11 @@
 
 import json
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import trabecula as lt
-
-
-@pytest.fixture(scope="module")
-def block():
-    """A cube of 10 mm with eight cells."""
-    return lt.Design(
-        region=lt.region.box(size=[10, 10, 10]),
-        lattice={
-            "core": lt.Lattice(cell="gyroid", part="sheet", map=lt.map.affine(wavelength=5), level=lt.level.fraction(0.3))
-        },
-    ).build()
-
-
-def trabecula(*words):
-    return subprocess.run([sys.executable, "-m", "trabecula", *map(str, words)], capture_output=True, text=True, timeout=300)
+from conftest import command
 
 
 def angles(mesh):
@@ -65,19 +49,19 @@ def test_the_command(tmp_path, block):
     design = tmp_path / "cube.toml"
     design.write_text(block._core.design)
     out = tmp_path / "cube.stl"
-    done = trabecula("mesh", design, "-o", out, "--per-cell", 16, "--smooth", "--json")
+    done = command("mesh", design, "-o", out, "--per-cell", 16, "--smooth", "--json")
     assert done.returncode == 0, done.stderr
     made, read = json.loads(done.stdout), lt.Mesh.read(out)
     assert made["triangles"] == read.counts[1] == made["smoothing"]["triangles"]
     assert made["smoothing"]["smallest_angle_p05"] > 15 and np.percentile(angles(read), 5) > 15
     assert read.closed and not read.defects
-    done = trabecula("mesh", design, "-o", out, "--per-cell", 16, "--smooth")
+    done = command("mesh", design, "-o", out, "--per-cell", 16, "--smooth")
     assert "19 in 20 triangles" in done.stderr
 
 
 @pytest.mark.parametrize("more", [["--tolerance", "0.1"], ["--triangles", "100"], ["--chord", "0.1"]])
 def test_what_does_not_go_together(tmp_path, more):
-    done = trabecula("mesh", tmp_path / "cube.toml", "-o", tmp_path / "cube.stl", "--smooth", *more)
+    done = command("mesh", tmp_path / "cube.toml", "-o", tmp_path / "cube.stl", "--smooth", *more)
     assert done.returncode == 2 and "--smooth" in done.stderr
 
 

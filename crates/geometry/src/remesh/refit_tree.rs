@@ -3,6 +3,7 @@
 //! The tree is made once, over the triangles in the order of a space-filling curve. Triangles that a collapse changes
 //! keep their positions in it, and the boxes above them grow.
 
+use super::half_edge_mesh::NONE;
 use crate::math::{Vec3, cross, dot, sub};
 use crate::mesh::{Mesh, is_embedded};
 
@@ -90,8 +91,33 @@ impl RefitTree {
         }
     }
 
+    /// Whether one of the prisms, all of them within `all`, meets a triangle of the mesh (triangles and positions) that
+    /// `stays`.
+    pub fn meets(
+        &self,
+        prisms: &[Prism],
+        all: &Bounds,
+        (triangles, positions): (&[[u32; 3]], &[Vec3]),
+        stays: impl Fn(u32) -> bool,
+        query: &mut Query,
+    ) -> bool {
+        let Query { found, stack } = query;
+        found.clear();
+        self.visit(all, stack, |t| {
+            if triangles[t as usize][0] != NONE && stays(t) {
+                found.push(t);
+            }
+        });
+        found.iter().any(|t| {
+            let names = triangles[*t as usize];
+            let positions = names.map(|v| positions[v as usize]);
+            let bounds = Bounds::of(&positions);
+            all.meets(&bounds) && prisms.iter().any(|p| p.meets(names, positions, &bounds))
+        })
+    }
+
     /// Calls `found` for the triangles under all leaves that touch `b`; `stack` is for its own use.
-    pub fn visit(&self, b: &Bounds, stack: &mut Vec<usize>, mut found: impl FnMut(u32)) {
+    fn visit(&self, b: &Bounds, stack: &mut Vec<usize>, mut found: impl FnMut(u32)) {
         stack.clear();
         stack.push(1);
         while let Some(i) = stack.pop() {
@@ -109,6 +135,13 @@ impl RefitTree {
             }
         }
     }
+}
+
+/// Working memory of [`RefitTree::meets`], kept to save allocations.
+#[derive(Default)]
+pub struct Query {
+    found: Vec<u32>,
+    stack: Vec<usize>,
 }
 
 /// A triangle with its plane and those through its edges normal to it.

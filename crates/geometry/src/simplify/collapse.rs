@@ -6,7 +6,7 @@ use super::error_quadric::Quadric;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE, next, prev};
 use crate::remesh::kept_edges;
-use crate::remesh::refit_tree::{Bounds, Prism, RefitTree};
+use crate::remesh::refit_tree::{Bounds, Prism, Query, RefitTree};
 
 /// Most triangles about a vertex.
 const CROWD: usize = 48;
@@ -48,8 +48,7 @@ pub struct Simplification {
     patch: Patch,
     prisms: Vec<Prism>,
     normals: Vec<Vec3>,
-    found: Vec<u32>,
-    stack: Vec<usize>,
+    query: Query,
 }
 
 /// How an edge is to be collapsed.
@@ -115,8 +114,7 @@ impl Simplification {
             patch: Patch::default(),
             prisms: Vec::new(),
             normals: Vec::new(),
-            found: Vec::new(),
-            stack: Vec::new(),
+            query: Query::default(),
         };
         work.rebuild_tree();
         for h in 0..3 * count as u32 {
@@ -419,23 +417,9 @@ impl Simplification {
         for e in self.boundary_edges.iter().chain(&[h, self.half_edges.twin(h)]) {
             self.mark[(e / 3) as usize] = self.marked;
         }
-        self.found.clear();
-        let (triangles, mark, marked) = (&self.half_edges.triangles, &self.mark, self.marked);
-        let found = &mut self.found;
-        self.tree.visit(&all, &mut self.stack, |t| {
-            if triangles[t as usize][0] != NONE && mark[t as usize] != marked {
-                found.push(t);
-            }
-        });
-        for &t in &self.found {
-            let names = self.half_edges.triangles[t as usize];
-            let positions = names.map(|v| self.positions[v as usize]);
-            let bounds = Bounds::of(&positions);
-            if all.meets(&bounds) && self.prisms.iter().any(|p| p.meets(names, positions, &bounds)) {
-                return false;
-            }
-        }
-        true
+        let stays = |t: u32| self.mark[t as usize] != self.marked;
+        let mesh = (&self.half_edges.triangles[..], &self.positions[..]);
+        !self.tree.meets(&self.prisms, &all, mesh, stays, &mut self.query)
     }
 
     /// Collapses the edge.

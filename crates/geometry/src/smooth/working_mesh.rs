@@ -3,7 +3,7 @@
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use crate::remesh::half_edge_mesh::{HalfEdgeMesh, NONE, next};
 use crate::remesh::kept_edges;
-use crate::remesh::refit_tree::{Bounds, Prism, RefitTree};
+use crate::remesh::refit_tree::{Bounds, Prism, Query, RefitTree};
 
 /// A change is worth it if the smallest angle's sine grows by this factor.
 pub const GAIN: f64 = 1.02;
@@ -34,8 +34,7 @@ pub struct WorkingMesh {
     indexed: usize,
     mark: Vec<u32>,
     marked: u32,
-    found: Vec<u32>,
-    stack: Vec<usize>,
+    query: Query,
     prisms: Vec<Prism>,
 }
 
@@ -84,8 +83,7 @@ impl WorkingMesh {
             indexed: 0,
             mark: vec![0; count],
             marked: 0,
-            found: Vec::new(),
-            stack: Vec::new(),
+            query: Query::default(),
             prisms: Vec::new(),
         };
         work.rebuild_tree();
@@ -174,23 +172,9 @@ impl WorkingMesh {
         for t in old {
             self.mark[*t as usize] = self.marked;
         }
-        self.found.clear();
-        let (triangles, mark, marked) = (&self.half_edges.triangles, &self.mark, self.marked);
-        let found = &mut self.found;
-        self.tree.visit(&all, &mut self.stack, |t| {
-            if triangles[t as usize][0] != NONE && mark[t as usize] != marked {
-                found.push(t);
-            }
-        });
-        for &t in &self.found {
-            let names = self.half_edges.triangles[t as usize];
-            let positions = names.map(|v| self.positions[v as usize]);
-            let bounds = Bounds::of(&positions);
-            if all.meets(&bounds) && self.prisms.iter().any(|p| p.meets(names, positions, &bounds)) {
-                return false;
-            }
-        }
-        true
+        let stays = |t: u32| self.mark[t as usize] != self.marked;
+        let mesh = (&self.half_edges.triangles[..], &self.positions[..]);
+        !self.tree.meets(&self.prisms, &all, mesh, stays, &mut self.query)
     }
 
     /// Makes the tree hold triangles that have changed.
