@@ -23,7 +23,7 @@ from .mesh import Mesh, region_of_file
 from .parts import part_files, write_parts
 from .solid import Solid
 from .starter import starter
-from .terminal import Progress, figure, say, settle, told, warn
+from .terminal import Progress, figure, say, settle, warn, warned
 from .texts import counted, intervals, table, voids
 
 __all__ = ["cells", "check", "measure", "mesh", "new", "render", "schema", "simplify", "slice", "tets", "voxels"]
@@ -88,7 +88,7 @@ def mesh(args) -> None:
             small = "at the region's boundary, smaller than eight grid cells and a thousandth of the largest, "
         say(f"{counted(others['dropped'])} {small}dropped: {others['dropped_volume']:.3g} mm³ in all")
     if args.json:
-        return put_json(made | {"warnings": told()})
+        return put_json(made | {"warnings": warned()})
     size = f"edge {edge:g} mm" if args.chord is None else f"within {made['chord_error']:.3g} mm"
     say(
         f"{args.output}: {made['triangles']} triangles, volume {figure(made['volume'])} mm³, solid fraction "
@@ -129,7 +129,7 @@ def mesh_parts(args) -> None:
         made["parts"][name] = mesh.summary().to_dict() | share
     made["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
-        return put_json(made | {"warnings": told()})
+        return put_json(made | {"warnings": warned()})
     for name, it in made["parts"].items():
         say(
             f"{name}: {it['triangles']} triangles, volume {figure(it['volume'])} mm³, {it['solid_fraction']:.4f} of the "
@@ -232,7 +232,7 @@ def voxels(args) -> None:
     made["solid_fraction"] = made["volume"] / solid.region_volume(grid.step)
     made["seconds"] = round(time.perf_counter() - start, 3)
     if args.json:
-        return put_json(made | {"warnings": told()})
+        return put_json(made | {"warnings": warned()})
     shape = " × ".join(map(str, grid.shape))
     say(
         f"{args.output}: {shape} voxels of {grid.step:g} mm, volume {figure(made['volume'])} mm³, solid fraction "
@@ -275,7 +275,7 @@ def measure(args) -> None:
     if found:
         figures["transitions"] = list(found)
     if args.json:
-        return put_json(figures | {"warnings": told()})
+        return put_json(figures | {"warnings": warned()})
     bare = solid is None and not args.region
     shown = figures | ({"closed": "yes, but inside out"} if inverted else {})
     print(table(shown, "needs a region (--region)" if bare else "none: all of it is the region's own surface"))
@@ -516,7 +516,7 @@ def stdin_text() -> str:
 
 
 def build(path: str, tell: bool = True) -> Solid:
-    """The solid of a design; its warnings are told, and with --strict refused before more work is done."""
+    """The solid of a design; warns on stderr, and refuses with --strict, before more work is done."""
     with quietly(DesignWarning):
         solid = design_of(path).build()
     for warning in solid.warnings:

@@ -14,7 +14,7 @@ import time
 
 __all__ = [
     *("Progress", "fail", "figure", "interrupts_leave", "interrupts_raise", "left", "listen", "outcome", "say", "settle"),
-    *("span", "told", "warn"),
+    *("span", "warn", "warned"),
 ]
 
 TYPE_CHECKING = False  # as type checkers know it, without the import
@@ -100,7 +100,7 @@ class _Voice:
     def __init__(self, quiet: bool = False, strict: bool = False):
         self.quiet = quiet
         self.strict = strict
-        self.told: list[Notice] = []
+        self.notices: list[Notice] = []
         self.progress: Progress | None = None
 
 
@@ -113,9 +113,9 @@ def listen(quiet: bool, strict: bool) -> None:
     _voice = _Voice(quiet, strict)
 
 
-def told() -> list[Notice]:
+def warned() -> list[Notice]:
     """What has been warned of, each text once."""
-    return list(_voice.told)
+    return list(_voice.notices)
 
 
 def fail(text: str) -> None:
@@ -134,19 +134,19 @@ def say(text: str) -> None:
 def warn(message: str, path: str = "", shown: bool = True) -> None:
     """Warns, once with each text; with ``strict`` it is an error, and shown even if ``quiet``."""
     notice: Notice = {"path": path, "message": message}
-    if notice in _voice.told:
+    if notice in _voice.notices:
         return
-    _voice.told.append(notice)
+    _voice.notices.append(notice)
     if shown or _voice.strict:
         (fail if _voice.strict else say)(f"warning: {path}: {message}" if path else f"warning: {message}")
 
 
 def settle() -> None:
     """Refuses to go on, if a warning is an error and there was one."""
-    if _voice.strict and _voice.told:
+    if _voice.strict and _voice.notices:
         from .errors import Refused
 
-        many = "a warning" if len(_voice.told) == 1 else f"{len(_voice.told)} warnings"
+        many = "a warning" if len(_voice.notices) == 1 else f"{len(_voice.notices)} warnings"
         raise Refused(f"{many}, refused by --strict; nothing is written")
 
 

@@ -51,7 +51,7 @@ pub fn spaces(
     let islands = if in_one_piece { Islands::Error } else { Islands::Keep };
     let finished = wanted.iter().zip(all).map(|(space, out)| {
         let made = out.finish(&Options { resolution: edge, islands }).map_err(|stopped| match stopped {
-            Stopped::Refused(fault) => Stopped::Refused(told(*space, fault)),
+            Stopped::Refused(fault) => Stopped::Refused(of_space(*space, fault)),
             other => other,
         })?;
         Ok(SpaceMade { space: *space, made })
@@ -60,7 +60,7 @@ pub fn spaces(
 }
 
 /// A fault of one of the solids.
-fn told(space: Space, fault: Fault) -> Fault {
+fn of_space(space: Space, fault: Fault) -> Fault {
     Fault { message: format!("of the parts, {}: {}", space.name(), fault.message), ..fault }
 }
 
