@@ -4,12 +4,14 @@ use crate::math::{Aabb, Vec3, cross, dot, norm, sub};
 use crate::weld::PointHash;
 
 mod edge_counts;
+mod embedded;
 pub mod exact;
 pub mod samples;
 mod self_intersections;
 
 pub use edge_counts::EdgeCounts;
-pub use self_intersections::{is_embedded, meet, near_pairs, self_intersections};
+pub use embedded::is_embedded;
+pub use self_intersections::{meet, near_pairs, self_intersections};
 
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]

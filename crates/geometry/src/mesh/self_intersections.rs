@@ -36,15 +36,6 @@ pub fn self_intersections(mesh: &Mesh, limit: usize) -> usize {
     found.into_inner().min(limit)
 }
 
-/// Whether no two triangles of a small mesh meet elsewhere than in their common vertices or edge, and none is flat.
-pub fn is_embedded(mesh: &Mesh) -> bool {
-    let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
-    (0..boxes.len()).all(|i| {
-        let meets = |j| boxes[i].touches(&boxes[j]) && meet(mesh, i, j);
-        !degenerate(mesh, i) && !(0..i).any(meets)
-    })
-}
-
 /// What `f` makes of each pair of triangles whose boxes, grown by `margin` (mm), touch; the order of the pairs is the
 /// same for any number of threads. Triangles without area are left out.
 pub fn near_pairs<T: Send>(mesh: &Mesh, margin: f64, f: impl Fn(usize, usize) -> Option<T> + Sync) -> Vec<T> {
@@ -77,7 +68,7 @@ fn tree(mesh: &Mesh, margin: f64) -> (Vec<Aabb>, Bvh) {
     (boxes, tree)
 }
 
-fn bounds(corners: [Vec3; 3]) -> Aabb {
+pub(super) fn bounds(corners: [Vec3; 3]) -> Aabb {
     corners.iter().fold(Aabb::EMPTY, |b, p| b.with(*p))
 }
 
