@@ -52,9 +52,9 @@ pub fn surface(solid: &Solid, edge: f64, progress: &dyn Progress) -> Result<Surf
 
 /// Of an estimate: most tiles that are searched, most that a surface may cross, triangles that are enough, tiles at a time.
 const LOOKED_AT: usize = 1024;
-const WORKED: usize = 24;
-const FOUND: usize = 200_000;
-const BATCH: usize = 4;
+const WORKED: usize = 64;
+const FOUND: usize = 1_000_000;
+const BATCH: usize = 16;
 
 /// A step through `n` things that comes to all of them and leaves them evenly filled on the way: coprime to n, near its golden
 /// section.
@@ -122,8 +122,7 @@ impl SurfaceMaker for GridSurface<'_> {
             sampled = batch.end;
             let each = batch.into_par_iter().map_init(Scratch::default, |scratch, i| {
                 let tile = grid.tile((total / 2 + i * stride) % total);
-                grid.local(&grid.nodes(tile), &grid.block(tile).bounds())?;
-                Some(tile::extract(&grid, tile, scratch).map_or(0, |v| v.triangles(0).count()))
+                tile::count(&grid, tile, scratch)
             });
             let each: Vec<usize> = each.flatten_iter().collect();
             worked += each.len();

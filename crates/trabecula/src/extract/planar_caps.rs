@@ -5,8 +5,8 @@
 use std::ops::Range;
 
 use super::feature_cells::FeatureCells;
-use super::sampling_grid::Sides;
-use super::sign_words::{Signs, bits};
+use super::sampling_grid::{GridPlane, LocalSolid, Sides};
+use super::sign_words::{Signs, bits, within};
 use super::vertex_id::VertexId;
 use crate::csg_tree::CsgTree;
 
@@ -24,7 +24,8 @@ pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize
         (at[u], at[v]) = (a, b);
         at
     };
-    let parts: Vec<[u64; 64]> = features.local.trees.iter().map(|t| solid_nodes(features, t, axis, plane)).collect();
+    let trees = features.local.trees.iter();
+    let parts: Vec<[u64; 64]> = trees.map(|t| solid_nodes(features.signs, t, axis, plane)).collect();
     let mut names = [[u32::MAX; 64]; 64];
     for b in own[v].clone() {
         let both: Vec<u64> = parts.iter().map(|solid| solid[b] & solid[b + 1]).collect();
@@ -57,6 +58,25 @@ pub(super) fn close(features: &mut FeatureCells, flat: usize, own: &[Range<usize
     }
 }
 
+/// About as many triangles as the cap of the first part of the solid has in the tile's own cells.
+pub(super) fn count(signs: &Signs, local: &LocalSolid, flat: &GridPlane, own: &[Range<usize>; 3]) -> usize {
+    let layer = if flat.below { flat.at - 1 } else { flat.at };
+    if !own[flat.axis].contains(&layer) {
+        return 0;
+    }
+    let (u, v) = ((flat.axis + 1) % 3, (flat.axis + 2) % 3);
+    let solid = solid_nodes(signs, &local.trees[0], flat.axis, flat.at);
+    let mine = within(&own[u]);
+    let squares = own[v].clone().map(|b| {
+        let corners = [solid[b], solid[b] >> 1, solid[b + 1], solid[b + 1] >> 1];
+        let each = corners.map(|w| (w & mine).count_ones() as usize);
+        let whole = corners.into_iter().fold(mine, |w, c| w & c).count_ones() as usize;
+        // A polygon of n nodes and two points on edges has n triangles, a square two.
+        each.into_iter().sum::<usize>() - 2 * whole
+    });
+    squares.sum()
+}
+
 /// Whether a cell lies on the solid side of all grid-aligned planes.
 fn is_solid(features: &FeatureCells, [i, j, k]: [usize; 3]) -> bool {
     let flats = 0..features.local.grid_planes.len();
@@ -76,8 +96,7 @@ fn is_next_to_feature(features: &FeatureCells, cell: [usize; 3], faces: [usize; 
 }
 
 /// Where the other surfaces make a plane of nodes one part of the solid: a word along the next axis, for each node along the last.
-fn solid_nodes(features: &FeatureCells, tree: &CsgTree, axis: usize, plane: usize) -> [u64; 64] {
-    let signs = features.signs;
+fn solid_nodes(signs: &Signs, tree: &CsgTree, axis: usize, plane: usize) -> [u64; 64] {
     let [_, ny, nz] = signs.shape;
     let row = |j: usize, k: usize| {
         tree.solid(&|f| {

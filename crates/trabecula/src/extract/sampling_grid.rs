@@ -185,6 +185,15 @@ impl Grid {
         [0, 1, 2].map(|a| (tile[a] * TILE).saturating_sub(1)..((tile[a] + 1) * TILE + 2).min(self.axes[a].len()))
     }
 
+    /// The cells of a tile itself, in the block of its nodes.
+    pub(super) fn own(&self, tile: [usize; 3]) -> [std::ops::Range<usize>; 3] {
+        let nodes = self.nodes(tile);
+        [0, 1, 2].map(|a| {
+            let (first, cells) = (tile[a] * TILE - nodes[a].start, nodes[a].len() - 1);
+            first..(first + TILE).min(cells)
+        })
+    }
+
     /// The nodes of a tile with its halo.
     pub(super) fn block(&self, tile: [usize; 3]) -> Block<'_> {
         let n = self.nodes(tile);

@@ -17,6 +17,7 @@
 //! A tile includes a halo of one cell. All that is computed there is a function of the grid edge or triangle alone, in the same
 //! order, so that adjacent tiles find bit-identical vertices.
 
+mod count;
 mod edge_vertices;
 mod holes;
 mod plain_triangles;
@@ -35,6 +36,7 @@ use super::sampling_grid::{Grid, GridPlane, LocalSolid, Sides, TILE};
 use super::sign_words::{Signs, below, bits, negative};
 use super::tile_components::TileComponents;
 use super::vertex_id::VertexId;
+pub(super) use count::count;
 use edge_vertices::{list_vertices, solve};
 use holes::hole;
 use plain_triangles::list_triangles;
@@ -247,10 +249,7 @@ pub(super) fn extract<'a>(grid: &'a Grid, tile: [usize; 3], s: &'a mut Scratch) 
     let local = grid.local(&range, &block.bounds())?;
     let nodes = Nodes::new(&block);
     let from = range.map(|r| r.start);
-    let own = [0, 1, 2].map(|a| {
-        let first = tile[a] * TILE - from[a];
-        first..(first + TILE).min(nodes.shape[a] - 1)
-    });
+    let own = grid.own(tile);
     trace_edges(s, grid, &local, &nodes, tile);
     sample(s, grid, &local, &block, &nodes);
     let hole = grid.faces.and_then(|faces| hole(s, &local, &nodes, faces));
