@@ -105,19 +105,24 @@ impl Lattice {
 
     /// Fills the core f at points (mm).
     pub fn cores(&self, points: &[Vec3], out: &mut [f64]) {
-        let mut u = vec![[0.0; 3]; points.len()];
-        self.map.phases(points, &mut u);
-        let g = || vec![[0.0; 3]; points.len()];
+        let n = points.len();
+        let (mut u, mut g) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
         match &self.distance {
-            Some(d) if self.map.affine().is_some() => d.values(&u, out),
-            Some(d) => {
-                let mut g = g();
+            Some(d) if self.map.affine().is_none() => {
+                let mut j = vec![[[0.0; 3]; 3]; n];
+                self.map.phases_and_jacobians(points, &mut u, &mut j);
                 d.gradients(&u, out, &mut g);
-                for ((f, g), p) in out.iter_mut().zip(g).zip(points) {
-                    *f *= self.ratio(d, g, &self.map.jacobian(*p));
+                for ((f, g), j) in out.iter_mut().zip(g).zip(&j) {
+                    *f *= self.ratio(d, g, j);
                 }
             }
-            None => self.cell.gradients(&u, out, &mut g()),
+            distance => {
+                self.map.phases(points, &mut u);
+                match distance {
+                    Some(d) => d.values(&u, out),
+                    None => self.cell.gradients(&u, out, &mut g),
+                }
+            }
         }
     }
 
@@ -146,11 +151,11 @@ impl Lattice {
     /// As `core_gradients`, under a map whose Jacobian varies.
     fn curved_gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
         if self.distance.is_none() {
-            let mut u = vec![[0.0; 3]; points.len()];
-            self.map.phases(points, &mut u);
+            let (mut u, mut j) = (vec![[0.0; 3]; points.len()], vec![[[0.0; 3]; 3]; points.len()]);
+            self.map.phases_and_jacobians(points, &mut u, &mut j);
             self.cell.gradients(&u, values, gradients);
-            for (g, p) in gradients.iter_mut().zip(points) {
-                *g = apply(&transpose(&self.map.jacobian(*p)), *g);
+            for (g, j) in gradients.iter_mut().zip(&j) {
+                *g = apply(&transpose(j), *g);
             }
             return;
         }

@@ -88,6 +88,14 @@ pub trait Mapping: Send + Sync {
     /// du/dx at a point, turns per mm.
     fn jacobian(&self, at: Vec3) -> Mat3;
 
+    /// Fills phases (turns) and Jacobians (turns per mm) of points (mm).
+    fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
+        self.phases(points, u);
+        for (j, p) in j.iter_mut().zip(points) {
+            *j = self.jacobian(*p);
+        }
+    }
+
     /// The affine map that this is, if it is one: its Jacobian is the same everywhere.
     fn affine(&self) -> Option<&Affine> {
         None

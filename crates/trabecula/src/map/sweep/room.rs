@@ -1,17 +1,18 @@
 //! The reach of a line (Federer, Curvature measures, Trans. Amer. Math. Soc. 93, 1959), within which a sweep neither folds nor
 //! tears, and the refusal of regions in which it does.
 
-use super::{FINE, SamplePoint, Sweep};
+use super::Sweep;
+use super::line::{FINE, Line, SamplePoint};
 use crate::field::Field;
 use crate::map::Mapping;
 use geometry::fault::Fault;
 use geometry::math::{Vec3, add, cross, dot, norm, scale, sub};
 
-impl Sweep {
+impl Line {
     /// Federer's reach: the least |q − p|²/(2 |the part of q − p across the tangent at p|) over points of the line, which is at
     /// most the least radius of curvature and half the width of the narrowest bottleneck. Open lines are followed `far` (mm)
     /// beyond their ends.
-    pub(super) fn found_reach(&self, far: f64) -> f64 {
+    pub fn reach(&self, far: f64) -> f64 {
         let mut least = f64::INFINITY;
         let mut all = self.sample_points.clone();
         let ends = [(0, -1.0), (self.sample_points.len() - 1, 1.0)];
@@ -23,9 +24,7 @@ impl Sweep {
             );
         }
         for k in &self.sample_points {
-            let (_, slope, second) = self.curve(k.t);
-            let bend = norm(cross(slope, second)) / norm(slope).powi(3);
-            least = least.min(1.0 / bend.max(1e-300));
+            least = least.min(1.0 / norm(k.bend).max(1e-300));
         }
         for k in &all {
             for q in &all {
@@ -39,7 +38,9 @@ impl Sweep {
         // A tenth off: between the sample points it may be less.
         0.9 * least
     }
+}
 
+impl Sweep {
     /// Refuses a map that folds or tears at one of the positions `samples` in the region.
     pub(super) fn refuse_folds(&mut self, region: &dyn Field, samples: &[Vec3]) -> Result<(), Fault> {
         let at = |p: Vec3| format!("({:.3}, {:.3}, {:.3}) mm", p[0], p[1], p[2]);
@@ -51,14 +52,11 @@ impl Sweep {
             );
             Err(Fault::new("points", message))
         };
-        for k in &self.sample_points {
-            let (c, first, second) = self.curve(k.t);
-            let speed = norm(first);
-            let bend = scale(sub(second, scale(k.tangent, dot(second, k.tangent))), 1.0 / (speed * speed));
-            let bent = norm(bend);
-            let center = add(c, scale(bend, 1.0 / (bent * bent)));
-            if bent > 1e-9 / self.length && region.value(center) <= 0.0 {
-                let own = norm(sub(center, c)) <= self.away(center) * (1.0 + 1e-6);
+        for k in &self.line.sample_points {
+            let bent = norm(k.bend);
+            let center = add(k.position, scale(k.bend, 1.0 / (bent * bent)));
+            if bent > 1e-9 / self.line.length && region.value(center) <= 0.0 {
+                let own = norm(sub(center, k.position)) <= self.away(center) * (1.0 + 1e-6);
                 if own {
                     return fold(center, 1.0 / bent);
                 }
@@ -84,8 +82,8 @@ impl Sweep {
                 }
                 let other = self.local(q);
                 let mut apart = (other.s - own.s).abs();
-                if self.closed {
-                    apart = apart.min(self.length - apart);
+                if self.line.closed {
+                    apart = apart.min(self.line.length - apart);
                 }
                 // A step of length h changes s by at most h / (1 − κ·d).
                 if apart > 4.0 * h / own.stretch.min(other.stretch).max(1e-3) {
@@ -98,7 +96,7 @@ impl Sweep {
                 }
             }
         }
-        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.sample_points[0].position)));
+        let [least, most] = range.map(|r| r.unwrap_or((1.0, self.line.sample_points[0].position)));
         self.along = [least.0, most.0].map(|r| r * self.wavelength[2]);
         self.extremes = [least.1, most.1].map(|p| self.jacobian(p));
         Ok(())
