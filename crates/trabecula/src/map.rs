@@ -136,7 +136,7 @@ pub trait Mapping: Send + Sync {
 
     /// The phases along the rows of a block.
     fn rows<'a>(&'a self, block: &Block<'a>) -> Box<dyn Rows + 'a> {
-        Box::new(PointRows { map: self, block: *block, layer: 0 })
+        Box::new(PointRows { map: self, block: *block, layer: 0, points: Vec::new(), phases: Vec::new() })
     }
 }
 
@@ -157,6 +157,8 @@ struct PointRows<'a, M: ?Sized> {
     map: &'a M,
     block: Block<'a>,
     layer: usize,
+    points: Vec<Vec3>,
+    phases: Vec<Vec3>,
 }
 
 impl<M: Mapping + ?Sized> Rows for PointRows<'_, M> {
@@ -166,10 +168,11 @@ impl<M: Mapping + ?Sized> Rows for PointRows<'_, M> {
 
     fn fill(&mut self, j: usize, out: &mut [Vec<f64>; 3]) {
         let [xs, ys, zs] = self.block.axes;
-        let points: Vec<Vec3> = xs.iter().map(|&x| [x, ys[j], zs[self.layer]]).collect();
-        let mut u = vec![[0.0; 3]; points.len()];
-        self.map.phases(&points, &mut u);
-        for (i, u) in u.iter().enumerate() {
+        self.points.clear();
+        self.points.extend(xs.iter().map(|&x| [x, ys[j], zs[self.layer]]));
+        self.phases.resize(xs.len(), [0.0; 3]);
+        self.map.phases(&self.points, &mut self.phases);
+        for (i, u) in self.phases.iter().enumerate() {
             for (out, u) in out.iter_mut().zip(u) {
                 out[i] = *u;
             }

@@ -18,7 +18,7 @@ use multiversion::multiversion;
 use super::Mapping;
 use super::inverse::{listed, whole};
 use crate::field::Field;
-use feet::Starts;
+use feet::{LANES, Starts};
 use geometry::fault::{Fault, number};
 use geometry::math::{Aabb, Mat3, Vec3, add, dot, norm, scale, sub};
 use line::{Line, Place};
@@ -43,6 +43,8 @@ pub struct Sweep {
     /// Where searches for feet start, in the region and about it.
     starts: Starts,
     wavelength: Vec3,
+    /// Its inverses, turns per mm.
+    per_mm: Vec3,
     /// The reach of the line (Federer), mm: within this distance the nearest point is unique.
     reach: f64,
     /// Least and greatest length of a cell along the line in the region, mm.
@@ -91,6 +93,7 @@ impl Sweep {
             line,
             starts: Starts::default(),
             wavelength,
+            per_mm: wavelength.map(|w| 1.0 / w),
             reach,
             along: [wavelength[2]; 2],
             extremes: [[[0.0; 3]; 3]; 2],
@@ -105,7 +108,12 @@ impl Sweep {
 
     #[inline(always)]
     fn local(&self, p: Vec3) -> Local {
-        let (span, x): Place = self.line.foot(p, self.starts.at(&self.line, p));
+        self.local_at(p, self.line.foot(p, self.starts.at(&self.line, p)))
+    }
+
+    /// Coordinates relative to the line of a position whose foot is known.
+    #[inline(always)]
+    fn local_at(&self, p: Vec3, (span, x): Place) -> Local {
         let (c, first, second) = self.line.spans[span].at(x);
         let d = sub(p, c);
         let [a0, a1, a2, b0, b1, b2, s, _] = self.line.row((span, x));
@@ -117,6 +125,23 @@ impl Sweep {
             tangent: scale(first, 1.0 / squared.sqrt()),
             normals,
             stretch: 1.0 - dot(second, d) / squared,
+        }
+    }
+
+    /// Hands the coordinates of each point over, with its index.
+    #[inline(always)]
+    fn each(&self, points: &[Vec3], mut take: impl FnMut(usize, Local)) {
+        let whole = points.chunks_exact(LANES);
+        let rest = points.len() - whole.remainder().len();
+        for (n, chunk) in whole.enumerate() {
+            let p: &[Vec3; LANES] = chunk.try_into().unwrap_or(&[[0.0; 3]; LANES]);
+            let feet = self.line.feet(p, &p.map(|p| self.starts.at(&self.line, p)));
+            for l in 0..LANES {
+                take(n * LANES + l, self.local_at(p[l], feet[l]));
+            }
+        }
+        for (n, p) in points.iter().enumerate().skip(rest) {
+            take(n, self.local(*p));
         }
     }
 
@@ -139,19 +164,19 @@ impl Sweep {
     /// The phase (turns) at a point (mm).
     #[inline(always)]
     fn phase(&self, l: &Local) -> Vec3 {
-        let w = self.wavelength;
-        [l.across[0] / w[0], l.across[1] / w[1], l.s / w[2]]
+        let w = self.per_mm;
+        [l.across[0] * w[0], l.across[1] * w[1], l.s * w[2]]
     }
 
     /// du/dx.
     #[inline(always)]
     fn slopes(&self, l: &Local) -> Mat3 {
         let along = scale(l.tangent, 1.0 / l.stretch.max(1e-6));
-        let ([a, b], w, twist) = (l.across, self.wavelength, self.line.twist);
+        let ([a, b], w, twist) = (l.across, self.per_mm, self.line.twist);
         [
-            scale(add(l.normals[0], scale(along, twist * b)), 1.0 / w[0]),
-            scale(sub(l.normals[1], scale(along, twist * a)), 1.0 / w[1]),
-            scale(along, 1.0 / w[2]),
+            scale(add(l.normals[0], scale(along, twist * b)), w[0]),
+            scale(sub(l.normals[1], scale(along, twist * a)), w[1]),
+            scale(along, w[2]),
         ]
     }
 
@@ -238,16 +263,11 @@ impl Mapping for Sweep {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn phases(map: &Sweep, points: &[Vec3], out: &mut [Vec3]) {
-    for (o, &p) in out.iter_mut().zip(points) {
-        *o = map.phase(&map.local(p));
-    }
+fn phases(map: &Sweep, points: &[Vec3], u: &mut [Vec3]) {
+    map.each(points, |i, l| u[i] = map.phase(&l));
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn phases_and_jacobians(map: &Sweep, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
-    for ((u, j), &p) in u.iter_mut().zip(j).zip(points) {
-        let l = map.local(p);
-        (*u, *j) = (map.phase(&l), map.slopes(&l));
-    }
+    map.each(points, |i, l| (u[i], j[i]) = (map.phase(&l), map.slopes(&l)));
 }

@@ -6,6 +6,10 @@ use rayon::prelude::*;
 
 /// Most steps of Newton's method, whose convergence is quadratic; each ends at the next span at the latest.
 const STEPS: usize = 30;
+/// Positions handled at once; the compiler turns each loop over them into vector instructions.
+pub(super) const LANES: usize = 8;
+/// Steps that they take together; few positions need more.
+const TOGETHER: usize = 6;
 /// Steps of the table of starts within the reach of the line.
 const STARTS: f64 = 16.0;
 /// Most entries of that table.
@@ -35,7 +39,7 @@ impl Line {
                 if slope <= 0.0 || count > STEPS {
                     return (span, x);
                 }
-                let step = (-value / slope).clamp(-s.stride, s.stride);
+                let step = (-value / slope).max(-s.stride).min(s.stride);
                 x += step;
                 if step.abs() <= s.settled {
                     return (span, x);
@@ -58,6 +62,66 @@ impl Line {
                 x += self.spans[span].long;
             }
         }
+    }
+
+    /// The feet of several positions: the same as one by one.
+    #[inline(always)]
+    pub fn feet(&self, p: &[Vec3; LANES], starts: &[Place; LANES]) -> [Place; LANES] {
+        let mut feet = *starts;
+        let span = starts[0].0;
+        let mut found = [false; LANES];
+        if starts.iter().all(|s| s.0 == span) {
+            let x = self.feet_on(span, p, starts);
+            for l in 0..LANES {
+                found[l] = !x[l].is_nan();
+                feet[l].1 = x[l];
+            }
+        }
+        for l in 0..LANES {
+            if !found[l] {
+                feet[l] = self.foot(p[l], starts[l]);
+            }
+        }
+        feet
+    }
+
+    /// Feet that are found on one span from starts on it, step by step as in `foot`; not a number for others.
+    #[inline(always)]
+    fn feet_on(&self, span: usize, p: &[Vec3; LANES], starts: &[Place; LANES]) -> [f64; LANES] {
+        let s = &self.spans[span];
+        let [a, b, c, d] = s.cubic;
+        let [_, _, f3, f4, f5] = s.square;
+        let (mut f, mut x) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for l in 0..LANES {
+            let q = sub(p[l], a);
+            x[l] = starts[l].1;
+            f[0][l] = -dot(q, b);
+            f[1][l] = s.square[0] - 2.0 * dot(q, c);
+            f[2][l] = s.square[1] - 3.0 * dot(q, d);
+        }
+        let (mut least, mut most, mut off) =
+            ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [f64::INFINITY; LANES]);
+        for _ in 0..TOGETHER {
+            for l in 0..LANES {
+                let value = f[0][l] + x[l] * (f[1][l] + x[l] * (f[2][l] + x[l] * (f3 + x[l] * (f4 + x[l] * f5))));
+                let slope = f[1][l] + x[l] * (2.0 * f[2][l] + x[l] * (3.0 * f3 + x[l] * (4.0 * f4 + x[l] * 5.0 * f5)));
+                let step = (-value / slope).max(-s.stride).min(s.stride);
+                let to = if slope > 0.0 { x[l] + step } else { f64::NAN };
+                let live = off[l] > s.settled;
+                x[l] = if live { to } else { x[l] };
+                off[l] = if live { step.abs() } else { off[l] };
+                least[l] = if x[l] < least[l] { x[l] } else { least[l] };
+                most[l] = if x[l] > most[l] { x[l] } else { most[l] };
+            }
+            if off.iter().all(|o| *o <= s.settled) {
+                break;
+            }
+        }
+        for l in 0..LANES {
+            let alone = off[l] <= s.settled && least[l] >= s.range[0] && most[l] <= s.range[1];
+            x[l] = if alone { x[l] } else { f64::NAN };
+        }
+        x
     }
 
     /// The sample point nearest to a position, or the foot on one of the rays that an open line goes on with.

@@ -83,6 +83,29 @@ fn slopes_places_and_bounds_agree() {
     }
 }
 
+/// A phase depends on the position alone, not on those it is evaluated with; its foot is the nearest point of the line.
+#[test]
+fn batches_are_single_points_and_feet_are_nearest() {
+    for (line, closed) in [(wave(), false), (ring(10, 9.0), true)] {
+        let (map, samples) = tube(line, closed);
+        let mut u = vec![[0.0; 3]; samples.len()];
+        // Along rows most feet of a batch are on one span.
+        let row: Vec<Vec3> = (0..samples.len()).map(|i| [0.07 * i as f64 - 5.0, 0.3, -0.2]).collect();
+        for points in [&samples, &row] {
+            map.phases(points, &mut u);
+            for (p, u) in points.iter().zip(&u) {
+                assert_eq!(*u, phase(&map, *p));
+            }
+        }
+        for p in &samples {
+            let away = map.away(*p);
+            let nearest =
+                map.line.sample_points.iter().map(|k| norm(sub(*p, k.position))).fold(f64::INFINITY, f64::min);
+            assert!(away <= nearest + 1e-12, "{closed} {p:?} {away} {nearest}");
+        }
+    }
+}
+
 /// Round a ring the frame comes back, whole cells fit, and phases are those of the cylinder map.
 #[test]
 fn a_ring_closes_with_whole_cells() {
