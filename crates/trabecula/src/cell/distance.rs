@@ -15,8 +15,11 @@ use super::periodic_spline::Spline;
 use super::quantile::Quantile;
 use super::series::Series;
 use super::thickness::least;
-use geometry::math::{Interval, Mat3, Vec3, apply, inverse, norm, transpose};
+use geometry::math::{Interval, Mat3, Vec3, add, apply, inverse, norm, scale, transpose};
 
+/// On creases the gradient may vanish and has no direction: with this the ratio of distances goes to one there, so that it is
+/// continuous.
+const SMALL: f64 = 1e-4;
 /// Nodes on the least radius of curvature of the mid-surface.
 const FINE: f64 = 8.0;
 /// Nodes on the finest wave along an axis.
@@ -85,6 +88,11 @@ impl Distance {
         self.spline.gradients(u, values, gradients);
     }
 
+    /// As `gradients`, with second derivatives.
+    pub fn second(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
+        self.spline.second(u, values, gradients, second);
+    }
+
     /// Distances at the phases `base + x · along`, one for each of `xs`, in single precision.
     pub fn fill_row(&self, base: Vec3, along: Vec3, xs: &[f64], out: &mut [f32]) {
         self.spline.fill_row(base, along, xs, out);
@@ -98,9 +106,20 @@ impl Distance {
     pub fn under(&self, value: f64, gradient: Vec3, jacobian: &Mat3) -> f64 {
         let own = norm(apply(&transpose(&self.to_phase), gradient));
         let here = norm(apply(&transpose(jacobian), gradient));
-        // On creases the gradient may vanish and has no direction: the ratio goes to one there, so that it is continuous.
-        const SMALL: f64 = 1e-4;
-        value * (own.powi(3) + SMALL) / (own.powi(2) * here + SMALL)
+        value * (own * own * own + SMALL) / (own * own * here + SMALL)
+    }
+
+    /// The ratio of `under`, and what makes its gradient in space: ∇ratio = Jᵀ H a + b K w, where H are the second derivatives
+    /// here by phase, w = Jᵀ∇ᵤd, and K w is the derivative of Jᵀ∇ᵤd along w as J alone varies. Gives (ratio, a, b).
+    pub fn ratio_slopes(&self, gradient: Vec3, jacobian: &Mat3) -> (f64, Vec3, f64) {
+        let (flat, w) = (apply(&transpose(&self.to_phase), gradient), apply(&transpose(jacobian), gradient));
+        let (own, here) = (norm(flat), norm(w));
+        let below = own * own * here + SMALL;
+        let ratio = (own * own * own + SMALL) / below;
+        // ∂ratio/∂own over own, and ∂ratio/∂here over here.
+        let (a, b) =
+            ((3.0 * own - 2.0 * ratio * here) / below, -ratio * own * own / (here.max(f64::MIN_POSITIVE) * below));
+        (ratio, add(scale(apply(&self.to_phase, flat), a), scale(apply(jacobian, w), b)), b)
     }
 
     /// A Lipschitz bound: an upper bound of |∂d/∂x| (mm per mm). A distance's own is one; the spline oscillates near
@@ -160,7 +179,7 @@ impl Distance {
 pub(super) mod tests {
     use super::super::named;
     use super::*;
-    use geometry::math::{add, dot, rotation, scale, sub, unit};
+    use geometry::math::{dot, rotation, sub, unit};
 
     pub(in crate::cell) fn series(name: &str) -> Series {
         Series::new(named(name).expect(name).terms()).expect(name)

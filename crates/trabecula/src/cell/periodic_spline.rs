@@ -113,40 +113,47 @@ impl Spline {
 
     /// Values at phases `u` (turns).
     pub(super) fn values(&self, u: &[Vec3], out: &mut [f64]) {
-        for (o, u) in out.iter_mut().zip(u) {
-            let (first, t) = self.interval(*u);
-            let [x, y, z] = t.map(weights);
-            *o = 0.0;
-            for (k, wz) in z.iter().enumerate() {
-                for (j, wy) in y.iter().enumerate() {
-                    *o += wz * wy * along(self.row(first, j, k), &x);
-                }
-            }
-        }
+        values(self, u, out);
     }
 
-    /// Values and gradients (per turn) at phases `u` (turns).
+    /// Values, the same as those of `values`, and gradients (per turn) at phases `u` (turns).
     pub(super) fn gradients(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        let n = self.shape.map(|n| n as f64);
-        for ((v, g), u) in values.iter_mut().zip(gradients).zip(u) {
-            let (first, t) = self.interval(*u);
-            let ([x, y, z], [dx, dy, dz]) = (t.map(weights), t.map(slopes));
-            // The value as in `values`, sum by sum, so that both give the same bits.
-            (*v, *g) = (0.0, [0.0; 3]);
-            for k in 0..4 {
-                for j in 0..4 {
-                    let row = self.row(first, j, k);
-                    let s = along(row, &x);
-                    *v += z[k] * y[j] * s;
-                    g[0] += z[k] * y[j] * along(row, &dx);
-                    g[1] += z[k] * dy[j] * s;
-                    g[2] += dz[k] * y[j] * s;
+        fill_gradients(self, u, values, gradients);
+    }
+
+    /// As `gradients`, with second derivatives.
+    pub(super) fn second(&self, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
+        fill_second(self, u, values, gradients, second);
+    }
+
+    /// Sums over the coefficients that count from entry `first` on: for each pair, y and z, of lists of weights, four numbers
+    /// along x.
+    #[inline(always)]
+    fn sums<const Y: usize, const N: usize>(
+        &self,
+        first: usize,
+        y: [[f64; 4]; Y],
+        z: [[f64; 4]; Y],
+        pairs: [(usize, usize); N],
+    ) -> [[f64; 4]; N] {
+        let mut sums = [[0.0; 4]; N];
+        for k in 0..4 {
+            let mut plane = [[0.0; 4]; Y];
+            for j in 0..4 {
+                let row: [f64; 4] = self.row(first, j, k).first_chunk().map_or([0.0; 4], |r| r.map(f64::from));
+                for (plane, y) in plane.iter_mut().zip(&y) {
+                    for i in 0..4 {
+                        plane[i] += y[j] * row[i];
+                    }
                 }
             }
-            for a in 0..3 {
-                g[a] *= n[a];
+            for (sum, (b, c)) in sums.iter_mut().zip(pairs) {
+                for i in 0..4 {
+                    sum[i] += z[c][k] * plane[b][i];
+                }
             }
         }
+        sums
     }
 
     /// Values at the phases `base + x · along`, one for each of `xs`, in single precision.
@@ -159,7 +166,7 @@ impl Spline {
     }
 
     /// The entry of the first of the coefficients that count at `u`, and the position in the knot interval (0 to 1).
-    #[inline]
+    #[inline(always)]
     fn interval(&self, u: Vec3) -> (usize, Vec3) {
         let mut at = [0; 3];
         let mut t = [0.0; 3];
@@ -174,7 +181,7 @@ impl Spline {
     }
 
     /// Four coefficients along x.
-    #[inline]
+    #[inline(always)]
     fn row(&self, first: usize, j: usize, k: usize) -> &[f32] {
         let at = first + j * self.stride[0] + k * self.stride[1];
         &self.padded[at..at + 4]
@@ -207,10 +214,53 @@ fn bernstein(block: &mut [f64; 64]) {
     }
 }
 
-#[inline]
-fn along(row: &[f32], w: &[f64; 4]) -> f64 {
-    let c = |i: usize| f64::from(row[i]);
-    (c(0) * w[0] + c(1) * w[1]) + (c(2) * w[2] + c(3) * w[3])
+#[inline(always)]
+fn along(c: &[f64; 4], w: &[f64; 4]) -> f64 {
+    (c[0] * w[0] + c[1] * w[1]) + (c[2] * w[2] + c[3] * w[3])
+}
+
+/// The second derivatives of [`weights`].
+#[inline(always)]
+fn bends(t: f64) -> [f64; 4] {
+    [1.0 - t, 3.0 * t - 2.0, 1.0 - 3.0 * t, t]
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn values(spline: &Spline, u: &[Vec3], out: &mut [f64]) {
+    for (o, u) in out.iter_mut().zip(u) {
+        let (first, t) = spline.interval(*u);
+        let [x, y, z] = t.map(weights);
+        let [v] = spline.sums(first, [y], [z], [(0, 0)]);
+        *o = along(&v, &x);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn fill_gradients(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
+    let n = spline.shape.map(|n| n as f64);
+    for ((o, g), u) in values.iter_mut().zip(gradients).zip(u) {
+        let (first, t) = spline.interval(*u);
+        let ([x, y, z], [dx, dy, dz]) = (t.map(weights), t.map(slopes));
+        let [v, vy, vz] = spline.sums(first, [y, dy], [z, dz], [(0, 0), (1, 0), (0, 1)]);
+        *o = along(&v, &x);
+        *g = [along(&v, &dx) * n[0], along(&vy, &x) * n[1], along(&vz, &x) * n[2]];
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn fill_second(spline: &Spline, u: &[Vec3], values: &mut [f64], gradients: &mut [Vec3], second: &mut [Mat3]) {
+    let [nx, ny, nz] = spline.shape.map(|n| n as f64);
+    for (((o, g), h), u) in values.iter_mut().zip(gradients).zip(second).zip(u) {
+        let (first, t) = spline.interval(*u);
+        let ([x, y, z], [dx, dy, dz], [bx, by, bz]) = (t.map(weights), t.map(slopes), t.map(bends));
+        let pairs = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
+        let [v, vy, vz, vyy, vyz, vzz] = spline.sums(first, [y, dy, by], [z, dz, bz], pairs);
+        *o = along(&v, &x);
+        *g = [along(&v, &dx) * nx, along(&vy, &x) * ny, along(&vz, &x) * nz];
+        let [xy, xz, yz] = [along(&vy, &dx) * nx * ny, along(&vz, &dx) * nx * nz, along(&vyz, &x) * ny * nz];
+        let [xx, yy, zz] = [along(&v, &bx) * nx * nx, along(&vyy, &x) * ny * ny, along(&vzz, &x) * nz * nz];
+        *h = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    }
 }
 
 /// On a row along x, y and z are constant: the spline becomes one of x alone.
@@ -335,6 +385,9 @@ mod tests {
         s.values(&u, &mut v);
         s.gradients(&u, &mut w, &mut g);
         assert_eq!(v, w);
+        let (mut w, mut k, mut h) = (vec![0.0; 300], vec![[0.0; 3]; 300], vec![[[0.0; 3]; 3]; 300]);
+        s.second(&u, &mut w, &mut k, &mut h);
+        assert_eq!((&v, &g), (&w, &k));
         let m = [[0.3, 0.1, 0.0], [0.0, 0.5, -0.2], [0.1, 0.0, 0.25]];
         let lipschitz = s.lipschitz(&m);
         for i in 0..300 {
@@ -345,6 +398,14 @@ mod tests {
                 s.values(&q, &mut d);
                 // The third derivative jumps at knots: the difference is of first order in 1e-5 there, times 2π³ squared.
                 assert!(((d[1] - d[0]) / 2e-5 - g[i][a]).abs() < 1e-5);
+            }
+            for a in 0..3 {
+                let mut q = [u[i], u[i]];
+                (q[0][a], q[1][a]) = (u[i][a] - 1e-5, u[i][a] + 1e-5);
+                let (mut d, mut e) = ([0.0; 2], [[0.0; 3]; 2]);
+                s.gradients(&q, &mut d, &mut e);
+                // At knots the difference is that of two straight lines: of first order, times the jump of the third derivative.
+                assert!((0..3).all(|b| ((e[1][b] - e[0][b]) / 2e-5 - h[i][a][b]).abs() < 2e-2));
             }
             assert!(norm(apply(&transpose(&m), g[i])) <= lipschitz);
             assert!(s.range().lo <= v[i] && v[i] <= s.range().hi);

@@ -231,6 +231,13 @@ impl Mapping for Phase {
         self.spline.jacobian(at).1
     }
 
+    fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
+        for ((u, j), p) in u.iter_mut().zip(j).zip(points) {
+            (*u, *j) = self.spline.jacobian(*p);
+            *u = add(*u, self.shift);
+        }
+    }
+
     fn solved(&self) -> Option<&Phase> {
         Some(self)
     }

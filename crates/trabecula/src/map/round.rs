@@ -1,9 +1,11 @@
 //! Maps that wrap a lattice round an axis or a centre, with a whole number of cells around, so that it closes.
 
+use multiversion::multiversion;
+
 use super::Mapping;
 use super::inverse::{corners, listed, whole};
 use geometry::fault::{Fault, number};
-use geometry::math::{Aabb, Mat3, Vec3, add, cross, dot, norm, product, scale, sub, unit};
+use geometry::math::{Aabb, Mat3, Vec3, add, angle_turns, cross, dot, norm, product, scale, sub, unit};
 
 /// A lattice wrapped round an axis or about a centre. Phases are (r/λ, n θ/2π, z/λ) on a cylinder and (r/λ, n φ/2π,
 /// n θ/2π) on a sphere: φ round the axis, θ from it, n cells around and half as many from pole to pole.
@@ -93,22 +95,40 @@ impl Round {
     }
 
     /// Coordinates across and along the axis, and the distance from it.
+    #[inline(always)]
     fn local(&self, p: Vec3) -> (Vec3, f64) {
         let d = sub(p, self.center);
         let l = self.frame.map(|e| dot(e, d));
-        (l, l[0].hypot(l[1]))
+        (l, long(l[0], l[1]))
     }
 
-    /// Phases (turns) of a point (mm).
-    fn phase(&self, p: Vec3) -> Vec3 {
-        let (l, r) = self.local(p);
-        let turn = |a: f64| self.around * a / core::f64::consts::TAU;
-        let round = turn(l[1].atan2(l[0]));
+    /// Phases (turns) where these are the coordinates and the distance from the axis.
+    #[inline(always)]
+    fn phase(&self, (l, r): (Vec3, f64)) -> Vec3 {
+        let round = self.around * angle_turns(l[1], l[0]);
         if self.sphere {
-            [r.hypot(l[2]) / self.wavelength[0], round, turn(r.atan2(l[2]))]
+            [long(r, l[2]) / self.wavelength[0], round, self.around * angle_turns(r, l[2])]
         } else {
             [r / self.wavelength[0], round, l[2] / self.wavelength[1]]
         }
+    }
+
+    /// du/dx there, turns per mm. Within a billionth of a wavelength of the axis, that at this distance.
+    #[inline(always)]
+    fn slopes(&self, (l, r): (Vec3, f64)) -> Mat3 {
+        let r = r.max(1e-9 * self.wavelength[0]);
+        let out = [l[0] / r, l[1] / r, 0.0];
+        let turn = self.around / core::f64::consts::TAU;
+        let round = [-out[1] * turn / r, out[0] * turn / r, 0.0];
+        let local = if self.sphere {
+            let s = long(r, l[2]);
+            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
+            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
+            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
+        } else {
+            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
+        };
+        product(&local, &self.frame)
     }
 
     /// How many cells there are round the axis.
@@ -138,7 +158,7 @@ impl Round {
     /// The edge of a cell round the axis at a position (mm), of a sphere that on the equator as far from the centre, mm.
     pub fn edge_at(&self, p: Vec3) -> f64 {
         let (l, r) = self.local(p);
-        self.arc(if self.sphere { r.hypot(l[2]) } else { r })
+        self.arc(if self.sphere { long(r, l[2]) } else { r })
     }
 
     /// The edge of a cell round the axis at a distance from it, mm.
@@ -154,27 +174,15 @@ impl Mapping for Round {
     }
 
     fn phases(&self, points: &[Vec3], out: &mut [Vec3]) {
-        for (o, &p) in out.iter_mut().zip(points) {
-            *o = self.phase(p);
-        }
+        phases(self, points, out);
     }
 
-    /// Within a billionth of a wavelength of the axis, that at this distance.
     fn jacobian(&self, p: Vec3) -> Mat3 {
-        let (l, r) = self.local(p);
-        let r = r.max(1e-9 * self.wavelength[0]);
-        let out = [l[0] / r, l[1] / r, 0.0];
-        let turn = self.around / core::f64::consts::TAU;
-        let round = [-l[1] / (r * r) * turn, l[0] / (r * r) * turn, 0.0];
-        let local = if self.sphere {
-            let s = r.hypot(l[2]);
-            let away = [out[0] * r / s, out[1] * r / s, l[2] / s];
-            let down = [out[0] * l[2] / s, out[1] * l[2] / s, -r / s];
-            [scale(away, 1.0 / self.wavelength[0]), round, scale(down, turn / s)]
-        } else {
-            [scale(out, 1.0 / self.wavelength[0]), round, [0.0, 0.0, 1.0 / self.wavelength[1]]]
-        };
-        product(&local, &self.frame)
+        self.slopes(self.local(p))
+    }
+
+    fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
+        phases_and_jacobians(self, points, u, j);
     }
 
     fn round(&self) -> Option<&Round> {
@@ -226,7 +234,7 @@ impl Mapping for Round {
     fn cells(&self, b: &Aabb) -> Vec<([i32; 3], Vec3)> {
         let positions = corners(b).map(|p| self.local(p));
         let most = |v: &dyn Fn(&(Vec3, f64)) -> f64| positions.iter().map(v).fold(f64::NEG_INFINITY, f64::max);
-        let away = |l: &(Vec3, f64)| if self.sphere { l.1.hypot(l.0[2]) } else { l.1 };
+        let away = |l: &(Vec3, f64)| if self.sphere { long(l.1, l.0[2]) } else { l.1 };
         let far = most(&away);
         let near = away(&self.local(b.center())) - 0.5 * norm(b.size());
         let radial = [whole(near / self.wavelength[0]).max(1) - 1, whole(far / self.wavelength[0]) + 1];
@@ -242,6 +250,27 @@ impl Mapping for Round {
 
     fn canonical(&self, cell: [i32; 3]) -> [i32; 3] {
         [cell[0], cell[1].rem_euclid(self.around()), cell[2]]
+    }
+}
+
+/// The length of (a, b).
+#[inline(always)]
+fn long(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn phases(map: &Round, points: &[Vec3], u: &mut [Vec3]) {
+    for (u, &p) in u.iter_mut().zip(points) {
+        *u = map.phase(map.local(p));
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn phases_and_jacobians(map: &Round, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
+    for ((u, j), &p) in u.iter_mut().zip(j).zip(points) {
+        let local = map.local(p);
+        (*u, *j) = (map.phase(local), map.slopes(local));
     }
 }
 
@@ -270,7 +299,7 @@ mod tests {
                     let mut q = [p, p];
                     q[0][a] -= 1e-6;
                     q[1][a] += 1e-6;
-                    let d = sub(map.phase(q[1]), map.phase(q[0]));
+                    let d = sub(map.phase(map.local(q[1])), map.phase(map.local(q[0])));
                     for i in 0..3 {
                         // Over the seam the phase jumps by the whole number of cells.
                         let d = d[i] - 12.0 * (d[i] / 12.0).round();
@@ -285,7 +314,7 @@ mod tests {
             }
         }
         let plain = Round::cylinder([0.0; 3], [0.0, 0.0, 1.0], [2.0, 3.0], 12.0, [1.0, 5.0, 9.0]).expect("cylinder");
-        let u = plain.phase([0.0, 4.0, 6.0]);
+        let u = plain.phase(plain.local([0.0, 4.0, 6.0]));
         assert!(norm(sub(u, [2.0, 3.0, 2.0])) < 1e-14, "{u:?}");
         assert_eq!(plain.lipschitz(&Aabb { min: [-1.0; 3], max: [1.0; 3] }), f64::INFINITY);
     }
