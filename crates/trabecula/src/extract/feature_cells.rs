@@ -14,8 +14,10 @@
 //! Source: planes in tetrahedra, as X. Du, Q. Zhou, N. Carr and T. Ju, Robust computation of implicit surface networks for
 //! piecewise linear functions, ACM Trans. Graph. 41 (2022) 41; the division after H. Freudenthal (1942).
 
+mod fragments;
 mod simplex_cut;
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::ops::Range;
 
@@ -29,6 +31,7 @@ use super::sampling_grid::{Grid, LocalSolid, Sides};
 use super::sign_words::Signs;
 use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
+pub(super) use fragments::Fragments;
 pub(super) use simplex_cut::{CutVertex, Simplex};
 
 /// Vertices and triangles that marching cubes does not make.
@@ -63,6 +66,8 @@ pub(super) struct FeatureCells<'a> {
     /// Nodes at which the surfaces are perturbed.
     pub perturbed_nodes: HashSet<usize>,
     pub divided_faces: DividedFaces,
+    /// Buffers for the simplex that is being cut.
+    pub fragments: Cell<Fragments>,
 }
 
 /// The six paths from the lowest corner of a cell to the highest, as sets of axes; and whether the tetrahedron on each is
@@ -231,23 +236,36 @@ impl FeatureCells<'_> {
     /// Cuts a feature cell.
     pub fn cell(&mut self, cell: [usize; 3]) {
         let node = self.nodes.index(cell);
+        let signs = self.signs.at_corners(cell);
+        let mut fragments = self.fragments.take();
+        let mut names: Vec<u32> = Vec::with_capacity(16);
+        let mut ring: Vec<u32> = Vec::with_capacity(8);
         for ([one, two], right) in PATHS {
-            let simplex = self.simplex(node, &[one, two, 7]);
-            let (negative, mixed) = self.signs_of(&simplex);
+            let (negative, mixed) = signs.among(1 | 1 << one | 1 << two | 1 << 7);
             if mixed == 0 || self.is_uniform(cell, (negative, mixed)) {
                 continue;
             }
-            for fragment in self.cut(&simplex, right, (negative, mixed), [None; 4]) {
-                for (f, facet) in fragment.negative_facets() {
-                    let sides = self.sides(cell, fragment.negative, f);
-                    if sides.behind == sides.ahead {
-                        continue;
-                    }
-                    let ring: Vec<VertexId> = facet.iter().map(|s| self.key(&simplex, *s)).collect();
-                    self.polygon(&ring, sides);
+            let simplex = self.simplex(node, &[one, two, 7]);
+            self.cut(&simplex, right, (negative, mixed), [None; 4], &mut fragments);
+            names.clear();
+            names.resize(fragments.vertices.len(), u32::MAX);
+            for (negative, f, facet) in fragments.negative_facets() {
+                let sides = self.sides(cell, negative, f);
+                if sides.behind == sides.ahead {
+                    continue;
                 }
+                ring.clear();
+                for v in facet {
+                    let name = &mut names[usize::from(*v)];
+                    if *name == u32::MAX {
+                        *name = self.vertex(self.key(&simplex, fragments.vertices[usize::from(*v)]));
+                    }
+                    ring.push(*name);
+                }
+                self.fan(&ring, sides);
             }
         }
+        self.fragments.set(fragments);
         for flat in &self.local.grid_planes {
             let layer = if flat.below { flat.at - 1 } else { flat.at };
             if cell[flat.axis] == layer {
@@ -320,21 +338,16 @@ impl FeatureCells<'_> {
     pub(super) fn face_fragments(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<VertexId>)> {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
-        let mut all = Vec::new();
+        let mut all = Vec::with_capacity(4);
+        let mut cut = self.fragments.take();
         for (step, right) in [(u, true), (v, false)] {
             let simplex = self.simplex(node, &[step, u | v]);
-            let (negative, mixed) = self.signs_of(&simplex);
-            let mut ring: Vec<CutVertex> = (0..3).map(|c| CutVertex { corners: 1 << c, surfaces: 0 }).collect();
-            if right != upper {
-                ring.reverse();
-            }
-            let fragments = self.split_by(&simplex, negative, mixed, ring);
-            all.extend(
-                fragments
-                    .into_iter()
-                    .map(|(negative, ring)| (negative, ring.iter().map(|s| self.key(&simplex, *s)).collect())),
-            );
+            let signs = self.signs_of(&simplex);
+            self.cut_triangle(&simplex, if right == upper { [0, 1, 2] } else { [2, 1, 0] }, signs, &mut cut);
+            let key = |v: &u16| self.key(&simplex, cut.vertices[usize::from(*v)]);
+            all.extend(cut.facets().map(|(negative, _, ring)| (negative, ring.iter().map(key).collect())));
         }
+        self.fragments.set(cut);
         all
     }
 

@@ -154,6 +154,18 @@ impl Signs {
         pair(row) | pair(row + 1) << 2 | pair(row + self.shape[1]) << 4 | pair(row + self.shape[1] + 1) << 6
     }
 
+    /// The signs at the corners of a cell.
+    pub fn at_corners(&self, [i, j, k]: [usize; 3]) -> CornerSigns {
+        let mut found = CornerSigns { patterns: [0; 64], negative: 0, mixed: 0 };
+        for f in 0..self.negative.len() {
+            let pattern = self.corners(f, i, j, k);
+            found.patterns[f] = pattern as u8;
+            found.negative |= u64::from(pattern == 255) << f;
+            found.mixed |= u64::from(pattern != 255 && pattern != 0) << f;
+        }
+        found
+    }
+
     /// The parts behind and ahead of the only surface in a cell.
     pub fn parts_beside(&self, local: &LocalSolid, surface: usize, [i, j, k]: [usize; 3]) -> [u8; 2] {
         let row = k * self.shape[1] + j;
@@ -208,6 +220,28 @@ impl Signs {
                 w | w << 1
             }
         }
+    }
+}
+
+/// The signs of the surfaces at the corners of a cell.
+pub(super) struct CornerSigns {
+    /// For each surface, the corners at which it is negative.
+    patterns: [u8; 64],
+    /// The surfaces that are negative at all corners, and those that change sign.
+    negative: u64,
+    mixed: u64,
+}
+
+impl CornerSigns {
+    /// The surfaces that are negative at all of some corners, and those that change sign between them.
+    pub fn among(&self, corners: u8) -> (u64, u64) {
+        let (mut all, mut some) = (0, 0);
+        for f in bits(self.mixed) {
+            let negative = self.patterns[f] & corners;
+            all |= u64::from(negative == corners) << f;
+            some |= u64::from(negative != 0) << f;
+        }
+        (self.negative | all, some & !all)
     }
 }
 

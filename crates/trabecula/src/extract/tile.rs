@@ -23,6 +23,7 @@ mod holes;
 mod plain_triangles;
 mod volume_balance;
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::ops::Range;
 
@@ -392,6 +393,7 @@ fn features<'a>(
         edges: &s.edges,
         perturbed_nodes: HashSet::new(),
         divided_faces: DividedFaces::none(local.live.len()),
+        fragments: Cell::default(),
     };
     (features, &s.vertices, &s.plain.seams)
 }

@@ -1,9 +1,10 @@
 //! Simplices of the grid, cut by the planes of surfaces.
 
 use super::FeatureCells;
+use super::fragments::Fragments;
 use crate::extract::sign_words::bits;
 use crate::extract::vertex_id::VertexId;
-use geometry::math::{Vec3, add, cross, scale, sub};
+use geometry::math::{Vec3, add, cross, dot, scale, sub};
 
 /// Corners of a simplex: nodes of the grid in ascending order; in fitted cells extra points as well.
 #[derive(Clone, Copy)]
@@ -19,67 +20,31 @@ pub(in crate::extract) struct CutVertex {
     pub surfaces: u64,
 }
 
-/// A facet of a fragment, counter-clockwise seen from outside.
-#[derive(Clone)]
-pub(in crate::extract) struct FragmentFacet {
-    /// The surface on which it lies; none if it is part of the simplex's own facet.
-    pub surface: Option<usize>,
-    pub ring: Vec<CutVertex>,
-}
-
-/// A convex fragment of a tetrahedron.
-pub(in crate::extract) struct Fragment {
-    /// The surfaces that are negative in it.
-    pub negative: u64,
-    pub facets: Vec<FragmentFacet>,
-}
-
-impl Fragment {
-    /// The facets on surfaces that are negative in it: each facet between two fragments is one of these of just one of them.
-    pub fn negative_facets(&self) -> impl Iterator<Item = (usize, &[CutVertex])> {
-        let on = self.facets.iter().filter_map(|facet| Some((facet.surface?, &facet.ring[..])));
-        on.filter(|(f, _)| self.negative >> f & 1 == 1)
-    }
-}
-
 /// Amplitude of the perturbation at the nodes of a cell that self-intersects in single precision, in grid steps.
 const SHIFT: f64 = 1.0 / 512.0;
-
-/// A polygon cut in two.
-pub(super) struct Halves {
-    /// Where the surface is negative.
-    pub(super) inside: Vec<CutVertex>,
-    pub(super) outside: Vec<CutVertex>,
-    /// The edge between them, directed as in the new facet of the inner part.
-    edge: Option<(CutVertex, CutVertex)>,
-}
-
-/// The parts of a polygon on either side of a surface.
-pub(super) enum Split {
-    /// The surface is negative everywhere.
-    Inside(Vec<CutVertex>),
-    /// It is positive everywhere.
-    Outside(Vec<CutVertex>),
-    Both(Halves),
-}
 
 impl Simplex {
     /// The corners of a tetrahedron's facets, each opposite a corner, counter-clockwise seen from outside. `right` is whether
     /// the tetrahedron is right-handed.
-    pub fn facets(right: bool) -> [[CutVertex; 3]; 4] {
+    pub fn facets(right: bool) -> [[u16; 3]; 4] {
         let facets = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-        facets.map(|mut c: [u8; 3]| {
-            if !right {
-                c.swap(1, 2);
-            }
-            c.map(|c| CutVertex { corners: 1 << c, surfaces: 0 })
-        })
+        facets.map(|[a, b, c]| if right { [a, b, c] } else { [a, c, b] })
     }
 }
 
 impl FeatureCells<'_> {
     pub(in crate::extract) fn offset(&self, step: usize) -> usize {
         (0..3).filter(|a| step >> a & 1 == 1).map(|a| self.nodes.stride[a]).sum()
+    }
+
+    /// The axes along which a node lies beyond another one, by the difference of their indices.
+    fn step(&self, offset: usize) -> usize {
+        let mut left = offset;
+        [2, 1, 0].into_iter().fold(0, |step, axis| {
+            let beyond = left >= self.nodes.stride[axis];
+            left -= if beyond { self.nodes.stride[axis] } else { 0 };
+            step | usize::from(beyond) << axis
+        })
     }
 
     /// The value of a surface at a node, kept away from zero: a plane through a node would leave needles.
@@ -118,82 +83,72 @@ impl FeatureCells<'_> {
 
     /// The id of a cut vertex of a simplex.
     pub(in crate::extract) fn key(&self, simplex: &Simplex, vertex: CutVertex) -> VertexId {
-        let mut nodes = (0..4).filter(|c| vertex.corners >> c & 1 == 1).map(|c| simplex.nodes[c]);
-        let Some(first) = nodes.next() else {
-            return VertexId::new(0, &[], &[]);
-        };
-        let (mut steps, mut count) = ([0; 3], 0);
-        let at = self.nodes.at(first);
-        for n in nodes {
-            let to = self.nodes.at(n);
-            steps[count] = (0..3).filter(|a| to[*a] > at[*a]).map(|a| 1 << a).sum();
-            count += 1;
+        let mut corners = [0; 4];
+        let count = listed(&mut corners, u64::from(vertex.corners));
+        let first = simplex.nodes[corners[0]];
+        let mut steps = [0; 3];
+        for (step, c) in steps.iter_mut().zip(&corners[1..count]) {
+            *step = self.step(simplex.nodes[*c] - first);
         }
-        let (mut surfaces, mut met) = ([0; 3], 0);
-        for f in bits(vertex.surfaces).take(3) {
-            surfaces[met] = f;
-            met += 1;
-        }
-        VertexId::new(first, &steps[..count], &surfaces[..met])
+        let mut surfaces = [0; 3];
+        let met = listed(&mut surfaces, vertex.surfaces);
+        VertexId::new(first, &steps[..count - 1], &surfaces[..met])
     }
 
     /// Barycentric coordinates of the point of a simplex where as many surfaces vanish as it has dimensions.
     pub(super) fn shares(&self, simplex: &Simplex, surfaces: &[usize]) -> [f64; 4] {
-        let v = |f: usize| {
-            [0, 1, 2, 3].map(|c| if c < simplex.count { self.value(surfaces[f], simplex.nodes[c]) } else { 0.0 })
-        };
-        let w = match surfaces.len() {
-            0 => [1.0, 0.0, 0.0, 0.0],
-            1 => {
-                let [a, b, ..] = v(0);
-                [b, -a, 0.0, 0.0]
-            }
-            2 => {
-                let ([a0, a1, a2, _], [b0, b1, b2, _]) = (v(0), v(1));
-                let [x, y, z] = cross([a0, a1, a2], [b0, b1, b2]);
-                [x, y, z, 0.0]
-            }
-            _ => {
-                let m = [v(0), v(1), v(2)];
-                [0, 1, 2, 3].map(|skip| {
-                    let c: Vec<usize> = (0..4).filter(|c| *c != skip).collect();
-                    let row = |r: usize| [m[r][c[0]], m[r][c[1]], m[r][c[2]]];
-                    let d = geometry::math::dot(row(0), cross(row(1), row(2)));
-                    if skip % 2 == 0 { d } else { -d }
-                })
-            }
-        };
-        let sum: f64 = w.iter().sum();
-        w.map(|x| (x / sum).clamp(0.0, 1.0))
+        let mut values = [[0.0; 4]; 3];
+        for (v, f) in values.iter_mut().zip(surfaces) {
+            *v = self.values(simplex, *f);
+        }
+        barycentric(&values, surfaces.len())
+    }
+
+    /// The values of a surface at the corners of a simplex.
+    fn values(&self, simplex: &Simplex, surface: usize) -> [f64; 4] {
+        [0, 1, 2, 3].map(|c| if c < simplex.count { self.value(surface, simplex.nodes[c]) } else { 0.0 })
     }
 
     /// The face of a simplex on which a cut vertex lies, and the surfaces that meet in it.
     fn part(&self, simplex: &Simplex, vertex: CutVertex) -> (Simplex, [usize; 3], usize) {
-        let mut part = Simplex { nodes: [simplex.nodes[0]; 4], count: 0 };
-        for c in (0..4).filter(|c| vertex.corners >> c & 1 == 1) {
-            part.nodes[part.count] = simplex.nodes[c];
-            part.count += 1;
-        }
-        let mut surfaces = [0; 3];
-        let mut met = 0;
-        for f in bits(vertex.surfaces).take(3) {
-            surfaces[met] = f;
-            met += 1;
+        let (mut corners, mut surfaces) = ([0; 4], [0; 3]);
+        let count = listed(&mut corners, u64::from(vertex.corners));
+        let met = listed(&mut surfaces, vertex.surfaces);
+        let mut part = Simplex { nodes: [simplex.nodes[0]; 4], count };
+        for (n, c) in part.nodes.iter_mut().zip(&corners[..count]) {
+            *n = simplex.nodes[*c];
         }
         (part, surfaces, met)
     }
 
-    /// Whether a surface is negative at a cut vertex.
-    fn is_negative_at(&self, simplex: &Simplex, vertex: CutVertex, surface: usize) -> bool {
-        let (part, surfaces, met) = self.part(simplex, vertex);
-        if part.count == 2
-            && let Some(is) = self.sign_on_line([part.nodes[0], part.nodes[1]], surfaces[0], surface)
+    /// Whether a surface is negative at a cut vertex, given the values of all surfaces at the corners.
+    fn is_negative_at(&self, simplex: &Simplex, values: &[[f64; 4]], vertex: CutVertex, surface: usize) -> bool {
+        if vertex.corners.is_power_of_two() {
+            return values[surface][vertex.corners.trailing_zeros() as usize] <= 0.0;
+        }
+        let mut corners = [0; 4];
+        let count = listed(&mut corners, u64::from(vertex.corners));
+        if count == 2
+            && let [a, b] = [corners[0], corners[1]].map(|c| simplex.nodes[c])
+            && let Some(is) = self.sign_on_line([a, b], vertex.surfaces.trailing_zeros() as usize, surface)
         {
             return is;
         }
-        let shares = self.shares(&part, &surfaces[..met]);
-        let value = (0..part.count).map(|c| shares[c] * self.value(surface, part.nodes[c]));
-        value.sum::<f64>() <= 0.0
+        let of = |f: usize| {
+            let mut own = [0.0; 4];
+            for (v, c) in own.iter_mut().zip(&corners[..count]) {
+                *v = values[f][*c];
+            }
+            own
+        };
+        let mut met = [[0.0; 4]; 3];
+        let mut dimensions = 0;
+        for f in bits(vertex.surfaces).take(3) {
+            met[dimensions] = of(f);
+            dimensions += 1;
+        }
+        let (shares, values) = (barycentric(&met, dimensions), of(surface));
+        (0..count).map(|c| shares[c] * values[c]).sum::<f64>() <= 0.0
     }
 
     /// The position of a node or an extra point.
@@ -281,129 +236,74 @@ impl FeatureCells<'_> {
         (all, some & !all)
     }
 
-    /// The fragments of a tetrahedron between the planes of the `mixed` surfaces. `lying_on` are surfaces on which its own
-    /// facets lie, each opposite a corner.
+    /// Cuts a tetrahedron by the planes of the `mixed` surfaces. `lying_on` are surfaces on which its own facets lie, each
+    /// opposite a corner.
     pub(in crate::extract) fn cut(
         &self,
         simplex: &Simplex,
         right: bool,
         (negative, mixed): (u64, u64),
         lying_on: [Option<usize>; 4],
-    ) -> Vec<Fragment> {
-        let facets = Simplex::facets(right).into_iter().zip(lying_on);
-        let facets = facets.map(|(ring, surface)| FragmentFacet { surface, ring: ring.to_vec() });
-        let mut fragments = vec![Fragment { negative, facets: facets.collect() }];
-        for f in bits(mixed) {
-            let mut next = Vec::with_capacity(2 * fragments.len());
-            for fragment in fragments {
-                let room = fragment.facets.len() + 1;
-                let (mut inside, mut outside) = (Vec::with_capacity(room), Vec::with_capacity(room));
-                // The new edges, directed as in the new facet of the inner part.
-                let mut edges: Vec<(CutVertex, CutVertex)> = Vec::new();
-                for facet in fragment.facets {
-                    let halves = match self.split(simplex, facet.ring, f) {
-                        Split::Inside(ring) => {
-                            inside.push(FragmentFacet { ring, ..facet });
-                            continue;
-                        }
-                        Split::Outside(ring) => {
-                            outside.push(FragmentFacet { ring, ..facet });
-                            continue;
-                        }
-                        Split::Both(halves) => halves,
-                    };
-                    for (part, to) in [(halves.inside, &mut inside), (halves.outside, &mut outside)] {
-                        if part.len() > 2 {
-                            to.push(FragmentFacet { surface: facet.surface, ring: part });
-                        }
-                    }
-                    edges.extend(halves.edge);
-                }
-                let mut ring = Vec::with_capacity(edges.len());
-                if let Some(&(start, mut at)) = edges.first() {
-                    ring.push(start);
-                    while at != start && ring.len() <= edges.len() {
-                        ring.push(at);
-                        at = edges.iter().find(|e| e.0 == at).map_or(start, |e| e.1);
-                    }
-                }
-                if !inside.is_empty() {
-                    if ring.len() > 2 {
-                        inside.push(FragmentFacet { surface: Some(f), ring: ring.clone() });
-                    }
-                    next.push(Fragment { negative: fragment.negative | 1 << f, facets: inside });
-                }
-                if !outside.is_empty() {
-                    if ring.len() > 2 {
-                        ring.reverse();
-                        outside.push(FragmentFacet { surface: Some(f), ring });
-                    }
-                    next.push(Fragment { negative: fragment.negative, facets: outside });
-                }
-            }
-            fragments = next;
-        }
-        fragments
+        out: &mut Fragments,
+    ) {
+        out.start(negative, lying_on.into_iter().zip(Simplex::facets(right)));
+        self.cut_by(simplex, mixed, out);
     }
 
-    /// The parts of a polygon between surfaces, with those that are negative there.
-    pub(in crate::extract) fn split_by(
+    /// Cuts a triangle, whose corners run this way, by the lines of the `mixed` surfaces.
+    pub(in crate::extract) fn cut_triangle(
         &self,
         simplex: &Simplex,
-        negative: u64,
-        mixed: u64,
-        ring: Vec<CutVertex>,
-    ) -> Vec<(u64, Vec<CutVertex>)> {
-        let mut fragments = vec![(negative, ring)];
-        for f in bits(mixed) {
-            let mut next = Vec::with_capacity(2 * fragments.len());
-            for (negative, ring) in fragments {
-                match self.split(simplex, ring, f) {
-                    Split::Inside(ring) => next.push((negative | 1 << f, ring)),
-                    Split::Outside(ring) => next.push((negative, ring)),
-                    Split::Both(halves) => {
-                        if halves.inside.len() > 2 {
-                            next.push((negative | 1 << f, halves.inside));
-                        }
-                        if halves.outside.len() > 2 {
-                            next.push((negative, halves.outside));
-                        }
-                    }
-                }
-            }
-            fragments = next;
-        }
-        fragments
+        corners: [u16; 3],
+        (negative, mixed): (u64, u64),
+        out: &mut Fragments,
+    ) {
+        out.start(negative, [(None, corners)]);
+        self.cut_by(simplex, mixed, out);
     }
 
-    /// The parts of a polygon where a surface is negative and positive, and the edge between them, directed as in the new facet
-    /// of the negative part.
-    pub(super) fn split(&self, simplex: &Simplex, ring: Vec<CutVertex>, f: usize) -> Split {
-        // A triangle has three corners, and one more for each of at most 64 surfaces.
-        let signs = (0..).zip(&ring).fold(0u128, |w, (i, s)| w | u128::from(self.is_negative_at(simplex, *s, f)) << i);
-        if signs == 0 {
-            return Split::Outside(ring);
+    fn cut_by(&self, simplex: &Simplex, mixed: u64, out: &mut Fragments) {
+        out.values.resize(self.local.live.len(), [0.0; 4]);
+        for f in bits(mixed) {
+            out.values[f] = self.values(simplex, f);
         }
-        if signs.count_ones() as usize == ring.len() {
-            return Split::Inside(ring);
+        for f in bits(mixed) {
+            out.negative.clear();
+            let (values, vertices) = (&out.values, &out.vertices);
+            out.negative.extend(vertices.iter().map(|v| self.is_negative_at(simplex, values, *v, f)));
+            out.cut(f);
         }
-        let is_inside = |i: usize| signs >> i & 1 == 1;
-        let room = ring.len() + 1;
-        let (mut inside, mut outside) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        let (mut leave, mut enter) = (None, None);
-        for i in 0..ring.len() {
-            let next = (i + 1) % ring.len();
-            (if is_inside(i) { &mut inside } else { &mut outside }).push(ring[i]);
-            if is_inside(i) != is_inside(next) {
-                let new = CutVertex {
-                    corners: ring[i].corners | ring[next].corners,
-                    surfaces: (ring[i].surfaces & ring[next].surfaces) | 1 << f,
-                };
-                inside.push(new);
-                outside.push(new);
-                *(if is_inside(i) { &mut leave } else { &mut enter }) = Some(new);
-            }
-        }
-        Split::Both(Halves { inside, outside, edge: enter.zip(leave) })
     }
+}
+
+/// Barycentric coordinates of the point of a simplex where as many functions vanish as it has dimensions, given their values at
+/// the corners.
+fn barycentric(values: &[[f64; 4]; 3], dimensions: usize) -> [f64; 4] {
+    let w = match dimensions {
+        0 => [1.0, 0.0, 0.0, 0.0],
+        1 => {
+            let [a, b, ..] = values[0];
+            [b, -a, 0.0, 0.0]
+        }
+        2 => {
+            let ([a0, a1, a2, _], [b0, b1, b2, _]) = (values[0], values[1]);
+            let [x, y, z] = cross([a0, a1, a2], [b0, b1, b2]);
+            [x, y, z, 0.0]
+        }
+        _ => {
+            let others = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+            [0, 1, 2, 3].map(|skip| {
+                let row = |r: usize| others[skip].map(|c| values[r][c]);
+                let d = dot(row(0), cross(row(1), row(2)));
+                if skip % 2 == 0 { d } else { -d }
+            })
+        }
+    };
+    let sum: f64 = w.iter().sum();
+    w.map(|x| (x / sum).clamp(0.0, 1.0))
+}
+
+/// Lists the first bits of a word; returns how many there are.
+fn listed<const N: usize>(list: &mut [usize; N], word: u64) -> usize {
+    bits(word).zip(list).map(|(bit, at)| *at = bit).count()
 }

@@ -293,22 +293,23 @@ impl FeatureCells<'_> {
     /// counter-clockwise about the face's axis.
     fn cut_parts(&mut self, at: (usize, usize), surface: usize, face: &CellFace) -> Vec<Polygon> {
         let mut fragments = Vec::with_capacity(face.parts.len());
+        let mut cut = self.fragments.take();
         for part in &face.parts {
             let [a, b, c] = part.corners.map(|c| face.corners[c].id);
             let simplex = Simplex { nodes: [a, b, c, a], count: 3 };
-            let (negative, mixed) = self.others_of(&simplex, surface, part.inside);
-            let mut ring = [1, 2, 4].map(|corners| CutVertex { corners, surfaces: 0 });
-            if !part.left {
-                ring.reverse();
-            }
-            for (negative, ring) in self.split_by(&simplex, negative, mixed, ring.to_vec()) {
-                let ring = ring.iter().map(|s| {
-                    let key = self.face_vertex_id(at, face, &part.corners, *s);
-                    (key, self.face_vertex_position(key, face, &simplex, *s))
+            let signs = self.others_of(&simplex, surface, part.inside);
+            let ring = if part.left { [0, 1, 2] } else { [2, 1, 0] };
+            self.cut_triangle(&simplex, ring, signs, &mut cut);
+            for (negative, _, ring) in cut.facets() {
+                let ring = ring.iter().map(|v| {
+                    let vertex = cut.vertices[usize::from(*v)];
+                    let key = self.face_vertex_id(at, face, &part.corners, vertex);
+                    (key, self.face_vertex_position(key, face, &simplex, vertex))
                 });
                 fragments.push((negative, ring.collect()));
             }
         }
+        self.fragments.set(cut);
         fragments
     }
 

@@ -200,6 +200,8 @@ impl FeatureCells<'_> {
     fn fill(&mut self, cell: [usize; 3], surface: usize, bases: &[Base], tets: &[Tet]) {
         let node = self.nodes.index(cell);
         let mut names: Vec<(Inner, u32)> = Vec::with_capacity(16);
+        let mut fragments = self.fragments.take();
+        let mut ring: Vec<u32> = Vec::with_capacity(8);
         for tet in tets {
             let (negative, mixed) = self.others_of(&tet.simplex, surface, tet.inside);
             let on_surface = tet.on_patch.map(|w| w.then_some(surface));
@@ -213,25 +215,31 @@ impl FeatureCells<'_> {
                 }
                 continue;
             }
-            for fragment in self.cut(&tet.simplex, tet.right, (negative, mixed), on_surface) {
-                for (f, facet) in fragment.negative_facets() {
-                    let sides = self.sides(cell, fragment.negative, f);
-                    if sides.behind == sides.ahead {
-                        continue;
-                    }
-                    let ring: Vec<u32> =
-                        facet.iter().map(|s| self.vertex_name(node, bases, tet, *s, &mut names)).collect();
-                    self.fan(&ring, sides);
+            self.cut(&tet.simplex, tet.right, (negative, mixed), on_surface, &mut fragments);
+            for (negative, f, facet) in fragments.negative_facets() {
+                let sides = self.sides(cell, negative, f);
+                if sides.behind == sides.ahead {
+                    continue;
                 }
+                ring.clear();
+                for v in facet {
+                    let vertex = fragments.vertices[usize::from(*v)];
+                    ring.push(self.vertex_name(node, bases, tet, vertex, &mut names));
+                }
+                self.fan(&ring, sides);
             }
         }
+        self.fragments.set(fragments);
     }
 
     /// Adds the facets of a tetrahedron that lie on the surface, where no other surface crosses it.
     fn fill_patch(&mut self, node: usize, sides: Sides, bases: &[Base], tet: &Tet, names: &mut Vec<(Inner, u32)>) {
         let facets = Simplex::facets(tet.right);
         for (ring, _) in facets.iter().zip(tet.on_patch).filter(|s| s.1) {
-            let ring = ring.map(|s| self.vertex_name(node, bases, tet, s, names));
+            let ring = ring.map(|c| {
+                let vertex = CutVertex { corners: 1 << c, surfaces: 0 };
+                self.vertex_name(node, bases, tet, vertex, names)
+            });
             self.fan(&ring, sides);
         }
     }
