@@ -62,9 +62,13 @@ impl EdgeStore {
     ) -> Option<Vec<Contour>> {
         let points = self.boundary(context, face)?;
         let all = [pierced, adjacent].concat();
-        let corners = [&all[..], pierced];
-        let few = corners.into_iter().find(|c| c.len() <= VertexId::CORNERS);
-        let candidates = self.candidates(context, face, &points, few.unwrap_or(&[]));
+        let few = [&all[..], pierced].into_iter().find(|c| c.len() <= VertexId::CORNERS);
+        let corners = few.unwrap_or(&[]);
+        let single = points.iter().all(|p| p.key.index() == 0) && points.len() < 4;
+        if single && corners.is_empty() {
+            return None;
+        }
+        let candidates = self.candidates(context, face, &points, corners);
         let mut search = ContourSearch {
             points: &points,
             pierced,
@@ -89,8 +93,7 @@ impl EdgeStore {
             search.add(&all, &mut Vec::new());
         });
         let (_, candidates) = search.best.or(plain)?;
-        let single = points.iter().all(|p| p.key.index() == 0);
-        if single && points.len() < 4 && candidates.iter().all(|w| w.via.is_empty()) {
+        if single && candidates.iter().all(|w| w.via.is_empty()) {
             return None;
         }
         let (low, axis) = face;

@@ -149,6 +149,9 @@ impl FeatureCells<'_> {
     fn order_along(&self, node: usize, axis: usize, fitted: usize) -> (Vec<f64>, Vec<(usize, f64, usize)>) {
         let points = self.points_of(node, axis, fitted);
         let at: Vec<f64> = points.iter().map(|p| self.share_of(node, axis, p.1)).collect();
+        if at.is_empty() {
+            return (at, Vec::new());
+        }
         let stretch = |f: usize| {
             let same = |s: &&f64| (self.value_along(f, node, axis, **s) <= 0.0) == (self.value(f, node) <= 0.0);
             at.iter().take_while(same).count()

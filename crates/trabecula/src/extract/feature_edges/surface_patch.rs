@@ -174,6 +174,10 @@ impl EdgeStore {
             *p = cell.within(*p);
         }
         tried.extend(neighbour_corners);
+        // Without feature edges there is no choice either, and no distance to ask for.
+        if let [only] = tried[..] {
+            return (only, 0.0);
+        }
         let samples: Vec<Vec3> = segments.iter().flat_map(|s| [s[0], scale(add(s[0], s[1]), 0.5), s[1]]).collect();
         let off = |apex: &Vec3| {
             let away = |p: &Vec3| {
