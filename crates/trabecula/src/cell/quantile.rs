@@ -25,9 +25,16 @@ pub(super) struct Quantile {
     start: f64,
     step: f64,
     /// V at the levels.
-    lower: Vec<f64>,
+    lower: Ascending,
     /// vol{|f| ≤ t} at t = i · step.
-    sheet: Vec<f64>,
+    sheet: Ascending,
+}
+
+/// Ascending shares at equal steps of the level.
+struct Ascending {
+    shares: Vec<f64>,
+    /// How many shares are less than i / LEVELS: where a search for one begins, and where it ends.
+    guide: Vec<u32>,
 }
 
 /// A function on rows: phases along x, phases along y and z, values, gradients.
@@ -88,17 +95,18 @@ impl Quantile {
                 last
             })
             .collect();
-        let at = |t: f64| interpolate(&lower, (t - start) / step);
+        let lower = Ascending::new(lower);
+        let at = |t: f64| lower.interpolate((t - start) / step);
         let sheet = (0..LEVELS / 2).map(|i| step * i as f64).map(|t| at(t) - at(-t)).collect();
-        Quantile { start, step, lower, sheet }
+        Quantile { start, step, sheet: Ascending::new(sheet), lower }
     }
 
     /// Solid fraction of the part at level t.
     pub(super) fn fraction(&self, part: Part, t: f64) -> f64 {
         match part {
-            Part::Lower => interpolate(&self.lower, (t - self.start) / self.step),
-            Part::Upper => 1.0 - interpolate(&self.lower, (t - self.start) / self.step),
-            Part::Sheet => interpolate(&self.sheet, t.max(0.0) / self.step),
+            Part::Lower => self.lower.interpolate((t - self.start) / self.step),
+            Part::Upper => 1.0 - self.lower.interpolate((t - self.start) / self.step),
+            Part::Sheet => self.sheet.interpolate(t.max(0.0) / self.step),
         }
     }
 
@@ -106,15 +114,15 @@ impl Quantile {
     pub(super) fn iso(&self, part: Part, fraction: f64) -> (f64, f64) {
         match part {
             Part::Lower => {
-                let (x, d) = invert(&self.lower, fraction);
+                let (x, d) = self.lower.invert(fraction);
                 (self.start + self.step * x, self.step * d)
             }
             Part::Upper => {
-                let (x, d) = invert(&self.lower, 1.0 - fraction);
+                let (x, d) = self.lower.invert(1.0 - fraction);
                 (self.start + self.step * x, -self.step * d)
             }
             Part::Sheet => {
-                let (x, d) = invert(&self.sheet, fraction);
+                let (x, d) = self.sheet.invert(fraction);
                 (self.step * x, self.step * d)
             }
         }
@@ -192,21 +200,36 @@ fn under_plane(g: &[f64; 3], h: f64, s: f64) -> f64 {
     (sum / (48.0 * a * b * c)).clamp(0.0, 1.0)
 }
 
-/// Piecewise linear value of an ascending table at index x, constant beyond its ends.
-fn interpolate(table: &[f64], x: f64) -> f64 {
-    let x = x.clamp(0.0, (table.len() - 1) as f64);
-    let i = (x as usize).min(table.len() - 2);
-    let s = x - i as f64;
-    table[i] * (1.0 - s) + table[i + 1] * s
-}
+impl Ascending {
+    fn new(shares: Vec<f64>) -> Ascending {
+        let below = |i: usize| shares.partition_point(|t| *t < i as f64 / LEVELS as f64) as u32;
+        let guide = (0..=LEVELS).map(below).collect();
+        Ascending { shares, guide }
+    }
 
-/// Index x at which the ascending table has value v, and dx/dv there (a slope over a few levels, so that it is smooth).
-fn invert(table: &[f64], v: f64) -> (f64, f64) {
-    let i = table.partition_point(|&t| t < v).clamp(1, table.len() - 1);
-    let (a, b) = (table[i - 1], table[i]);
-    let s = if b > a { ((v - a) / (b - a)).clamp(0.0, 1.0) } else { 0.5 };
-    let (lo, hi) = (i.saturating_sub(8), (i + 7).min(table.len() - 1));
-    let rise = table[hi] - table[lo];
-    let slope = if rise > 0.0 { (hi - lo) as f64 / rise } else { 0.0 };
-    ((i - 1) as f64 + s, slope)
+    /// Piecewise linear value at index x, constant beyond the ends.
+    fn interpolate(&self, x: f64) -> f64 {
+        let table = &self.shares;
+        let x = x.clamp(0.0, (table.len() - 1) as f64);
+        let i = (x as usize).min(table.len() - 2);
+        let s = x - i as f64;
+        table[i] * (1.0 - s) + table[i + 1] * s
+    }
+
+    /// Index x of the value v, and dx/dv there (a slope over a few levels, so that it is smooth).
+    fn invert(&self, v: f64) -> (f64, f64) {
+        let table = &self.shares;
+        // A power of two: the product is exact.
+        let k = ((v * LEVELS as f64) as usize).min(LEVELS - 1);
+        let [from, to] = [self.guide[k], self.guide[k + 1]].map(|i| i as usize);
+        // Beyond the last share, as at v > 1, none is greater.
+        let to = if k + 1 == LEVELS { table.len() } else { to };
+        let i = (from + table[from..to].partition_point(|&t| t < v)).clamp(1, table.len() - 1);
+        let (a, b) = (table[i - 1], table[i]);
+        let s = if b > a { ((v - a) / (b - a)).clamp(0.0, 1.0) } else { 0.5 };
+        let (lo, hi) = (i.saturating_sub(8), (i + 7).min(table.len() - 1));
+        let rise = table[hi] - table[lo];
+        let slope = if rise > 0.0 { (hi - lo) as f64 / rise } else { 0.0 };
+        ((i - 1) as f64 + s, slope)
+    }
 }

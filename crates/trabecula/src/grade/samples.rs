@@ -99,8 +99,10 @@ impl Samples {
     }
 
     /// Value and gradient (per mm) at a point.
+    #[inline]
     pub fn at(&self, p: Vec3) -> (f64, Vec3) {
-        let [(i, x, inx), (j, y, iny), (k, z, inz)] = [0, 1, 2].map(|a| self.interval(p[a], a));
+        let [(i, x, inx), (j, y, iny), (k, z, inz)] =
+            [self.interval(p[0], 0), self.interval(p[1], 1), self.interval(p[2], 2)];
         let [nx, ny, nz] = self.shape;
         let v = |di: usize, dj: usize, dk: usize| {
             let (i, j, k) = ((i + di).min(nx - 1), (j + dj).min(ny - 1), (k + dk).min(nz - 1));

@@ -232,10 +232,8 @@ impl Mapping for Phase {
     }
 
     fn phases_and_jacobians(&self, points: &[Vec3], u: &mut [Vec3], j: &mut [Mat3]) {
-        for ((u, j), p) in u.iter_mut().zip(j).zip(points) {
-            (*u, *j) = self.spline.jacobian(*p);
-            *u = add(*u, self.shift);
-        }
+        self.spline.jacobians(points, u, j);
+        u.iter_mut().for_each(|u| *u = add(*u, self.shift));
     }
 
     fn solved(&self) -> Option<&Phase> {

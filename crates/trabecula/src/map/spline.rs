@@ -65,7 +65,7 @@ impl Spline {
     }
 
     /// Where the coordinate `x` falls along an axis.
-    #[inline]
+    #[inline(always)]
     fn spot(&self, x: f64, axis: usize) -> Spot {
         let h = self.grid.step[axis];
         let s = (x - self.grid.origin[axis]) / h;
@@ -83,43 +83,47 @@ impl Spline {
 
     /// u at points.
     pub fn values(&self, points: &[Vec3], out: &mut [Vec3]) {
-        let [_, sy, sz] = self.strides();
-        for (o, p) in out.iter_mut().zip(points) {
-            let [x, y, z] = [0, 1, 2].map(|a| self.spot(p[a], a));
-            let base = x.first + y.first * sy + z.first * sz;
-            for (o, c) in o.iter_mut().zip(&self.coefficients) {
-                let mut sum = 0.0;
-                for k in 0..4 {
-                    for j in 0..4 {
-                        let row = &c[base + j * sy + k * sz..][..4];
-                        let w = z.value[k] * y.value[j];
-                        sum += w * along(row, &x.value);
-                    }
-                }
-                *o = sum;
-            }
-        }
+        values(self, points, out);
     }
 
     /// u and its Jacobian ∂uᵢ/∂xⱼ at a point.
     pub fn jacobian(&self, p: Vec3) -> (Vec3, Mat3) {
+        let (mut u, mut m) = ([[0.0; 3]], [[[0.0; 3]; 3]]);
+        self.jacobians(&[p], &mut u, &mut m);
+        (u[0], m[0])
+    }
+
+    /// u, the same as that of `values`, and its Jacobian at points.
+    pub fn jacobians(&self, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
+        jacobians(self, points, u, m);
+    }
+
+    /// For each function the sums over its coefficients about a point: for each pair of weights along y and z, four numbers
+    /// along x.
+    #[inline(always)]
+    fn sums<const N: usize>(&self, first: [usize; 3], pairs: [[&[f64; 4]; 2]; N]) -> [[[f64; 4]; N]; 3] {
         let [_, sy, sz] = self.strides();
-        let [x, y, z] = [0, 1, 2].map(|a| self.spot(p[a], a));
-        let base = x.first + y.first * sy + z.first * sz;
-        let (mut u, mut m) = ([0.0; 3], [[0.0; 3]; 3]);
-        for (i, c) in self.coefficients.iter().enumerate() {
+        let base = first[0] + first[1] * sy + first[2] * sz;
+        let mut sums = [[[0.0; 4]; N]; 3];
+        for (sums, c) in sums.iter_mut().zip(&self.coefficients) {
             for k in 0..4 {
+                let mut planes = [[0.0; 4]; N];
                 for j in 0..4 {
-                    let row = &c[base + j * sy + k * sz..][..4];
-                    let s = along(row, &x.value);
-                    u[i] += z.value[k] * y.value[j] * s;
-                    m[i][0] += z.value[k] * y.value[j] * along(row, &x.slope);
-                    m[i][1] += z.value[k] * y.slope[j] * s;
-                    m[i][2] += z.slope[k] * y.value[j] * s;
+                    let row = c[base + j * sy + k * sz..].first_chunk::<4>().unwrap_or(&[0.0; 4]);
+                    for (plane, [y, _]) in planes.iter_mut().zip(&pairs) {
+                        for i in 0..4 {
+                            plane[i] += y[j] * row[i];
+                        }
+                    }
+                }
+                for ((sum, plane), [_, z]) in sums.iter_mut().zip(&planes).zip(&pairs) {
+                    for i in 0..4 {
+                        sum[i] += z[k] * plane[i];
+                    }
                 }
             }
         }
-        (u, m)
+        sums
     }
 
     /// Blocks of intervals along each axis.
@@ -323,9 +327,29 @@ fn cubics(line: &[f64], segments: &[Segment], t: &[f64], out: &mut [f64]) {
     }
 }
 
-#[inline]
-fn along(row: &[f64], w: &[f64; 4]) -> f64 {
-    row[0] * w[0] + row[1] * w[1] + row[2] * w[2] + row[3] * w[3]
+#[inline(always)]
+fn along(row: &[f64; 4], w: &[f64; 4]) -> f64 {
+    (row[0] * w[0] + row[1] * w[1]) + (row[2] * w[2] + row[3] * w[3])
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn values(spline: &Spline, points: &[Vec3], out: &mut [Vec3]) {
+    for (o, p) in out.iter_mut().zip(points) {
+        let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
+        let sums = spline.sums([x.first, y.first, z.first], [[&y.value, &z.value]]);
+        *o = sums.map(|[s]| along(&s, &x.value));
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn jacobians(spline: &Spline, points: &[Vec3], u: &mut [Vec3], m: &mut [Mat3]) {
+    for ((u, m), p) in u.iter_mut().zip(m).zip(points) {
+        let [x, y, z] = [spline.spot(p[0], 0), spline.spot(p[1], 1), spline.spot(p[2], 2)];
+        let pairs = [[&y.value, &z.value], [&y.slope, &z.value], [&y.value, &z.slope]];
+        let sums = spline.sums([x.first, y.first, z.first], pairs);
+        *u = sums.map(|[s, ..]| along(&s, &x.value));
+        *m = sums.map(|[s, sy, sz]| [along(&s, &x.slope), along(&sy, &x.value), along(&sz, &x.value)]);
+    }
 }
 
 /// A bound of the spectral norm, at most a seventh above it: λ of the greatest of M Mᵀ, to the eighth, is at most the sum
