@@ -32,6 +32,7 @@ use super::sign_words::Signs;
 use super::tile::{Nodes, Numbers, numbered};
 use super::vertex_id::VertexId;
 pub(super) use fragments::Fragments;
+use simplex_cut::section;
 pub(super) use simplex_cut::{CutVertex, Simplex};
 
 /// Vertices and triangles that marching cubes does not make.
@@ -238,31 +239,25 @@ impl FeatureCells<'_> {
         let node = self.nodes.index(cell);
         let signs = self.signs.at_corners(cell);
         let mut fragments = self.fragments.take();
-        let mut names: Vec<u32> = Vec::with_capacity(16);
-        let mut ring: Vec<u32> = Vec::with_capacity(8);
+        let mut known: Vec<(VertexId, u32)> = Vec::with_capacity(32);
         for ([one, two], right) in PATHS {
-            let (negative, mixed) = signs.among(1 | 1 << one | 1 << two | 1 << 7);
-            if mixed == 0 || self.is_uniform(cell, (negative, mixed)) {
+            let corners = [0, one, two, 7];
+            let (negative, mixed) = signs.among(corners);
+            if mixed == 0 {
                 continue;
             }
-            let simplex = self.simplex(node, &[one, two, 7]);
-            self.cut(&simplex, right, (negative, mixed), [None; 4], &mut fragments);
-            names.clear();
-            names.resize(fragments.vertices.len(), u32::MAX);
-            for (negative, f, facet) in fragments.negative_facets() {
-                let sides = self.sides(cell, negative, f);
-                if sides.behind == sides.ahead {
-                    continue;
+            let simplex = self.simplex(node, &corners[1..]);
+            if mixed.is_power_of_two() {
+                let f = mixed.trailing_zeros() as usize;
+                let section = section(right, signs.pattern(f, corners)).iter();
+                let vertices = section.map(|corners| CutVertex { corners: *corners, surfaces: mixed });
+                self.facet(cell, &simplex, (negative, f), vertices, &mut known);
+            } else if !self.is_uniform(cell, (negative, mixed)) {
+                self.cut(&simplex, right, (negative, mixed), [None; 4], &mut fragments);
+                for (negative, f, facet) in fragments.negative_facets() {
+                    let vertices = facet.iter().map(|v| fragments.vertices[usize::from(*v)]);
+                    self.facet(cell, &simplex, (negative, f), vertices, &mut known);
                 }
-                ring.clear();
-                for v in facet {
-                    let name = &mut names[usize::from(*v)];
-                    if *name == u32::MAX {
-                        *name = self.vertex(self.key(&simplex, fragments.vertices[usize::from(*v)]));
-                    }
-                    ring.push(*name);
-                }
-                self.fan(&ring, sides);
             }
         }
         self.fragments.set(fragments);
@@ -271,6 +266,37 @@ impl FeatureCells<'_> {
             if cell[flat.axis] == layer {
                 self.cap_face(cell, flat.axis, flat.below);
             }
+        }
+    }
+
+    /// Adds a facet of a fragment, on a surface, if it bounds a part of the solid. `known` are vertices of the cell.
+    fn facet(
+        &mut self,
+        cell: [usize; 3],
+        simplex: &Simplex,
+        (negative, surface): (u64, usize),
+        vertices: impl Iterator<Item = CutVertex>,
+        known: &mut Vec<(VertexId, u32)>,
+    ) {
+        let sides = self.sides(cell, negative, surface);
+        if sides.behind == sides.ahead {
+            return;
+        }
+        let mut first = None;
+        let mut last = None;
+        for vertex in vertices {
+            let key = self.key(simplex, vertex);
+            // Adjacent tetrahedra share most vertices: the few of one cell are found sooner than those of the block.
+            let name = known.iter().find(|k| k.0 == key).map(|k| k.1).unwrap_or_else(|| {
+                let name = self.vertex(key);
+                known.push((key, name));
+                name
+            });
+            if let (Some(first), Some(last)) = (first, last) {
+                self.extra.triangles.push(([first, last, name], sides));
+            }
+            last = first.and(Some(name));
+            first = first.or(Some(name));
         }
     }
 
@@ -336,19 +362,38 @@ impl FeatureCells<'_> {
     /// A face of a cell divided by the surfaces that cross it: the fragments of its two triangles with the surfaces that are
     /// negative there, counter-clockwise seen from outside the cell.
     pub(super) fn face_fragments(&self, cell: [usize; 3], axis: usize, upper: bool) -> Vec<(u64, Vec<VertexId>)> {
+        let mut all = Vec::with_capacity(4);
+        self.each_face_fragment(cell, axis, upper, None, &mut |negative, ring| all.push((negative, ring.to_vec())));
+        all
+    }
+
+    /// Calls `found` with these; only with those of the triangles that a surface crosses, if it is given.
+    fn each_face_fragment(
+        &self,
+        cell: [usize; 3],
+        axis: usize,
+        upper: bool,
+        surface: Option<usize>,
+        found: &mut impl FnMut(u64, &[VertexId]),
+    ) {
         let node = self.nodes.index(cell) + self.offset(usize::from(upper) << axis);
         let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
-        let mut all = Vec::with_capacity(4);
         let mut cut = self.fragments.take();
+        let mut keys: Vec<VertexId> = Vec::with_capacity(8);
         for (step, right) in [(u, true), (v, false)] {
             let simplex = self.simplex(node, &[step, u | v]);
             let signs = self.signs_of(&simplex);
+            if surface.is_some_and(|f| signs.1 >> f & 1 == 0) {
+                continue;
+            }
             self.cut_triangle(&simplex, if right == upper { [0, 1, 2] } else { [2, 1, 0] }, signs, &mut cut);
-            let key = |v: &u16| self.key(&simplex, cut.vertices[usize::from(*v)]);
-            all.extend(cut.facets().map(|(negative, _, ring)| (negative, ring.iter().map(key).collect())));
+            for (negative, _, ring) in cut.facets() {
+                keys.clear();
+                keys.extend(ring.iter().map(|v| self.key(&simplex, cut.vertices[usize::from(*v)])));
+                found(negative, &keys);
+            }
         }
         self.fragments.set(cut);
-        all
     }
 
     /// The cap of a feature cell on its lower or upper face along an axis.
@@ -387,10 +432,7 @@ impl FeatureCells<'_> {
             };
             match fitted {
                 Some(facet) => facet.fragments().for_each(|(n, ring)| add(n, ring)),
-                None => {
-                    let cut = self.face_fragments(cell, axis, upper);
-                    cut.iter().for_each(|(n, ring)| add(*n, ring));
-                }
+                None => self.each_face_fragment(cell, axis, upper, Some(surface), &mut add),
             }
         }
         let mut path = Vec::new();

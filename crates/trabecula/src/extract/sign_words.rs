@@ -181,8 +181,10 @@ impl Signs {
     /// Whether a surface is negative at a node.
     #[inline]
     pub fn is_negative(&self, surface: usize, node: usize) -> bool {
-        let nx = self.shape[0];
-        self.negative[surface][node / nx] >> (node % nx) & 1 == 1
+        // A division of short numbers is the faster one.
+        let (node, nx) = (node as u32, self.shape[0] as u32);
+        let row = node / nx;
+        self.negative[surface][row as usize] >> (node - row * nx) & 1 == 1
     }
 
     /// Whether a cell of the block is a feature cell.
@@ -234,14 +236,20 @@ pub(super) struct CornerSigns {
 
 impl CornerSigns {
     /// The surfaces that are negative at all of some corners, and those that change sign between them.
-    pub fn among(&self, corners: u8) -> (u64, u64) {
+    pub fn among(&self, corners: [usize; 4]) -> (u64, u64) {
         let (mut all, mut some) = (0, 0);
         for f in bits(self.mixed) {
-            let negative = self.patterns[f] & corners;
-            all |= u64::from(negative == corners) << f;
-            some |= u64::from(negative != 0) << f;
+            let pattern = self.pattern(f, corners);
+            all |= u64::from(pattern == 15) << f;
+            some |= u64::from(pattern != 0) << f;
         }
         (self.negative | all, some & !all)
+    }
+
+    /// Those of some corners at which a surface is negative, as bits.
+    pub fn pattern(&self, surface: usize, corners: [usize; 4]) -> usize {
+        let at = corners.map(|c| usize::from(self.patterns[surface]) >> c & 1);
+        at[0] | at[1] << 1 | at[2] << 2 | at[3] << 3
     }
 }
 

@@ -1,5 +1,7 @@
 //! Simplices of the grid, cut by the planes of surfaces.
 
+use std::sync::LazyLock;
+
 use super::FeatureCells;
 use super::fragments::Fragments;
 use crate::extract::sign_words::bits;
@@ -274,6 +276,25 @@ impl FeatureCells<'_> {
             out.cut(f);
         }
     }
+}
+
+/// The polygon in which the plane of one surface cuts a tetrahedron, right-handed or not, by the corners at which the surface is
+/// negative: for each vertex the two corners between which it lies, as bits.
+pub(super) fn section(right: bool, negative: usize) -> &'static [u8] {
+    static SECTIONS: LazyLock<[[Vec<u8>; 16]; 2]> = LazyLock::new(|| {
+        let mut cut = Fragments::default();
+        [false, true].map(|right| {
+            core::array::from_fn(|negative| {
+                cut.start(0, Simplex::facets(right).map(|ring| (None, ring)));
+                cut.negative.clear();
+                cut.negative.extend((0..4).map(|c| negative >> c & 1 == 1));
+                cut.cut(0);
+                let facets = cut.negative_facets().flat_map(|(_, _, ring)| ring);
+                facets.map(|v| cut.vertices[usize::from(*v)].corners).collect()
+            })
+        })
+    });
+    &SECTIONS[usize::from(right)][negative]
 }
 
 /// Barycentric coordinates of the point of a simplex where as many functions vanish as it has dimensions, given their values at
