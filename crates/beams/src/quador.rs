@@ -29,6 +29,7 @@ use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, add, norm, scale, sub};
 
 mod bezier;
+mod block_fill;
 mod boundary_form;
 mod box_index;
 mod closest;
@@ -54,6 +55,7 @@ mod smooth_union;
 mod tessellation;
 
 pub use bezier::Bezier;
+pub use block_fill::Wanted;
 pub use closest::{Closest, ClosestPoints};
 pub use collisions::Collision;
 pub use fillet_sizes::HubFillets;
@@ -69,6 +71,9 @@ pub use tessellation::{Measures, Tessellation};
 use box_index::BoxIndex;
 use fillet_sizes::{FilletSizes, fillet_sizes, hub_fillets};
 use hub::AffineFunction;
+
+/// Number of half-beams that a processor's own cache holds.
+const CACHED_HALF_BEAMS: usize = 4096;
 
 /// Size of the fillets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,6 +134,8 @@ struct Ball {
     part: Aabb,
     /// Upper bound of half the second derivative of N.
     curvature: f64,
+    /// Upper bound of N where no G is more than 1.
+    most: f64,
 }
 
 /// A hub with a fillet smaller than requested.
@@ -253,6 +260,7 @@ impl Quadors {
                 bounds: Aabb::EMPTY,
                 part: Aabb::EMPTY,
                 curvature: 0.0,
+                most: f64::INFINITY,
             })
             .collect();
         out.set_fillets();
@@ -279,13 +287,15 @@ impl Quadors {
             let beams = |of: &[usize; 2]| of.map(|i| self.half_beams[first + i].beam);
             self.overlaps.extend(of.overlaps.iter().map(|pair| Overlap { hub, beams: beams(pair) }));
         }
-        let curvature: Vec<f64> = classes.sample.par_iter().map(|hub| self.hub(*hub).curvature_bound()).collect();
+        let of = |hub: &usize| (self.hub(*hub).curvature_bound(), self.hub(*hub).union_bound());
+        let bounds_of_class: Vec<(f64, f64)> = classes.sample.par_iter().map(of).collect();
         for (hub, class) in classes.of.iter().enumerate() {
             let (of, center) = (self.hub(hub), self.balls[hub].center);
             let placed = |b: Aabb| Aabb { min: add(center, b.min), max: add(center, b.max) };
             let (bounds, part) = (placed(of.bounds()), placed(of.part_bounds().grown(1e-6 * of.radius)));
             let ball = &mut self.balls[hub];
-            (ball.bounds, ball.part, ball.curvature) = (bounds, part, curvature[*class as usize]);
+            (ball.bounds, ball.part) = (bounds, part);
+            (ball.curvature, ball.most) = bounds_of_class[*class as usize];
         }
     }
 
@@ -299,13 +309,19 @@ impl Quadors {
         self.balls.is_empty()
     }
 
+    /// Whether the hubs and their half-beams exceed what a processor keeps at hand.
+    pub fn is_large(&self) -> bool {
+        self.half_beams.len() > CACHED_HALF_BEAMS
+    }
+
     /// A hub, in its own frame.
+    #[inline]
     pub fn hub(&self, i: usize) -> Hub<'_> {
         let b = &self.balls[i];
         let n = b.last - b.first;
         let taus = if self.taus.is_empty() { &[][..] } else { &self.taus[b.taus..b.taus + n * n] };
         let (half_beams, g) = (&self.half_beams[b.first..b.last], &self.g[b.first..b.last]);
-        Hub { radius: b.radius, half_beams, g, taus }
+        Hub { radius: b.radius, half_beams, g, taus, most: b.most }
     }
 
     /// Centre of a hub, mm.

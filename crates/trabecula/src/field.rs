@@ -72,6 +72,18 @@ pub trait Field: Send + Sync {
         self.fill(block, out);
     }
 
+    /// As `fill_where`, where a node may have any value of its sign, at least a grid cell's diagonal in magnitude, if all nodes
+    /// of the cells around it have that sign: what a surface needs. Fields with bounds that are cheap override it.
+    fn fill_near(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        self.fill_where(block, wanted, out);
+    }
+
+    /// Whether values at scattered points wait for memory: many points are then better given in an order in which neighbours
+    /// follow each other.
+    fn is_large(&self) -> bool {
+        false
+    }
+
     /// The value at one point (mm).
     fn value(&self, p: Vec3) -> f64 {
         let mut v = [0.0];

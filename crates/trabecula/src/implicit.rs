@@ -130,6 +130,11 @@ impl Field for Negated {
         self.0.fill_where(block, wanted, out);
         out.iter_mut().for_each(|v| *v = -*v);
     }
+
+    fn fill_near(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+        self.0.fill_near(block, wanted, out);
+        out.iter_mut().for_each(|v| *v = -*v);
+    }
 }
 
 /// A field minus a constant.

@@ -86,6 +86,8 @@ pub struct Hub<'a> {
     pub(crate) g: &'a [AffineFunction],
     /// R: τ of each pair of half-beams and 1 on the diagonal, row by row; empty if they meet in creases.
     pub(crate) taus: &'a [f64],
+    /// Upper bound of N where no G is more than 1.
+    pub(crate) most: f64,
 }
 
 impl Hub<'_> {
@@ -99,16 +101,17 @@ impl Hub<'_> {
         if self.sharp() { 1.0 } else { self.taus[i * self.half_beams.len() + j] }
     }
 
-    /// How far x lies outside the range of the hub's formula (mm; positive outside), and the gradient: the distance
-    /// past the cut plane of the half-beam with the largest G, limited by the difference of G to the second largest.
+    /// How far x lies outside the range of the hub's formula (mm; positive outside), and the gradient, if that is more than
+    /// `least`: the distance past the cut plane of the half-beam with the largest G, limited by the difference of G to the
+    /// second largest.
     #[inline]
-    pub fn past_cut(&self, x: Vec3) -> (f64, Vec3) {
-        self.with_g(x, |g| self.past_cut_of(x, g))
+    pub(super) fn past_cut(&self, x: Vec3, least: f64) -> (f64, Vec3) {
+        self.with_g(x, |g| self.past_cut_of(x, g, least))
     }
 
     /// As `past_cut`, for given G at x.
     #[inline]
-    pub(super) fn past_cut_of(&self, x: Vec3, g: &[f64]) -> (f64, Vec3) {
+    pub(super) fn past_cut_of(&self, x: Vec3, g: &[f64], least: f64) -> (f64, Vec3) {
         let (mut first, mut second) = (0.0, 0.0);
         for &g in g {
             if g > first {
@@ -117,10 +120,11 @@ impl Hub<'_> {
                 second = g;
             }
         }
-        let mut most = (f64::NEG_INFINITY, [0.0; 3]);
-        for (s, &g) in self.half_beams.iter().zip(g) {
+        let mut most = (least, [0.0; 3]);
+        for (i, &g) in g.iter().enumerate() {
             let lead = g - if g == first { second } else { first };
             if lead > most.0 {
+                let s = &self.half_beams[i];
                 let along = dot(s.axis, x) - s.cut;
                 if along.min(lead) > most.0 {
                     most = if along < lead { (along, s.axis) } else { (lead, s.g.a) };
@@ -188,10 +192,8 @@ impl Hub<'_> {
         if self.sharp() {
             return self.half_beams.iter().map(|s| dot(s.g.a, s.g.a)).fold(0.0, f64::max);
         }
-        // N over all half-beams is at least N over any of them, and a sum of squares.
-        let all: Vec<usize> = (0..self.half_beams.len()).collect();
         let mut m = [[0.0; 3]; 3];
-        for h in Factor::new(self, &all).squares(&|i| self.half_beams[i].g) {
+        for h in self.squares(&|i| self.half_beams[i].g) {
             for i in 0..3 {
                 for j in 0..3 {
                     m[i][j] += h.a[i] * h.a[j];
@@ -199,6 +201,20 @@ impl Hub<'_> {
             }
         }
         geometry::math::spectral_norm(&m)
+    }
+
+    /// Upper bound of N where no G is more than 1. N increases with every G, and as their square if they increase together.
+    pub(super) fn union_bound(&self) -> f64 {
+        if self.sharp() {
+            return 1.0;
+        }
+        self.squares(&|_| AffineFunction { a: [0.0; 3], b: 1.0 }).iter().map(|h| h.b * h.b).sum::<f64>() * (1.0 + 1e-9)
+    }
+
+    /// N of these functions over all half-beams, which is at least N over any of them, as a sum of squares.
+    fn squares(&self, g: &dyn Fn(usize) -> AffineFunction) -> Vec<AffineFunction> {
+        let all: Vec<usize> = (0..self.half_beams.len()).collect();
+        Factor::new(self, &all).squares(g)
     }
 
     /// The middle of the crotch of two half-beams, where the crease between them would be, and the fillet's radius of

@@ -11,6 +11,8 @@ use geometry::math::{Aabb, Interval, Vec3, dot, scale, sub};
 
 /// Maximum number of hubs examined for the bound over a box.
 const MAX_HUBS_PER_BOX: usize = 96;
+/// Bound of the rounding of the squares from which a value is made, relative to the largest of them.
+const ROUNDING: f64 = 1e-12;
 
 impl Quadors {
     /// Length derived from q = S − N: ρ − a around a cylinder of the typical radius a. Outside it increases no faster
@@ -23,15 +25,40 @@ impl Quadors {
     /// The field at one point, mm.
     #[inline]
     pub fn value(&self, p: Vec3) -> f64 {
-        let mut least = self.cap;
-        for &i in self.index.near(p) {
+        self.value_among(p, self.index.near(p))
+    }
+
+    /// The field at one point of which all hubs that can matter there are known, mm.
+    #[inline]
+    pub(super) fn value_among(&self, p: Vec3, hubs: &[u32]) -> f64 {
+        self.least_among(p, hubs).0
+    }
+
+    /// The field at one point, and the first of the given hubs that has this value there; none where it is the upper limit.
+    #[inline]
+    fn least_among(&self, p: Vec3, hubs: &[u32]) -> (f64, Option<u32>) {
+        let mut least = (self.cap, None);
+        // Where one value is small, most others need not be found: mostly the nearest hub has the smallest.
+        let (mut nearest, mut away) = (0, f64::INFINITY);
+        for (n, &i) in hubs.iter().enumerate() {
+            let x = sub(p, self.balls[i as usize].center);
+            if dot(x, x) < away {
+                (nearest, away) = (n, dot(x, x));
+            }
+        }
+        let (before, rest) = hubs.split_at(nearest.min(hubs.len()));
+        let (one, after) = rest.split_at(rest.len().min(1));
+        for &i in one.iter().chain(before).chain(after) {
             let ball = &self.balls[i as usize];
             let outside = ball.bounds.distance(p);
-            if outside > 0.0 && outside >= least {
+            if outside > 0.0 && outside >= least.0 {
                 continue;
             }
-            let v = self.below(&self.hub(i as usize), sub(p, ball.center), least);
-            least = least.min(if outside > 0.0 { v.max(outside) } else { v });
+            let v = self.below(&self.hub(i as usize), sub(p, ball.center), least.0);
+            let v = if outside > 0.0 { v.max(outside) } else { v };
+            if v < least.0 {
+                least = (v, Some(i));
+            }
         }
         least
     }
@@ -40,40 +67,34 @@ impl Quadors {
     #[inline]
     fn below(&self, hub: &Hub, x: Vec3, least: f64) -> f64 {
         hub.with_g(x, |g| {
-            let square = dot(x, x) - hub.radius * hub.radius;
+            let from_center = dot(x, x);
+            let square = from_center - hub.radius * hub.radius;
             let level = if least < 0.0 { 2.0 * self.scale * least } else { least * (least + 2.0 * self.scale) };
-            let v = self.length(square - hub.union_of(g, largest(g), [f64::INFINITY, square - level]));
-            if v < least { v.max(hub.past_cut_of(x, g).0) } else { v }
+            // What is surely not less stays so after rounding: the least value does not depend on the order of the hubs.
+            let enough = square - level - ROUNDING * (from_center + level.abs());
+            let v = self.length(square - hub.union_of(g, largest(g), [f64::INFINITY, enough]));
+            if v < least { hub.past_cut_of(x, g, v).0 } else { v }
         })
     }
 
     fn value_and_gradient(&self, p: Vec3) -> (f64, Vec3) {
-        let mut least = (self.cap, [0.0; 3]);
-        for &i in self.index.near(p) {
-            let ball = &self.balls[i as usize];
-            let outside = ball.bounds.distance(p);
-            if outside > 0.0 && outside >= least.0 {
-                continue;
-            }
-            let hub = self.hub(i as usize);
-            let x = sub(p, ball.center);
-            let (q, g) = hub.gradient(x);
-            let steep = if q < 0.0 { self.scale } else { (q + self.scale * self.scale).sqrt() };
-            let mut own = (self.length(q), scale(g, 0.5 / steep));
-            let past_cut = hub.past_cut(x);
-            if past_cut.0 > own.0 {
-                own = past_cut;
-            }
-            if outside > 0.0 && outside > own.0 {
-                let out =
-                    [0, 1, 2].map(|a| (p[a] - ball.bounds.max[a]).max(0.0) - (ball.bounds.min[a] - p[a]).max(0.0));
-                own = (outside, scale(out, 1.0 / outside));
-            }
-            if own.0 < least.0 {
-                least = own;
-            }
+        let (value, Some(i)) = self.least_among(p, self.index.near(p)) else {
+            return (self.cap, [0.0; 3]);
+        };
+        let (ball, hub) = (&self.balls[i as usize], self.hub(i as usize));
+        let outside = ball.bounds.distance(p);
+        if outside > 0.0 && value == outside {
+            let out = [0, 1, 2].map(|a| (p[a] - ball.bounds.max[a]).max(0.0) - (ball.bounds.min[a] - p[a]).max(0.0));
+            return (value, scale(out, 1.0 / outside));
         }
-        least
+        let x = sub(p, ball.center);
+        let (q, g) = hub.gradient(x);
+        let own = self.length(q);
+        if value > own {
+            return (value, hub.past_cut(x, own).1);
+        }
+        let steep = if q < 0.0 { self.scale } else { (q + self.scale * self.scale).sqrt() };
+        (value, scale(g, 0.5 / steep))
     }
 
     /// Whether a point (mm) is in the solid.
@@ -97,6 +118,14 @@ impl Quadors {
     /// Bounds of a hub with its half-beams up to their cut planes, mm.
     pub fn hub_bounds(&self, i: usize) -> Aabb {
         self.balls[i].bounds
+    }
+
+    /// Distance of a hub's bounds from a box: if positive, a lower bound of its value there, mm.
+    #[inline]
+    pub(super) fn apart(&self, hub: u32, b: &Aabb) -> f64 {
+        let of = &self.balls[hub as usize].bounds;
+        let apart = [0, 1, 2].map(|a| (of.min[a] - b.max[a]).max(b.min[a] - of.max[a]).max(0.0));
+        dot(apart, apart).sqrt()
     }
 
     /// The range of one hub's value over a box.
@@ -132,9 +161,8 @@ impl Quadors {
             m.max(along.min(s.g.at(x) + reach(s.g.a)))
         });
         hi = hi.max(past);
-        let apart = [0, 1, 2].map(|a| (ball.bounds.min[a] - b.max[a]).max(b.min[a] - ball.bounds.max[a]).max(0.0));
         let farthest = [0, 1, 2].map(|a| (ball.bounds.min[a] - b.min[a]).max(b.max[a] - ball.bounds.max[a]).max(0.0));
-        let apart = dot(apart, apart).sqrt();
+        let apart = self.apart(i as u32, b);
         if apart > 0.0 {
             lo = lo.max(apart);
         }

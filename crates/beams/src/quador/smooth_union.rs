@@ -113,7 +113,7 @@ impl Hub<'_> {
         limits: Limits,
         f: &mut impl FnMut(usize, f64),
     ) {
-        if most <= 0.0 {
+        if most <= 0.0 || self.most * most * most < limits[1] {
             return;
         }
         if self.sharp() || most * most > limits[0] {

@@ -308,7 +308,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
         let out = &mut s.samples[i];
         // Every sample is written, so nothing needs clearing.
         out.resize(block.len(), 0.0);
-        if surface.cut || (i == 0 && local.grid_planes.is_empty()) {
+        if surface.cut {
             surface.field.fill(block, out);
         } else {
             let wanted = wanted.get_or_insert_with(|| {
@@ -317,7 +317,7 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
                 s.edges.traced.wanted(nodes, &mut wanted);
                 wanted
             });
-            surface.field.fill_where(block, wanted, out);
+            surface.field.fill_near(block, wanted, out);
         }
         negative(&mut s.signs.negative[i], out, block.shape()[0], surface.cut);
     }

@@ -1,14 +1,14 @@
 //! Beams as implicit functions for surface extraction.
 
 use beams::pattern::PatternField;
-use beams::quador::Quadors;
+use beams::quador::{Quadors, Wanted};
 use geometry::math::{Aabb, Interval, Vec3};
 
-use crate::field::Field;
+use crate::field::{Block, Field};
 use crate::implicit::Implicit;
 
 macro_rules! field_of {
-    ($($beams:ty),*) => {$(
+    ($($beams:ty { $($fill:item)* })*) => {$(
         impl Field for $beams {
             fn values(&self, points: &[Vec3], out: &mut [f64]) {
                 <$beams>::values(self, points, out);
@@ -21,6 +21,8 @@ macro_rules! field_of {
             fn bound(&self, b: &Aabb) -> Interval {
                 <$beams>::bound(self, b)
             }
+
+            $($fill)*
         }
 
         impl Implicit for $beams {
@@ -35,4 +37,23 @@ macro_rules! field_of {
     )*};
 }
 
-field_of!(Quadors, PatternField);
+field_of!(
+    Quadors {
+        fn fill(&self, block: &Block, out: &mut [f32]) {
+            Quadors::fill(self, block.axes, Wanted { nodes: None, near: false }, out);
+        }
+
+        fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+            Quadors::fill(self, block.axes, Wanted { nodes: Some(wanted), near: false }, out);
+        }
+
+        fn fill_near(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
+            Quadors::fill(self, block.axes, Wanted { nodes: Some(wanted), near: true }, out);
+        }
+
+        fn is_large(&self) -> bool {
+            Quadors::is_large(self)
+        }
+    }
+    PatternField {}
+);

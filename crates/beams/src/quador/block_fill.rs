@@ -1,0 +1,179 @@
+//! The field at all nodes of a structured block: the hubs that can matter are found for parts of it instead of for each node.
+
+use super::Quadors;
+use geometry::math::{Aabb, Interval, Vec3, norm};
+
+/// Parts of a block of at most this many nodes are not divided.
+const FEW_NODES: usize = 32;
+
+/// Which nodes of a block need which values.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// The nodes that need a value: one word for each row along x, of at most 64 nodes; all if there is none.
+    pub nodes: Option<&'a [u64]>,
+    /// Whether a node may have any value of its sign, at least the diagonal of a grid cell in magnitude, if all nodes of the cells
+    /// around it have that sign.
+    pub near: bool,
+}
+
+struct Fill<'a> {
+    quadors: &'a Quadors,
+    axes: [&'a [f64]; 3],
+    wanted: Wanted<'a>,
+    /// How far around a part its bounds hold, mm: by a grid cell if only nodes near the surface need their values.
+    around: f64,
+    /// Diagonal of the largest grid cell, mm.
+    diagonal: f64,
+    /// The hubs of the parts from the whole block to the present one.
+    hubs: Vec<u32>,
+    out: &'a mut [f32],
+}
+
+impl Quadors {
+    /// Fills `out` (x fastest) with the field at the nodes of a block, given by ascending coordinates along each axis (mm). The
+    /// values are those of `value`, rounded; nodes that are not wanted may have any.
+    pub fn fill(&self, axes: [&[f64]; 3], wanted: Wanted, out: &mut [f32]) {
+        if axes.iter().any(|axis| axis.is_empty()) {
+            return;
+        }
+        let widest = axes.map(|axis| axis.windows(2).fold(0.0f64, |most, w| most.max(w[1] - w[0])));
+        let around = if wanted.near { widest.into_iter().fold(0.0, f64::max) * (1.0 + 1e-9) } else { 0.0 };
+        let mut fill = Fill { quadors: self, axes, wanted, around, diagonal: norm(widest), hubs: Vec::new(), out };
+        let shape = axes.map(<[f64]>::len);
+        let bounds = fill.bounds([0; 3], shape);
+        self.index.about(&bounds, &mut |near| fill.hubs.extend_from_slice(near));
+        fill.hubs.sort_unstable();
+        fill.hubs.dedup();
+        fill.part([0; 3], shape, 0);
+    }
+}
+
+impl Fill<'_> {
+    fn bounds(&self, lo: [usize; 3], hi: [usize; 3]) -> Aabb {
+        let end = |a: usize, i: usize| self.axes[a][i];
+        Aabb { min: [0, 1, 2].map(|a| end(a, lo[a])), max: [0, 1, 2].map(|a| end(a, hi[a] - 1)) }.grown(self.around)
+    }
+
+    /// Fills the nodes from `lo` up to `hi`. The hubs from number `first` on are all that can matter there.
+    fn part(&mut self, lo: [usize; 3], hi: [usize; 3], first: usize) {
+        if !self.is_wanted(lo, hi) {
+            return self.each(lo, hi, |fill, _| fill.quadors.cap);
+        }
+        let bounds = self.bounds(lo, hi);
+        let own = self.hubs.len();
+        let range = self.cull(&bounds, first);
+        let sign = if range.lo > 0.0 { 1.0 } else { -1.0 };
+        if own == self.hubs.len() {
+            self.each(lo, hi, |fill, _| fill.quadors.cap);
+        } else if self.wanted.near && (range.lo > 0.0 || range.hi < 0.0) {
+            let far = sign * range.lo.abs().min(range.hi.abs()).max(self.diagonal);
+            self.each(lo, hi, |_, _| far);
+        } else {
+            let size = [0, 1, 2].map(|a| hi[a] - lo[a]);
+            if size.iter().product::<usize>() <= FEW_NODES {
+                self.each(lo, hi, |fill, p| fill.quadors.value_among(p, &fill.hubs[own..]));
+            } else {
+                let length = |a: usize| self.axes[a][hi[a] - 1] - self.axes[a][lo[a]];
+                let longest =
+                    (0..3).filter(|a| size[*a] > 1).max_by(|a, b| length(*a).total_cmp(&length(*b))).unwrap_or(0);
+                let (mut end, mut begin) = (hi, lo);
+                end[longest] = (lo[longest] + hi[longest]) / 2;
+                begin[longest] = end[longest];
+                self.part(lo, end, own);
+                self.part(begin, hi, own);
+            }
+        }
+        self.hubs.truncate(own);
+    }
+
+    /// Adds those of the hubs from number `first` on that can be nearest in a box, by proven bounds; and bounds the field there.
+    fn cull(&mut self, bounds: &Aabb, first: usize) -> Interval {
+        let own = self.hubs.len();
+        let mut range = Interval::new(self.quadors.cap, self.quadors.cap);
+        let mut lows = Vec::with_capacity(own - first);
+        for n in first..own {
+            let hub = self.hubs[n];
+            let apart = self.quadors.apart(hub, bounds);
+            if apart == 0.0 || apart < range.hi {
+                let of = self.quadors.hub_bound(hub as usize, bounds);
+                range = range.min(of);
+                lows.push(of.lo);
+                self.hubs.push(hub);
+            }
+        }
+        let mut kept = own;
+        for (n, lo) in lows.into_iter().enumerate() {
+            if lo <= range.hi {
+                self.hubs[kept] = self.hubs[own + n];
+                kept += 1;
+            }
+        }
+        self.hubs.truncate(kept);
+        range
+    }
+
+    fn is_wanted(&self, lo: [usize; 3], hi: [usize; 3]) -> bool {
+        let Some(words) = self.wanted.nodes else {
+            return true;
+        };
+        let mask = (u64::MAX >> (64 - (hi[0] - lo[0]))) << lo[0];
+        (lo[2]..hi[2]).any(|k| (lo[1]..hi[1]).any(|j| words[k * self.axes[1].len() + j] & mask != 0))
+    }
+
+    fn each(&mut self, lo: [usize; 3], hi: [usize; 3], value: impl Fn(&Self, Vec3) -> f64) {
+        let [nx, ny] = [0, 1].map(|a| self.axes[a].len());
+        for k in lo[2]..hi[2] {
+            for j in lo[1]..hi[1] {
+                for i in lo[0]..hi[0] {
+                    self.out[(k * ny + j) * nx + i] =
+                        value(self, [self.axes[0][i], self.axes[1][j], self.axes[2][k]]) as f32;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Fillet, tests};
+    use super::*;
+
+    #[test]
+    fn a_block_has_the_values_of_its_nodes_and_their_signs() {
+        let mut random = tests::Random(6);
+        for fillet in [Fillet::None, Fillet::Auto] {
+            let q = Quadors::new(&tests::cubic(2, 1.5), fillet).expect("a lattice");
+            for step in [0.05, 0.2, 0.9] {
+                let [xs, ys, zs] = [23, 17, 20].map(|n| {
+                    let from = 15.0 * random.next() - 3.0;
+                    (0..n).map(|i| from + step * (f64::from(i) + 0.3 * random.next())).collect::<Vec<f64>>()
+                });
+                let (axes, rows) = ([&xs[..], &ys, &zs], ys.len() * zs.len());
+                let words: Vec<u64> = (0..rows).map(|row| if row % 3 == 0 { 0 } else { 0x6f_fff0 }).collect();
+                let fill = |nodes, near| {
+                    let mut out = vec![f32::NAN; xs.len() * rows];
+                    q.fill(axes, Wanted { nodes, near }, &mut out);
+                    out
+                };
+                let (all, some, near) = (fill(None, false), fill(Some(&words), false), fill(None, true));
+                let at = |i: usize, j: usize, k: usize| (k * ys.len() + j) * xs.len() + i;
+                for (k, z) in zs.iter().enumerate() {
+                    for (j, y) in ys.iter().enumerate() {
+                        for (i, x) in xs.iter().enumerate() {
+                            let (n, v) = (at(i, j, k), q.value([*x, *y, *z]) as f32);
+                            assert_eq!(all[n], v);
+                            assert!(words[k * ys.len() + j] >> i & 1 == 0 || some[n] == v);
+                            let around = |n: usize, end: usize| n.saturating_sub(1)..(n + 2).min(end);
+                            let crossed = around(k, zs.len()).any(|k| {
+                                around(j, ys.len())
+                                    .any(|j| around(i, xs.len()).any(|i| (all[at(i, j, k)] < 0.0) != (v < 0.0)))
+                            });
+                            let far = near[n].abs() >= step as f32 && (near[n] < 0.0) == (v < 0.0);
+                            assert!(near[n] == v || far && !crossed, "{fillet:?} {step}: {} {v}", near[n]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
