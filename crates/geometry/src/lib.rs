@@ -14,7 +14,7 @@
 //! - **Simplification**: [`simplify()`] removes triangles within a proven distance, without self-intersections.
 //! - **Smoothing**: [`smooth()`] makes better triangles of slivers, the volume and sharp edges kept.
 //! - **Search**: [`Bvh`] is a bounding-volume hierarchy over anything with a box ([`Aabb`]); [`weld`] finds points
-//!   near each other; [`union_find`] joins sets.
+//!   near each other, [`spatial_order`] lets them follow each other; [`union_find`] joins sets.
 //! - **Symmetry**: [`symmetry`] has the 230 space groups by Hall symbol; [`math`] has vectors, matrices and intervals,
 //!   [`cubic_spline`] tricubic interpolation on grids.
 //! - **Pictures**: [`render`] draws meshes.
@@ -65,6 +65,7 @@ pub mod render;
 pub mod repair;
 pub mod simplify;
 pub mod smooth;
+pub mod spatial_order;
 pub mod surface_mesh;
 pub mod symmetry;
 pub mod tetmesh;

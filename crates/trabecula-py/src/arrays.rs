@@ -1,5 +1,6 @@
 //! Arrays of points in, arrays of numbers out.
 
+use geometry::spatial_order::spatial_order;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -26,11 +27,29 @@ pub fn points(p: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
 
 /// Values of a field at points.
 pub fn values<'py>(py: Python<'py>, field: &dyn Field, points: Vec<[f64; 3]>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    const BATCH: usize = 4096;
-    let out = run(py, None, None, |_| {
-        let mut out = vec![0.0; points.len()];
-        out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| field.values(p, o));
-        out
-    })?;
+    let out = run(py, None, None, |_| evaluated(&points, field.is_large(), |p, out| field.values(p, out)))?;
     Ok(out.into_pyarray(py))
+}
+
+/// What a function gives at points, by all threads; it gets them in an order in which neighbours follow each other if
+/// `in_order` is set.
+pub fn evaluated<T: Copy + Default + Send>(
+    points: &[[f64; 3]],
+    in_order: bool,
+    evaluate: impl Fn(&[[f64; 3]], &mut [T]) + Sync,
+) -> Vec<T> {
+    const BATCH: usize = 4096;
+    let mut out = vec![T::default(); points.len()];
+    if !in_order {
+        out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(o, p)| evaluate(p, o));
+        return out;
+    }
+    let order = spatial_order(points);
+    let mut found = out.clone();
+    found.par_chunks_mut(BATCH).zip(order.par_chunks(BATCH)).for_each(|(o, numbers)| {
+        let points: Vec<[f64; 3]> = numbers.iter().map(|n| points[*n as usize]).collect();
+        evaluate(&points, o);
+    });
+    order.iter().zip(found).for_each(|(n, v)| out[*n as usize] = v);
+    out
 }

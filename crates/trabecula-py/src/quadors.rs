@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use rayon::prelude::*;
 
-use crate::arrays::points;
+use crate::arrays::{evaluated, points};
 use crate::error;
 use crate::run::run;
 
@@ -77,8 +77,10 @@ impl Quadors {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let points = self::points(&points)?;
         let held: Vec<bool> = run(py, None, None, |_| {
-            let each = points.par_iter().with_min_len(256);
-            each.map(|p| self.quadors.contains(*p)).collect()
+            let contains = |p: &[[f64; 3]], out: &mut [bool]| {
+                out.iter_mut().zip(p).for_each(|(o, p)| *o = self.quadors.contains(*p));
+            };
+            evaluated(&points, self.quadors.is_large(), contains)
         })?;
         Ok(held.into_pyarray(py))
     }

@@ -193,6 +193,10 @@ impl Field for Solid {
         region.max(filled.fold(lattice.bound(b), |least, f| least.min(f.bound(b))))
     }
 
+    fn is_large(&self) -> bool {
+        self.field.as_ref().is_some_and(|f| f.is_large())
+    }
+
     // Rounding keeps order, so joining rounded values gives the rounded value.
     fn fill(&self, block: &Block, out: &mut [f32]) {
         self.region.fill(block, out);
