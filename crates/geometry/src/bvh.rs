@@ -2,7 +2,10 @@
 
 use core::ops::Range;
 
-use crate::math::{Aabb, Vec3, add};
+use crate::math::{Aabb, add};
+
+mod wide;
+pub use wide::WideBvh;
 
 /// How the items of a node are divided between its children.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,56 +114,6 @@ impl Bvh {
             }
         }
     }
-
-    /// Calls `visit` with the positions (in the tree's order) of the items of every leaf within a squared distance of `p`
-    /// (mm²), nearer children first. `limit` is that distance at first; `visit` gives what it is from then on.
-    #[inline]
-    pub fn nearest(&self, p: Vec3, mut limit: f64, mut visit: impl FnMut(Range<usize>) -> f64) {
-        let mut stack = [(0usize, 0.0f64); STACK];
-        let mut top = usize::from(!self.nodes.is_empty());
-        while top > 0 {
-            top -= 1;
-            let (mut i, near) = stack[top];
-            if near > limit {
-                continue;
-            }
-            loop {
-                let node = &self.nodes[i];
-                if let Some(items) = node.items() {
-                    limit = visit(items);
-                    break;
-                }
-                let [mut near, mut far] = node.children(i).map(|c| (c, square_distance(&self.nodes[c].bounds, p)));
-                if far.1 < near.1 {
-                    (near, far) = (far, near);
-                }
-                if far.1 <= limit {
-                    stack[top] = far;
-                    top += 1;
-                }
-                if near.1 > limit {
-                    break;
-                }
-                i = near.0;
-            }
-        }
-    }
-}
-
-/// The larger of two numbers that are not NaN: one instruction, unlike `f64::max`.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn square_distance(b: &Aabb, p: Vec3) -> f64 {
-    let mut square = 0.0;
-    for a in 0..3 {
-        let d = larger(larger(b.min[a] - p[a], p[a] - b.max[a]), 0.0);
-        square += d * d;
-    }
-    square
 }
 
 fn half_area(b: &Aabb) -> f64 {
@@ -319,6 +272,8 @@ mod tests {
             let mut sorted = tree.order().to_vec();
             sorted.sort_unstable();
             assert_eq!(sorted, items);
+            let in_order: Vec<Aabb> = tree.order().iter().map(|i| boxes[*i as usize]).collect();
+            let wide = WideBvh::new(&tree, &in_order);
             let mut seed = 8;
             for _ in 0..200 {
                 let p = [0; 3].map(|_| random(&mut seed));
@@ -329,10 +284,8 @@ mod tests {
                 found.sort_unstable();
                 assert!(found.iter().eq(items.iter().filter(touches)));
                 let mut best = f64::INFINITY;
-                tree.nearest(p, best, |range| {
-                    for i in &tree.order()[range] {
-                        best = best.min(boxes[*i as usize].distance(p).powi(2));
-                    }
+                wide.nearest(p, best, |i| {
+                    best = best.min(in_order[i].distance(p).powi(2));
                     best
                 });
                 let want = items.iter().map(|i| boxes[*i as usize].distance(p)).fold(f64::INFINITY, f64::min);

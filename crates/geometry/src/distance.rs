@@ -16,7 +16,7 @@ pub mod winding;
 
 use normals::Normals;
 use triangle::{Feature, Triangle};
-use triangle_bvh::{Nearest, TriangleBvh};
+use triangle_bvh::{Candidates, Nearest, TriangleBvh};
 use winding::Winding;
 
 /// A position and its signed distance, where none is known: no comparison with it holds.
@@ -95,6 +95,16 @@ impl MeshDistance {
     /// The nearest triangle; `seed` is one that may be near.
     pub fn nearest(&self, p: Vec3, seed: u32) -> Nearest {
         self.tree.nearest(p, seed)
+    }
+
+    /// Finds the triangles of which one is nearest to any point of the ball about `center`, whose nearest triangle is `hit`.
+    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, found: &mut Candidates) {
+        self.tree.candidates(center, hit, radius, found);
+    }
+
+    /// The nearest triangle to a point of the candidates' ball.
+    pub fn nearest_of(&self, candidates: &Candidates, p: Vec3) -> Nearest {
+        self.tree.nearest_of(candidates, p)
     }
 
     /// Signed distance (mm) of `p`, whose nearest triangle is `hit`; zero where rounding hides it, so that points of flat

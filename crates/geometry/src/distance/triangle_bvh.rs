@@ -1,8 +1,8 @@
 //! The nearest triangle to a point.
 
 use super::triangle::{Feature, Triangle};
-use crate::bvh::{Bvh, Node, Split};
-use crate::math::{Aabb, Vec3};
+use crate::bvh::{Bvh, Node, Split, WideBvh};
+use crate::math::{Aabb, Vec3, norm, sub};
 
 /// The nearest point of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -17,10 +17,19 @@ pub struct Nearest {
     pub feature: Feature,
 }
 
+/// The triangles of which one is nearest to any point of a ball.
+#[derive(Debug, Default)]
+pub struct Candidates {
+    center: Vec3,
+    /// Distances from the centre (mm), rising, and positions in the tree's order.
+    of: Vec<(f64, u32)>,
+}
+
 /// A bounding-volume hierarchy over triangles, which are reordered so that a leaf's lie together.
 #[derive(Debug)]
 pub struct TriangleBvh {
     bvh: Bvh,
+    wide: WideBvh,
     triangles: Vec<Triangle>,
     rounding: f64,
 }
@@ -32,8 +41,10 @@ impl TriangleBvh {
         let bvh = Bvh::new(&boxes, (0..triangles.len() as u32).collect(), Split::SurfaceArea);
         let all = bvh.nodes().first().map_or(Aabb { min: [0.0; 3], max: [0.0; 3] }, |n| n.bounds);
         let largest = all.min.iter().chain(&all.max).fold(0.0f64, |m, x| m.max(x.abs()));
-        let triangles = bvh.order().iter().map(|i| triangles[*i as usize]).collect();
-        TriangleBvh { bvh, triangles, rounding: 16.0 * f64::EPSILON * largest }
+        let triangles: Vec<Triangle> = bvh.order().iter().map(|i| triangles[*i as usize]).collect();
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::bounds).collect();
+        let wide = WideBvh::new(&bvh, &boxes);
+        TriangleBvh { bvh, wide, triangles, rounding: 16.0 * f64::EPSILON * largest }
     }
 
     /// The rounding that a distance to the mesh carries, mm.
@@ -61,26 +72,78 @@ impl TriangleBvh {
     pub fn nearest(&self, p: Vec3, seed: u32) -> Nearest {
         let (square, away, feature) = self.triangles[seed as usize].nearest(p);
         let mut best = Nearest { square, away, triangle: seed, feature };
-        // Boxes are searched while they may hold a tie, so that rounding cannot make the seed matter.
-        let reach = |square: f64| {
-            let largest = p.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-            let d = square.sqrt() * (1.0 + 1e-12) + self.rounding + 1e-14 * largest;
-            d * d
-        };
+        let reach = |square: f64| self.reach(p, square);
         let mut limit = reach(square);
-        self.bvh.nearest(p, limit, |items| {
-            for k in items {
-                let (square, away, feature) = self.triangles[k].nearest(p);
-                let k = k as u32;
-                if square < best.square || (square == best.square && k < best.triangle) {
-                    if square < best.square {
-                        limit = reach(square);
-                    }
-                    best = Nearest { square, away, triangle: k, feature };
+        self.wide.nearest(p, limit, |k| {
+            let (square, away, feature) = self.triangles[k].nearest(p);
+            let k = k as u32;
+            if square < best.square || (square == best.square && k < best.triangle) {
+                if square < best.square {
+                    limit = reach(square);
                 }
+                best = Nearest { square, away, triangle: k, feature };
             }
             limit
         });
         best
+    }
+
+    /// The squared distance to which boxes are searched if the nearest triangle yet is at a squared distance of `square`: they
+    /// may hold a tie, so that rounding cannot make the order of the search matter.
+    fn reach(&self, p: Vec3, square: f64) -> f64 {
+        let d = self.at_most(p, square.sqrt());
+        d * d
+    }
+
+    /// A computed distance d (mm) with what rounding may hide.
+    fn at_most(&self, p: Vec3, d: f64) -> f64 {
+        let largest = p.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        d * (1.0 + 1e-12) + self.rounding + 1e-14 * largest
+    }
+
+    /// Finds the candidates of the ball about `center`, whose nearest triangle is `hit`: those at most twice the radius farther off.
+    pub fn candidates(&self, center: Vec3, hit: &Nearest, radius: f64, found: &mut Candidates) {
+        found.center = center;
+        found.of.clear();
+        let most = self.at_most(center, hit.square.sqrt() + 2.0 * radius);
+        let limit = most * most;
+        self.wide.nearest(center, limit, |k| {
+            let square = self.triangles[k].nearest(center).0;
+            if square <= limit {
+                found.of.push((square.sqrt(), k as u32));
+            }
+            limit
+        });
+        found.of.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    }
+
+    /// As `nearest`, of a point in the ball of the candidates.
+    pub fn nearest_of(&self, candidates: &Candidates, p: Vec3) -> Nearest {
+        let off = norm(sub(p, candidates.center));
+        let mut best = Nearest { square: f64::INFINITY, away: [0.0; 3], triangle: u32::MAX, feature: Feature::Face };
+        let mut most = f64::INFINITY;
+        for &(d, k) in &candidates.of {
+            if d - off > most {
+                break;
+            }
+            let (square, away, feature) = self.triangles[k as usize].nearest(p);
+            if square < best.square || (square == best.square && k < best.triangle) {
+                best = Nearest { square, away, triangle: k, feature };
+                most = self.at_most(p, square.sqrt());
+            }
+        }
+        best
+    }
+}
+
+impl Candidates {
+    /// Their number.
+    pub fn len(&self) -> usize {
+        self.of.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.of.is_empty()
     }
 }
