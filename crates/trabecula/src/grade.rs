@@ -164,26 +164,11 @@ impl Grade {
 mod tests {
     use super::*;
     use geometry::fault::Fault;
-    use geometry::math::{norm, scale};
+    use crate::region::{Region, Sphere};
 
     /// Distance to the unit sphere.
-    struct Ball;
-    impl Field for Ball {
-        fn values(&self, points: &[Vec3], out: &mut [f64]) {
-            for (o, p) in out.iter_mut().zip(points) {
-                *o = norm(*p) - 1.0;
-            }
-        }
-        fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-            self.values(points, values);
-            for (g, p) in gradients.iter_mut().zip(points) {
-                *g = scale(*p, 1.0 / norm(*p));
-            }
-        }
-        fn bound(&self, b: &Aabb) -> Interval {
-            let far = (0..3).map(|a| b.min[a].abs().max(b.max[a].abs()).powi(2)).sum::<f64>().sqrt();
-            Interval::new(b.distance([0.0; 3]) - 1.0 - 1e-12, far - 1.0 + 1e-12)
-        }
+    fn ball() -> Region {
+        Arc::new(Sphere::new([0.0; 3], 1.0).unwrap())
     }
 
     fn grid() -> Samples {
@@ -200,14 +185,14 @@ mod tests {
             Grade::Constant(0.3),
             Linear::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
             Steps::new([0.5, -1.0, 2.0], vec![[-1.0, 0.2], [0.5, 0.9], [2.0, -0.4]]).unwrap().into(),
-            Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
+            Depth::new(ball(), vec![[0.0, 0.6], [0.4, 0.2], [0.8, 0.3]]).unwrap().into(),
             formula("0.3 + 0.1*sin(x/0.3) * y^2 - max(z, x)"),
             Radial::new([0.2, 0.1, 0.0], None, stops()).unwrap().into(),
             Radial::new([0.2, 0.1, 0.0], Some([0.6, 0.0, 0.8]), stops()).unwrap().into(),
             grid().into(),
             Remapped::new(grid(), Stops(vec![[2.0, 0.1], [7.0, 0.9], [10.0, 0.4]])).into(),
             Sigmoid::new(formula("x + y*z"), 0.2, 1.5).unwrap().into(),
-            region_step(Arc::new(Ball), 0.7).unwrap().into(),
+            region_step(ball(), 0.7).unwrap().into(),
             Polyline::new(chain(), false, None, None).unwrap().into(),
             Polyline::new(chain(), true, Some([0.1, -0.2, 1.0]), None).unwrap().into(),
             Rbf::new(chain(), &values, Some(1.1), None).unwrap().into(),
@@ -224,7 +209,7 @@ mod tests {
 
     #[test]
     fn depth_counts_from_the_surface_inwards() {
-        let g = Depth::new(Arc::new(Ball), vec![[0.0, 0.6], [0.5, 0.2]]).unwrap();
+        let g = Depth::new(ball(), vec![[0.0, 0.6], [0.5, 0.2]]).unwrap();
         let mut v = [0.0; 4];
         g.values(&[[2.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.75, 0.0], [0.0, 0.0, 0.1]], &mut v);
         for (v, want) in v.iter().zip([0.6, 0.6, 0.4, 0.2]) {
@@ -291,10 +276,10 @@ mod tests {
         assert_eq!(at(Linear::new(z, vec![[0.0, 1.0], [0.0, 2.0]])).as_deref(), Some("stops[1]"));
         assert_eq!(at(Linear::new(z, vec![[0.0, f64::NAN]])).as_deref(), Some("stops[0]"));
         let late = vec![[0.0, 1.0], [f64::INFINITY, 2.0]];
-        assert_eq!(at(Depth::new(Arc::new(Ball), late)).as_deref(), Some("stops[1]"));
+        assert_eq!(at(Depth::new(ball(), late)).as_deref(), Some("stops[1]"));
         assert_eq!(at(Radial::new([0.0; 3], Some([0.0; 3]), one())).as_deref(), Some("axis"));
         assert_eq!(at(Radial::new([f64::INFINITY; 3], None, one())).as_deref(), Some("center[0]"));
         assert_eq!(at(Sigmoid::new(Grade::Constant(0.0), 0.0, 0.0)).as_deref(), Some("width"));
-        assert_eq!(at(region_step(Arc::new(Ball), -1.0)).as_deref(), Some("width"));
+        assert_eq!(at(region_step(ball(), -1.0)).as_deref(), Some("width"));
     }
 }

@@ -15,6 +15,7 @@ mod capsule;
 mod csg;
 mod cuboid;
 mod cylinder;
+mod distance_table;
 mod file;
 mod halfspace;
 mod mesh;
@@ -27,6 +28,7 @@ mod tetrahedron;
 pub use csg::{Difference, Intersection, Union};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use distance_table::DistanceTable;
 pub use file::MeshFile;
 pub use halfspace::{HalfSpace, HalfSpaceKind};
 pub use mesh::MeshRegion;
@@ -158,6 +160,11 @@ pub trait Shape: Field {
     /// Adds to `out` the implicit surfaces of the shape offset outwards by `by` (mm; inwards if negative) and returns how
     /// they are combined. Surfaces are numbered by their index in `out`.
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree;
+
+    /// Whether distances are searched for, rather than computed in closed form, so that a table of them pays.
+    fn is_searched(&self) -> bool {
+        false
+    }
 
     /// The mesh that the shape is, if it is one: meshes that are combined make one.
     fn as_mesh(&self) -> Option<&MeshRegion> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{BuildGrade, Grade, Quantity, Stops, Varying};
 use crate::field::Field;
 use crate::kind::{DesignError, Kind};
+use crate::region::{DistanceTable, Region};
 use geometry::fault::Fault;
 use geometry::math::{Aabb, Interval, Vec3, scale};
 
@@ -19,39 +20,51 @@ pub struct DepthKind {
 
 impl BuildGrade for DepthKind {
     fn build(&self, of: &Quantity) -> Result<Grade, DesignError> {
-        Ok(Depth { region: of.environment.region.clone(), stops: of.stops(self.stops.clone()) }.into())
+        Ok(Depth::of(of.environment.region.clone(), of.stops(self.stops.clone())).into())
     }
 }
 
 /// Piecewise linear in the depth (mm) below the surface of a region, constant beyond the first and last stop.
+///
+/// Depth below the surface of a mesh is interpolated in a [`DistanceTable`].
 #[derive(Clone)]
 pub struct Depth {
-    region: Arc<dyn Field>,
+    /// Signed distance, mm.
+    distance: Arc<dyn Field>,
     stops: Stops,
 }
 
 impl Depth {
-    /// Below the surface of `region`, a signed distance (mm, negative inside); stops `[depth, value]`.
+    /// Below the surface of `region`; stops `[depth, value]`.
     ///
     /// # Errors
     /// Stops that are none, not finite or not rising in depth.
-    pub fn new(region: Arc<dyn Field>, stops: Vec<[f64; 2]>) -> Result<Depth, Fault> {
+    pub fn new(region: Region, stops: Vec<[f64; 2]>) -> Result<Depth, Fault> {
         let kind = DepthKind { stops: Stops(stops) };
         kind.valid()?;
-        Ok(Depth { region, stops: kind.stops })
+        Ok(Depth::of(region, kind.stops))
+    }
+
+    /// The same of checked stops.
+    fn of(region: Region, stops: Stops) -> Depth {
+        let distance: Arc<dyn Field> = match region.is_searched() && region.bounds().is_finite() {
+            true => Arc::new(DistanceTable::new(region, -stops.ends())),
+            false => region,
+        };
+        Depth { distance, stops }
     }
 }
 
 impl Field for Depth {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        self.region.values(points, out);
+        self.distance.values(points, out);
         for o in out.iter_mut() {
             *o = self.stops.at(-*o).0;
         }
     }
 
     fn gradients(&self, points: &[Vec3], values: &mut [f64], gradients: &mut [Vec3]) {
-        self.region.gradients(points, values, gradients);
+        self.distance.gradients(points, values, gradients);
         for (v, g) in values.iter_mut().zip(gradients) {
             let (value, slope) = self.stops.at(-*v);
             (*v, *g) = (value, scale(*g, -slope));
@@ -59,7 +72,7 @@ impl Field for Depth {
     }
 
     fn bound(&self, b: &Aabb) -> Interval {
-        self.stops.range(-self.region.bound(b))
+        self.stops.range(-self.distance.bound(b))
     }
 }
 

@@ -1,12 +1,9 @@
 //! A smooth step across the surface of a region.
 
-use std::sync::Arc;
-
 use super::{BuildGrade, Depth, Grade, Quantity, Sigmoid};
 use crate::environment;
-use crate::field::Field;
 use crate::kind::{DesignError, Kind};
-use crate::region::{Notes, RegionKind};
+use crate::region::{Notes, Region, RegionKind};
 use geometry::fault::{Fault, number};
 
 /// 1 inside a region and 0 outside, with a smooth step at its surface.
@@ -28,12 +25,11 @@ impl BuildGrade for WithinKind {
     }
 }
 
-/// The smooth step from 0 outside a region to 1 inside, one half on its surface, over `width` (mm) across it. `region` is a
-/// signed distance (mm, negative inside).
+/// The smooth step from 0 outside a region to 1 inside, one half on its surface, over `width` (mm) across it.
 ///
 /// # Errors
 /// A width that is not a finite length greater than 0.
-pub fn region_step(region: Arc<dyn Field>, width: f64) -> Result<Sigmoid, Fault> {
+pub fn region_step(region: Region, width: f64) -> Result<Sigmoid, Fault> {
     if !(width > 0.0 && width.is_finite()) {
         let message = format!("width is {} mm; it must be a finite length greater than 0", number(width));
         return Err(Fault::new("width", message));

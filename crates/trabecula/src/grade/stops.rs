@@ -76,6 +76,11 @@ impl Stops {
         }
     }
 
+    /// The first and the last position: beyond them a function is constant.
+    pub fn ends(&self) -> Interval {
+        Interval::new(self.0[0][0], self.0[self.0.len() - 1][0])
+    }
+
     /// An interval that contains every value of the piecewise linear function on an interval: exact but for rounding.
     pub fn range(&self, s: Interval) -> Interval {
         if s.lo.is_nan() || s.hi.is_nan() {

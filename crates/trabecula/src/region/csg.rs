@@ -237,6 +237,10 @@ macro_rules! joined {
                 }
             }
 
+            fn is_searched(&self) -> bool {
+                self.regions().iter().any(|r| r.is_searched())
+            }
+
             fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
                 let meshes = self.meshes();
                 let regions = self.regions().iter().enumerate().filter_map(|(i, r)| match meshes {

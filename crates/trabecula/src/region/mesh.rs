@@ -7,6 +7,7 @@ use crate::csg_tree::CsgTree;
 use crate::field::{Block, Field};
 use crate::implicit::Surface;
 use geometry::distance::triangle::Triangle;
+use geometry::distance::triangle_bvh::Candidates;
 use geometry::distance::{MeshDistance, UNKNOWN};
 use geometry::fault::Fault;
 use geometry::feature_edges::{Creases, creases};
@@ -126,7 +127,7 @@ impl Shape for MeshRegion {
         let widest = |axis: &[f64]| axis.windows(2).fold(0.0f64, |m, w| m.max(w[1] - w[0]));
         let cell = norm(block.axes.map(widest));
         let shape = block.shape();
-        let mut fill = Fill { region: self, block, level, cell, out };
+        let mut fill = Fill { region: self, block, level, cell, out, candidates: Candidates::default() };
         fill.part([0; 3], shape, 0, UNKNOWN);
     }
 
@@ -139,6 +140,10 @@ impl Shape for MeshRegion {
                 CsgTree::Leaf(out.len() - 1)
             }
         }
+    }
+
+    fn is_searched(&self) -> bool {
+        true
     }
 
     fn as_mesh(&self) -> Option<&MeshRegion> {
@@ -161,7 +166,12 @@ struct Fill<'a> {
     /// Diagonal of the largest grid cell.
     cell: f64,
     out: &'a mut [f32],
+    /// A buffer.
+    candidates: Candidates,
 }
+
+/// Candidates beyond which each node is searched for by itself.
+const MOST_CANDIDATES: usize = 32;
 
 impl Fill<'_> {
     /// Fills the nodes from `lo` up to `hi`, `seed` being a triangle that may be near and `known` a distance.
@@ -179,8 +189,13 @@ impl Fill<'_> {
         let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
         if (0..3).map(|a| hi[a] - lo[a]).product::<usize>() <= 8 || hi[longest] - lo[longest] < 2 {
             let (mut seed, mut known) = (hit.triangle, known);
+            self.region.distance.candidates(center, &hit, norm(size) / 2.0 * (1.0 + 1e-9), &mut self.candidates);
+            let few = self.candidates.len() <= MOST_CANDIDATES;
             self.each(lo, hi, |fill, p| {
-                let hit = fill.region.distance.nearest(p, seed);
+                let hit = match few {
+                    true => fill.region.distance.nearest_of(&fill.candidates, p),
+                    false => fill.region.distance.nearest(p, seed),
+                };
                 seed = hit.triangle;
                 known = (p, fill.region.distance.signed(&hit, p, known));
                 known.1 - fill.level

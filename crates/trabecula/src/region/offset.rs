@@ -90,6 +90,10 @@ impl Shape for Offset {
         out.iter_mut().filter(|v| v.abs() <= snap).for_each(|v| *v = 0.0);
     }
 
+    fn is_searched(&self) -> bool {
+        self.of.is_searched()
+    }
+
     fn surfaces(self: Arc<Self>, by: f64, out: &mut Vec<Surface>) -> CsgTree {
         self.of.clone().surfaces(self.by + by, out)
     }
