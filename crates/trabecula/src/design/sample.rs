@@ -39,21 +39,44 @@ pub(super) fn nodes(region: &Region) -> Vec<Vec3> {
     grid.filter(|p| region.value(*p) <= reach).collect()
 }
 
+/// Those of the points `from` to `from + tries` of the sequence that are inside.
 fn filter(region: &Region, bounds: &Aabb, from: usize, tries: usize) -> Vec<Vec3> {
-    const BATCH: usize = 4096;
+    const BATCH: usize = 1 << 16;
     let mut kept = Vec::new();
-    let mut points = Vec::with_capacity(BATCH);
-    let mut values = vec![0.0; BATCH];
-    let mut i = from;
-    while i < from + tries {
-        let n = BATCH.min(from + tries - i);
-        points.clear();
-        points.extend((i..i + n).map(|i| halton(bounds, i)));
-        region.values(&points, &mut values[..n]);
-        kept.extend(points.iter().zip(&values).filter(|(_, v)| **v < 0.0).map(|(p, _)| *p));
-        i += n;
+    for first in (from..from + tries).step_by(BATCH) {
+        let points: Vec<Vec3> = (first..(first + BATCH).min(from + tries)).map(|i| halton(bounds, i)).collect();
+        let mut order: Vec<u32> = (0..points.len() as u32).collect();
+        let mut inside = vec![false; points.len()];
+        mark_inside(region, &points, &mut order, &mut inside);
+        kept.extend(points.iter().zip(inside).filter(|(_, inside)| *inside).map(|(p, _)| *p));
     }
     kept
+}
+
+/// Marks those of the points `of` that are inside. Most are by the bound over a box: distances are evaluated near the surface
+/// alone, and for points that follow each other closely.
+fn mark_inside(region: &Region, points: &[Vec3], of: &mut [u32], inside: &mut [bool]) {
+    const FEW: usize = 8;
+    let at = |i: &u32| points[*i as usize];
+    if of.len() <= FEW {
+        let mut values = [0.0; FEW];
+        let here: Vec<Vec3> = of.iter().map(at).collect();
+        region.values(&here, &mut values[..of.len()]);
+        of.iter().zip(values).for_each(|(i, v)| inside[*i as usize] = v < 0.0);
+        return;
+    }
+    let bounds = of.iter().fold(Aabb::EMPTY, |b, i| b.with(at(i)));
+    let range = region.bound(&bounds);
+    if range.hi < 0.0 || range.lo >= 0.0 {
+        return of.iter().for_each(|i| inside[*i as usize] = range.hi < 0.0);
+    }
+    let size = bounds.size();
+    let longest = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
+    let middle = of.len() / 2;
+    of.select_nth_unstable_by(middle, |a, b| at(a)[longest].total_cmp(&at(b)[longest]));
+    let (low, high) = of.split_at_mut(middle);
+    mark_inside(region, points, low, inside);
+    mark_inside(region, points, high, inside);
 }
 
 /// Point `i` of Halton's sequence in the box.
