@@ -206,7 +206,7 @@ impl Starts {
             })
             .collect();
         // Feet about a node agree if those of the nodes next to it are where its gradient has them, to four times what is
-        // good enough: errors are of second order, and those nodes are twice as far as the positions that start from it.
+        // good enough: errors are of second order, and those nodes are at twice the distance of the positions that start from it.
         let agrees = |i: usize, n: &Node| {
             let (at, p) = node(i);
             let piece = line.spans[n.place.0].long.max(line.spans[line.before()].long) / FINE as f64;
