@@ -42,7 +42,7 @@ mod windows;
 use std::sync::Arc;
 
 use crate::field::{Block, Field};
-use crate::implicit::Implicit;
+use crate::implicit::{Implicit, Pair};
 use geometry::math::{Aabb, Interval, Vec3};
 
 pub use constituent::Constituent;
@@ -112,21 +112,24 @@ impl Field for Blend {
     }
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
-        self.fill_block(block, None, out);
+        self.fill_block([self.side], block, None, [out]);
     }
 
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
-        self.fill_block(block, Some(wanted), out);
+        self.fill_block([self.side], block, Some(wanted), [out]);
     }
 }
 
 impl Implicit for Blend {
     fn parts(&self) -> Vec<Arc<dyn Implicit>> {
-        if !self.two_sided || self.side.is_some() {
+        if !self.is_whole_sheet() {
             return Vec::new();
         }
-        let side = |side| Arc::new(Blend { side: Some(side), ..self.clone() }) as Arc<dyn Implicit>;
-        vec![side(Side::High), side(Side::Low)]
+        SIDES.map(|side| Arc::new(Blend { side, ..self.clone() }) as Arc<dyn Implicit>).into()
+    }
+
+    fn pair(&self) -> Option<Arc<dyn Pair>> {
+        self.is_whole_sheet().then(|| Arc::new(self.clone()) as Arc<dyn Pair>)
     }
 
     fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
@@ -135,5 +138,20 @@ impl Implicit for Blend {
 
     fn lipschitz(&self) -> f64 {
         self.lipschitz
+    }
+}
+
+/// The sides in the order of the parts.
+const SIDES: [Option<Side>; 2] = [Some(Side::High), Some(Side::Low)];
+
+impl Pair for Blend {
+    fn fill_both(&self, block: &Block, wanted: &[u64], out: [&mut [f32]; 2]) {
+        self.fill_block(SIDES, block, Some(wanted), out);
+    }
+}
+
+impl Blend {
+    fn is_whole_sheet(&self) -> bool {
+        self.two_sided && self.side.is_none()
     }
 }

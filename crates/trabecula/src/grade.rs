@@ -163,8 +163,8 @@ impl Grade {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use geometry::fault::Fault;
     use crate::region::{Region, Sphere};
+    use geometry::fault::Fault;
 
     /// Distance to the unit sphere.
     fn ball() -> Region {

@@ -25,6 +25,11 @@ pub trait Implicit: Field {
         Vec::new()
     }
 
+    /// The two parts, where they are evaluated faster together.
+    fn pair(&self) -> Option<Arc<dyn Pair>> {
+        None
+    }
+
     /// Of a sheet, the functions of its two faces: negative in the wall, the first positive on the upper side of the
     /// mid-surface, the second on the lower one. `None` if there is no mid-surface.
     fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
@@ -32,11 +37,19 @@ pub trait Implicit: Field {
     }
 }
 
+/// The two parts of a field that have all but their last steps in common.
+pub trait Pair: Send + Sync {
+    /// Fills each of `out` (x fastest) as `fill_where` of that part does.
+    fn fill_both(&self, block: &Block, wanted: &[u64], out: [&mut [f32]; 2]);
+}
+
 /// An implicit surface: the zero set of a smooth function that is negative towards the solid.
 #[derive(Clone)]
 pub struct Surface {
     /// The function.
     pub field: Arc<dyn Field>,
+    /// Set if it is one of a pair, both of which have it.
+    pub pair: Option<Arc<dyn Pair>>,
     /// A Lipschitz bound of the function, per mm.
     pub lipschitz: f64,
     /// Set if the zero set is a plane normal to a coordinate axis.
@@ -69,6 +82,7 @@ impl Surface {
             lipschitz: field.lipschitz(),
             has_creases: field.has_creases(),
             field,
+            pair: None,
             plane: None,
             cut: false,
             creases: Arc::default(),
@@ -80,6 +94,7 @@ impl Surface {
     pub fn distance(field: Arc<dyn Field>) -> Surface {
         Surface {
             field,
+            pair: None,
             lipschitz: 1.0,
             plane: None,
             cut: true,
@@ -92,13 +107,13 @@ impl Surface {
     /// The same surface with the solid on its other side.
     pub fn complement(self) -> Surface {
         let plane = self.plane.map(|p| Plane { below: !p.below, ..p });
-        Surface { field: Arc::new(Negated(self.field)), plane, ..self }
+        Surface { field: Arc::new(Negated(self.field)), pair: None, plane, ..self }
     }
 
     /// The surface where the function is `by`: the solid grows by that distance (mm) if the function is a distance.
     pub fn offset(self, by: f64) -> Surface {
         let plane = self.plane.map(|p| Plane { at: p.at + if p.below { by } else { -by }, ..p });
-        Surface { field: Arc::new(Shifted(self.field, by)), plane, ..self }
+        Surface { field: Arc::new(Shifted(self.field, by)), pair: None, plane, ..self }
     }
 }
 

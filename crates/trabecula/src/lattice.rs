@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::cell::{Cell, Cut, Distance, Part};
 use crate::field::{Block, Field};
 use crate::grade::Grade;
-use crate::implicit::Implicit;
+use crate::implicit::{Implicit, Pair};
 use crate::map::Map;
 use geometry::math::{
     Aabb, IDENTITY, Interval, Mat3, Vec3, add, apply, inverse, norm, product, scale, spectral_norm, sub, transpose,
@@ -324,17 +324,21 @@ impl Field for Lattice {
     }
 
     fn fill(&self, block: &Block, out: &mut [f32]) {
-        self.fill_rows(block, None, out);
+        self.fill_cuts(block, None, [(self.cut, out)]);
     }
 
     fn fill_where(&self, block: &Block, wanted: &[u64], out: &mut [f32]) {
-        self.fill_rows(block, Some(wanted), out);
+        self.fill_cuts(block, Some(wanted), [(self.cut, out)]);
     }
 }
 
 impl Implicit for Lattice {
     fn parts(&self) -> Vec<Arc<dyn Implicit>> {
         self.cut.sides(|cut| Lattice { cut, ..self.clone() })
+    }
+
+    fn pair(&self) -> Option<Arc<dyn Pair>> {
+        (self.cut.halves().is_some()).then(|| Arc::new(self.clone()) as Arc<dyn Pair>)
     }
 
     fn faces(&self) -> Option<[Arc<dyn Implicit>; 2]> {
@@ -349,28 +353,35 @@ impl Implicit for Lattice {
     }
 }
 
+impl Pair for Lattice {
+    fn fill_both(&self, block: &Block, wanted: &[u64], [a, b]: [&mut [f32]; 2]) {
+        let [lower, upper] = self.cut.halves().unwrap_or([self.cut; 2]);
+        self.fill_cuts(block, Some(wanted), [(lower, a), (upper, b)]);
+    }
+}
+
 impl Lattice {
-    /// Only a level that varies is evaluated node by node, and only at the nodes in `wanted`.
-    fn fill_rows(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
-        let mut cores = Rows::new(self, block);
+    /// Fills the values of cuts. Only a level that varies is evaluated node by node, and only at the nodes in `wanted`.
+    fn fill_cuts<const N: usize>(&self, block: &Block, wanted: Option<&[u64]>, mut out: [(Cut, &mut [f32]); N]) {
+        let mut rows = Rows::new(self, block);
         let [xs, ys, zs] = block.axes;
+        let mut core = vec![0f32; xs.len()];
         let mut isos = vec![self.uniform.unwrap_or(0.0) as f32; xs.len()];
         let mut points: Vec<Vec3> = Vec::new();
         let mut found: Vec<f64> = Vec::new();
-        let (sign, of_level, folded) = self.cut.signs();
-        let (sign, of_level) = (sign as f32, of_level as f32);
-        for (n, row) in out.chunks_exact_mut(xs.len()).enumerate() {
+        for n in 0..ys.len() * zs.len() {
             let (j, k) = (n % ys.len(), n / ys.len());
             let word = wanted.map_or(u64::MAX, |w| w[n]);
             let here = |i: usize| wanted.is_none() || word >> i & 1 == 1;
+            let row = n * xs.len()..(n + 1) * xs.len();
             if j == 0 {
-                cores.enter_layer(k);
+                rows.enter_layer(k);
             }
             if word == 0 {
-                row.fill(1.0);
+                out.iter_mut().for_each(|(_, out)| out[row.clone()].fill(1.0));
                 continue;
             }
-            cores.fill(j, k, word, row);
+            rows.fill(j, k, word, &mut core);
             if self.uniform.is_none() {
                 points.clear();
                 points.extend((0..xs.len()).filter(|&i| here(i)).map(|i| [xs[i], ys[j], zs[k]]));
@@ -380,12 +391,7 @@ impl Lattice {
                     isos[i] = *t as f32;
                 }
             }
-            let levels = row.iter_mut().zip(&isos);
-            if folded {
-                levels.for_each(|(f, t)| *f = sign * f.abs() + of_level * t);
-            } else {
-                levels.for_each(|(f, t)| *f = sign * *f + of_level * t);
-            }
+            out.iter_mut().for_each(|(cut, out)| cut.fill(&core, &isos, &mut out[row.clone()]));
         }
     }
 }

@@ -117,6 +117,7 @@ fn thickened(surface: Surface, thickness: &Grade, least: f64, bounds: &Aabb) -> 
     Surface {
         lipschitz: surface.lipschitz + lipschitz(thickness, bounds),
         plane: None,
+        pair: None,
         field: Arc::new(Thickened { surface: surface.field, thickness: thickness.clone(), least }),
         ..surface
     }

@@ -92,6 +92,7 @@ impl Solid {
                            sheets. Give the lattices part = \"sheet\", or leave the parts out";
             return Err(Fault::new("parts", message));
         };
+        let pair = self.field.as_ref().and_then(|f| f.pair());
         let CsgSolid { mut surfaces, tree: region } = self.boundary();
         let mut filled = Vec::new();
         for body in &self.filled {
@@ -99,7 +100,7 @@ impl Solid {
             surfaces.extend(body.surfaces.iter().cloned().map(|f| Surface { cut: false, ..f }));
         }
         let [upper, lower] = [surfaces.len(), surfaces.len() + 1];
-        surfaces.extend(faces.map(Surface::smooth));
+        surfaces.extend(faces.map(|f| Surface { pair: pair.clone(), ..Surface::smooth(f) }));
         let sheet = CsgTree::Intersection(vec![CsgTree::Leaf(upper), CsgTree::Leaf(lower)]);
         let free = CsgTree::Union(filled.clone()).inverse();
         filled.push(sheet);
@@ -123,10 +124,10 @@ impl Solid {
             if parts.is_empty() {
                 parts.push(field.clone());
             }
-            let mut lattice = Vec::new();
+            let (pair, mut lattice) = (field.pair(), Vec::new());
             for part in parts {
                 lattice.push(CsgTree::Leaf(surfaces.len()));
-                surfaces.push(Surface::smooth(part));
+                surfaces.push(Surface { pair: pair.clone(), ..Surface::smooth(part) });
             }
             if any.is_empty() {
                 all.extend(lattice);

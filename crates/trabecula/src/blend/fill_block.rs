@@ -6,7 +6,7 @@
 
 use super::grid_row::GridRow;
 use super::mixed_rows::MixedRows;
-use super::sum::Blend;
+use super::sum::{Blend, Side};
 use crate::field::Block;
 use geometry::math::{Aabb, Interval, Vec3};
 
@@ -50,8 +50,14 @@ impl Cubes {
 }
 
 impl Blend {
-    /// Fills the values at the nodes of a block; where `wanted` is given at those with a bit alone.
-    pub(super) fn fill_block(&self, block: &Block, wanted: Option<&[u64]>, out: &mut [f32]) {
+    /// Fills the values on `sides` at the nodes of a block; where `wanted` is given at those with a bit alone.
+    pub(super) fn fill_block<const S: usize>(
+        &self,
+        sides: [Option<Side>; S],
+        block: &Block,
+        wanted: Option<&[u64]>,
+        mut out: [&mut [f32]; S],
+    ) {
         let cubes = Cubes::new(self, block);
         let all = cubes.present.iter().fold(0, |m, c| m | c);
         let [xs, ys, zs] = block.axes;
@@ -65,9 +71,9 @@ impl Blend {
             rows.iter_mut().flatten().for_each(|r| r.enter_layer(k));
             for j in 0..ys.len() {
                 let word = wanted.map_or(u64::MAX, |w| w[k * ys.len() + j]);
-                let row = &mut out[(k * ys.len() + j) * xs.len()..][..xs.len()];
+                let mut on = out.each_mut().map(|out| &mut out[(k * ys.len() + j) * xs.len()..][..xs.len()]);
                 if word == 0 {
-                    row.fill(1.0);
+                    on.iter_mut().for_each(|row| row.fill(1.0));
                     continue;
                 }
                 let here = |i: &usize| wanted.is_none() || word >> i & 1 == 1;
@@ -86,8 +92,8 @@ impl Blend {
                     nodes.clear();
                     nodes.extend((from..to.min(xs.len())).filter(here));
                     match &mut mixed {
-                        Some(mixed) if several(run[0]) => mixed.fill(self, &nodes, &line, row),
-                        _ => alone.fill(self, run[0].trailing_zeros() as usize, &nodes, &line, row),
+                        Some(mixed) if several(run[0]) => mixed.fill((self, sides), &nodes, &line, &mut on),
+                        _ => alone.fill((self, sides), run[0].trailing_zeros() as usize, &nodes, &line, &mut on),
                     }
                     from = to;
                 }
@@ -109,7 +115,14 @@ struct Alone {
 }
 
 impl Alone {
-    fn fill(&mut self, blend: &Blend, s: usize, nodes: &[usize], line: &GridRow, row: &mut [f32]) {
+    fn fill<const S: usize>(
+        &mut self,
+        (blend, sides): (&Blend, [Option<Side>; S]),
+        s: usize,
+        nodes: &[usize],
+        line: &GridRow,
+        on: &mut [&mut [f32]; S],
+    ) {
         let summand = &blend.summands[s];
         self.high.resize(nodes.len(), 0.0);
         match summand.uniform_upper_end() {
@@ -121,7 +134,9 @@ impl Alone {
             }
         }
         for (i, high) in nodes.iter().zip(&self.high) {
-            row[*i] = blend.alone(s, line.value(s, *i), *high) as f32;
+            for (row, side) in on.iter_mut().zip(sides) {
+                row[*i] = blend.alone(side, s, line.value(s, *i), *high) as f32;
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use super::ends::HIGH;
 use super::grid_row::GridRow;
 use super::row_cache::RowCache;
 use super::share_grid::Simplex;
-use super::sum::Blend;
+use super::sum::{Blend, Side};
 use super::summand::Summand;
 use geometry::math::Vec3;
 
@@ -45,18 +45,30 @@ impl MixedRows {
         }
     }
 
-    /// Fills the values at some nodes of a row.
-    pub fn fill(&mut self, blend: &Blend, nodes: &[usize], line: &GridRow, row: &mut [f32]) {
+    /// Fills the values on sides at some nodes of a row.
+    pub fn fill<const S: usize>(
+        &mut self,
+        of: (&Blend, [Option<Side>; S]),
+        nodes: &[usize],
+        line: &GridRow,
+        on: &mut [&mut [f32]; S],
+    ) {
         // One function, compiled for the numbers of lattices that are frequent.
-        match blend.summands.len() {
-            2 => self.fill_of::<2>(blend, nodes, line, row),
-            3 => self.fill_of::<3>(blend, nodes, line, row),
-            _ => self.fill_of::<0>(blend, nodes, line, row),
+        match of.0.summands.len() {
+            2 => self.fill_of::<2, S>(of, nodes, line, on),
+            3 => self.fill_of::<3, S>(of, nodes, line, on),
+            _ => self.fill_of::<0, S>(of, nodes, line, on),
         }
     }
 
     /// The same for N lattices, or for any number if N is 0.
-    fn fill_of<const N: usize>(&mut self, blend: &Blend, nodes: &[usize], line: &GridRow, row: &mut [f32]) {
+    fn fill_of<const N: usize, const S: usize>(
+        &mut self,
+        (blend, sides): (&Blend, [Option<Side>; S]),
+        nodes: &[usize],
+        line: &GridRow,
+        on: &mut [&mut [f32]; S],
+    ) {
         let MixedRows { shares, ends, offsets } = self;
         let n = if N > 0 { N } else { blend.summands.len() };
         let summands = &blend.summands[..n];
@@ -69,17 +81,19 @@ impl MixedRows {
         if let (Some(levels), Some(offsets)) = (&blend.levels, &mut *offsets) {
             offsets.move_to(levels, line.at);
         }
-        let (ends, wanted) = (&ends[..n], blend.ends());
+        let ends = &ends[..n];
         for &i in nodes {
             let here = &shares.at(i)[..3 * n];
             let (w, simplex, coordinates) = (&here[..n], &here[n..2 * n], &here[2 * n..]);
             if let Some(s) = w.iter().position(|w| *w == 1.0) {
-                row[i] = blend.alone(s, line.value(s, i), ends[s].at(i)[0]) as f32;
+                for (row, side) in on.iter_mut().zip(sides) {
+                    row[i] = blend.alone(side, s, line.value(s, i), ends[s].at(i)[0]) as f32;
+                }
                 continue;
             }
             let present = || w.iter().enumerate().filter(|(_, w)| **w > 0.0);
             let f: f64 = present().map(|(s, w)| w * line.value(s, i)).sum();
-            let value = |end: &usize| {
+            let mut value = |end: &usize| {
                 let end = *end;
                 let of = |s: usize| summands[s].end(end, ends[s].at(i)[0], false);
                 let mut level: f64 = present().map(|(s, w)| w * of(s)).sum();
@@ -95,7 +109,9 @@ impl MixedRows {
             };
             // Faster than `max`: neither is NaN.
             let greater = |a: f64, b: f64| if b > a { b } else { a };
-            row[i] = wanted.iter().map(value).reduce(greater).unwrap_or(-1.0) as f32;
+            for (row, side) in on.iter_mut().zip(sides) {
+                row[i] = blend.ends_on(side).iter().map(&mut value).reduce(greater).unwrap_or(-1.0) as f32;
+            }
         }
     }
 }

@@ -142,7 +142,12 @@ impl Blend {
 
     /// The ends (`LOW`, `HIGH`) whose inequalities this field has.
     pub(super) fn ends(&self) -> &'static [usize] {
-        match self.side {
+        self.ends_on(self.side)
+    }
+
+    /// The same of a side.
+    pub(super) fn ends_on(&self, side: Option<Side>) -> &'static [usize] {
+        match side {
             Some(Side::High) => &[HIGH],
             Some(Side::Low) => &[LOW],
             None if self.two_sided => &[HIGH, LOW],
@@ -169,8 +174,14 @@ impl Blend {
     }
 
     /// The value where F, LO and HI are these.
-    pub(super) fn value_of(&self, [f, lo, hi]: [f64; 3]) -> f64 {
-        match self.side {
+    pub(super) fn value_of(&self, of: [f64; 3]) -> f64 {
+        self.value_on(self.side, of)
+    }
+
+    /// The same on a side.
+    #[inline]
+    fn value_on(&self, side: Option<Side>, [f, lo, hi]: [f64; 3]) -> f64 {
+        match side {
             Some(Side::High) => f - hi,
             Some(Side::Low) => lo - f,
             None if self.two_sided => (f - hi).max(lo - f),
@@ -178,10 +189,10 @@ impl Blend {
         }
     }
 
-    /// The value where summand `s` is alone, with value `g` and upper end `high`.
+    /// The value on a side where summand `s` is alone, with value `g` and upper end `high`.
     #[inline]
-    pub(super) fn alone(&self, s: usize, g: f64, high: f64) -> f64 {
-        self.value_of([g, self.summands[s].lower_end_alone(high), high])
+    pub(super) fn alone(&self, side: Option<Side>, s: usize, g: f64, high: f64) -> f64 {
+        self.value_on(side, [g, self.summands[s].lower_end_alone(high), high])
     }
 }
 

@@ -52,16 +52,27 @@ impl Cut {
         }
     }
 
+    /// Fills the values where f and t are these.
+    pub fn fill(self, f: &[f32], t: &[f32], out: &mut [f32]) {
+        let (s, c, folded) = self.signs();
+        let (s, c) = (s as f32, c as f32);
+        let all = out.iter_mut().zip(f.iter().zip(t));
+        if folded {
+            all.for_each(|(o, (f, t))| *o = s * f.abs() + c * t);
+        } else {
+            all.for_each(|(o, (f, t))| *o = s * f + c * t);
+        }
+    }
+
+    /// The two sides of a whole sheet.
+    pub fn halves(self) -> Option<[Cut; 2]> {
+        let whole = self.part == Part::Sheet && self.side.is_none();
+        whole.then(|| [Part::Lower, Part::Upper].map(|side| Cut { side: Some(side), ..self }))
+    }
+
     /// The two sides of a sheet, each as the field that `of` makes of it; none of anything smooth.
     pub fn sides<F: Implicit + 'static>(self, of: impl Fn(Cut) -> F) -> Vec<Arc<dyn Implicit>> {
-        if self.part != Part::Sheet || self.side.is_some() {
-            return Vec::new();
-        }
-        let side = |part| {
-            let side = Some(part);
-            Arc::new(of(Cut { side, ..self })) as Arc<dyn Implicit>
-        };
-        vec![side(Part::Lower), side(Part::Upper)]
+        self.halves().map_or(Vec::new(), |both| both.map(|cut| Arc::new(of(cut)) as Arc<dyn Implicit>).into())
     }
 }
 

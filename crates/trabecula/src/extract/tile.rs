@@ -26,8 +26,10 @@ mod volume_balance;
 use std::cell::Cell;
 use std::collections::HashSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::field::Block;
+use crate::implicit::{Pair, Surface};
 use geometry::math::Vec3;
 
 use super::feature_cells::{FeatureCells, FeatureMesh};
@@ -302,14 +304,16 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
         s.samples.resize_with(count, Vec::new);
     }
     s.signs.negative.resize_with(count, Vec::new);
+    // Every sample is written, so nothing needs clearing.
+    s.samples[..count].iter_mut().for_each(|out| out.resize(block.len(), 0.0));
     let mut wanted = None;
-    for (i, &f) in local.live.iter().enumerate() {
-        let surface = &grid.surfaces[f];
-        let out = &mut s.samples[i];
-        // Every sample is written, so nothing needs clearing.
-        out.resize(block.len(), 0.0);
+    let mut live = local.live.iter().map(|f| &grid.surfaces[*f]).enumerate().peekable();
+    while let Some((i, surface)) = live.next() {
+        let is_other = |p: &Arc<dyn Pair>, next: &Surface| next.pair.as_ref().is_some_and(|n| Arc::ptr_eq(p, n));
+        let pair = surface.pair.as_ref().filter(|p| live.next_if(|(_, next)| is_other(p, next)).is_some());
+        let both = i..i + 1 + usize::from(pair.is_some());
         if surface.cut {
-            surface.field.fill(block, out);
+            surface.field.fill(block, &mut s.samples[i]);
         } else {
             let wanted = wanted.get_or_insert_with(|| {
                 let known = local.live.iter().filter(|f| grid.surfaces[**f].cut).count();
@@ -317,9 +321,14 @@ fn sample(s: &mut Scratch, grid: &Grid, local: &LocalSolid, block: &Block, nodes
                 s.edges.traced.wanted(nodes, &mut wanted);
                 wanted
             });
-            surface.field.fill_near(block, wanted, out);
+            match (pair, &mut s.samples[both.clone()]) {
+                (Some(pair), [a, b]) => pair.fill_both(block, wanted, [a, b]),
+                (_, out) => out.iter_mut().for_each(|out| surface.field.fill_near(block, wanted, out)),
+            }
         }
-        negative(&mut s.signs.negative[i], out, block.shape()[0], surface.cut);
+        for i in both {
+            negative(&mut s.signs.negative[i], &s.samples[i], block.shape()[0], surface.cut);
+        }
     }
 }
 

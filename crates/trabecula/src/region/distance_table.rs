@@ -119,7 +119,6 @@ impl DistanceTable {
     fn clamped(&self, d: f64) -> f64 {
         d.clamp(self.range.lo, self.range.hi)
     }
-
 }
 
 /// Signed distances, mm.
@@ -256,7 +255,9 @@ mod tests {
                 let h = 1e-6 * table.step;
                 let mut ends = [add(*p, [h, 0.0, 0.0]), sub(*p, [h, 0.0, 0.0])];
                 ends.sort_by(|a, b| b[0].total_cmp(&a[0]));
-                let same = ends.iter().all(|e| table.cell(*e).is_some_and(|c| c.first == table.cell(*p).map_or(0, |c| c.first)));
+                let same = ends
+                    .iter()
+                    .all(|e| table.cell(*e).is_some_and(|c| c.first == table.cell(*p).map_or(0, |c| c.first)));
                 if inside && same {
                     let mut v = [0.0; 2];
                     table.values(&ends, &mut v);
