@@ -31,8 +31,8 @@ pub struct DistanceTable {
     of: Region,
     /// Distances that are told apart: any other may stand for another one beyond the same end.
     range: Interval,
-    /// First node, mm.
-    origin: Vec3,
+    /// Those of the region. The first node is their lower corner.
+    bounds: Aabb,
     /// Edge of a cell, mm.
     step: f64,
     bricks: [usize; 3],
@@ -46,6 +46,9 @@ struct Brick {
     /// Whether each cell is interpolated.
     interpolated: [bool; CELLS * CELLS * CELLS],
 }
+
+/// The nodes of a cell outside the region's bounds, if distances beyond the surface are not told apart.
+static OUTSIDE: [[f64; 4]; node([1; 3]) + 1] = [[0.0; 4]; node([1; 3]) + 1];
 
 /// A point in its cell.
 struct InCell<'a> {
@@ -64,15 +67,18 @@ impl DistanceTable {
         let step = (size.iter().product::<f64>() / NODES).cbrt().max(longest / MOST);
         let bricks = size.map(|s| (s / (step * CELLS as f64)).ceil().max(1.0) as usize);
         let made = (0..bricks.iter().product()).map(|_| OnceLock::new()).collect();
-        DistanceTable { of, range, origin: bounds.min, step, bricks, made }
+        DistanceTable { of, range, bounds, step, bricks, made }
     }
 
     /// The cell of a point, if it is interpolated there.
     #[inline]
     fn cell(&self, p: Vec3) -> Option<InCell<'_>> {
+        if self.range.hi <= 0.0 && (0..3).any(|a| p[a] < self.bounds.min[a] || p[a] > self.bounds.max[a]) {
+            return Some(InCell { nodes: &OUTSIDE, first: 0, at: [0.0; 3] });
+        }
         let (mut brick, mut cell, mut at) = ([0; 3], [0; 3], [0.0; 3]);
         for a in 0..3 {
-            let u = (p[a] - self.origin[a]) / self.step;
+            let u = (p[a] - self.bounds.min[a]) / self.step;
             // Neither is NaN.
             if !(u >= 0.0 && u < (self.bricks[a] * CELLS) as f64) {
                 return None;
@@ -87,7 +93,7 @@ impl DistanceTable {
     }
 
     fn brick(&self, brick: [usize; 3]) -> Brick {
-        let coordinate = |a: usize, u: f64| self.origin[a] + (brick[a] as f64 * CELLS as f64 + u) * self.step;
+        let coordinate = |a: usize, u: f64| self.bounds.min[a] + (brick[a] as f64 * CELLS as f64 + u) * self.step;
         let position = |u: Vec3| [0, 1, 2].map(|a| coordinate(a, u[a]));
         let mut interpolated = [false; CELLS * CELLS * CELLS];
         let bounds = Aabb { min: position([0.0; 3]), max: position([CELLS as f64; 3]) };
@@ -173,7 +179,7 @@ fn each(n: usize) -> impl Iterator<Item = [usize; 3]> {
 
 /// The index of a node in its brick.
 #[inline]
-fn node([i, j, k]: [usize; 3]) -> usize {
+const fn node([i, j, k]: [usize; 3]) -> usize {
     i + PLANES * (j + PLANES * k)
 }
 
