@@ -120,6 +120,7 @@ smoke: $(VENV)/.release
 
 bench: $(VENV)/.release
 	$(BIN)/python bench/peers.py --trabecula $(BIN)/trabecula --record
+	$(BIN)/python bench/parts.py --trabecula $(BIN)/trabecula
 	$(BIN)/python bench/beams.py --trabecula $(BIN)/trabecula
 	$(BIN)/python bench/tets.py --trabecula $(BIN)/trabecula
 

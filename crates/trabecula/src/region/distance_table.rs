@@ -29,7 +29,7 @@ const TESTED: [Vec3; 2] = [[0.25; 3], [0.75; 3]];
 /// The table.
 pub struct DistanceTable {
     of: Region,
-    /// Distances that are told apart: any other may stand for another one beyond the same end.
+    /// Distances that matter: any other may stand for another one beyond the same end.
     range: Interval,
     /// Those of the region. The first node is their lower corner.
     bounds: Aabb,
@@ -47,7 +47,7 @@ struct Brick {
     interpolated: [bool; CELLS * CELLS * CELLS],
 }
 
-/// The nodes of a cell outside the region's bounds, if distances beyond the surface are not told apart.
+/// The nodes of a cell outside the region's bounds, where distances beyond the surface do not matter.
 static OUTSIDE: [[f64; 4]; node([1; 3]) + 1] = [[0.0; 4]; node([1; 3]) + 1];
 
 /// A point in its cell.
@@ -59,7 +59,7 @@ struct InCell<'a> {
 }
 
 impl DistanceTable {
-    /// The table of a bounded region, of which distances in `range` (mm) are told apart.
+    /// The table of a bounded region, of which distances in `range` (mm) matter.
     pub fn new(of: Region, range: Interval) -> DistanceTable {
         let bounds = of.bounds();
         let size = bounds.size();
