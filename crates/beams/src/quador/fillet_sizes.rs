@@ -14,8 +14,10 @@ const FILLET_REACH: f64 = 0.999;
 const MIN_EIGENVALUE: f64 = 0.01;
 /// Equal fillets that are tried, from the largest, in radii of the beams.
 const LEVELS: [f64; 3] = [4.0, 0.8, 0.01];
-/// Number of halvings of an interval of sizes.
-const HALVINGS: usize = 16;
+/// Number of halvings of an interval of sizes. Sizes are steps of beam radii no finer than the last interval, and so is any volume:
+/// 2⁻³² is below the accuracy of volumes. The least eigenvalue is then as near to its minimum; much nearer, and the inverse loses
+/// the digits by which pairs are found free.
+const HALVINGS: usize = 32;
 /// Number of times that all pairs are moved on.
 const ROUNDS: usize = 4;
 /// A fillet is short if it has less than this share of what was asked for: radii follow from 1 − τ ≥ 10⁻³, known to rounding.
@@ -59,10 +61,8 @@ impl Pairs {
     }
 
     /// Moves pairs towards another matrix while all eigenvalues stay above a minimum. Where the way ends, pairs that lower
-    /// the least eigenvalue stay and the others go on, which makes room for the next round.
-    fn advance(&mut self, pairs: &[(usize, usize)], to: &Pairs, floor: f64) {
-        let mut moving = pairs.to_vec();
-        moving.retain(|&(i, j)| self.at(i, j) != to.at(i, j));
+    /// the least eigenvalue stay and the others go on.
+    fn advance(&mut self, mut moving: Vec<(usize, usize)>, to: &Pairs, floor: f64) {
         while !moving.is_empty() {
             let from: Vec<f64> = moving.iter().map(|&(i, j)| self.at(i, j)).collect();
             let mut step = |s: f64| {
@@ -77,23 +77,32 @@ impl Pairs {
             }
             let last = last_allowed([0.0, 1.0], &mut step);
             step(last);
-            // The gradient of the logarithm of the determinant, large along the least eigenvector.
-            let inverse = inverse(self.n, &self.tau, 1.0 - floor);
-            let most = inverse.iter().fold(0.0f64, |a, v| a.max(v.abs()));
             let before = moving.len();
-            moving.retain(|&(i, j)| {
-                let way = (to.at(i, j) - self.at(i, j)).signum();
-                way * inverse[i * self.n + j] >= -1e-3 * most
-            });
+            moving = self.free(&moving, to, floor);
             if moving.len() == before {
                 return;
             }
         }
     }
 
-    /// As `advance`, in several rounds.
+    /// The pairs that are not where another matrix has them, and that do not lower the least eigenvalue, which is near its
+    /// minimum, on their way there.
+    fn free(&self, pairs: &[(usize, usize)], to: &Pairs, floor: f64) -> Vec<(usize, usize)> {
+        // The gradient of the logarithm of the determinant, large along the least eigenvector.
+        let inverse = inverse(self.n, &self.tau, 1.0 - floor);
+        let most = inverse.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+        let way = |i, j| to.at(i, j) - self.at(i, j);
+        let is_free =
+            |&(i, j): &(usize, usize)| way(i, j) != 0.0 && way(i, j).signum() * inverse[i * self.n + j] >= -1e-3 * most;
+        pairs.iter().copied().filter(is_free).collect()
+    }
+
+    /// As `advance`, in several rounds: where pairs have moved, others may be free again.
     fn toward(&mut self, pairs: &[(usize, usize)], to: &Pairs, floor: f64) {
-        (0..ROUNDS).for_each(|_| self.advance(pairs, to, floor));
+        self.advance(pairs.to_vec(), to, floor);
+        for _ in 1..ROUNDS {
+            self.advance(self.free(pairs, to, floor), to, floor);
+        }
     }
 }
 
