@@ -27,6 +27,7 @@ use rayon::prelude::*;
 use crate::graph::Graph;
 use geometry::fault::{Fault, counted, number};
 use geometry::math::{Aabb, Vec3, add, norm, scale, sub};
+use geometry::progress::{Cancellation, checkpoint};
 
 mod bezier;
 mod block_fill;
@@ -272,8 +273,13 @@ impl Quadors {
     /// Sets the fillets, once for equal hubs, and the bounds that depend on them.
     fn set_fillets(&mut self) {
         let (fillet, classes) = (self.fillet, self.classes());
+        let request = Cancellation::current();
+        let sizes_of = |hub, fillet| {
+            checkpoint();
+            fillet_sizes(hub, fillet)
+        };
         let sizes: Vec<FilletSizes> =
-            classes.sample.par_iter().map(|hub| fillet_sizes(self.hub(*hub), fillet)).collect();
+            classes.sample.par_iter().map(|hub| request.enter(|| sizes_of(self.hub(*hub), fillet))).collect();
         let mut starts = Vec::with_capacity(sizes.len());
         for of in &sizes {
             starts.push(self.taus.len());

@@ -3,6 +3,7 @@
 use crate::fault::Fault;
 use crate::math::{add, cross, norm, scale, sub};
 use crate::mesh::{Mesh, self_intersections};
+use crate::progress::checkpoint;
 
 mod arrangement;
 mod fairing;
@@ -149,6 +150,7 @@ fn check_caps(done: &Repaired, repair: Repair, given: usize, found: Option<&str>
 pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     validity::numbers(&mesh)?;
     let given = mesh.triangles.len();
+    checkpoint();
     let mut edges = validity::edges(&mesh);
     if edges.is_err() {
         mesh = mesh.joined_where_open();
@@ -157,6 +159,7 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
     let found = match edges {
         Ok(pairs) => {
             let crossing = self_intersections(&mesh, MANY);
+            checkpoint();
             if crossing == 0 {
                 if validity::plain(&mesh, &pairs) {
                     let done = Repaired::default();
@@ -180,11 +183,13 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         done.degenerate = given - mesh.triangles.len() + stitch::drop_degenerate(&mut mesh);
         done.duplicates = stitch::drop_duplicates(&mut mesh);
         done.joined = stitch::join_seams(&mut mesh);
+        checkpoint();
         if done.joined > 0 {
             done.duplicates += stitch::drop_duplicates(&mut mesh);
         }
         let reach = mesh.single_rounding();
         done.split = stitch::split_at_corners(&mut mesh, reach);
+        checkpoint();
         done.turned = orientation::face_alike(&mut mesh);
         let caps = holes::close(&mut mesh);
         (done.holes, done.hole_length, done.hole_area) = (caps.holes, caps.length, caps.area);
@@ -199,7 +204,9 @@ pub fn boundary(mut mesh: Mesh, repair: Repair) -> Result<Boundary, Fault> {
         check_caps(&done, repair, given, found.as_deref())?;
         stitch::drop_degenerate(&mut mesh);
     }
+    checkpoint();
     done.bodies_turned = orientation::face_out(&mut mesh);
+    checkpoint();
     validity::thick(&mesh)?;
     let clean = validity::edges(&mesh).ok();
     let crosses = clean.is_none() || found.is_some() && self_intersections(&mesh, 1) > 0;

@@ -20,6 +20,7 @@ use crate::distance::winding::Winding;
 use crate::math::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::mesh::exact::{drop_axis, orient2d, orient3d};
 use crate::mesh::{Mesh, near_pairs};
+use crate::progress::{Cancellation, checkpoint};
 use crate::union_find::{find, singles, unite};
 
 /// How two triangles meet.
@@ -90,13 +91,17 @@ pub fn boundary(mesh: &Mesh, least: usize) -> Cut {
         Classifier { faces: &faces, tree: &tree, winding: &winding, place: &place, level: least as f64 - 0.5 };
     let whole = |i: usize| segments[i].is_empty() && covers[i].is_empty();
     let kept_whole = classifier.patches(mesh, &whole);
+    let request = Cancellation::current();
     let pieces: Vec<Vec<[Vec3; 3]>> = (0..n)
         .into_par_iter()
         .map(|i| {
             if whole(i) {
                 return Vec::new();
             }
-            classifier.pieces(i, &segments[i], &covers[i], eta)
+            request.enter(|| {
+                checkpoint();
+                classifier.pieces(i, &segments[i], &covers[i], eta)
+            })
         })
         .collect();
     let mut out = Mesh { vertices: mesh.vertices.clone(), triangles: Vec::new() };

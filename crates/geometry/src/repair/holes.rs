@@ -12,6 +12,7 @@ use super::fairing;
 use super::half_edges::{halves, rises};
 use crate::math::{Vec3, cross, dot, norm, sub, unit};
 use crate::mesh::Mesh;
+use crate::progress::checkpoint;
 
 /// Loops of more vertices are divided by chords first: the search takes the cube of their number.
 const LONG: usize = 160;
@@ -38,6 +39,7 @@ pub fn close(mesh: &mut Mesh) -> Caps {
     }
     let surroundings = Surroundings::of(mesh, &loops);
     for boundary in &loops {
+        checkpoint();
         let at = |i: usize| mesh.vertices[boundary[i % boundary.len()] as usize];
         caps.holes += 1;
         caps.length += (0..boundary.len()).map(|i| norm(sub(at(i + 1), at(i)))).sum::<f64>();

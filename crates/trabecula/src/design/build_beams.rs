@@ -22,6 +22,7 @@ use ::beams::graph::{self, Radii, Trim, Wireframe, with_radii};
 use ::beams::quador::{Fillet, Quadors};
 use geometry::fault::{Fault, number};
 use geometry::math::{Vec3, norm};
+use geometry::progress::checkpoint;
 
 use beam_report::{FEW, warn, warn_cleaned};
 pub(super) use beam_report::{held, inside, lone, report, share};
@@ -72,9 +73,11 @@ pub(super) fn beams(
     if let (Some(fraction), None) = (spec.fraction, &radii.radius) {
         radii.radius = Some(Grade::Constant(radius_for_fraction::of_frame(fraction, &wire, spec, environment)?));
     }
+    checkpoint();
     let graph = with_radii(&wire, &own, &radii, Grade::values).map_err(fault)?;
     check_beams(&graph, spec).map_err(fault)?;
     let quadors = Quadors::new(&graph, fillet(spec.fillet)).map_err(fault)?;
+    checkpoint();
     let inside = |p: Vec3| region.value(p) <= slack;
     let fillets: Vec<f64> = (0..quadors.len())
         .into_par_iter()
@@ -87,6 +90,7 @@ pub(super) fn beams(
     let mut shortfalls = quadors.shortfalls().to_vec();
     shortfalls.retain(|s| inside(quadors.center(s.hub)));
     shortfalls.sort_by(|a, b| a.fillets.radius[0].total_cmp(&b.fillets.radius[0]));
+    checkpoint();
     let mut collisions = quadors.collisions();
     collisions.retain(|c| inside(c.at));
     let truss = Truss {
