@@ -431,6 +431,21 @@ def test_memory_that_a_limit_leaves(tmp_path, cube):
     assert done.returncode == 1 and "of memory" in done.stderr and "try edge" in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize("limit", [60, 100, 200, 300, 700])
+@pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
+def test_a_limit_of_address_space(tmp_path, cube, limit, name):
+    """`ulimit -v`: a mesh, or one sentence and status 1; never an abort, nor a file that is left."""
+    resource = pytest.importorskip("resource")
+    most = lambda: resource.setrlimit(resource.RLIMIT_AS, (limit * 10**6, limit * 10**6))  # noqa: E731
+    words = [*COMMAND, "mesh", str(cube), "-o", name, "--edge", "0.2"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, preexec_fn=most)
+    if limit >= 512:  # for one thread that is enough
+        assert done.returncode == 0 and (tmp_path / name).exists(), done.stderr
+        return
+    assert done.returncode == 1 and "address space" in done.stderr, done.stderr
+    assert len(done.stderr.splitlines()) == 1 and names(tmp_path) == ["cube.toml"]
+
+
 def test_measures_of_odd_meshes(tmp_path):
     """Inside out, touching in a vertex or an edge, open: said in words."""
     corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]

@@ -381,6 +381,9 @@ def serve(argv: list[str] | None) -> int:
         return 2
     listen(getattr(args, "quiet", False), getattr(args, "strict", False))
     try:
+        from .machine import fewer_threads
+
+        fewer_threads(getattr(args, "threads", None))
         from . import commands
         from .errors import DesignWarning
 

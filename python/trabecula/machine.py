@@ -9,7 +9,11 @@ from . import _core
 from .files import check_place, special
 from .formats import MESHES
 
-__all__ = ["file_size", "fits", "rounded_up"]
+__all__ = ["fewer_threads", "file_size", "fits", "rounded_up"]
+
+#: Address space of a command, and of each of its threads (stack, the allocator's reserve, tiles in flight), bytes: several
+#: times what they take, since an allocation that fails ends the process on the spot.
+COMMAND, THREAD = 384e6, 128e6
 
 
 def file_size(kind: str, triangles: float, vertices: float | None = None) -> float:
@@ -26,6 +30,29 @@ def free_disk(folder: str) -> float:
     import shutil  # slow to import, and so left to systems that need it
 
     return float(shutil.disk_usage(folder).free)
+
+
+def fewer_threads(threads: int | None) -> None:
+    """Sees to it that a command fits the limit of its address space (``ulimit -v``), if there is one: with as many threads as
+    do, unless their number is given. A ValueError where it does not fit.
+    """
+    try:
+        import resource  # not on every system
+    except ImportError:
+        return
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return
+    fit = int((limit - COMMAND) // THREAD)
+    if fit < (threads or 1):
+        number = "one thread needs" if (threads or 1) == 1 else f"{threads} threads need"
+        advice = f", or use --threads {fit}" if fit > 0 else ""
+        raise ValueError(
+            f"the limit of address space (ulimit -v) is {_bytes(limit)}, and a command with {number} "
+            f"{_bytes(COMMAND + THREAD * (threads or 1))}; raise the limit{advice}"
+        )
+    # The core's threads, as many as processors by default.
+    os.environ["RAYON_NUM_THREADS"] = str(min(fit, threads or os.cpu_count() or 1))
 
 
 def fits(
